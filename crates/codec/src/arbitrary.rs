@@ -1,17 +1,17 @@
-//! Random messages for tests: `arbitrary::Arbitrary` for every generated type.
+//! Random valid messages for tests: `arbitrary::Arbitrary` for every generated type.
 //!
-//! The messages are valid: counts are within their limits, strings fit their fields, numbers are
-//! numbers. So each of them encodes, and decodes to itself.
+//! Counts are within their limits, strings fit their fields and no number is NaN, so every
+//! generated message encodes and decodes to itself.
 
 pub use arbitrary::{Arbitrary, Result, Unstructured};
 use bytes::Bytes;
 
 use super::{FormattedBlob, Text};
 
-/// A random list, blob or string is rarely longer than this, whatever its definition allows.
+/// Random lists, blobs and strings rarely exceed the minimum length by more than this.
 const USUAL_LENGTH: u64 = 12;
 
-/// A count within limits; small, mostly.
+/// A count within `min..=max`, usually small.
 fn count(random: &mut Unstructured<'_>, min: u64, max: u64) -> Result<u64> {
     random.int_in_range(min..=max.min(min.saturating_add(USUAL_LENGTH)))
 }
@@ -19,7 +19,7 @@ fn count(random: &mut Unstructured<'_>, min: u64, max: u64) -> Result<u64> {
 /// A list with a valid number of elements.
 ///
 /// # Errors
-/// Those of `element`.
+/// Errors from `element`.
 pub fn list<'a, T>(
     random: &mut Unstructured<'a>,
     min: u64,
@@ -33,12 +33,12 @@ pub fn list<'a, T>(
 /// Raw octets of a valid length.
 ///
 /// # Errors
-/// None in practice: a source that has run dry gives zeros.
+/// None in practice: an exhausted source yields zeros.
 pub fn blob(random: &mut Unstructured<'_>, min: u64, max: u64) -> Result<Bytes> {
     list(random, min, max, u8::arbitrary).map(Bytes::from)
 }
 
-/// Raw octets of a valid length in some format.
+/// Raw octets of a valid length with a random format.
 ///
 /// # Errors
 /// As [`blob`].
@@ -53,7 +53,7 @@ pub fn formatted<'a, F: Arbitrary<'a>>(
     })
 }
 
-/// A string of a valid length, of any octets.
+/// A string of valid length, made of arbitrary octets.
 ///
 /// # Errors
 /// As [`blob`].
@@ -61,7 +61,7 @@ pub fn text(random: &mut Unstructured<'_>, min: u64, max: u64) -> Result<Text> {
     blob(random, min, max).map(Text::from)
 }
 
-/// A string that fits a fixed length and does not end with the zeros that fill it up.
+/// A string that fits a fixed length and has no trailing zeros, which would read as padding.
 ///
 /// # Errors
 /// As [`blob`].
@@ -73,7 +73,7 @@ pub fn fixed_text(random: &mut Unstructured<'_>, length: u64) -> Result<Text> {
     Ok(Text::from(Bytes::from(octets)))
 }
 
-/// A single-precision number that equals itself.
+/// A single-precision number other than NaN, so that it equals itself.
 ///
 /// # Errors
 /// As [`blob`].
@@ -81,7 +81,7 @@ pub fn f32(random: &mut Unstructured<'_>) -> Result<f32> {
     f32::arbitrary(random).map(|value| if value.is_nan() { 0.0 } else { value })
 }
 
-/// A double-precision number that equals itself.
+/// A double-precision number other than NaN, so that it equals itself.
 ///
 /// # Errors
 /// As [`blob`].
@@ -89,10 +89,10 @@ pub fn f64(random: &mut Unstructured<'_>) -> Result<f64> {
     f64::arbitrary(random).map(|value| if value.is_nan() { 0.0 } else { value })
 }
 
-/// Something that may be absent.
+/// An optional value.
 ///
 /// # Errors
-/// Those of `value`.
+/// Errors from `value`.
 pub fn optional<'a, T>(
     random: &mut Unstructured<'a>,
     value: impl FnOnce(&mut Unstructured<'a>) -> Result<T>,
@@ -100,10 +100,10 @@ pub fn optional<'a, T>(
     bool::arbitrary(random)?.then(|| value(random)).transpose()
 }
 
-/// An array, filled in the order of its memory.
+/// An array, filled in memory order.
 ///
 /// # Errors
-/// Those of `element`.
+/// Errors from `element`.
 pub fn array<'a, T: Default, const N: usize>(
     random: &mut Unstructured<'a>,
     mut element: impl FnMut(&mut Unstructured<'a>) -> Result<T>,

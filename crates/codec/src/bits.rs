@@ -1,10 +1,10 @@
-//! Several small numbers in one integer: `bit_field`.
+//! Bit fields: several small numbers packed into one integer (JSIDL `bit_field`).
 
 use super::OutOfRange;
 
-/// An unsigned integer that is divided into sub-fields. Bits outside all of them are kept.
+/// An unsigned integer divided into sub-fields. Bits outside the sub-fields are preserved.
 pub trait Bits: Copy {
-    /// Name, lowest and highest bit of every sub-field, in the order of the definition.
+    /// Name, lowest bit and highest bit of every sub-field, in definition order.
     const FIELDS: &'static [(&'static str, u32, u32)];
 
     /// The integer on the wire.
@@ -17,27 +17,27 @@ pub trait Bits: Copy {
     }
 }
 
-/// The bits `from..=to` of an integer.
+/// Extracts bits `from..=to` of an integer.
 #[doc(hidden)]
 pub const fn get(raw: u64, from: u32, to: u32) -> u64 {
     (raw >> from) & mask(from, to)
 }
 
-/// The integer with its bits `from..=to` replaced; the value fits.
+/// Replaces bits `from..=to` of an integer. The caller guarantees that the value fits.
 #[doc(hidden)]
 pub const fn set(raw: u64, from: u32, to: u32, value: u64) -> u64 {
     raw & !(mask(from, to) << from) | value << from
 }
 
-/// As many ones as there are bits in `from..=to`.
+/// A mask with one set bit per bit of `from..=to`, starting at bit 0.
 const fn mask(from: u32, to: u32) -> u64 {
     u64::MAX >> (63 - (to - from))
 }
 
-/// The integer with its bits `from..=to` replaced.
+/// Replaces bits `from..=to` of an integer.
 ///
 /// # Errors
-/// If the value is not in the limits that the definition states.
+/// If the value is outside the limits in the definition.
 #[doc(hidden)]
 pub const fn set_checked(
     raw: u64,
@@ -57,7 +57,7 @@ pub const fn set_checked(
     Ok(set(raw, from, to, value))
 }
 
-/// Gives a newtype over an unsigned integer what a bit field needs.
+/// Implements the bit field traits for a newtype over an unsigned integer.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __codec_bit_field {
@@ -103,7 +103,7 @@ macro_rules! __codec_bit_field {
     };
 }
 
-/// Prints the sub-fields as a set of names and numbers.
+/// Prints the sub-fields as a map from name to number.
 #[doc(hidden)]
 pub fn debug<B: Bits>(bits: B, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
     let fields = B::FIELDS
@@ -112,7 +112,7 @@ pub fn debug<B: Bits>(bits: B, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Res
     f.debug_map().entries(fields).finish()
 }
 
-/// The bits that no sub-field of `B` owns.
+/// The bits outside all sub-fields of `B`.
 #[cfg(feature = "serde")]
 pub(super) fn reserved<B: Bits>() -> u64 {
     !B::FIELDS

@@ -1,18 +1,18 @@
-//! Raw octets that say what they are: `variable_format_field`.
+//! Raw octets tagged with a format (JSIDL `variable_format_field`).
 
 use bytes::Bytes;
 
-/// Raw octets with the index of their format. A received blob shares the memory of its message.
+/// Raw octets with their format index. A received blob shares the memory of its message.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub struct FormattedBlob<F> {
-    /// The format, one of the constants of its type or what a peer sent.
+    /// The format: a constant of type `F`, or an unknown value from a peer.
     pub format: F,
     /// The octets.
     pub data: Bytes,
 }
 
 impl<F> FormattedBlob<F> {
-    /// Octets in a format.
+    /// Creates a blob from a format and octets.
     pub fn new(format: F, data: impl Into<Bytes>) -> Self {
         Self {
             format,

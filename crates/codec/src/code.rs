@@ -1,9 +1,9 @@
-//! What a message code says about its message.
+//! Message codes: mapping a query to its report.
 
-/// The code of the report that answers a query; `None` if the code is not a query's.
+/// The code of the report that answers a query; `None` if the code is not a query.
 ///
-/// Queries are 2000h to 3FFFh and their reports 2000h above (AS5710). In the range that is left to
-/// experiments, services of IOP and our own have queries from E000h on and their reports 1000h above.
+/// Queries are 2000h to 3FFFh and their reports 2000h higher (AS5710). In the experimental range,
+/// IOP services and this stack's own use queries from E000h and reports 1000h higher.
 #[must_use]
 pub const fn report_code(query: u16) -> Option<u16> {
     match query {

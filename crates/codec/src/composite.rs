@@ -1,13 +1,13 @@
-//! Values whose size depends on what is in them: records, sequences, variants, message bodies.
+//! Values of variable size: records, sequences, variants and message bodies.
 
 use super::{DecodeError, EncodeError, Reader, Writer};
 
 /// A value whose size on the wire depends on its content.
 pub trait Composite: Sized {
-    /// The least number of octets that any value takes; what a list may count on.
+    /// Least number of octets of any value. List decoding bounds its allocation with it.
     const MIN_LEN: usize;
 
-    /// The octets that this value takes.
+    /// Number of octets of this value.
     fn encoded_len(&self) -> usize;
 
     /// Appends the value.
@@ -19,6 +19,6 @@ pub trait Composite: Sized {
     /// Reads a value.
     ///
     /// # Errors
-    /// If the octets are not one.
+    /// If the octets do not encode a valid value.
     fn read(input: &mut Reader<'_>) -> Result<Self, DecodeError>;
 }

@@ -1,14 +1,14 @@
-//! Integers with named values: `value_set`.
+//! Integers with named values (JSIDL `value_set`).
 
-/// An integer with named values. Peers send others too, and those are kept.
+/// An integer with named values. Unnamed values from peers are preserved.
 pub trait Enumeration: Copy {
-    /// The values that the definition names, in its order.
+    /// The values named in the definition, in definition order.
     const VALUES: &'static [(u64, &'static str)];
 
     /// The integer on the wire.
     fn raw(self) -> u64;
 
-    /// The definition's name for the value, if it has one.
+    /// The name of the value in the definition, if it has one.
     fn name(self) -> Option<&'static str> {
         Self::VALUES
             .iter()
@@ -17,7 +17,7 @@ pub trait Enumeration: Copy {
     }
 }
 
-/// Gives a newtype over an integer what an enumerated field needs.
+/// Implements the enumeration traits for a newtype over an integer.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __codec_enumeration {

@@ -1,89 +1,89 @@
-//! Why octets are not a message, or a message cannot become octets.
+//! Errors of decoding and encoding messages.
 //!
-//! The cause is made where it is found; the names of the fields around it are added on the way
-//! out, so that the path costs nothing while all is well.
+//! An error is created at its cause. The names of the enclosing fields are added as it propagates,
+//! so the path costs nothing on success.
 
 use std::fmt;
 
-/// Octets that are not the message they were taken for.
+/// The octets are not a valid message of the expected type.
 ///
 /// Prints as `ReportGlobalPose (4402h): Altitude at octet 12: 4 octets wanted, 2 left`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DecodeError(Box<Failure<DecodeErrorKind>>);
 
-/// A message that the wire cannot carry.
+/// The message cannot be encoded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EncodeError(Box<Failure<EncodeErrorKind>>);
 
-/// What is wrong with the octets.
+/// Cause of a decoding error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DecodeErrorKind {
     /// The message ends inside a field.
     Short {
-        /// Octets that the field takes.
+        /// Size of the field in octets.
         wanted: u64,
-        /// Octets that are left.
+        /// Octets remaining.
         left: usize,
     },
-    /// The message is complete, but octets follow.
+    /// Octets follow the end of the message.
     Trailing {
-        /// How many.
+        /// Number of octets after the end.
         octets: usize,
     },
-    /// It is another message.
+    /// The message has another code.
     Code {
         /// The code in the octets.
         found: u16,
-        /// The code of the message wanted.
+        /// The code of the expected message.
         expected: u16,
     },
-    /// The presence vector has bits that no member owns.
+    /// The presence vector sets undefined bits.
     Presence {
         /// The vector.
         found: u64,
-        /// All the bits that have a meaning.
+        /// Mask of all defined bits.
         defined: u64,
     },
-    /// A count of elements or octets outside its limits.
+    /// A count of elements or octets is outside its limits.
     Count {
         /// The count.
         found: u64,
-        /// The least that the definition allows.
+        /// The least count that the definition allows.
         min: u64,
-        /// The greatest that the definition allows.
+        /// The greatest count that the definition allows.
         max: u64,
     },
-    /// A variant's tag beyond its alternatives.
+    /// A variant's tag selects no alternative.
     Tag {
         /// The tag.
         found: u64,
-        /// How many alternatives there are.
+        /// Number of alternatives.
         alternatives: u64,
     },
-    /// A `variable_field` whose index chooses nothing.
+    /// The index of a `variable_field` selects no type.
     Choice {
         /// The index.
         found: u8,
     },
 }
 
-/// What is wrong with the message.
+/// Cause of an encoding error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum EncodeErrorKind {
-    /// More or fewer elements or octets than the definition allows.
+    /// The number of elements or octets is outside the limits of the definition.
     Count {
-        /// How many there are.
+        /// Actual number.
         found: u64,
-        /// The least that the definition allows.
+        /// The least number that the definition allows.
         min: u64,
-        /// The greatest that the definition allows.
+        /// The greatest number that the definition allows.
         max: u64,
     },
 }
 
-/// A cause and where it was met.
+/// A cause and its location.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Failure<K> {
     kind: K,
@@ -110,7 +110,7 @@ impl<K> Failure<K> {
         })
     }
 
-    /// `NodeList[2].NodeID`.
+    /// The path in JSIDL names, for example `NodeList[2].NodeID`.
     fn path(&self) -> String {
         let mut path = String::new();
         for step in self.path.iter().rev() {
@@ -143,7 +143,7 @@ macro_rules! failure {
                 Self(Failure::new(kind, offset))
             }
 
-            /// Adds the member in which the error was met.
+            /// Adds the enclosing member to the path.
             #[doc(hidden)]
             #[cold]
             #[inline(never)]
@@ -153,7 +153,7 @@ macro_rules! failure {
                 self
             }
 
-            /// Adds the index of the element in which the error was met.
+            /// Adds the index of the enclosing element to the path.
             #[doc(hidden)]
             #[cold]
             #[inline(never)]
@@ -163,7 +163,7 @@ macro_rules! failure {
                 self
             }
 
-            /// Adds the message in which the error was met.
+            /// Adds the enclosing message.
             #[cold]
             #[inline(never)]
             #[must_use]
@@ -172,23 +172,23 @@ macro_rules! failure {
                 self
             }
 
-            /// What is wrong.
+            /// The cause.
             pub fn kind(&self) -> $kind {
                 self.0.kind
             }
 
-            /// The octet, counted from 0 at the message's code, where the field begins.
+            /// Offset of the field in octets, counted from 0 at the message code.
             pub fn offset(&self) -> usize {
                 self.0.offset
             }
 
-            /// The message's name, as its definition spells it.
+            /// The name of the message in its definition.
             pub fn message(&self) -> Option<&'static str> {
                 self.0.message.map(|(name, _)| name)
             }
 
-            /// The way to the field in JSIDL names, such as `NodeList[2].NodeID`; empty if the
-            /// message as a whole is meant.
+            /// The path to the field in JSIDL names, such as `NodeList[2].NodeID`. Empty if the
+            /// error concerns the message as a whole.
             pub fn path(&self) -> String {
                 self.0.path()
             }

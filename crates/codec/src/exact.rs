@@ -1,15 +1,15 @@
-//! Exact arithmetic on floating-point numbers, for the few values that lie so close to a rounding
-//! boundary that ordinary arithmetic cannot tell the side.
+//! Exact floating-point arithmetic, for the few values so close to a rounding boundary that
+//! ordinary arithmetic cannot decide the side.
 //!
-//! A sum of products is kept as an expansion: floating-point numbers that do not overlap and whose
-//! exact sum is the value (Shewchuk 1997). Its sign is the sign of the largest part.
+//! A sum of products is kept as an expansion: non-overlapping floating-point numbers whose exact
+//! sum is the value (Shewchuk 1997). The sign of the expansion is the sign of its largest part.
 
 use std::cmp::Ordering;
 
 /// An exact sum of at most [`PARTS`](Self::PARTS) floating-point numbers.
 #[derive(Debug, Default)]
 pub(super) struct Expansion {
-    /// From small to large, without zeros, `len` of them.
+    /// The first `len` are used, sorted from small to large, without zeros.
     parts: [f64; Self::PARTS],
     len: usize,
 }
@@ -17,7 +17,7 @@ pub(super) struct Expansion {
 impl Expansion {
     const PARTS: usize = 16;
 
-    /// Adds `(a - b) * factor`; at most twice per expansion.
+    /// Adds `(a - b) * factor`. At most two calls fit into one expansion.
     pub(super) fn add_product_of_difference(&mut self, a: f64, b: f64, factor: i128) {
         let (difference, rest) = two_sum(a, -b);
         let low = factor % (1 << 33);
@@ -51,7 +51,7 @@ impl Expansion {
         self.len = kept;
     }
 
-    /// How the sum compares with zero.
+    /// Compares the sum with zero.
     pub(super) fn sign(&self) -> Ordering {
         match self.parts[..self.len].last() {
             Some(&largest) if largest > 0.0 => Ordering::Greater,
@@ -61,7 +61,7 @@ impl Expansion {
     }
 }
 
-/// The rounded sum and the exact error of rounding it (Knuth).
+/// The rounded sum and its exact rounding error (Knuth).
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;

@@ -1,32 +1,33 @@
-//! Values that always take the same number of octets: numbers, what wraps one, and arrays of them.
+//! Values of constant size: numbers, newtypes over numbers, and arrays of them.
 
-/// A value of one size on the wire, little-endian.
+/// A value of constant size on the wire, little-endian.
 ///
-/// `get` and `put` work inside a run of octets whose length the caller has checked once for
-/// several values; offsets are constants in generated code, so no check is left per value.
+/// `get` and `put` operate on a run of octets whose length the caller has checked once for several
+/// values. Offsets are constants in generated code, so no bounds check remains per value.
 pub trait Fixed: Sized {
-    /// Octets on the wire.
+    /// Size on the wire in octets.
     const SIZE: usize;
 
-    /// Reads the value at an offset of a run.
+    /// Reads the value at offset `at` of a run.
     ///
     /// # Panics
-    /// If the run is shorter than `at + SIZE`, which is a mistake of the caller, never of the input.
+    /// If the run is shorter than `at + SIZE`. That is a bug in the caller and never depends on
+    /// input.
     fn get(run: &[u8], at: usize) -> Self;
 
-    /// Writes the value at an offset of a run.
+    /// Writes the value at offset `at` of a run.
     ///
     /// # Panics
     /// As [`get`](Self::get).
     fn put(self, run: &mut [u8], at: usize);
 }
 
-/// An unsigned integer that stands before a list, a string or raw octets and counts them.
+/// An unsigned integer that precedes a list, a string or raw octets and holds their length.
 pub trait Count: Fixed + Copy {
     /// The count as a number.
     fn to_u64(self) -> u64;
 
-    /// The number as a count, if it fits.
+    /// Converts a number to a count, if it fits.
     fn from_u64(count: u64) -> Option<Self>;
 }
 
@@ -69,7 +70,7 @@ macro_rules! count {
 number!(u8, u16, u32, u64, i8, i16, i32, i64, f32, f64);
 count!(u8, u16, u32, u64);
 
-/// A newtype is written as what it wraps.
+/// Encodes a newtype as the value it wraps.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __codec_fixed_newtype {

@@ -1,15 +1,15 @@
-//! The runtime of messages that the crate `jsidl` generates.
+//! Runtime library for the messages that the crate `jsidl` generates.
 //!
-//! A JAUS message is little-endian, unaligned and unpadded: its code, then its body. What the
-//! generator of the `jsidl` crate emits is plain Rust over the types of this crate: a
-//! [`Reader`] over shared octets, a [`Writer`] that appends, [`Fixed`] for what has one size,
-//! [`Composite`] for what has many, and open types for what people read: [`Scale`]d integers,
-//! enumerations, bit fields, [`Text`].
+//! A JAUS message is its code followed by its body, little-endian, unaligned and unpadded.
+//! Generated code is plain Rust over the types of this crate: a [`Reader`] over shared octets, an
+//! appending [`Writer`], [`Fixed`] for values of constant size, [`Composite`] for values of
+//! variable size, and public field types: [`Scale`]d integers, enumerations, bit fields, [`Text`].
 //!
-//! Three promises hold for every generated type:
-//! - the integers on the wire are what is kept, so `encode(decode(b)) == b` for every accepted `b`;
-//! - decoding never panics and never allocates more than the input can fill;
-//! - errors name the message, the path to the field and the octet.
+//! Every generated type guarantees:
+//! - Values are stored as the integers on the wire, so `encode(decode(b)) == b` for every accepted
+//!   `b`.
+//! - Decoding never panics and never allocates more than the input can fill.
+//! - Errors name the message, the path to the field and the octet offset.
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "arbitrary")]
@@ -62,7 +62,8 @@ pub use crate::{
     __codec_if_arbitrary as if_arbitrary, __codec_if_serde as if_serde, __codec_scaled as scaled,
 };
 
-/// Passes its content on if this crate has the feature `serde`, wherever it is expanded.
+/// Expands to its content if this crate has the feature `serde`, whatever the calling crate
+/// enables.
 #[cfg(feature = "serde")]
 #[doc(hidden)]
 #[macro_export]
@@ -70,7 +71,8 @@ macro_rules! __codec_if_serde {
     ($($content:tt)*) => { $($content)* };
 }
 
-/// Passes its content on if this crate has the feature `serde`, wherever it is expanded.
+/// Expands to its content if this crate has the feature `serde`, whatever the calling crate
+/// enables.
 #[cfg(not(feature = "serde"))]
 #[doc(hidden)]
 #[macro_export]
@@ -78,7 +80,8 @@ macro_rules! __codec_if_serde {
     ($($content:tt)*) => {};
 }
 
-/// Passes its content on if this crate has the feature `arbitrary`, wherever it is expanded.
+/// Expands to its content if this crate has the feature `arbitrary`, whatever the calling crate
+/// enables.
 #[cfg(feature = "arbitrary")]
 #[doc(hidden)]
 #[macro_export]
@@ -86,7 +89,8 @@ macro_rules! __codec_if_arbitrary {
     ($($content:tt)*) => { $($content)* };
 }
 
-/// Passes its content on if this crate has the feature `arbitrary`, wherever it is expanded.
+/// Expands to its content if this crate has the feature `arbitrary`, whatever the calling crate
+/// enables.
 #[cfg(not(feature = "arbitrary"))]
 #[doc(hidden)]
 #[macro_export]
@@ -94,7 +98,7 @@ macro_rules! __codec_if_arbitrary {
     ($($content:tt)*) => {};
 }
 
-/// Any integer is a value of the newtype around it.
+/// Implements `Arbitrary` for a newtype over an integer. Every integer is valid.
 #[cfg(feature = "arbitrary")]
 #[doc(hidden)]
 #[macro_export]
@@ -110,7 +114,7 @@ macro_rules! __codec_arbitrary_integer {
     };
 }
 
-/// Needs the feature `arbitrary`.
+/// Expands to nothing without the feature `arbitrary`.
 #[cfg(not(feature = "arbitrary"))]
 #[doc(hidden)]
 #[macro_export]

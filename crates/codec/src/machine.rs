@@ -1,19 +1,20 @@
-//! What generated state machines share: what became of an event, and the states to go back to.
+//! Shared parts of generated state machines: the outcome of an event and the stack of return
+//! states.
 
-/// What became of an event that a machine was given.
+/// Result of passing an event to a state machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[must_use]
 pub enum Outcome {
-    /// A transition was taken.
+    /// The machine took a transition.
     Handled,
-    /// The state has no transition for it.
+    /// The state has no transition for the event.
     Ignored,
-    /// The state has transitions for it, and none could be taken: no guard held, or there was no
-    /// state to go back to, or no room to remember one more.
+    /// The state has transitions for the event, but none was possible: no guard held, there was no
+    /// state to return to, or the return stack was full.
     Rejected,
 }
 
-/// The states that a machine goes back to, the last first; at most `N`.
+/// A stack of at most `N` states to return to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Memory<S, const N: usize> {
     states: [Option<S>; N],
@@ -21,7 +22,7 @@ pub struct Memory<S, const N: usize> {
 }
 
 impl<S: Copy, const N: usize> Memory<S, N> {
-    /// Nothing to go back to.
+    /// Creates an empty stack.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -30,19 +31,19 @@ impl<S: Copy, const N: usize> Memory<S, N> {
         }
     }
 
-    /// Whether there is a state to go back to.
+    /// Whether there is a state to return to.
     #[must_use]
     pub const fn is_used(&self) -> bool {
         self.count > 0
     }
 
-    /// Whether one more can be remembered.
+    /// Whether the stack has room for another state.
     #[must_use]
     pub const fn has_room(&self) -> bool {
         self.count < N
     }
 
-    /// Remembers a state; without effect if there is no [room](Self::has_room).
+    /// Pushes a state. No effect if there is no [room](Self::has_room).
     pub fn push(&mut self, state: S) {
         if let Some(place) = self.states.get_mut(self.count) {
             *place = Some(state);
@@ -50,7 +51,7 @@ impl<S: Copy, const N: usize> Memory<S, N> {
         }
     }
 
-    /// Takes out the state that was remembered last.
+    /// Removes and returns the state pushed last.
     pub fn pop(&mut self) -> Option<S> {
         let last = self.count.checked_sub(1)?;
         self.count = last;

@@ -1,5 +1,5 @@
-//! What every message can do: by its type, and as a trait object when the type is known only by
-//! its code.
+//! Common interface of all messages: a trait for types known at compile time, and a trait object
+//! for types known only by message code.
 
 use std::any::Any;
 use std::fmt::Debug;
@@ -8,38 +8,38 @@ use bytes::Bytes;
 
 use super::{DecodeError, EncodeError, Reader, Writer};
 
-/// A message as its definition describes it. Generated, never written by hand.
+/// A message type. Generated from its definition, never written by hand.
 ///
-/// The encoded form begins with the two octets of the message code; transport headers are not
-/// part of it.
+/// The encoded form begins with the two octets of the message code. It contains no transport
+/// headers.
 pub trait Message: Sized + View + Clone + Debug + PartialEq + Send + Sync + 'static {
     /// The message code, for example `0x4B00`.
     const CODE: u16;
     /// The name in the definition, for example `ReportIdentification`.
     const NAME: &'static str;
-    /// Whether the definition calls it a command.
+    /// Whether the definition marks the message as a command.
     const IS_COMMAND: bool;
-    /// Whether it is a command of a service that inherits Access Control: one that only the client
-    /// in control may give. Set Emergency and Clear Emergency are the exceptions, which Management
-    /// takes from anyone.
+    /// Whether the message is a command of a service that inherits Access Control, which only the
+    /// client in control may send. Exceptions are Set Emergency and Clear Emergency: Management
+    /// accepts them from any client.
     const NEEDS_CONTROL: bool;
 
-    /// The octets that this message takes, its code included.
+    /// Size in octets, including the message code.
     fn encoded_len(&self) -> usize;
 
-    /// Appends the message, its code first.
+    /// Appends the message, beginning with its code.
     ///
     /// # Errors
     /// As [`encode`](Self::encode), without the message's name.
     fn write(&self, output: &mut Writer<'_>) -> Result<(), EncodeError>;
 
-    /// Reads a message from its code on.
+    /// Reads a message, beginning with its code.
     ///
     /// # Errors
     /// As [`decode`](Self::decode), without the message's name.
     fn read(input: &mut Reader<'_>) -> Result<Self, DecodeError>;
 
-    /// The message as octets.
+    /// Encodes the message.
     ///
     /// # Errors
     /// If a count or a length is outside the limits of the definition.
@@ -49,7 +49,7 @@ pub trait Message: Sized + View + Clone + Debug + PartialEq + Send + Sync + 'sta
         Ok(buffer.into())
     }
 
-    /// Appends the message to a buffer, which is left as it was if there is an error.
+    /// Appends the message to a buffer. On error the buffer is unchanged.
     ///
     /// # Errors
     /// As [`encode`](Self::encode).
@@ -65,14 +65,14 @@ pub trait Message: Sized + View + Clone + Debug + PartialEq + Send + Sync + 'sta
         }
     }
 
-    /// Reads a message, which must fill the octets to the end.
+    /// Decodes a message, which must occupy all octets.
     ///
     /// # Errors
     /// If the octets are not exactly one message of this type.
     #[inline]
     fn decode(octets: &Bytes) -> Result<Self, DecodeError> {
         let mut input = Reader::new(octets);
-        // One variable for the result from beginning to end: it is built where it is to be.
+        // A single variable holds the result throughout, so it is built in place.
         let mut result = Self::read(&mut input);
         if result.is_err() || input.remaining() != 0 {
             let error = result.err().unwrap_or_else(|| input.trailing());
@@ -85,7 +85,7 @@ pub trait Message: Sized + View + Clone + Debug + PartialEq + Send + Sync + 'sta
 #[cfg(feature = "serde")]
 use super::view::View;
 
-/// Stands for `view::View`, which needs the feature `serde`.
+/// Replaces `view::View` when the feature `serde` is disabled.
 #[cfg(not(feature = "serde"))]
 #[doc(hidden)]
 pub trait View: Sized {}
@@ -93,7 +93,7 @@ pub trait View: Sized {}
 #[cfg(not(feature = "serde"))]
 impl<T> View for T {}
 
-/// A message of a type that is known only at run time.
+/// A message whose type is known only at run time.
 pub trait AnyMessage: Any + Debug + Send + Sync {
     /// [`Message::CODE`].
     fn code(&self) -> u16;
@@ -110,7 +110,7 @@ pub trait AnyMessage: Any + Debug + Send + Sync {
     /// As there.
     fn encode(&self) -> Result<Bytes, EncodeError>;
 
-    /// What people see.
+    /// The human-readable view.
     #[cfg(feature = "serde")]
     fn view(&self) -> super::view::Value;
 
@@ -153,20 +153,20 @@ impl<M: Message> AnyMessage for M {
 }
 
 impl dyn AnyMessage {
-    /// Whether it is an `M`.
+    /// Whether the message is an `M`.
     pub fn is<M: Message>(&self) -> bool {
         self.downcast_ref::<M>().is_some()
     }
 
-    /// The message as the type it is.
+    /// The message as an `M`, if it is one.
     pub fn downcast_ref<M: Message>(&self) -> Option<&M> {
         (self as &dyn Any).downcast_ref()
     }
 
-    /// The message as the type it is, or itself if it is another.
+    /// Converts the message to an `M`.
     ///
     /// # Errors
-    /// The message, if it is not an `M`.
+    /// The unchanged message, if it is not an `M`.
     pub fn downcast<M: Message>(self: Box<Self>) -> Result<M, Box<Self>> {
         if !self.is::<M>() {
             return Err(self);

@@ -5,8 +5,8 @@ use bytes::Bytes;
 use super::error::{DecodeError, DecodeErrorKind};
 use super::{Count, Fixed, FormattedBlob, Text};
 
-/// A cursor over a received message: a slice for the fields, and the shared octets themselves for
-/// strings and raw octets, which are not copied.
+/// A cursor over a received message. It keeps a slice for reading fields, and the shared octets so
+/// that strings and blobs need no copy.
 #[derive(Debug, Clone)]
 pub struct Reader<'a> {
     shared: &'a Bytes,
@@ -14,7 +14,7 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Starts at the first octet.
+    /// Creates a reader at the first octet.
     #[inline]
     pub fn new(octets: &'a Bytes) -> Self {
         Self {
@@ -35,10 +35,10 @@ impl<'a> Reader<'a> {
         self.rest.len()
     }
 
-    /// Reads the code with which a message begins.
+    /// Reads the message code.
     ///
     /// # Errors
-    /// If it is another one.
+    /// If it differs from `expected`.
     #[inline]
     pub fn code(&mut self, expected: u16) -> Result<(), DecodeError> {
         match self.fixed::<u16>()? {
@@ -50,7 +50,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The error for what is left behind a message.
+    /// The error for octets after the end of a message.
     #[cold]
     #[inline(never)]
     pub(super) fn trailing(&self) -> DecodeError {
@@ -60,10 +60,10 @@ impl<'a> Reader<'a> {
         DecodeError::new(kind, self.offset())
     }
 
-    /// Reads several fixed fields under one check.
+    /// Reads several fixed-size fields with one bounds check.
     ///
     /// # Errors
-    /// The first of `fields` (name and size) that the input has no room for.
+    /// Names the first of `fields` (name and size) that does not fit into the input.
     #[inline(always)]
     pub fn run<const N: usize>(
         &mut self,
@@ -107,7 +107,7 @@ impl<'a> Reader<'a> {
         )
     }
 
-    /// Reads one fixed value.
+    /// Reads one fixed-size value.
     ///
     /// # Errors
     /// If the input ends inside it.
@@ -122,10 +122,10 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads a member and names it in errors.
+    /// Reads a member and adds its name to errors.
     ///
     /// # Errors
-    /// Those of `read`.
+    /// Errors from `read`.
     #[inline(always)]
     pub fn member<T>(
         &mut self,
@@ -135,10 +135,10 @@ impl<'a> Reader<'a> {
         read(self).map_err(|error| error.within(name))
     }
 
-    /// Reads a member if it is present, and names it in errors.
+    /// Reads an optional member and adds its name to errors.
     ///
     /// # Errors
-    /// Those of `read`.
+    /// Errors from `read`.
     #[inline]
     pub fn optional<T>(
         &mut self,
@@ -156,7 +156,7 @@ impl<'a> Reader<'a> {
     /// Reads a presence vector.
     ///
     /// # Errors
-    /// If it sets bits that no member owns.
+    /// If it sets undefined bits.
     #[inline]
     pub fn presence<C: Count>(&mut self, defined: u64) -> Result<u64, DecodeError> {
         let offset = self.offset();
@@ -173,12 +173,12 @@ impl<'a> Reader<'a> {
     /// Reads the tag of a variant.
     ///
     /// # Errors
-    /// If there is no such alternative.
+    /// If the tag selects no alternative.
     #[inline]
     pub fn tag<C: Count>(&mut self, alternatives: u64) -> Result<u64, DecodeError> {
         let offset = self.offset();
         let found = self.fixed::<C>()?.to_u64();
-        // A variant without alternatives is its tag alone, 0.
+        // A variant without alternatives consists of its tag, 0.
         if found >= alternatives.max(1) {
             return Err(DecodeError::new(
                 DecodeErrorKind::Tag {
@@ -191,15 +191,15 @@ impl<'a> Reader<'a> {
         Ok(found)
     }
 
-    /// The error for a `variable_field` whose index, just read, chooses nothing.
+    /// The error for a `variable_field` whose index, just read, selects no type.
     #[cold]
     #[inline(never)]
     pub fn unknown_choice(&self, found: u8) -> DecodeError {
         DecodeError::new(DecodeErrorKind::Choice { found }, self.offset() - 1)
     }
 
-    /// Reads a count and checks it against its limits and against what is left, given that each
-    /// thing counted takes at least `least` octets.
+    /// Reads a count and checks it against its limits and the remaining input. Each counted item
+    /// takes at least `least` octets.
     #[inline(always)]
     fn count<C: Count>(&mut self, min: u64, max: u64, least: usize) -> Result<usize, DecodeError> {
         let offset = self.offset();
@@ -225,7 +225,7 @@ impl<'a> Reader<'a> {
     /// Reads a list whose elements take at least `least` octets each.
     ///
     /// # Errors
-    /// A count beyond its limits or the input; those of `element`, with the index added.
+    /// If the count exceeds its limits or the input. Errors from `element`, with the index added.
     #[inline]
     pub fn list<C: Count, T>(
         &mut self,
@@ -235,8 +235,8 @@ impl<'a> Reader<'a> {
         mut element: impl FnMut(&mut Self) -> Result<T, DecodeError>,
     ) -> Result<Vec<T>, DecodeError> {
         let count = self.count::<C>(min, max, least)?;
-        // `least` octets of input stand behind every element; one that takes none gets no memory
-        // in advance.
+        // Each element consumes at least `least` octets of input, which bounds the allocation.
+        // Elements that may be empty get no memory in advance.
         let mut list = Vec::with_capacity(if least == 0 { 0 } else { count });
         for index in 0..count {
             match element(self) {
@@ -247,17 +247,17 @@ impl<'a> Reader<'a> {
         Ok(list)
     }
 
-    /// Reads counted raw octets; they stay shared with the message.
+    /// Reads length-prefixed raw octets, sharing the memory of the message.
     ///
     /// # Errors
-    /// A count beyond its limits or the input.
+    /// If the length exceeds its limits or the input.
     #[inline(always)]
     pub fn blob<C: Count>(&mut self, min: u64, max: u64) -> Result<Bytes, DecodeError> {
         let length = self.count::<C>(min, max, 1)?;
         Ok(self.share(length))
     }
 
-    /// Shares the next octets, of which there are enough.
+    /// Shares the next octets. The caller has checked that there are enough.
     #[inline(always)]
     fn share(&mut self, length: usize) -> Bytes {
         let start = self.offset();
@@ -265,7 +265,7 @@ impl<'a> Reader<'a> {
         self.shared.slice(start..start + length)
     }
 
-    /// Reads a format index and counted raw octets.
+    /// Reads a format index and length-prefixed raw octets.
     ///
     /// # Errors
     /// As [`blob`](Self::blob).
@@ -281,7 +281,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Reads a counted string.
+    /// Reads a length-prefixed string.
     ///
     /// # Errors
     /// As [`blob`](Self::blob).
@@ -290,7 +290,7 @@ impl<'a> Reader<'a> {
         self.blob::<C>(min, max).map(Text::from)
     }
 
-    /// Reads a string of fixed length; the zeros that fill it up are left out.
+    /// Reads a string of fixed length, without its zero padding.
     ///
     /// # Errors
     /// If the input ends inside it.

@@ -1,4 +1,4 @@
-//! Tables of what was generated: services by identity, messages by code and by name.
+//! Tables of generated types: services by identity, messages by code and by name.
 
 use std::fmt;
 
@@ -6,14 +6,14 @@ use bytes::Bytes;
 
 use super::{AnyMessage, DecodeError, Message};
 
-/// What identifies a service: its URN and version.
+/// Identity of a service: URN and version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ServiceId {
     /// For example `urn:jaus:jss:core:Discovery`.
     pub urn: &'static str,
-    /// Raised by incompatible changes.
+    /// Major version, raised by incompatible changes.
     pub major: u8,
-    /// Raised by additions.
+    /// Minor version, raised by additions.
     pub minor: u8,
 }
 
@@ -23,7 +23,7 @@ impl fmt::Display for ServiceId {
     }
 }
 
-/// What a definition says about a service.
+/// Definition of a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ServiceInfo {
     /// For example `Discovery`.
@@ -32,13 +32,13 @@ pub struct ServiceInfo {
     pub id: ServiceId,
     /// The service that this one extends.
     pub inherits_from: Option<ServiceId>,
-    /// Codes of the messages that it receives; inherited ones are not repeated.
+    /// Codes of the messages that it receives, without inherited ones.
     pub inputs: &'static [u16],
-    /// Codes of the messages that it sends; inherited ones are not repeated.
+    /// Codes of the messages that it sends, without inherited ones.
     pub outputs: &'static [u16],
 }
 
-/// What is known about a message type, and how to make one from octets.
+/// Metadata of a message type, with constructors from octets and views.
 #[derive(Clone, Copy)]
 #[non_exhaustive]
 pub struct MessageInfo {
@@ -48,20 +48,20 @@ pub struct MessageInfo {
     pub name: &'static str,
     /// [`Message::IS_COMMAND`]
     pub is_command: bool,
-    /// The services that declare exactly this layout, the newest version first.
+    /// The services that declare exactly this layout, newest version first.
     pub services: &'static [ServiceId],
     /// [`Message::decode`]
     pub decode: fn(&Bytes) -> Result<Box<dyn AnyMessage>, DecodeError>,
-    /// Makes the message from what people write.
+    /// Creates the message from its human-readable view.
     #[cfg(feature = "serde")]
     pub from_view: fn(&super::view::Value) -> Result<Box<dyn AnyMessage>, super::view::Error>,
-    /// Makes a valid message from random octets.
+    /// Creates a valid message from random octets.
     #[cfg(feature = "arbitrary")]
     pub arbitrary: fn(&mut arbitrary::Unstructured<'_>) -> arbitrary::Result<Box<dyn AnyMessage>>,
 }
 
 impl MessageInfo {
-    /// The entry for a message type.
+    /// Creates the entry for a message type.
     #[doc(hidden)]
     pub const fn of<M: Message + RandomMessage>(services: &'static [ServiceId]) -> Self {
         Self {
@@ -88,7 +88,7 @@ impl fmt::Debug for MessageInfo {
     }
 }
 
-/// Stands for `arbitrary::Arbitrary` with any lifetime, if there is the feature `arbitrary`.
+/// Replaces `arbitrary::Arbitrary` for any lifetime when the feature `arbitrary` is enabled.
 #[cfg(feature = "arbitrary")]
 #[doc(hidden)]
 pub trait RandomMessage: for<'a> arbitrary::Arbitrary<'a> {}
@@ -96,7 +96,7 @@ pub trait RandomMessage: for<'a> arbitrary::Arbitrary<'a> {}
 #[cfg(feature = "arbitrary")]
 impl<T: for<'a> arbitrary::Arbitrary<'a>> RandomMessage for T {}
 
-/// Stands for `arbitrary::Arbitrary`, which needs the feature `arbitrary`.
+/// Replaces `arbitrary::Arbitrary` when the feature `arbitrary` is disabled.
 #[cfg(not(feature = "arbitrary"))]
 #[doc(hidden)]
 pub trait RandomMessage {}
@@ -104,14 +104,14 @@ pub trait RandomMessage {}
 #[cfg(not(feature = "arbitrary"))]
 impl<T> RandomMessage for T {}
 
-/// The message types of several service sets, found by code or by name.
+/// Message types of several service sets, searchable by code and by name.
 #[derive(Debug, Clone, Copy)]
 pub struct Registry {
     sets: &'static [&'static [MessageInfo]],
 }
 
 impl Registry {
-    /// A registry over the `MESSAGES` of generated modules, each of which is sorted by code.
+    /// Creates a registry from the `MESSAGES` of generated modules. Each slice is sorted by code.
     pub const fn new(sets: &'static [&'static [MessageInfo]]) -> Self {
         Self { sets }
     }
@@ -121,8 +121,8 @@ impl Registry {
         self.sets.iter().copied().flatten()
     }
 
-    /// The types with this code. There is mostly one; where versions differ on the wire the
-    /// newest comes first.
+    /// The types with this code, usually one. If versions differ on the wire, the newest comes
+    /// first.
     pub fn by_code(&self, code: u16) -> impl Iterator<Item = &'static MessageInfo> + use<> {
         self.sets.iter().flat_map(move |set| {
             let start = set.partition_point(|info| info.code < code);
@@ -132,7 +132,7 @@ impl Registry {
         })
     }
 
-    /// The types with this name, as definitions spell it; the newest first.
+    /// The types with this name in their definition, newest first.
     pub fn by_name<'n>(
         &self,
         name: &'n str,
@@ -150,11 +150,11 @@ impl Registry {
             .find(|info| info.services.contains(&service))
     }
 
-    /// Reads a message by its code, as the first of its types that fits;
-    /// `None` if the code is unknown or missing.
+    /// Decodes a message by its code as the first type that accepts the octets. `None` if the code
+    /// is unknown or missing.
     ///
     /// # Errors
-    /// The first type's, if none fits.
+    /// The error of the first type, if no type accepts the octets.
     pub fn decode(&self, octets: &Bytes) -> Option<Result<Box<dyn AnyMessage>, DecodeError>> {
         let code = u16::from_le_bytes(*octets.first_chunk()?);
         let mut first_error = None;

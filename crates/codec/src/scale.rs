@@ -1,30 +1,30 @@
-//! Real numbers carried as integers: `scale_range`.
+//! Real numbers encoded as scaled integers (JSIDL `scale_range`).
 
 use std::cmp::Ordering;
 use std::fmt;
 
 use super::exact::Expansion;
 
-/// A range of real numbers spread evenly over all values of an integer, which are counted from its
-/// least one.
+/// A range of real numbers spread evenly over all values of an integer, counted from its least
+/// value.
 ///
 /// `value = raw * (upper - lower) / (2^n - 1) + lower`, both limits inclusive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
     lower: f64,
     upper: f64,
-    /// Steps from the lower limit to the upper one.
+    /// Number of steps from the lower limit to the upper limit.
     max: u64,
-    /// Steps below the lower limit that the integer has too.
+    /// Number of additional integer steps below the lower limit.
     below: u64,
     step: f64,
     rounding: Rounding,
 }
 
-/// How a real number between two steps becomes an integer: `integer_function`.
+/// Rounding of a real number between two steps (JSIDL `integer_function`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rounding {
-    /// To the nearest, halves up; the only one in published definitions.
+    /// To nearest, halves up. Published definitions use no other mode.
     Round,
     /// Down.
     Floor,
@@ -33,7 +33,7 @@ pub enum Rounding {
 }
 
 impl Scale {
-    /// The range for an integer whose greatest value is `max`.
+    /// Creates the scale for an integer whose greatest value is `max`.
     pub const fn new(lower: f64, upper: f64, max: u64, rounding: Rounding) -> Self {
         let step = (upper - lower) / max as f64;
         Self {
@@ -46,9 +46,9 @@ impl Scale {
         }
     }
 
-    /// The range for a type of integers with the limits `least` and `greatest`.
+    /// Creates the scale for an integer type with limits `least` and `greatest`.
     ///
-    /// A signed type has 0 in the centre of the range, as the Reference Architecture has it: its
+    /// A signed type has 0 at the centre of the range, as the Reference Architecture specifies: its
     /// least integer is one step below the range.
     pub const fn of_integer(
         lower: f64,
@@ -72,12 +72,12 @@ impl Scale {
         self.upper
     }
 
-    /// The distance between neighbouring values.
+    /// The distance between adjacent values.
     pub const fn step(&self) -> f64 {
         self.step
     }
 
-    /// The real number that an integer stands for.
+    /// Converts an integer to the real number it represents.
     #[inline]
     pub fn value(&self, raw: u64) -> f64 {
         self.unbounded(raw).min(self.upper)
@@ -88,8 +88,8 @@ impl Scale {
         (raw as f64 - self.below as f64) * self.step + self.lower
     }
 
-    /// The integer for a real number, exactly rounded; `None` for what is outside the range or not
-    /// a number. An integer below the range may be written by its value.
+    /// Converts a real number to an integer with exact rounding. `None` if the number is NaN or
+    /// outside the range. The one integer below the range is reachable by its own value.
     pub fn raw(&self, value: f64) -> Option<u64> {
         if self.below > 0 && value < self.lower && value >= self.lower - 1.5 * self.step {
             return Some(u64::from(self.reaches(value, 0)));
@@ -103,7 +103,7 @@ impl Scale {
             Rounding::Floor => steps,
             Rounding::Ceiling => steps + 1.0,
         };
-        // A few roundings separate `steps` from the truth; so close to an integer they matter.
+        // A few rounding errors affect `steps`. They matter only this close to an integer.
         let doubt = (steps + 1.0) * (8.0 * f64::EPSILON);
         let below = shifted as u64;
         let fraction = shifted - below as f64;
@@ -114,7 +114,8 @@ impl Scale {
         }
     }
 
-    /// Steps from the lower limit to a number in the range, by bisection with exact comparisons.
+    /// Steps from the lower limit to a number in the range, found by bisection with exact
+    /// comparisons.
     #[cold]
     #[inline(never)]
     fn raw_exactly(&self, value: f64) -> u64 {
@@ -130,7 +131,7 @@ impl Scale {
         least
     }
 
-    /// Whether a number is rounded to so many steps above the lower limit or higher.
+    /// Whether a number rounds to `raw` steps above the lower limit or more.
     fn reaches(&self, value: f64, raw: u64) -> bool {
         let twice = 2 * i128::from(raw);
         let boundary = match self.rounding {
@@ -148,15 +149,16 @@ impl Scale {
         }
     }
 
-    /// The decimal with the fewest significant digits that stands for `raw`: what people are
-    /// shown. Zero has no digits; of two with equally many digits the nearer one is taken.
+    /// The decimal with the fewest significant digits that converts to `raw`, used for display.
+    /// Zero counts as having no digits. Of two decimals with equally many digits, the nearer one
+    /// wins.
     pub fn shortest(&self, raw: u64) -> f64 {
         let stands_for_raw = |&candidate: &f64| self.raw(candidate) == Some(raw);
         if stands_for_raw(&0.0) {
             return 0.0;
         }
         let value = self.unbounded(raw);
-        // Halfway to where another integer begins, away from doubts of rounding.
+        // Halfway to the next integer, far from rounding boundaries.
         let inside = match self.rounding {
             Rounding::Round => value,
             Rounding::Floor => value + self.step / 2.0,
@@ -170,13 +172,13 @@ impl Scale {
     }
 }
 
-/// The decimals with so many significant digits around a number that is not 0, the nearest first.
+/// Decimals with `digits` significant digits around a nonzero number, nearest first.
 fn decimals(value: f64, digits: usize) -> impl Iterator<Item = f64> {
     let text = format!("{:.*e}", digits - 1, value.abs()).replace('.', "");
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
     let mantissa: u64 = mantissa.parse().unwrap_or(0);
     let exponent = exponent.parse::<i32>().unwrap_or(0) - (digits as i32 - 1);
-    // Decimals are ten times as dense below a power of ten.
+    // Below a power of ten, decimals are ten times as dense.
     let below = if mantissa == 10_u64.pow(digits as u32 - 1) {
         (10 * mantissa - 1, exponent - 1)
     } else {
@@ -188,7 +190,7 @@ fn decimals(value: f64, digits: usize) -> impl Iterator<Item = f64> {
         .map(move |decimal| decimal.copysign(value))
 }
 
-/// An integer that stands for a real number in a range.
+/// An integer that represents a real number in a range.
 pub trait Scaled: Copy {
     /// The field's name in the definition.
     const NAME: &'static str;
@@ -203,11 +205,11 @@ pub trait Scaled: Copy {
     /// If the value is outside the range, which includes its limits.
     fn from_real(value: f64) -> Result<Self, OutOfRange>;
 
-    /// The value in the unit of the field.
+    /// The value in the field's unit.
     fn to_real(self) -> f64;
 }
 
-/// A number that a field cannot hold.
+/// Error: a number is outside the range of a field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutOfRange {
     /// The field's name in the definition.
@@ -218,12 +220,12 @@ pub struct OutOfRange {
     pub lower: f64,
     /// The greatest number that the field holds.
     pub upper: f64,
-    /// The unit, as the definition spells it; `one` for a bare number.
+    /// The unit, as spelled in the definition; `one` for a dimensionless number.
     pub unit: &'static str,
 }
 
 impl OutOfRange {
-    /// The error for a field with a scale.
+    /// Creates the error for a scaled field.
     #[doc(hidden)]
     #[cold]
     pub const fn of<T: Scaled>(value: f64) -> Self {
@@ -257,7 +259,7 @@ impl fmt::Display for OutOfRange {
     }
 }
 
-/// Gives a newtype over an integer what a scaled field needs.
+/// Implements the scaled field traits for a newtype over an integer.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __codec_scaled {
@@ -298,7 +300,7 @@ macro_rules! __codec_scaled {
                 }
             }
 
-            /// The value in the unit of the field.
+            /// The value in the field's unit.
             #[inline]
             pub fn value(self) -> f64 {
                 <Self as $crate::Scaled>::SCALE.value(self.count())
@@ -309,12 +311,12 @@ macro_rules! __codec_scaled {
                 self.0
             }
 
-            /// From the integer on the wire; each one stands for a value.
+            /// Creates the value from the integer on the wire. Every integer is valid.
             pub const fn from_raw(raw: $raw) -> Self {
                 Self(raw)
             }
 
-            /// Steps from the least integer of the type.
+            /// Steps above the least integer of the type.
             #[inline]
             const fn count(self) -> u64 {
                 (self.0 as i64).abs_diff(<$raw>::MIN as i64)

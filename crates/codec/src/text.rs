@@ -1,4 +1,4 @@
-//! Strings as peers send them: octets, in practice ASCII.
+//! Strings as received from peers: octets, in practice ASCII.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -7,14 +7,14 @@ use bytes::Bytes;
 
 /// The octets of a string field.
 ///
-/// JSIDL names no character set, so the octets are kept as they came; [`as_str`](Self::as_str)
-/// and [`to_string_lossy`](Self::to_string_lossy) read them as UTF-8. A received text shares the
+/// JSIDL specifies no character set, so the octets are kept unchanged. [`as_str`](Self::as_str) and
+/// [`to_string_lossy`](Self::to_string_lossy) interpret them as UTF-8. A received text shares the
 /// memory of its message.
 #[derive(Clone, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Text(Bytes);
 
 impl Text {
-    /// A text that lives as long as the program.
+    /// Creates a text from a static string without copying.
     pub const fn from_static(text: &'static str) -> Self {
         Self(Bytes::from_static(text.as_bytes()))
     }
@@ -24,22 +24,22 @@ impl Text {
         &self.0
     }
 
-    /// The text, if it is UTF-8.
+    /// The text, if it is valid UTF-8.
     pub fn as_str(&self) -> Option<&str> {
         std::str::from_utf8(&self.0).ok()
     }
 
-    /// The text with a replacement character for what is not UTF-8.
+    /// The text, with replacement characters for invalid UTF-8.
     pub fn to_string_lossy(&self) -> Cow<'_, str> {
         String::from_utf8_lossy(&self.0)
     }
 
-    /// Octets, not characters.
+    /// Length in octets, not characters.
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether there are no octets.
+    /// Whether the length is zero.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

@@ -3,7 +3,7 @@
 use super::error::{EncodeError, EncodeErrorKind};
 use super::{Count, Fixed, FormattedBlob, Text};
 
-/// Appends a message to a buffer, which keeps its capacity from one message to the next.
+/// Appends a message to a buffer. The buffer keeps its capacity between messages.
 #[derive(Debug)]
 pub struct Writer<'a> {
     buffer: &'a mut Vec<u8>,
@@ -11,7 +11,7 @@ pub struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    /// Appends after what the buffer holds.
+    /// Creates a writer that appends to the buffer's content.
     #[inline]
     pub fn new(buffer: &'a mut Vec<u8>) -> Self {
         Self {
@@ -26,7 +26,7 @@ impl<'a> Writer<'a> {
         self.buffer.len() - self.start
     }
 
-    /// Makes room for several fixed values under one check.
+    /// Reserves space for several fixed-size values with one check.
     #[inline(always)]
     pub fn run<const N: usize>(&mut self) -> &mut [u8; N] {
         self.buffer.extend_from_slice(&[0; N]);
@@ -36,10 +36,10 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Writes one fixed value.
+    /// Writes one fixed-size value.
     #[inline]
     pub fn fixed<T: Fixed>(&mut self, value: T) {
-        // The size is a constant: for a number this is one check and one store.
+        // The size is constant, so a number costs one check and one store.
         if T::SIZE <= 16 {
             let mut octets = [0; 16];
             value.put(&mut octets, 0);
@@ -51,7 +51,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Writes a fixed value if there is one.
+    /// Writes an optional fixed-size value.
     #[inline]
     pub fn optional<T: Fixed>(&mut self, value: Option<T>) {
         if let Some(value) = value {
@@ -59,10 +59,10 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Writes a member and names it in errors.
+    /// Writes a member and adds its name to errors.
     ///
     /// # Errors
-    /// Those of `write`.
+    /// Errors from `write`.
     #[inline]
     pub fn member(
         &mut self,
@@ -93,7 +93,8 @@ impl<'a> Writer<'a> {
     /// Writes a list.
     ///
     /// # Errors
-    /// If there are too many or too few elements; those of `element`, with the index added.
+    /// If the number of elements is outside the limits. Errors from `element`, with the index
+    /// added.
     #[inline]
     pub fn list<C: Count, T>(
         &mut self,
@@ -111,10 +112,10 @@ impl<'a> Writer<'a> {
         Ok(())
     }
 
-    /// Writes counted raw octets.
+    /// Writes length-prefixed raw octets.
     ///
     /// # Errors
-    /// If there are too many or too few.
+    /// If the length is outside the limits.
     #[inline]
     pub fn blob<C: Count>(&mut self, octets: &[u8], min: u64, max: u64) -> Result<(), EncodeError> {
         self.count::<C>(octets.len(), min, max)?;
@@ -122,7 +123,7 @@ impl<'a> Writer<'a> {
         Ok(())
     }
 
-    /// Writes a format index and counted raw octets.
+    /// Writes a format index and length-prefixed raw octets.
     ///
     /// # Errors
     /// As [`blob`](Self::blob).
@@ -137,7 +138,7 @@ impl<'a> Writer<'a> {
         self.blob::<C>(&blob.data, min, max)
     }
 
-    /// Writes a counted string.
+    /// Writes a length-prefixed string.
     ///
     /// # Errors
     /// As [`blob`](Self::blob).
@@ -146,7 +147,7 @@ impl<'a> Writer<'a> {
         self.blob::<C>(text.as_bytes(), min, max)
     }
 
-    /// Writes a string of fixed length and fills it up with zeros.
+    /// Writes a string of fixed length, padded with zeros.
     ///
     /// # Errors
     /// If the text is longer.

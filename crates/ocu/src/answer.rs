@@ -1,4 +1,4 @@
-//! What the station says to a page.
+//! Messages from the station to a page.
 
 use serde::Serialize;
 
@@ -10,18 +10,18 @@ use super::state::State;
 pub(super) enum Said<'a> {
     /// The first frame.
     Hello {
-        /// Of this protocol.
+        /// Protocol version.
         version: u32,
         token_needed: bool,
         operator: String,
         authority: u8,
     },
     State(&'a State),
-    /// A request was carried out.
+    /// A request succeeded.
     Done {
         id: u64,
     },
-    /// It was not.
+    /// A request was refused.
     Refused {
         #[serde(skip_serializing_if = "Option::is_none")]
         id: Option<u64>,

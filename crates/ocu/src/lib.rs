@@ -1,9 +1,9 @@
-//! The operator's station: a component that watches a vehicle, takes it under control, drives it and
-//! stops it, and the page through which people do that in a browser.
+//! The operator control unit (OCU): a component that monitors, controls, drives and stops a
+//! vehicle, and its browser page.
 //!
-//! [`Station`] is the ready component. Its session speaks JAUS, its server speaks HTTP and WebSocket to
-//! the pages; between them go requests one way and snapshots the other. Manual drive goes through the
-//! [`Stick`](stick::Stick), which lets go of itself when nobody pushes it.
+//! [`Station`] is the complete component. Its session speaks JAUS; its server speaks HTTP and
+//! WebSocket to the pages. Requests pass from server to session, snapshots in the other direction.
+//! Manual drive goes through the [`Stick`](stick::Stick), which releases itself when pushes cease.
 #![forbid(unsafe_code)]
 
 mod answer;
@@ -33,6 +33,6 @@ mod tree;
 pub use station::{Listen, OpenStation, Station};
 pub use token::{Token, TokenError};
 
-/// One connection of a page: who pushes the stick.
+/// Identifies one page connection, for example the one that holds the stick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PageId(pub u64);

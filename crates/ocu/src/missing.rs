@@ -1,4 +1,4 @@
-//! Parts of the vehicle that have disappeared or fallen silent.
+//! Tracking of vehicle parts that have disappeared or fallen silent.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::role::Role;
 use jaus::address::JausId;
 
-/// How a part is missing.
+/// The kind of absence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Absence {
     /// Discovery has lost it.
@@ -16,7 +16,7 @@ pub(super) enum Absence {
 }
 
 impl Absence {
-    /// As pages know it.
+    /// Name in the page protocol.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Gone => "gone",
@@ -25,27 +25,27 @@ impl Absence {
     }
 }
 
-/// A part that Discovery has lost.
+/// A part that discovery has lost.
 #[derive(Debug, Clone)]
 pub(super) struct GonePart {
     pub(super) role: Role,
     pub(super) name: String,
-    /// Its last report.
+    /// Time of its last report.
     pub(super) heard: Option<Instant>,
-    /// When Discovery lost it.
+    /// Time when discovery lost it.
     pub(super) at: Instant,
 }
 
-/// The parts that Discovery has lost, until they are back or replaced.
+/// The parts that discovery has lost, until they return or are replaced.
 #[derive(Debug, Default)]
 pub(super) struct GoneParts {
     parts: BTreeMap<JausId, GonePart>,
 }
 
 impl GoneParts {
-    /// A part that does not come back is forgotten after this time.
+    /// A part that does not return is dropped after this time.
     const KEPT: Duration = Duration::from_secs(300);
-    /// The oldest goes when there are more.
+    /// Maximum number of parts. The oldest is dropped first.
     const MOST: usize = 32;
 
     pub(super) fn get(&self, id: JausId) -> Option<&GonePart> {
@@ -66,7 +66,7 @@ impl GoneParts {
         }
     }
 
-    /// Forgets those that are back or replaced by a part with the same role.
+    /// Drops parts that have returned or were replaced by a part with the same role.
     pub(super) fn handle_present(&mut self, present: &[(JausId, Role)]) {
         self.parts.retain(|gone, part| {
             let replaces = |role: Role| part.role != Role::Other && role == part.role;
@@ -76,7 +76,7 @@ impl GoneParts {
         });
     }
 
-    /// Forgets those that have been gone for a long time.
+    /// Drops parts whose retention time is over.
     pub(super) fn handle_time(&mut self, now: Instant) {
         self.parts
             .retain(|_, part| now.saturating_duration_since(part.at) < Self::KEPT);

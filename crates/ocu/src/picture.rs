@@ -1,5 +1,5 @@
-//! What the operator's station knows of its vehicle: reports come in, snapshots for the pages go
-//! out. Knows no network and no clock.
+//! The station's model of the vehicle: reports go in, snapshots for the pages come out. It uses no
+//! network and no clock.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,13 +13,13 @@ use super::state;
 use jaus::address::JausId;
 use jaus::service::{Component, Directory, Kind, State};
 
-/// The vehicle as it is known.
+/// The known state of the vehicle.
 #[derive(Debug)]
 pub(super) struct Picture {
     own: JausId,
     directory: Arc<Directory>,
     vehicle: Option<u16>,
-    /// What the vehicle is called, also when Discovery has lost it.
+    /// Name of the vehicle, kept after discovery has lost it.
     name: String,
     parts: BTreeMap<JausId, Part>,
     gone: GoneParts,
@@ -35,26 +35,26 @@ pub(super) struct Picture {
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     pub(super) role: Role,
-    /// Whether it offers Management.
+    /// Whether the part offers Management.
     pub(super) managed: bool,
     status: Option<Sample<u8>>,
-    /// Who controls it, with which authority.
+    /// The client in control, with its authority.
     controller: Option<Sample<Option<(JausId, u8)>>>,
     stage: Option<state::Stage>,
-    /// What it is called.
+    /// Name of the part.
     name: String,
     reports_pose: bool,
     reports_velocity: bool,
     pose_clock: Option<SampleClock>,
     velocity_clock: Option<SampleClock>,
-    /// Its last report.
+    /// Time of its last report.
     heard: Option<Instant>,
-    /// Whether the last news of a subscription was that reports have stopped.
+    /// Whether the last subscription event was a loss of reports.
     is_down: bool,
 }
 
-/// What was reported, by whom, and when it was true: when the sample was taken, by its time stamp;
-/// without one, when the report arrived.
+/// A reported value with its reporter and sample time. The time comes from the report's time stamp,
+/// or is the arrival time without a stamp.
 #[derive(Debug, Clone, Copy)]
 struct Sample<T> {
     what: T,
@@ -63,9 +63,9 @@ struct Sample<T> {
 }
 
 impl Part {
-    /// After so long without a report, a part that reports periodically is silent.
+    /// A part with periodic reports is silent after this time without a report.
     const SILENT: Duration = Duration::from_millis(1500);
-    /// Likewise, if its subscription is down as well.
+    /// A part whose subscription is down is silent after this time without a report.
     const DOWN: Duration = Duration::from_secs(1);
 
     fn new(role: Role) -> Self {
@@ -85,7 +85,7 @@ impl Part {
         }
     }
 
-    /// Takes what Discovery knows of it.
+    /// Updates the part from discovery data.
     fn describe(&mut self, component: &Component, role: Role) {
         self.role = role;
         self.managed = role::is_managed(component);
@@ -99,7 +99,7 @@ impl Part {
         );
     }
 
-    /// Whether its reports have stopped.
+    /// Whether its reports have ceased.
     fn is_silent(&self, now: Instant) -> bool {
         let is_periodic = self.managed || self.reports_pose || self.reports_velocity;
         self.heard.is_some_and(|heard| {
@@ -117,13 +117,13 @@ impl Part {
         self.status.is_some_and(|it| it.what == state as u8)
     }
 
-    /// Whether it has said since `since` that it stands by.
+    /// Whether it has reported standby since `since`.
     pub(super) fn stands_by(&self, since: Instant) -> bool {
         self.is(State::Standby) && self.status.is_some_and(|it| it.at > since)
     }
 
-    /// Whether it has said since `since` that somebody other than `own`, or nobody, controls it;
-    /// who does.
+    /// Whether it has reported since `since` that a client other than `own`, or none, is in
+    /// control. Returns that client.
     pub(super) fn disowns(&self, own: JausId, since: Instant) -> Option<Option<JausId>> {
         let told = self.controller.filter(|it| it.at > since)?;
         let controller = told.what.map(|(id, _)| id);
@@ -134,22 +134,21 @@ impl Part {
         self.told_controller()?
     }
 
-    /// Who controls it, or that nobody does, once it has said so.
+    /// The reported client in control, which may be none; `None` before a report.
     pub(super) fn told_controller(&self) -> Option<Option<JausId>> {
         Some(self.controller?.what.map(|(id, _)| id))
     }
 }
 
 impl Picture {
-    /// A report that is older counts for nothing when the vehicle's safety is at stake.
+    /// Older reports are ignored for safety decisions.
     const FRESH: Duration = Duration::from_secs(2);
-    /// With an older pose, velocity or status nobody may drive.
+    /// Manual drive requires pose, velocity and status younger than this.
     const DRIVABLE: Duration = Duration::from_secs(1);
-    /// A planner that is silent for so long, while other parts report, is lost.
+    /// A planner that is silent for this time while other parts report is lost.
     const LOST: Duration = Duration::from_secs(2);
 
-    /// Nothing is known yet; `vehicle` is the one to look at, the first that turns up if there is
-    /// none.
+    /// Creates an empty picture of `vehicle`, or of the first vehicle discovered.
     pub(super) fn new(own: JausId, vehicle: Option<u16>) -> Self {
         Self {
             own,
@@ -175,7 +174,7 @@ impl Picture {
         &self.parts
     }
 
-    /// The component that does something in the vehicle.
+    /// The component with this role in the vehicle.
     pub(super) fn find(&self, role: Role) -> Option<JausId> {
         let mut parts = self.parts.iter();
         parts.find(|(_, part)| part.role == role).map(|(id, _)| *id)
@@ -189,20 +188,20 @@ impl Picture {
         self.mission.as_ref().map(|told| &told.what)
     }
 
-    /// The component that keeps the maps.
+    /// The component that stores the maps.
     pub(super) const fn store(&self) -> Option<JausId> {
         self.store
     }
 
-    /// One of its maps.
+    /// The map with this number.
     pub(super) fn map(&self, id: u16) -> Option<state::Map> {
         self.maps.iter().find(|map| map.id == id).cloned()
     }
 
-    /// Another vehicle is chosen.
+    /// Selects another vehicle.
     ///
     /// # Errors
-    /// If there is none with this number: why not, in words.
+    /// If there is no vehicle with this number, with the reason as text.
     pub(super) fn select(&mut self, now: Instant, subsystem: u16) -> Result<(), String> {
         if !role::is_vehicle(&self.directory, subsystem) || subsystem == self.own.subsystem() {
             return Err(format!(
@@ -217,7 +216,7 @@ impl Picture {
         Ok(())
     }
 
-    /// Components came, changed or went.
+    /// Handles a change of the discovered components.
     pub(super) fn handle_directory(&mut self, now: Instant, directory: Arc<Directory>) {
         self.directory = directory;
         self.vehicle = self.vehicle.or_else(|| self.first_vehicle());
@@ -229,7 +228,7 @@ impl Picture {
         self.set_parts(now, known.iter().flat_map(|it| it.components()));
     }
 
-    /// The vehicle has these components, and no others.
+    /// Replaces the components of the vehicle.
     fn set_parts<'c>(&mut self, now: Instant, components: impl Iterator<Item = &'c Component>) {
         let mut parts = BTreeMap::new();
         for component in components {
@@ -274,7 +273,7 @@ impl Picture {
         named.or_else(|| others().next()).map(|(id, _)| id)
     }
 
-    /// A part of the vehicle has told something.
+    /// Handles a report of a part of the vehicle.
     pub(super) fn handle_report(&mut self, now: Instant, by: JausId, report: Report) {
         let Some(part) = self.parts.get_mut(&by) else {
             return;
@@ -306,8 +305,8 @@ impl Picture {
         }
     }
 
-    /// Why the picture is too old to drive by, in words; `None` if it is not. What no part of the
-    /// vehicle offers is not expected.
+    /// Why the picture is too old to drive by, as text; `None` if it is not. Only data that some
+    /// part of the vehicle offers is expected.
     pub(super) fn stale(&self, now: Instant) -> Option<String> {
         let gone = self.gone.iter();
         let gone = gone.map(|(id, part)| (id, part.role));
@@ -341,13 +340,13 @@ impl Picture {
             })
     }
 
-    /// Whether the vehicle reports where it is.
+    /// Whether the vehicle reports its position.
     pub(super) fn is_position_known(&self) -> bool {
         self.pose
             .is_some_and(|it| it.what.x.is_some() && it.what.y.is_some())
     }
 
-    /// The parts that have disappeared or fallen silent: each with its name and how.
+    /// The parts that have disappeared or fallen silent, each with its name and kind of absence.
     pub(super) fn missing(&self, now: Instant) -> impl Iterator<Item = (JausId, &str, Absence)> {
         let gone = self.gone.iter();
         let gone = gone.map(|(id, part)| (id, &*part.name, Absence::Gone));
@@ -375,8 +374,8 @@ impl Picture {
         self.missing(now).map(describe).collect()
     }
 
-    /// The planner, if it was lost while it drove. When everything is silent, the network is the
-    /// reason, and nothing is known of the planner.
+    /// The planner, if it was lost while it drove. When all parts are silent, the network is to
+    /// blame, and the planner does not count as lost.
     pub(super) fn lost_planner(&self, now: Instant) -> Option<(JausId, Absence)> {
         let told = self.mission.as_ref();
         let planner = told.filter(|it| it.what.stage.is_driven())?.by;
@@ -391,7 +390,7 @@ impl Picture {
         is_lost.then_some((planner, Absence::Silent))
     }
 
-    /// The parts that can be stopped by an emergency and have not said lately that they are.
+    /// The parts that can enter emergency and have not recently reported it.
     pub(super) fn not_in_emergency(&self, now: Instant) -> impl Iterator<Item = JausId> {
         let stands = move |part: &Part| {
             let fresh = |it: &Sample<u8>| now.saturating_duration_since(it.at) < Self::FRESH;
@@ -403,7 +402,7 @@ impl Picture {
             .map(|(id, _)| *id)
     }
 
-    /// The parts that are stopped by an emergency.
+    /// The parts in emergency.
     pub(super) fn in_emergency(&self) -> impl Iterator<Item = JausId> {
         let stopped = self
             .parts
@@ -412,12 +411,12 @@ impl Picture {
         stopped.map(|(id, _)| *id)
     }
 
-    /// What is known of everybody.
+    /// The tree of all known components.
     pub(super) fn tree(&self) -> Vec<state::Subsystem> {
         super::tree::of(&self.directory)
     }
 
-    /// What is known of the vehicle. `obstacle` says why a part is not under control.
+    /// Snapshot of the vehicle. `obstacle` returns why a part is not under control.
     pub(super) fn vehicle_state(
         &self,
         now: Instant,
@@ -476,8 +475,8 @@ impl Picture {
         }
     }
 
-    /// The mission with its path; also of a planner that was lost while it drove. `told_to_stop`
-    /// says whether the drivers have been stopped for that.
+    /// Snapshot of the mission with its path, also of a planner lost while driving. `told_to_stop`
+    /// states whether the drivers were stopped for that reason.
     pub(super) fn mission_state(&self, now: Instant, told_to_stop: bool) -> Option<state::Mission> {
         let told = self.mission.as_ref()?;
         let lost = self.lost_planner(now).map(|(id, how)| state::LostPlanner {
@@ -494,7 +493,7 @@ impl Picture {
         })
     }
 
-    /// The map to show: the one of the planner, or the first.
+    /// The map to show: the planner's map, or the first.
     pub(super) fn map_state(&self) -> Option<state::Map> {
         let traversability = |map: &&state::Map| map.name == "traversability";
         let map = self.maps.iter().find(traversability);
@@ -502,7 +501,7 @@ impl Picture {
     }
 }
 
-/// When a sample was taken that arrives now.
+/// Sample time of a report that arrives now.
 fn sampled_at(clock: &mut Option<SampleClock>, now: Instant, stamp: Option<Stamp>) -> Instant {
     match (stamp, clock) {
         (None, clock) => {
@@ -517,7 +516,7 @@ fn sampled_at(clock: &mut Option<SampleClock>, now: Instant, stamp: Option<Stamp
     }
 }
 
-/// Milliseconds since then.
+/// Milliseconds since `then`.
 fn age(now: Instant, then: Instant) -> u64 {
     let age = now.saturating_duration_since(then).as_millis();
     u64::try_from(age).unwrap_or(u64::MAX)

@@ -1,4 +1,4 @@
-//! What the parts of a vehicle tell, as the station keeps it: read from messages, in SI units.
+//! Reports of vehicle parts, decoded from messages into SI units.
 
 use super::sample_clock::Stamp;
 use super::state;
@@ -9,28 +9,28 @@ use jaus_vehicle::messages::ground::{
     ReportMission, ReportPlannedPath, ReportRasterMaps, ReportStage,
 };
 
-/// What a part has told.
+/// A report of a part.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Report {
-    /// The number of its state in Management.
+    /// Number of the Management state.
     Status(u8),
-    /// Who controls it, with which authority.
+    /// The client in control, with its authority.
     Control(Option<(JausId, u8)>),
     Stage(state::Stage),
-    /// The pose, and the time stamp of the sample if it has one.
+    /// The pose, with the time stamp of the sample if present.
     Pose(state::Pose, Option<Stamp>),
-    /// The velocity, likewise.
+    /// The velocity, with the time stamp of the sample if present.
     Velocity(state::Velocity, Option<Stamp>),
     Mission(Mission),
     Path(Vec<[f64; 2]>),
     Maps(Vec<state::Map>),
-    /// A subscription has stopped bringing reports, or brings them again.
+    /// A subscription has lost or regained its reports.
     Subscription {
         is_up: bool,
     },
 }
 
-/// How the planner's mission is.
+/// State of the planner's mission.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Mission {
     pub(super) number: u32,
@@ -43,7 +43,7 @@ pub(super) struct Mission {
     reason: String,
 }
 
-/// The stages of a mission by their numbers in Report Mission.
+/// Mission stage, by its number in Report Mission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct MissionStage(u8);
 
@@ -71,14 +71,14 @@ impl MissionStage {
         self.0 == 3
     }
 
-    /// Whether the planner drives the vehicle, or is about to.
+    /// Whether the planner drives the vehicle or is about to.
     pub(super) const fn is_driven(self) -> bool {
         matches!(self.0, 4..=7)
     }
 }
 
 impl Mission {
-    /// As pages show it, without its path.
+    /// Snapshot for pages, without the path.
     pub(super) fn state(&self) -> state::Mission {
         state::Mission {
             mission: self.number,
@@ -165,13 +165,13 @@ impl From<ReportMission> for Report {
     }
 }
 
-/// The most points of a path that a page is told of.
+/// Maximum number of path points in a snapshot.
 const MOST_POINTS: usize = 500;
 
 impl From<ReportPlannedPath> for Report {
     fn from(report: ReportPlannedPath) -> Self {
         let points = report.point_list;
-        // Every so many, and the last one always.
+        // Keep every n-th point, and always the last.
         let step = points.len().div_ceil(MOST_POINTS - 1).max(1);
         let mut thin: Vec<_> = points.iter().step_by(step).map(|it| [it.x, it.y]).collect();
         if let Some(last) = points
@@ -184,7 +184,7 @@ impl From<ReportPlannedPath> for Report {
     }
 }
 
-/// The most maps that are kept in mind.
+/// Maximum number of maps kept.
 const MOST_MAPS: usize = 256;
 
 impl From<ReportRasterMaps> for Report {

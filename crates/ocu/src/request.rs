@@ -1,102 +1,102 @@
-//! What a page says: requests for the vehicle, and what concerns the connection alone.
+//! Messages from a page: requests for the vehicle, and settings of the connection.
 
 use serde::Deserialize;
 
 /// One frame from a page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Frame {
-    /// With an id, the request is answered.
+    /// A request with an id is answered.
     #[serde(default)]
     pub id: Option<u64>,
-    /// What is wanted.
+    /// The content.
     #[serde(flatten)]
     pub said: Said,
 }
 
-/// What a page says.
+/// Content of a frame.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum Said {
-    /// Who it is.
+    /// Authentication.
     Token {
-        /// What was printed or written into a file.
+        /// The token, as printed or stored in a file.
         token: String,
     },
-    /// Whether and which messages it wants to see.
+    /// Enables or disables the message view.
     Messages {
-        /// Whether any.
+        /// Whether to send messages.
         on: bool,
-        /// Which.
+        /// Which messages to send.
         #[serde(default)]
         filter: MessageFilter,
     },
-    /// A request.
+    /// A request for the vehicle.
     #[serde(untagged)]
     OperatorRequest(OperatorRequest),
 }
 
-/// Which messages a page wants to see; what is empty lets everything through.
+/// Filter of the message view. Empty fields match everything.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Deserialize)]
 #[serde(default)]
 pub struct MessageFilter {
-    /// Source or destination, for example `101.2.33`, or the beginning of one: `101.2`.
+    /// Source or destination, for example `101.2.33`, or a prefix such as `101.2`.
     pub component: String,
-    /// A part of the service's name.
+    /// Part of the service name.
     pub service: String,
-    /// A part of the message's name, or its code.
+    /// Part of the message name, or the message code.
     pub message: String,
-    /// Somewhere in the message as JSON.
+    /// Text within the message as JSON.
     pub text: String,
 }
 
-/// What an operator wants of the vehicle.
+/// An operator's request for the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum OperatorRequest {
-    /// To look at another vehicle.
+    /// Select another vehicle.
     Select {
-        /// Its number.
+        /// Its subsystem number.
         subsystem: u16,
     },
-    /// To take control, or to give it back.
+    /// Take or release control.
     Control {
-        /// Whether to take it.
+        /// Whether to take control.
         on: bool,
     },
-    /// To have it act on commands.
+    /// Resume: make the vehicle act on commands.
     Resume,
-    /// To have it stop and wait.
+    /// Standby: make the vehicle stop and wait.
     Standby,
-    /// To stop everything at once, or to take that back.
+    /// Set or clear an emergency.
     Emergency {
-        /// Whether to stop.
+        /// Whether to set it.
         on: bool,
     },
-    /// To drive by hand.
+    /// Drive manually.
     Drive {
-        /// Ahead, -1 to 1.
+        /// Forward, -1 to 1.
         forward: f64,
-        /// To the right, -1 to 1.
+        /// Right, -1 to 1.
         turn: f64,
     },
-    /// To drive no more.
+    /// End manual drive.
     DriveEnd,
-    /// To have a path planned.
+    /// Plan a path to a destination.
     Destination {
-        /// Metres to the north.
+        /// Metres north.
         x: f64,
-        /// Metres to the east.
+        /// Metres east.
         y: f64,
-        /// Metres per second at most; the planner's own without it.
+        /// Speed limit in metres per second. Without one, the planner's default applies.
         #[serde(default)]
         speed: Option<f64>,
     },
-    /// To have the path driven.
+    /// Approve the planned path.
     Approve {
-        /// Which mission's.
+        /// The mission to approve.
         mission: u32,
     },
-    /// To end the mission.
+    /// Stop the mission.
     Stop,
 }
 

@@ -1,4 +1,4 @@
-//! What the components of a vehicle do in it, told by the services that they offer.
+//! Roles of components in a vehicle, derived from the services that they offer.
 
 use jaus::messages::core::management;
 use jaus::messages::mobility::{
@@ -8,7 +8,7 @@ use jaus::messages::mobility::{
 use jaus::service::{Component, Directory};
 use jaus_vehicle::messages::ground::{mission_planner, raster_maps, stage};
 
-/// What a component does. One that does several things is known by the first of them.
+/// Role of a component. A component with several roles has the first of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Role {
     PrimitiveDriver,
@@ -18,7 +18,7 @@ pub(super) enum Role {
     VelocitySensor,
     PoseSensor,
     Store,
-    /// Another component that can be managed.
+    /// Another component with Management.
     Other,
 }
 
@@ -34,7 +34,7 @@ impl Role {
         (Self::Store, raster_maps::URN),
     ];
 
-    /// What a component does; `None` if an operator has nothing to do with it.
+    /// The role of a component; `None` if it is irrelevant to an operator.
     pub(super) fn of(component: &Component) -> Option<Self> {
         let known = Self::ALL.iter().find(|(_, urn)| component.offers(urn));
         let other = || is_managed(component).then_some(Self::Other);
@@ -54,7 +54,7 @@ impl Role {
         }
     }
 
-    /// In words, for reasons.
+    /// Description for reasons.
     pub(super) const fn words(self) -> &'static str {
         match self {
             Self::PrimitiveDriver => "the primitive driver",
@@ -68,7 +68,7 @@ impl Role {
         }
     }
 
-    /// As a title, for notices; `None` for a component whose own name says more.
+    /// Title for notices; `None` for a component with a more specific name of its own.
     pub(super) const fn title(self) -> Option<&'static str> {
         match self {
             Self::PrimitiveDriver => Some("Primitive Driver"),
@@ -82,7 +82,7 @@ impl Role {
         }
     }
 
-    /// Whether an operator who takes control takes it of this component, too.
+    /// Whether taking control includes this component.
     pub(super) const fn is_commanded(self) -> bool {
         matches!(
             self,
@@ -91,27 +91,27 @@ impl Role {
     }
 }
 
-/// Whether a component has a state that can be changed, an emergency among them.
+/// Whether a component offers Management, and so can enter emergency.
 pub(super) fn is_managed(component: &Component) -> bool {
     component.offers(management::URN)
 }
 
-/// Whether a component tells how far its stage is.
+/// Whether a component reports its stage.
 pub(super) fn tells_stage(component: &Component) -> bool {
     component.offers(stage::URN)
 }
 
-/// Whether a component reports where the vehicle is.
+/// Whether a component reports the vehicle's pose.
 pub(super) fn reports_pose(component: &Component) -> bool {
     component.offers(local_pose_sensor::URN)
 }
 
-/// Whether a component reports how the vehicle moves.
+/// Whether a component reports the vehicle's velocity.
 pub(super) fn reports_velocity(component: &Component) -> bool {
     component.offers(velocity_state_sensor::URN)
 }
 
-/// Whether a subsystem has something that an operator can work with.
+/// Whether a subsystem has components that an operator can use.
 pub(super) fn is_vehicle(directory: &Directory, subsystem: u16) -> bool {
     let known = directory.subsystem(subsystem);
     known.is_some_and(|it| it.components().any(|it| Role::of(it).is_some()))

@@ -1,31 +1,31 @@
-//! The age of a sample by its own time stamp, although the clock of its sender differs from ours.
+//! Age of samples from their own time stamps, with unsynchronised clocks.
 
 use std::time::{Duration, Instant};
 
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 
-/// Milliseconds since the first day of the sender's month began.
+/// Milliseconds since the start of the sender's month.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Stamp(u64);
 
-/// Finds out when the samples of one sender were taken, by our clock.
+/// Estimates when the samples of one sender were taken, by the local clock.
 ///
-/// The sample that arrived with the least delay is the reference: it counts as taken when it
-/// arrived, and the age of the others follows from the difference of the stamps. A sender that
-/// repeats a stamp has a frozen sensor: its sample gets older although reports arrive.
+/// The sample with the least delay is the reference: it counts as taken on arrival, and the age of
+/// the others follows from the stamp differences. A repeated stamp means a frozen sensor, so the
+/// sample ages although reports arrive.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SampleClock {
-    /// The stamp of the sample with the least delay, and when that sample arrived.
+    /// Stamp and arrival time of the sample with the least delay.
     reference: (Stamp, Instant),
     newest: Stamp,
-    /// When the newest sample was taken.
+    /// Time of the newest sample.
     taken: Instant,
-    /// When the newest sample arrived.
+    /// Arrival time of the newest sample.
     received: Instant,
 }
 
 impl Stamp {
-    /// `None` if the stamp is no time of day.
+    /// Reads a stamp; `None` if it is not a valid time.
     pub(super) fn read(stamp: TimeStamp) -> Option<Self> {
         let [day, hour, minutes, seconds] =
             [stamp.day(), stamp.hour(), stamp.minutes(), stamp.seconds()].map(u64::from);
@@ -41,10 +41,10 @@ impl Stamp {
 }
 
 impl SampleClock {
-    /// Clocks differ by less than one part in so many.
+    /// Clocks differ by less than one part in this number.
     const DRIFT: u32 = 1000;
 
-    /// Begins with the first sample of a sender.
+    /// Starts with the first sample of a sender.
     pub(super) const fn new(now: Instant, stamp: Stamp) -> Self {
         Self {
             reference: (stamp, now),
@@ -54,18 +54,18 @@ impl SampleClock {
         }
     }
 
-    /// Processes a sample that arrives now; returns when it was taken.
+    /// Handles a sample that arrives now. Returns the time when it was taken.
     pub(super) fn handle_sample(&mut self, now: Instant, stamp: Stamp) -> Instant {
         if stamp == self.newest {
             return self.taken;
         }
-        // The sender's clock was set back, or its month is over: its stamps mean something else now.
+        // The sender's clock was set back or its month is over, so its stamps have a new reference.
         if stamp < self.newest {
             *self = Self::new(now, stamp);
             return now;
         }
         let (first, at) = self.reference;
-        // Otherwise a clock that is slower than ours makes all samples look old after some hours.
+        // Without this, a slower sender clock would make all samples look old after some hours.
         let drift = now.saturating_duration_since(self.received) / Self::DRIFT;
         let at = at + drift;
         let taken = at.checked_add(stamp.since(first)).unwrap_or(now);
@@ -91,7 +91,7 @@ mod tests {
         Duration::from_millis(ms)
     }
 
-    /// A clock that has processed samples of each tenth of a second up to `now`, without delay.
+    /// A clock that has received samples at 10 Hz without delay, `tenths` in total.
     fn running(start: Instant, tenths: u64) -> SampleClock {
         let mut clock = SampleClock::new(start, Stamp(0));
         for tenth in 1..=tenths {
@@ -139,7 +139,7 @@ mod tests {
     fn a_clock_of_the_sender_that_is_slow_makes_no_sample_old() {
         let start = Instant::now();
         let mut clock = SampleClock::new(start, Stamp(0));
-        // A day at 10 Hz with a clock that loses 0.5 ms each second.
+        // One day at 1 Hz with a clock that loses 0.5 ms per second.
         for second in 1..86_400 {
             let now = start + ms(1000 * second);
             let taken = clock.handle_sample(now, Stamp(1000 * second - second / 2));

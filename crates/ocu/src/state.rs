@@ -1,22 +1,22 @@
-//! What a page shows: one snapshot of everything, so that a page that connects again needs nothing
-//! else. What is not known is `null`.
+//! Snapshots for pages. Each one is complete, so that a reconnecting page needs nothing else.
+//! Unknown values are `null`.
 
 use serde::Serialize;
 
-/// Everything a page shows, at one moment.
+/// A complete snapshot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct State {
-    /// Counts the snapshots.
+    /// Snapshot counter.
     pub seq: u64,
-    /// When it was taken, RFC 3339 in UTC.
+    /// Time of the snapshot, RFC 3339 in UTC.
     pub time: String,
-    /// The operator's own id.
+    /// The operator's own JAUS id.
     pub operator: String,
-    /// Everybody who is known.
+    /// All known subsystems.
     pub tree: Vec<Subsystem>,
-    /// The chosen vehicle.
+    /// The selected vehicle.
     pub vehicle: Option<Vehicle>,
-    /// Whether the operator is in control of it.
+    /// Control of the vehicle.
     pub control: Control,
     /// Manual drive.
     pub drive: Drive,
@@ -29,193 +29,194 @@ pub struct State {
 /// A subsystem of the tree.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Subsystem {
-    /// Its number.
+    /// Subsystem number.
     pub subsystem: u16,
-    /// What it is called.
+    /// Name.
     pub name: String,
-    /// What it is, for example `vehicle`.
+    /// Kind, for example `vehicle`.
     pub kind: String,
-    /// Its nodes.
+    /// Nodes of the subsystem.
     pub nodes: Vec<Node>,
 }
 
 /// A node of the tree.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Node {
-    /// Its number.
+    /// Node number.
     pub node: u8,
-    /// What it is called.
+    /// Name.
     pub name: String,
-    /// Its components.
+    /// Components of the node.
     pub components: Vec<Component>,
 }
 
 /// A component of the tree.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Component {
-    /// Its id.
+    /// JAUS id.
     pub id: String,
-    /// What it is called.
+    /// Name.
     pub name: String,
-    /// What it offers.
+    /// Services offered.
     pub services: Vec<Service>,
 }
 
 /// A service that a component offers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Service {
-    /// Its name.
+    /// URN.
     pub urn: String,
     /// Major and minor version, as `1.0`.
     pub version: String,
 }
 
-/// The chosen vehicle.
+/// The selected vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Vehicle {
-    /// Its number.
+    /// Subsystem number.
     pub subsystem: u16,
-    /// What it is called.
+    /// Name.
     pub name: String,
-    /// Where it is.
+    /// Pose.
     pub pose: Option<Pose>,
-    /// How it moves.
+    /// Velocity.
     pub velocity: Option<Velocity>,
-    /// Its components that can be managed or that the operator needs.
+    /// Components that offer Management or matter to the operator.
     pub parts: Vec<Part>,
-    /// Those that have disappeared or fallen silent.
+    /// Components that have disappeared or fallen silent.
     pub missing: Vec<Missing>,
     /// Why the picture is too old to drive by; `null` if it is not.
     pub stale: Option<String>,
-    /// Whether it is stopped by an emergency: every part that can be, if this operator wants it.
+    /// Whether the vehicle is in emergency. If this operator has set it: whether every part has
+    /// confirmed it.
     pub emergency: bool,
 }
 
-/// Where a vehicle is, in the local frame.
+/// Pose of a vehicle in the local frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pose {
-    /// Metres to the north; `null` if unknown.
+    /// Metres north; `null` if unknown.
     pub x: Option<f64>,
-    /// Metres to the east; `null` if unknown.
+    /// Metres east; `null` if unknown.
     pub y: Option<f64>,
     /// Radians clockwise from north; `null` if unknown.
     pub yaw: Option<f64>,
-    /// Milliseconds since the sample was taken, by its time stamp; without one, since the report
-    /// arrived.
+    /// Milliseconds since the sample was taken according to its time stamp, or since the report
+    /// arrived without a stamp.
     pub age_ms: u64,
 }
 
-/// How a vehicle moves.
+/// Velocity of a vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Velocity {
-    /// Metres per second ahead; `null` if unknown.
+    /// Forward speed in metres per second; `null` if unknown.
     pub x: Option<f64>,
-    /// Radians per second clockwise; `null` if unknown.
+    /// Clockwise yaw rate in radians per second; `null` if unknown.
     pub yaw_rate: Option<f64>,
-    /// Milliseconds since the sample was taken, as for the pose.
+    /// Age of the sample in milliseconds, as for the pose.
     pub age_ms: u64,
 }
 
 /// A component of the vehicle.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Part {
-    /// Its id.
+    /// JAUS id.
     pub id: String,
-    /// What it does in the vehicle, for example `primitive_driver`.
+    /// Role in the vehicle, for example `primitive_driver`.
     pub role: &'static str,
-    /// Whether it can be managed: a sensor or a store has no state, and nobody controls it.
+    /// Whether it offers Management. Sensors and stores have no state and no controller.
     pub managed: bool,
-    /// Its state in Management, for example `ready`.
+    /// Management state, for example `ready`.
     pub state: Option<&'static str>,
-    /// Milliseconds since it reported that state.
+    /// Milliseconds since that state was reported.
     pub state_age_ms: Option<u64>,
-    /// Who controls it.
+    /// JAUS id of the client in control.
     pub controller: Option<String>,
-    /// With which authority.
+    /// Authority of that client.
     pub authority: Option<u8>,
-    /// Whether this operator controls it.
+    /// Whether this operator is in control.
     pub ours: bool,
-    /// Why it is not under control though that is wanted.
+    /// Why it is not under control although it should be.
     pub obstacle: Option<String>,
-    /// How far its stage of the waterfall is.
+    /// State of its stage of the mission.
     pub stage: Option<Stage>,
-    /// Milliseconds since it last reported anything.
+    /// Milliseconds since its last report.
     pub age_ms: Option<u64>,
 }
 
 /// A component of the vehicle that has disappeared or fallen silent.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Missing {
-    /// Its id.
+    /// JAUS id.
     pub id: String,
-    /// What it does in the vehicle, for example `primitive_driver`.
+    /// Role in the vehicle, for example `primitive_driver`.
     pub role: &'static str,
-    /// The same for people, for example `Primitive Driver`.
+    /// Display name, for example `Primitive Driver`.
     pub name: String,
-    /// `gone` if Discovery has lost it, `silent` if its reports have stopped.
+    /// `gone` if discovery has lost it, `silent` if its reports have ceased.
     pub how: &'static str,
     /// Milliseconds since its last report.
     pub age_ms: Option<u64>,
 }
 
-/// How far a stage is.
+/// State of a stage.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Stage {
-    /// For example `active`.
+    /// State, for example `active`.
     pub state: &'static str,
-    /// Percent.
+    /// Progress in percent.
     pub progress: u8,
-    /// Why it does not go on.
+    /// Why it is blocked.
     pub reason: String,
 }
 
-/// Whether the operator is in control.
+/// Control state of the operator.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Default)]
 pub struct Control {
-    /// Control of what is needed now is held: of the primitive driver, or of the planner while it
-    /// drives.
+    /// Whether control of the essential part is held: of the primitive driver, or of the planner
+    /// while it drives.
     pub held: bool,
-    /// Whether it is wanted.
+    /// Whether control is wanted.
     pub wanted: bool,
-    /// What is in the way.
+    /// Why control is not complete.
     pub reason: String,
 }
 
 /// Manual drive.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct Drive {
-    /// Whether somebody drives.
+    /// Whether a page drives.
     pub active: bool,
-    /// Ahead, -1 to 1.
+    /// Forward, -1 to 1.
     pub forward: f64,
-    /// To the right, -1 to 1.
+    /// Right, -1 to 1.
     pub turn: f64,
-    /// Why the station ended it although the stick was not let go; empty otherwise.
+    /// Why the station ended manual drive although the stick was not released; empty otherwise.
     pub reason: String,
 }
 
 /// The planner's mission.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mission {
-    /// Its number.
+    /// Mission number.
     pub mission: u32,
-    /// How far it is, for example `driving`.
+    /// Stage, for example `driving`.
     pub stage: &'static str,
-    /// Which try this is.
+    /// Current attempt.
     pub attempt: u8,
-    /// How many there are at most.
+    /// Maximum number of attempts.
     pub attempts: u8,
-    /// Percent.
+    /// Progress in percent.
     pub progress: u8,
     /// Metres north and east.
     pub destination: [f64; 2],
-    /// How much of the path lies ahead.
+    /// Remaining length of the path in metres.
     pub remaining_m: f64,
-    /// Why it does not go on.
+    /// Why it is blocked.
     pub reason: String,
-    /// The points of its path, metres north and east, at most 500.
+    /// Points of the path, in metres north and east, at most 500.
     pub path: Vec<[f64; 2]>,
-    /// Milliseconds since it was reported.
+    /// Milliseconds since the report.
     pub age_ms: u64,
     /// The planner, if it was lost while it drove.
     pub lost: Option<LostPlanner>,
@@ -224,36 +225,36 @@ pub struct Mission {
 /// A planner that was lost while it drove.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct LostPlanner {
-    /// Its id.
+    /// JAUS id.
     pub id: String,
     /// `gone` or `silent`, as for [`Missing`].
     pub how: &'static str,
-    /// Whether this station has told the drivers to stop: it can if it controlled the planner.
+    /// Whether this station has stopped the drivers, which requires that it controlled the planner.
     pub told_to_stop: bool,
 }
 
-/// A map of the vehicle's world model; its cells are asked for separately.
+/// A map of the vehicle's world model, without its cells, which have their own request.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Map {
-    /// Its number.
+    /// Map number.
     pub id: u16,
-    /// What it is called.
+    /// Name.
     pub name: String,
-    /// Cells along X.
+    /// Number of cells along X.
     pub rows: u16,
-    /// Cells along Y.
+    /// Number of cells along Y.
     pub columns: u16,
-    /// How long and wide a cell is.
+    /// Side length of a cell in metres.
     pub cell_m: f64,
-    /// Metres north of its south-west corner.
+    /// X of the south-west corner, in metres north.
     pub x: f64,
-    /// Metres east of its south-west corner.
+    /// Y of the south-west corner, in metres east.
     pub y: f64,
-    /// Raised by every change.
+    /// Revision, raised by every change.
     pub revision: u32,
 }
 
-/// A map at one of its revisions.
+/// A map at a certain revision.
 pub(crate) type Edition = (u16, u32);
 
 impl Map {

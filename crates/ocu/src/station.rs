@@ -1,4 +1,4 @@
-//! The operator's station as a ready component: settings, the listening socket, and the run.
+//! The operator station as a complete component: settings, listening socket and main loop.
 
 use std::convert::Infallible;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -11,42 +11,42 @@ use super::token::Token;
 use jaus::link::interface;
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
-/// An operator's station, with its page.
+/// An operator station with its page.
 #[derive(Debug, Clone)]
 pub struct Station {
-    /// The vehicle to look at; the first that is discovered without one.
+    /// The vehicle to monitor. `None` selects the first one discovered.
     pub vehicle: Option<u16>,
-    /// With which authority it asks for control, 0 to 255.
+    /// Authority for control requests, 0 to 255.
     pub authority: u8,
-    /// Where the page is.
+    /// Address of the page.
     pub listen: Listen,
-    /// What an operator has to show before the vehicle obeys. Without one, nothing is needed on the
-    /// loopback interface, and one is made up elsewhere.
+    /// The token an operator must show before the vehicle obeys. Without one, the loopback
+    /// interface needs none, and other addresses get a generated one.
     pub token: Option<Token>,
-    /// Whether the token is needed to look, too.
+    /// Whether reading also requires the token.
     pub token_to_read: bool,
-    /// Names under which the page is known, beside `localhost` and the addresses of this machine.
+    /// Host names of the page, in addition to `localhost` and the addresses of this machine.
     pub hosts: Vec<String>,
 }
 
-/// Where a page is.
+/// Address of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Listen {
-    /// On the loopback interface, at port 8080 or the next that is free.
+    /// The loopback interface, at port 8080 or the next free port.
     Loopback,
-    /// At an address; port 0 stands for any that is free.
+    /// A given address; port 0 selects any free port.
     At(SocketAddr),
 }
 
 impl Listen {
-    /// The first port that is tried …
+    /// First port to try.
     const PORT: u16 = 8080;
-    /// … and how many after it.
+    /// Number of further ports to try.
     const PORTS: u16 = 20;
 }
 
 impl Default for Station {
-    /// The first vehicle, with the authority 200, for people at this machine alone.
+    /// The first vehicle discovered, authority 200, on the loopback interface only.
     fn default() -> Self {
         Self {
             vehicle: None,
@@ -60,10 +60,10 @@ impl Default for Station {
 }
 
 impl Station {
-    /// Listens for pages, which reach the session once the station runs.
+    /// Opens the listening socket. Pages reach the session once the station runs.
     ///
     /// # Errors
-    /// If the address can not be listened at.
+    /// If listening at the address fails.
     pub async fn open(mut self) -> Result<OpenStation, PartError> {
         let listener = listen(self.listen).await?;
         let address = listener
@@ -81,7 +81,7 @@ impl Station {
     }
 }
 
-/// A station whose address is known.
+/// A station with an open listening socket.
 #[derive(Debug)]
 pub struct OpenStation {
     station: Station,
@@ -90,13 +90,13 @@ pub struct OpenStation {
 }
 
 impl OpenStation {
-    /// Where it listens.
+    /// The listening address.
     #[must_use]
     pub const fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Addresses of the page, with the token if one is needed: for whoever starts the station.
+    /// URLs of the page, including the token if one is needed, for the user who starts the station.
     #[must_use]
     pub fn urls(&self) -> Vec<String> {
         let token = self.station.token.as_ref();
@@ -174,7 +174,7 @@ async fn listen(listen: Listen) -> Result<TcpListener, PartError> {
     }
 }
 
-/// The addresses of this machine that another one may reach, or the loopback one.
+/// The addresses of this machine that others may reach, or else the loopback address.
 fn own_addresses() -> Vec<IpAddr> {
     const MOST: usize = 4;
     let all = interface::list().unwrap_or_default();

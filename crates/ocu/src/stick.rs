@@ -1,33 +1,33 @@
-//! The stick of manual drive: who holds it, what it says, and the dead man's rule, by which the
-//! vehicle stops when nothing more comes from whoever drives.
+//! The stick of manual drive: its holder, its position, and the dead-man rule that stops the
+//! vehicle when pushes cease.
 
 use std::time::{Duration, Instant};
 
 use super::PageId;
 
-/// Where the stick is pushed, each from -1 to 1.
+/// Stick position, each axis from -1 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Push {
     forward: f64,
     turn: f64,
 }
 
-/// Another page drives.
+/// Error: another page is driving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("another page drives now; it has to let go first")]
 pub struct Busy;
 
-/// One stick for all pages: the first to push holds it until it lets go or falls silent.
+/// One stick for all pages. The first page to push holds it until it releases it or falls silent.
 #[derive(Debug, Default)]
 pub struct Stick {
     phase: Phase,
-    /// Whether the page that drove has fallen silent, and no page has driven since.
+    /// Whether the driving page fell silent and no page has driven since.
     fell_silent: bool,
 }
 
 #[derive(Debug, Default)]
 enum Phase {
-    /// Nobody drives, and the vehicle knows that.
+    /// No page drives, and the vehicle has confirmed it.
     #[default]
     Rest,
     Driven {
@@ -35,31 +35,31 @@ enum Phase {
         push: Push,
         heard: Instant,
     },
-    /// Nobody drives any more, and the vehicle is being told.
+    /// No page drives any more, and the vehicle is being stopped.
     Stopping { since: Instant },
 }
 
 impl Push {
-    /// A stick that is let go.
+    /// A released stick.
     pub const NONE: Self = Self {
         forward: 0.0,
         turn: 0.0,
     };
 
-    /// Ahead and to the right are positive; `None` if one of them is not from -1 to 1.
+    /// Creates a push. Forward and right are positive; `None` if a value is outside -1 to 1.
     #[must_use]
     pub fn new(forward: f64, turn: f64) -> Option<Self> {
         let possible = |share: f64| (-1.0..=1.0).contains(&share);
         (possible(forward) && possible(turn)).then_some(Self { forward, turn })
     }
 
-    /// Ahead, from -1 to 1.
+    /// Forward, from -1 to 1.
     #[must_use]
     pub const fn forward(self) -> f64 {
         self.forward
     }
 
-    /// To the right, clockwise from above, from -1 to 1.
+    /// Right, clockwise from above, from -1 to 1.
     #[must_use]
     pub const fn turn(self) -> f64 {
         self.turn
@@ -67,16 +67,16 @@ impl Push {
 }
 
 impl Stick {
-    /// Without a push for so long, the vehicle stops.
+    /// Dead-man timeout: without a push for this time, the vehicle stops.
     pub const DEAD_MAN: Duration = Duration::from_millis(300);
-    /// The vehicle is told to stop for so long at most, if it never says that it knows: by then its
-    /// own rule has stopped it.
+    /// Maximum time to repeat the stop command without an acknowledgement. By then the vehicle's
+    /// own timeout has stopped it.
     pub const STOPPING: Duration = Duration::from_secs(3);
 
-    /// A page pushes the stick.
+    /// Handles a push from a page.
     ///
     /// # Errors
-    /// If another page holds it.
+    /// If another page holds the stick.
     pub fn handle_push(&mut self, now: Instant, page: PageId, push: Push) -> Result<(), Busy> {
         self.handle_time(now);
         match &self.phase {
@@ -93,21 +93,21 @@ impl Stick {
         }
     }
 
-    /// A page lets go, or is gone. Without effect unless it holds the stick.
+    /// Handles a release by a page or its disconnection. Only the holder can release the stick.
     pub fn handle_release(&mut self, now: Instant, page: PageId) {
         if matches!(self.phase, Phase::Driven { page: holder, .. } if holder == page) {
             self.stop(now);
         }
     }
 
-    /// The vehicle has acknowledged that nothing pushes it.
+    /// Handles the vehicle's acknowledgement of the stop.
     pub fn handle_stopped(&mut self) {
         if matches!(self.phase, Phase::Stopping { .. }) {
             self.phase = Phase::Rest;
         }
     }
 
-    /// Time has passed: a stick that nobody seems to hold any more is let go.
+    /// Applies the timeouts: releases a stick without pushes.
     pub fn handle_time(&mut self, now: Instant) {
         match self.phase {
             Phase::Driven { heard, .. } if now >= heard + Self::DEAD_MAN => {
@@ -119,14 +119,14 @@ impl Stick {
         }
     }
 
-    /// Takes the stick out of every hand.
+    /// Releases the stick, whichever page holds it.
     pub fn stop(&mut self, now: Instant) {
         if matches!(self.phase, Phase::Driven { .. }) {
             self.phase = Phase::Stopping { since: now };
         }
     }
 
-    /// What the vehicle is to be told now; nothing if it is at rest.
+    /// The setpoint to send now; `None` at rest.
     #[must_use]
     pub fn poll_push(&mut self, now: Instant) -> Option<Push> {
         self.handle_time(now);
@@ -137,13 +137,13 @@ impl Stick {
         }
     }
 
-    /// Whether driving ended because nothing came from the page any more.
+    /// Whether driving ended because the page fell silent.
     #[must_use]
     pub const fn fell_silent(&self) -> bool {
         self.fell_silent
     }
 
-    /// What is pushed, if somebody drives.
+    /// The current push, if a page drives.
     #[must_use]
     pub const fn driven(&self) -> Option<Push> {
         match self.phase {

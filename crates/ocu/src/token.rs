@@ -4,23 +4,23 @@ use std::fmt;
 use std::hint::black_box;
 use std::path::Path;
 
-/// What an operator has to show: from a file, or made up for one run.
+/// Access token of an operator: from a file, or generated for one run.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 
-/// Why there is no token.
+/// Why no token is available.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TokenError {
-    /// The file can not be read.
+    /// The file cannot be read.
     #[error("the token file {file} can not be read: {source}")]
     Unreadable {
-        /// Which file.
+        /// The file.
         file: String,
-        /// Why not.
+        /// The cause.
         source: std::io::Error,
     },
-    /// What it holds is no secret.
+    /// The content is unsuitable as a token.
     #[error(
         "the token file {file} holds {length} characters: write one line of {} to {} letters and \
          digits into it, such as `openssl rand -hex 16` prints",
@@ -28,29 +28,29 @@ pub enum TokenError {
         Token::LONGEST
     )]
     Unsuitable {
-        /// Which file.
+        /// The file.
         file: String,
-        /// How many characters it holds, without spaces around them.
+        /// Number of characters, without surrounding whitespace.
         length: usize,
     },
-    /// The system has no randomness.
+    /// The system provides no random numbers.
     #[error("no token can be made up, because the system gives no random numbers: {0}")]
     NoRandomness(getrandom::Error),
 }
 
 impl Token {
-    /// The shortest that is accepted.
+    /// Minimum length of a token.
     pub const SHORTEST: usize = 16;
-    /// The longest that is accepted.
+    /// Maximum length of a token.
     pub const LONGEST: usize = 256;
-    /// Octets of randomness in one that is made up.
+    /// Random octets in a generated token.
     const RANDOM: usize = 16;
 
-    /// Takes the token from a file of one line.
+    /// Reads the token from a file of one line.
     ///
     /// # Errors
-    /// If the file can not be read, or holds something too short, too long, or with other characters
-    /// than letters, digits and `-._~`.
+    /// If the file cannot be read, or its content is too short, too long, or contains characters
+    /// other than letters, digits and `-._~`.
     pub fn read(file: &Path) -> Result<Self, TokenError> {
         let name = || file.display().to_string();
         let text = std::fs::read_to_string(file).map_err(|source| TokenError::Unreadable {
@@ -63,8 +63,8 @@ impl Token {
         })
     }
 
-    /// A token of one's own; `None` if it is too short, too long, or would have to be quoted in an
-    /// address.
+    /// Creates a token from a text; `None` if it is too short, too long, or would need quoting in a
+    /// URL.
     #[must_use]
     pub fn new(text: &str) -> Option<Self> {
         let plain = |it: u8| it.is_ascii_alphanumeric() || b"-._~".contains(&it);
@@ -73,17 +73,17 @@ impl Token {
         suits.then(|| Self(text.to_owned()))
     }
 
-    /// Makes one up: 32 hexadecimal digits.
+    /// Generates a token of 32 hexadecimal digits.
     ///
     /// # Errors
-    /// If the system gives no random numbers.
+    /// If the system provides no random numbers.
     pub fn generate() -> Result<Self, TokenError> {
         let mut octets = [0; Self::RANDOM];
         getrandom::fill(&mut octets).map_err(TokenError::NoRandomness)?;
         Ok(Self(octets.iter().map(|it| format!("{it:02x}")).collect()))
     }
 
-    /// Whether this is what was shown; how long that takes says nothing about where they differ.
+    /// Compares with a shown token, in constant time for equal lengths.
     #[must_use]
     pub fn is(&self, shown: &str) -> bool {
         if shown.len() != self.0.len() {
@@ -94,7 +94,7 @@ impl Token {
         difference == 0
     }
 
-    /// The token itself, to be shown to the operator.
+    /// The token as text, for display to the operator.
     #[must_use]
     pub fn reveal(&self) -> &str {
         &self.0

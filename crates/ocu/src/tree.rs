@@ -1,9 +1,9 @@
-//! The tree of subsystems, nodes, components and services as pages show it.
+//! The tree of subsystems, nodes, components and services for pages.
 
 use super::state::{Component, Node, Service, Subsystem};
 use jaus::service::{self, Directory, Identification, Offer};
 
-/// The most components that a page is told of.
+/// Maximum number of components in a snapshot.
 const MOST: usize = 1000;
 
 pub(super) fn of(directory: &Directory) -> Vec<Subsystem> {

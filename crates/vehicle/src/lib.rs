@@ -1,16 +1,17 @@
-//! The reference ground vehicle: what it takes beyond a JAUS stack to make a vehicle drive a mission.
+//! The reference ground vehicle: everything above the JAUS stack that a vehicle needs to drive a
+//! mission.
 //!
 //! | module | contents |
 //! |---|---|
 //! | [`motion`] | a platform, real or simulated, and the motion control over it |
 //! | [`actuator`] | wheels and what turns them: a simulated motor, stepper motors on GPIO lines |
-//! | [`world`] | vector objects and raster maps, their index, and the file that keeps them |
+//! | [`world`] | vector objects and raster maps, their index and their file |
 //! | [`mission`] | path planning over a map, and the stages of a mission |
 //! | [`mobility`] | the services of the mobility set (AS6009), which command a [`motion::Pilot`] |
-//! | [`ground`] | our own services: world model, missions, stages, odometry |
-//! | [`parts`] | ready components, each of which a program runs |
+//! | [`ground`] | this project's own services: world model, missions, stages, odometry |
+//! | [`parts`] | complete components, one per program |
 //!
-//! From `mobility` and `ground` down, nothing opens a socket or reads a clock.
+//! `mobility`, `ground` and the modules below them open no sockets and read no clocks.
 #![forbid(unsafe_code)]
 
 pub mod actuator;

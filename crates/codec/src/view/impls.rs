@@ -1,4 +1,4 @@
-//! The views of what generated types are made of.
+//! Views of the field types that generated messages consist of.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use bytes::Bytes;
 use super::{Error, Object, Value, View};
 use crate::{Bits, FormattedBlob, OutOfRange, Scale, Text, bits};
 
-/// The member for the bits of a bit field that no sub-field owns.
+/// Member name for the bits of a bit field outside all sub-fields.
 const RESERVED: &str = "_reserved";
 
 macro_rules! integer {
@@ -50,7 +50,7 @@ impl View for f64 {
 }
 
 impl View for f32 {
-    /// The `f64` with the same shortest decimal: 0.1, not 0.10000000149011612.
+    /// Widens to the `f64` with the same shortest decimal: 0.1, not 0.10000000149011612.
     fn view(&self) -> Value {
         let decimal = self.to_string().parse().unwrap_or(f64::from(*self));
         if decimal as Self == *self {
@@ -145,7 +145,7 @@ impl View for Bytes {
 fn hex(octets: &[u8]) -> Value {
     let mut text = String::with_capacity(2 * octets.len());
     for octet in octets {
-        // Writing to a string does not fail.
+        // Writing to a string never fails.
         let _ = write!(text, "{octet:02x}");
     }
     Value::Text(text.into())
@@ -176,17 +176,17 @@ impl<F: View> View for FormattedBlob<F> {
     }
 }
 
-/// What people see of a scaled integer.
+/// The view of a scaled integer.
 #[doc(hidden)]
 #[inline(never)]
 pub fn scaled(scale: &Scale, raw: u64) -> Value {
     Value::Real(scale.shortest(raw))
 }
 
-/// The scaled integer that people mean.
+/// Reads a scaled integer from its view.
 ///
 /// # Errors
-/// If it is not a number in the range.
+/// If the view is not a number in the range.
 #[doc(hidden)]
 #[inline(never)]
 pub fn raw_scaled(
@@ -198,7 +198,7 @@ pub fn raw_scaled(
     Ok(scale.raw(number).ok_or_else(|| out_of_range(number))?)
 }
 
-/// What people see of a bit field.
+/// The view of a bit field.
 #[doc(hidden)]
 pub fn bits<B: Bits>(field: B) -> Value {
     let raw = field.raw();
@@ -213,7 +213,7 @@ pub fn bits<B: Bits>(field: B) -> Value {
     Value::Object(members)
 }
 
-/// The integer of a bit field from what people write; a sub-field that is left out is 0.
+/// Reads the integer of a bit field from its view. Omitted sub-fields are 0.
 ///
 /// # Errors
 /// If a number does not fit its bits.
@@ -244,7 +244,7 @@ pub fn raw_bits<B: Bits>(value: &Value) -> Result<u64, Error> {
     Ok(raw)
 }
 
-/// The bits of a sub-field in their place.
+/// The bits of a sub-field, shifted into position.
 fn sub_field<B: Bits>(name: &str, value: &Value, from: u32, to: u32) -> Result<u64, Error> {
     let number = value.named(B::names(name))?.integer::<u64>()?;
     let greatest = u64::MAX >> (63 - (to - from));
@@ -254,7 +254,7 @@ fn sub_field<B: Bits>(name: &str, value: &Value, from: u32, to: u32) -> Result<u
     Ok(number << from)
 }
 
-/// What people see of a `variable_field`.
+/// The view of a `variable_field`.
 #[doc(hidden)]
 pub fn choice_of<T: View>(index: u8, units: &'static str, value: &T) -> Value {
     Value::object(3)
@@ -263,10 +263,10 @@ pub fn choice_of<T: View>(index: u8, units: &'static str, value: &T) -> Value {
         .with("value", value.view())
 }
 
-/// The value of a `variable_field` whose index chooses its type.
+/// Reads a `variable_field`, whose index selects the type.
 ///
 /// # Errors
-/// Those of `read`, which is given the index and the value; a missing or unknown key.
+/// If a key is missing or unknown. Errors from `read`, which receives the index and the value.
 #[doc(hidden)]
 pub fn choice<T>(
     value: &Value,

@@ -1,4 +1,4 @@
-//! What people read and write: messages as trees of names and plain values, for JSON and its like.
+//! Human-readable views: messages as trees of names and plain values, for JSON and similar formats.
 //!
 //! | in the definition | in the view |
 //! |---|---|
@@ -13,8 +13,8 @@
 //! | raw octets | lower-case hex text; with a format, `{"format": 1, "data": "…"}` |
 //! | variable fields | `{"index": 1, "units": "meter", "value": 2.5}` |
 //!
-//! Every generated type has a [`View`], and through it serde's `Serialize` and `Deserialize` (for
-//! formats that describe themselves).
+//! Every generated type implements [`View`], and on top of it serde's `Serialize` and `Deserialize`
+//! (for self-describing formats).
 
 mod impls;
 mod value;
@@ -31,24 +31,25 @@ pub use impls::{bits, choice, choice_of, raw_bits, raw_scaled, scaled};
 
 use super::OutOfRange;
 
-/// A type that people can read and write.
+/// A type with a human-readable view.
 pub trait View: Sized {
-    /// What people see.
+    /// Converts to the view.
     fn view(&self) -> Value;
 
-    /// The value that people mean.
+    /// Converts from the view.
     ///
     /// # Errors
-    /// If it is not of the form described [above](self), or outside the limits of a field.
+    /// If the view does not have the form described [above](self), or a value exceeds the limits of
+    /// its field.
     fn from_view(value: &Value) -> Result<Self, Error>;
 
-    /// What a member stands for that is not there, if it may be left out.
+    /// Default for an absent member, if it is optional.
     fn absent() -> Option<Self> {
         None
     }
 }
 
-/// What is wrong with a view, and at which field.
+/// Cause and location of an invalid view.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Error {
     /// Innermost first.
@@ -57,7 +58,7 @@ pub struct Error {
 }
 
 impl Error {
-    /// A mistake in the value itself.
+    /// An error in the value itself.
     pub fn new(sentence: impl Into<String>) -> Self {
         Self {
             path: Vec::new(),
@@ -65,7 +66,7 @@ impl Error {
         }
     }
 
-    /// A key that is none of those known.
+    /// An unknown key, with the list of known keys.
     pub fn unknown_key(key: &str, known: &[&str]) -> Self {
         let known = if known.is_empty() {
             "none".to_owned()
@@ -75,7 +76,7 @@ impl Error {
         Self::new(format!("unknown key \"{key}\"; known here: {known}"))
     }
 
-    /// Adds the member in which the mistake was met.
+    /// Adds the enclosing member to the path.
     #[cold]
     #[inline(never)]
     #[must_use]
@@ -84,7 +85,7 @@ impl Error {
         self
     }
 
-    /// Adds the index of the element in which the mistake was met.
+    /// Adds the index of the enclosing element to the path.
     #[must_use]
     pub fn element(mut self, index: usize) -> Self {
         self.path.push(format!("[{index}]"));
@@ -115,7 +116,7 @@ impl From<OutOfRange> for Error {
     }
 }
 
-/// Gives a type that has a [`View`] serde's `Serialize` and `Deserialize`.
+/// Implements serde's `Serialize` and `Deserialize` for a type with a [`View`].
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __codec_view_serde {

@@ -1,4 +1,4 @@
-//! The tree of plain values between a message and a text format.
+//! The tree of plain values between messages and text formats.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -8,16 +8,16 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::{Error, View};
 
-/// A plain value, as text formats have them.
+/// A plain value of a text format.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
-    /// Nothing; an absent member when it is read.
+    /// Null. When reading, it stands for an absent member.
     Null,
-    /// True or false; no message has one.
+    /// True or false. No message field uses it.
     Bool(bool),
-    /// An integer that is not negative.
+    /// A non-negative integer.
     Unsigned(u64),
-    /// A negative integer, when it is read; any signed field, when it is shown.
+    /// A negative integer when reading; any signed field when writing.
     Signed(i64),
     /// A real number.
     Real(f64),
@@ -25,17 +25,17 @@ pub enum Value {
     Text(Cow<'static, str>),
     /// An array.
     List(Vec<Self>),
-    /// Names and values, in order.
+    /// Names and values, ordered.
     Object(Vec<(Cow<'static, str>, Self)>),
 }
 
 impl Value {
-    /// An object without members, with room for some.
+    /// Creates an empty object with capacity for `members` members.
     pub fn object(members: usize) -> Self {
         Self::Object(Vec::with_capacity(members))
     }
 
-    /// The object with one more member; nothing is added for one that is absent.
+    /// Adds a member and returns the object. A [`Null`](Self::Null) value adds nothing.
     #[inline(never)]
     #[must_use]
     pub fn with(mut self, name: &'static str, value: Self) -> Self {
@@ -47,17 +47,17 @@ impl Value {
         self
     }
 
-    /// An array of shown elements.
+    /// Creates an array of the elements' views.
     pub fn list<'a, T: View + 'a>(elements: impl IntoIterator<Item = &'a T>) -> Self {
         Self::List(elements.into_iter().map(View::view).collect())
     }
 
-    /// An object whose one key is the name of the chosen alternative.
+    /// Creates an object whose only key is the name of the selected alternative.
     pub fn alternative(name: &'static str, value: Self) -> Self {
         Self::Object(vec![(Cow::Borrowed(name), value)])
     }
 
-    /// The name of the chosen alternative, and its value.
+    /// The name and value of the selected alternative.
     ///
     /// # Errors
     /// If it is not an object with one key.
@@ -68,10 +68,10 @@ impl Value {
         }
     }
 
-    /// The elements of an array, each read and its index added to errors.
+    /// Reads the elements of an array and adds the index to errors.
     ///
     /// # Errors
-    /// If it is not an array; those of the elements.
+    /// If the value is not an array. Errors of the elements.
     pub fn elements<T: View>(&self) -> Result<Vec<T>, Error> {
         let Self::List(elements) = self else {
             return Err(self.unexpected("an array"));
@@ -93,7 +93,7 @@ impl Value {
         }
     }
 
-    /// The value as an integer of a type.
+    /// Converts to an integer type.
     ///
     /// # Errors
     /// If it is not an integer, or does not fit.
@@ -107,10 +107,10 @@ impl Value {
         integer.ok_or_else(|| self.unexpected(&format!("an integer of {bits} bits")))
     }
 
-    /// The value, or if it is one of the names, the integer that the name stands for.
+    /// Replaces a name with the integer it stands for. Other values are returned unchanged.
     ///
     /// # Errors
-    /// If it is another text.
+    /// If the value is a text that is not in `names`.
     pub fn named(&self, names: &[(u64, &str)]) -> Result<Self, Error> {
         let Self::Text(text) = self else {
             return Ok(self.clone());
@@ -127,13 +127,13 @@ impl Value {
         }
     }
 
-    /// The error for a value that is not what it should be.
+    /// The error for a value of an unexpected kind.
     pub(super) fn unexpected(&self, expected: &str) -> Error {
         Error::new(format!("expected {expected}, found {self}"))
     }
 }
 
-/// Names the value in an error: itself if it is short, otherwise its kind.
+/// Identifies the value in an error: the value itself if it is short, otherwise its kind.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -150,17 +150,17 @@ impl fmt::Display for Value {
     }
 }
 
-/// An object that is being read, member by member.
+/// Reads an object member by member.
 #[derive(Debug)]
 pub struct Object<'a> {
     members: &'a [(Cow<'static, str>, Value)],
 }
 
 impl<'a> Object<'a> {
-    /// Begins to read.
+    /// Starts reading.
     ///
     /// # Errors
-    /// If it is not an object, or has other members than `known`.
+    /// If the value is not an object, or has members outside `known`.
     pub fn new(value: &'a Value, known: &[&str]) -> Result<Self, Error> {
         let Value::Object(members) = value else {
             return Err(value.unexpected("an object"));
@@ -171,9 +171,9 @@ impl<'a> Object<'a> {
         Ok(Self { members })
     }
 
-    /// The value of a member, if it is there.
+    /// The value of a member, if present.
     pub fn get(&self, name: &str) -> Option<&'a Value> {
-        // The last one counts, as in JSON readers elsewhere.
+        // The last duplicate wins, as in other JSON readers.
         let member = self.members.iter().rev().find(|(member, _)| member == name);
         member.map(|(_, value)| value)
     }
@@ -181,7 +181,7 @@ impl<'a> Object<'a> {
     /// Reads a member.
     ///
     /// # Errors
-    /// If it is required but absent; its own.
+    /// If the member is required but absent. Errors of the member itself.
     pub fn member<T: View>(&self, name: &str) -> Result<T, Error> {
         match self.present(name) {
             Some(value) => T::from_view(value).map_err(|error| error.within(name)),
@@ -189,7 +189,7 @@ impl<'a> Object<'a> {
         }
     }
 
-    /// The value of a member that is neither left out nor null.
+    /// The value of a member that is present and not null.
     #[inline(never)]
     fn present(&self, name: &str) -> Option<&'a Value> {
         self.get(name).filter(|value| **value != Value::Null)
@@ -229,7 +229,7 @@ impl<'de> Deserialize<'de> for Value {
     }
 }
 
-/// Takes whatever a self-describing format has.
+/// Accepts any value of a self-describing format.
 struct AnyValue;
 
 impl<'de> Visitor<'de> for AnyValue {

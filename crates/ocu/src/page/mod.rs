@@ -1,21 +1,22 @@
-//! The operator's page: plain HTML, CSS and JavaScript modules, embedded in the binary. Nothing of
-//! it is built, and nothing is loaded from elsewhere, so that it works on a vehicle's own network
-//! without the Internet, and so that the browser can be told to run nothing else.
+//! The operator's page: plain HTML, CSS and JavaScript modules, embedded in the binary.
+//!
+//! There is no build step, and nothing is loaded from elsewhere. So the page works on a vehicle's
+//! own network without the Internet, and the browser can be told to run nothing else.
 
 /// One file of the page.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct File {
-    /// Where the server offers it, `/` first.
+    /// URL path on the server, starting with `/`.
     pub(crate) path: &'static str,
-    /// Its media type, as the server must say it.
+    /// Media type for the header `Content-Type`.
     pub(crate) content_type: &'static str,
-    /// What it holds.
+    /// Content of the file.
     pub(crate) body: &'static str,
 }
 
-/// What the browser may do with the page, as the header `Content-Security-Policy`: run its scripts
-/// and talk to the server that it came from, nothing else; not even styles or handlers written
-/// into the document, so that a name from the network can never become a program.
+/// The header `Content-Security-Policy`: the page may run its own scripts and talk to its own
+/// server, nothing else. Inline styles and event handlers are blocked as well, so a name from the
+/// network can never become code.
 pub(crate) const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
     img-src 'self'; connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; \
     frame-ancestors 'none'";

@@ -1,4 +1,4 @@
-//! What the picture says about parts that are missing and reports that are old.
+//! The picture with missing parts and outdated reports.
 
 use super::*;
 use jaus::messages::core::{ReportStatus, management};
@@ -68,7 +68,7 @@ fn mission(stage: u8) -> ReportMission {
     }
 }
 
-/// Everything is reported.
+/// Reports everything.
 fn report_all(picture: &mut Picture, now: Instant) {
     picture.handle_report(now, DRIVER, ReportStatus::default().into());
     picture.handle_report(now, SENSORS, pose().into());

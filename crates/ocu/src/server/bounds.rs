@@ -1,12 +1,11 @@
-//! How much a page may say.
+//! Limits on the frames from a page.
 
 use std::time::{Duration, Instant};
 
-/// The largest frame of a page, in octets; the largest request has a tenth of it.
+/// Maximum frame size in octets. The largest request takes a tenth of it.
 pub(super) const LARGEST_FRAME: usize = 4096;
 
-/// How often a page may say something: a bucket that fills evenly and that every frame takes
-/// something out of.
+/// Token bucket that limits the frame rate of a page.
 #[derive(Debug)]
 pub(super) struct Rate {
     left: u32,
@@ -14,9 +13,9 @@ pub(super) struct Rate {
 }
 
 impl Rate {
-    /// Frames at once: what a page that was held up says when it goes on.
+    /// Burst size: the frames that a page sends after a delay.
     const BURST: u32 = 100;
-    /// Between two frames in the long run: five times what a page does that drives.
+    /// Refill period of one frame: five times the rate of a page that drives.
     const PERIOD: Duration = Duration::from_millis(20);
 
     pub(super) const fn new(now: Instant) -> Self {
@@ -26,7 +25,7 @@ impl Rate {
         }
     }
 
-    /// Whether one more frame is all right.
+    /// Whether another frame is within the limit.
     pub(super) fn allows(&mut self, now: Instant) -> bool {
         while self.left < Self::BURST && self.filled + Self::PERIOD <= now {
             self.filled += Self::PERIOD;

@@ -1,4 +1,4 @@
-//! The connections of all browsers together: how many there may be, and how long one may be silent.
+//! Limits on browser connections: their number and their idle time.
 
 use std::io;
 use std::net::SocketAddr;
@@ -13,13 +13,13 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{Instant, Sleep, sleep};
 
-/// A listener that takes in so many and no more.
+/// A listener with a limited number of connections.
 pub(super) struct Connections {
     listener: TcpListener,
     places: Arc<Semaphore>,
 }
 
-/// A connection that ends when nothing comes for too long.
+/// A connection with an idle timeout.
 pub(super) struct Connection {
     stream: TcpStream,
     silence: Pin<Box<Sleep>>,
@@ -27,13 +27,13 @@ pub(super) struct Connection {
 }
 
 impl Connections {
-    /// More than all pages need, and far below the number of files that a process may open.
+    /// Connection limit: more than all pages need, and far below the usual limit of open files.
     const MOST: usize = 256;
-    /// Pages answer pings more often than that.
+    /// Idle timeout. Pages answer pings more often than this.
     const SILENCE: Duration = Duration::from_secs(30);
-    /// Before it is tried again when the system gives no connection.
+    /// Delay before the next attempt after a failed accept.
     const PAUSE: Duration = Duration::from_millis(100);
-    /// What those hear that find no place.
+    /// Response when the connection limit is reached.
     const NO_PLACE: &[u8] =
         b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
 
@@ -59,7 +59,7 @@ impl Listener for Connections {
                     continue;
                 }
             };
-            // Snapshots and commands are small and wanted at once; without it they are only later.
+            // Send small snapshots and commands without delay. A failure only adds latency.
             let _ = stream.set_nodelay(true);
             match self.places.clone().try_acquire_owned() {
                 Ok(place) => {
@@ -72,7 +72,7 @@ impl Listener for Connections {
                 }
                 Err(_) => {
                     tracing::debug!(%address, "too many connections");
-                    // A courtesy: nobody waits for whoever does not take it at once.
+                    // Best effort: never wait for the peer.
                     let _ = stream.try_write(Self::NO_PLACE);
                 }
             }

@@ -1,11 +1,11 @@
-//! Keeps out what another site's page makes a browser ask: by its origin, and by the name under
-//! which it thinks that it reaches us, which an attacker can let point at any address.
+//! Protection against cross-site requests and DNS rebinding, by checking the headers Origin and
+//! Host.
 
 use std::net::{IpAddr, Ipv6Addr};
 
 use axum::http::{HeaderMap, StatusCode, header};
 
-/// Why a request is not answered.
+/// Why a request is rejected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Refusal {
     #[error("a request without the header Host, or with more than one, is not answered")]
@@ -29,8 +29,7 @@ impl Refusal {
     }
 }
 
-/// Whether a request comes from our own page, from somebody who typed our address, or from a
-/// program that is no browser.
+/// Accepts requests from the own page, from a typed URL, and from programs other than browsers.
 pub(super) fn check(headers: &HeaderMap, hosts: &[String]) -> Result<(), Refusal> {
     let host = sole(headers, &header::HOST).ok_or(Refusal::NoHost)?;
     let name = name_of(host);
@@ -55,14 +54,14 @@ pub(super) fn check(headers: &HeaderMap, hosts: &[String]) -> Result<(), Refusal
     }
 }
 
-/// The value of a header that is there once.
+/// The value of a header that occurs exactly once.
 fn sole(headers: &HeaderMap, name: impl header::AsHeaderName) -> Option<&str> {
     let mut values = headers.get_all(name).iter();
     let value = values.next()?;
     values.next().is_none().then_some(value)?.to_str().ok()
 }
 
-/// A host without its port.
+/// The host without its port.
 fn name_of(host: &str) -> &str {
     match host.rsplit_once(':') {
         Some((name, port)) if port.bytes().all(|it| it.is_ascii_digit()) => name,
@@ -70,7 +69,8 @@ fn name_of(host: &str) -> &str {
     }
 }
 
-/// An address can not be made to point elsewhere; a name can, unless it is ours.
+/// Whether the host is ours. Literal addresses are safe from DNS rebinding; other names must be
+/// configured.
 fn is_ours(name: &str, hosts: &[String]) -> bool {
     let inner = name.strip_prefix('[').and_then(|it| it.strip_suffix(']'));
     let is_address = name.parse::<IpAddr>().is_ok_and(|it| it.is_ipv4())

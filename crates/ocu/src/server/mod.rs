@@ -1,5 +1,5 @@
-//! The pages' server: the page's files, the WebSocket to the session, and what keeps strangers out.
-//! It holds nothing of the vehicle: snapshots pass through, requests are handed to the session.
+//! The web server: the page's files, the WebSocket to the session, and access protection. It holds
+//! no vehicle state: snapshots and requests just pass through.
 
 mod bounds;
 mod connections;
@@ -29,14 +29,14 @@ use jaus::address::JausId;
 use jaus::node::Node;
 use jaus_view::Dictionary;
 
-/// Who may come in, and whom they meet.
+/// Access rules, and the identity shown to pages.
 pub(super) struct Admission {
     pub(super) operator: JausId,
     pub(super) authority: u8,
     pub(super) token: Option<Token>,
     pub(super) token_to_read: bool,
     pub(super) hosts: Vec<String>,
-    /// The station's node, if it is in this process: what passes it can be seen.
+    /// The station's node, if it runs in this process. Enables the message view.
     pub(super) node: Option<Node>,
 }
 
@@ -45,30 +45,30 @@ pub(super) struct Server {
     shared: Arc<Shared>,
 }
 
-/// What all connections share.
+/// State shared by all connections.
 struct Shared {
     admission: Admission,
     access: Access,
     dictionary: Dictionary,
-    /// Places for pages.
+    /// Limits the number of pages.
     places: Arc<Semaphore>,
     pages: AtomicU64,
     counters: Counters,
 }
 
-/// What was kept out, since the start.
+/// Counts of rejected requests since the start.
 #[derive(Default)]
 struct Counters {
-    /// Pages that found no place.
+    /// Pages beyond the limit.
     no_place: AtomicU64,
-    /// Requests of other sites' pages, or under a name that is not ours.
+    /// Cross-site requests, and requests with an unknown host name.
     strangers: AtomicU64,
     wrong_tokens: AtomicU64,
-    /// Pages that said too much at once, or too often.
+    /// Pages that exceeded the frame size or rate.
     too_much: AtomicU64,
 }
 
-/// How the server is, for whoever supervises it.
+/// Health report for monitoring.
 #[derive(Serialize)]
 struct Health {
     ok: bool,
@@ -80,7 +80,7 @@ struct Health {
 }
 
 impl Server {
-    /// How many pages are served at once.
+    /// Maximum number of pages served at once.
     const PAGES: usize = 32;
 
     pub(super) fn new(admission: Admission, access: Access) -> Self {
@@ -97,7 +97,7 @@ impl Server {
         }
     }
 
-    /// Serves pages for as long as the listener does.
+    /// Serves pages for as long as the listener accepts connections.
     pub(super) async fn run(self, listener: TcpListener) -> std::io::Error {
         let files = page::FILES.iter().fold(Router::new(), |router, file| {
             router.route(file.path, get(move || serve_file(file)))
@@ -115,7 +115,7 @@ impl Server {
     }
 }
 
-/// Lets nobody in who comes by way of another site, and tells the browser how to treat the answer.
+/// Rejects cross-site requests, and adds the security headers to responses.
 async fn admit(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
     if let Err(refusal) = guard::check(request.headers(), &shared.admission.hosts) {
         shared.counters.strangers.fetch_add(1, Relaxed);
@@ -153,8 +153,8 @@ async fn health(State(shared): State<Arc<Shared>>) -> Json<Health> {
     })
 }
 
-/// The cells of a map, one octet each, row by row. Which revision they are of the state tells; the
-/// one in the address keeps browsers from mixing them up.
+/// The cells of a map, one octet each, row by row. The snapshot states the revision; the one in the
+/// URL only separates the entries in browser caches.
 async fn serve_map(
     State(shared): State<Arc<Shared>>,
     Path(map): Path<u16>,
@@ -166,11 +166,11 @@ async fn serve_map(
     }
     let (reply, cells) = oneshot::channel();
     let reply = Box::new(move |result| {
-        // Nobody waits any more if it can not be sent.
+        // Fails only if the request has been dropped.
         let _ = reply.send(result);
     });
     let order = Order::Cells { map, reply };
-    // If it could not be sent, nobody holds the other end.
+    // On failure the reply end is dropped as well, which is handled below.
     let _ = shared.access.orders.send(order).await;
     match cells.await {
         Ok(Ok(cells)) => {
@@ -200,12 +200,12 @@ async fn serve_page(State(shared): State<Arc<Shared>>, upgrade: WebSocketUpgrade
 }
 
 impl Shared {
-    /// Whether somebody who has shown nothing yet may change the vehicle.
+    /// Whether changing the vehicle requires a token.
     fn needs_token(&self) -> bool {
         self.admission.token.is_some()
     }
 
-    /// Whether what was shown is the token; what is wrong is counted.
+    /// Whether the shown token is right. Wrong tokens are counted.
     fn admits(&self, shown: &str) -> bool {
         let right = self
             .admission
@@ -218,7 +218,7 @@ impl Shared {
         right
     }
 
-    /// Whether a request may look at what the vehicle tells.
+    /// Whether a request may read vehicle data.
     fn lets_read(&self, headers: &HeaderMap) -> bool {
         let shown = headers.get(header::AUTHORIZATION);
         let shown = shown.and_then(|it| it.to_str().ok()?.strip_prefix("Bearer "));

@@ -1,5 +1,5 @@
-//! One page's WebSocket: what it says goes to the session, snapshots and answers come back. Reading
-//! and writing are independent, so that a page that does not keep up can still stop the vehicle.
+//! The WebSocket of one page: requests to the session, snapshots and answers back. Reading and
+//! writing are independent, so that a page that reads slowly can still stop the vehicle.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -20,22 +20,22 @@ use crate::request::{Frame, MessageFilter, OperatorRequest, Said};
 use crate::session::{Order, Reply};
 use jaus_view::Filter;
 
-/// The version of the protocol between page and station.
+/// Version of the protocol between page and station.
 const VERSION: u32 = 1;
-/// Answers that may wait for a page; a page that takes none loses further ones.
+/// Limit of queued answers per page. Further answers are dropped.
 const ANSWERS: usize = 64;
-/// A page that takes nothing for so long is given up.
+/// A page that accepts no data for this time is disconnected.
 const STUCK: Duration = Duration::from_secs(5);
-/// Between two pings, to which a page's browser answers by itself.
+/// Ping interval. Browsers answer pings automatically.
 const PING: Duration = Duration::from_secs(5);
-/// How long a wrong token is thought about.
+/// Delay of the reply to a wrong token.
 const WRONG_TOKEN: Duration = Duration::from_secs(1);
-/// After so many of them the connection ends.
+/// Number of wrong tokens after which the connection is closed.
 const WRONG_TOKENS: u32 = 5;
-/// Between two refusals that answer no request in particular.
+/// Minimum interval between refusals of requests without an id.
 const REFUSAL: Duration = Duration::from_secs(1);
 
-/// Serves a page until it goes, or has to.
+/// Serves a page until either side closes the connection.
 pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>) {
     let page = PageId(shared.pages.fetch_add(1, Relaxed));
     let (mut sink, stream) = socket.split();
@@ -56,7 +56,7 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>) {
         parting = reader.run(stream) => parting,
         () = write(&mut sink, &shared, &trusted, waiting, chosen) => None,
     };
-    // The hand that was on the stick is gone, whatever else is.
+    // Release the stick first, since the page that may hold it is gone.
     let _ = shared.access.orders.send(Order::Gone(page)).await;
     if let Some((code, reason)) = parting {
         let frame = CloseFrame {
@@ -64,19 +64,19 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>) {
             reason: Utf8Bytes::from_static(reason),
         };
         let close = sink.send(Message::Close(Some(frame)));
-        // Whoever does not listen is not told.
+        // Best effort: the page may not be reading.
         let _ = timeout(STUCK, close).await;
     }
 }
 
-/// Why a connection ends: the code and the words of the Close frame.
+/// Code and reason of the Close frame.
 type Parting = (u16, &'static str);
 
 struct Reader<'s> {
     page: PageId,
     shared: &'s Shared,
     answers: mpsc::Sender<Utf8Bytes>,
-    /// Which messages the page wants to see.
+    /// The filter for the page's message view.
     views: mpsc::Sender<Option<Filter>>,
     trusted: &'s AtomicBool,
     rate: Rate,
@@ -92,8 +92,8 @@ impl Reader<'_> {
                 Ok(message) => message,
                 Err(error) => {
                     tracing::debug!(page = self.page.0, %error, "connection broken");
-                    // Most of all a frame that is too large; nobody hears it if the connection is
-                    // broken.
+                    // Usually an oversized frame. If the connection is broken, nobody receives the
+                    // reason.
                     self.shared.counters.too_much.fetch_add(1, Relaxed);
                     return Some((close_code::SIZE, "frames have up to 4096 octets"));
                 }
@@ -140,7 +140,7 @@ impl Reader<'_> {
         None
     }
 
-    /// The page shows a token.
+    /// Handles a token from the page.
     async fn show(&mut self, id: Option<u64>, token: &str) -> Option<Parting> {
         if self.shared.admits(token) {
             self.trusted.store(true, Relaxed);
@@ -154,7 +154,7 @@ impl Reader<'_> {
         (self.wrong_tokens >= WRONG_TOKENS).then_some((close_code::POLICY, "too many wrong tokens"))
     }
 
-    /// The page wants to see messages, or none.
+    /// Starts or ends the message view.
     async fn choose(&mut self, id: Option<u64>, on: bool, filter: &MessageFilter) {
         if !self.may_read() {
             return self.refuse(id, "looking needs the token, too");
@@ -169,7 +169,7 @@ impl Reader<'_> {
             Ok(chosen) => chosen,
             Err(error) => return self.refuse(id, &error.to_string()),
         };
-        // An error means that the writer has ended, and with it the connection.
+        // On error the writer has ended, and the connection with it.
         let _ = self.views.send(chosen).await;
         self.say(id.map(|id| Answer::Done { id }).as_ref());
     }
@@ -185,12 +185,12 @@ impl Reader<'_> {
             request,
             reply,
         };
-        // An error means that the session has ended, and the writer notices that.
+        // On error the session has ended, which the writer notices.
         let _ = self.shared.access.orders.send(order).await;
     }
 
-    /// What tells the page how its request went. Without an id it only hears of refusals, and of them
-    /// not too many.
+    /// The callback that reports the result of a request to the page. Without an id, only refusals
+    /// are reported, at a limited rate.
     fn reply(&mut self, id: Option<u64>) -> Reply {
         let answers = self.answers.clone();
         let now = Instant::now();
@@ -219,15 +219,15 @@ impl Reader<'_> {
     }
 }
 
-/// Queues an answer for the page, unless too many wait already.
+/// Queues an answer for the page. Drops it if the queue is full.
 fn say(answers: &mpsc::Sender<Utf8Bytes>, answer: &Answer<'_>) {
-    // Numbers and texts only, so that there is nothing that JSON can not say.
+    // Serialisation cannot fail for numbers and text.
     if let Ok(json) = serde_json::to_string(answer) {
         let _ = answers.try_send(json.into());
     }
 }
 
-/// Whether a page may look.
+/// Whether a page may read vehicle data.
 fn may_read(shared: &Shared, trusted: &AtomicBool) -> bool {
     !shared.admission.token_to_read || trusted.load(Relaxed)
 }
@@ -240,7 +240,7 @@ async fn next_message(view: &mut Option<MessageView<'_>>) -> Option<Utf8Bytes> {
     }
 }
 
-/// Tells the page everything, until it does not take it or the session has ended.
+/// Sends all data to the page until it stops accepting or the session has ended.
 async fn write(
     sink: &mut SplitSink<WebSocket, Message>,
     shared: &Shared,

@@ -1,5 +1,5 @@
-//! The message view of one page: what passes the station's node, filtered, as JSON. A page that is
-//! too slow loses messages and is told how many; the traffic never waits.
+//! The message view of one page: the traffic of the station's node, filtered, as JSON. A slow page
+//! loses messages and receives their number; the traffic is never delayed.
 
 use std::collections::VecDeque;
 
@@ -10,17 +10,17 @@ use crate::request::MessageFilter;
 use jaus::node::{Node, Tap, Tapped};
 use jaus_view::{Dictionary, Entry, Filter, FilterError, Links, MessageStream};
 
-/// What a page sees of the messages.
+/// The message stream of one page.
 pub(super) struct MessageView<'s> {
     tap: Tap,
     stream: MessageStream<'s>,
     links: Links,
-    /// Several messages may pass at once.
+    /// One passage can contain several messages.
     waiting: VecDeque<Utf8Bytes>,
 }
 
 impl<'s> MessageView<'s> {
-    /// Passages that may wait for a page.
+    /// Limit of queued passages per page.
     const WAITING: usize = 512;
 
     pub(super) fn new(node: &Node, dictionary: &'s Dictionary, filter: Filter) -> Self {
@@ -32,8 +32,8 @@ impl<'s> MessageView<'s> {
         }
     }
 
-    /// The next frame for the page; `None` when the node has stopped. Nothing is lost if the
-    /// returned future is dropped.
+    /// The next frame for the page; `None` when the node has stopped. The returned future is cancel
+    /// safe.
     pub(super) async fn next(&mut self) -> Option<Utf8Bytes> {
         loop {
             if let Some(frame) = self.waiting.pop_front() {
@@ -53,7 +53,7 @@ impl<'s> MessageView<'s> {
     }
 }
 
-/// A filter as a page has it in its fields.
+/// Converts the page's filter fields to a filter.
 pub(super) fn filter(wanted: &MessageFilter) -> Result<Filter, FilterError> {
     let mut filter = Filter::default();
     for (key, value) in [
@@ -67,10 +67,10 @@ pub(super) fn filter(wanted: &MessageFilter) -> Result<Filter, FilterError> {
     Ok(filter)
 }
 
-/// The longest value that a page is shown, in octets of JSON: a map's cells are not for reading.
+/// The longest value sent to a page, in octets of JSON. Map cells, for example, are longer.
 const LONGEST: usize = 16 << 10;
 
-/// A message in the page's words.
+/// Formats a message in the page protocol.
 fn in_a_frame(entry: &Entry) -> Utf8Bytes {
     let mut frame = Map::new();
     frame.insert("type".to_owned(), "message".into());

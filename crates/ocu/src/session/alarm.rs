@@ -1,5 +1,5 @@
-//! Emergency: every part of the vehicle is told at once and again and again until its status says
-//! that it has stopped, and whoever starts again meanwhile is told, too.
+//! Emergency: sent to every part of the vehicle immediately and repeatedly until its status
+//! confirms the stop. Parts that restart meanwhile receive it as well.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -9,18 +9,18 @@ use super::client::Client;
 use crate::picture::Picture;
 use jaus::address::JausId;
 
-/// The emergency that this operator has set, if any.
+/// The emergency set by this operator, if any.
 #[derive(Default)]
 pub(super) struct Alarm {
     wanted: bool,
-    /// Until when the parts may take to end it.
+    /// Until when clearing is repeated.
     clearing: Option<Instant>,
-    /// Who is being told.
+    /// Parts with a delivery in progress.
     busy: BTreeSet<JausId>,
     waiting: Vec<Waiting>,
 }
 
-/// Somebody who wants to know what became of it.
+/// A requester waiting for the result.
 struct Waiting {
     on: bool,
     until: Instant,
@@ -28,16 +28,16 @@ struct Waiting {
 }
 
 impl Alarm {
-    /// How long the requester waits for the parts.
+    /// How long a requester waits for the parts.
     const PATIENCE: Duration = Duration::from_secs(3);
-    /// How many may wait; more are answered at once.
+    /// Limit of waiting requesters. Further ones are answered immediately.
     const MOST_WAITING: usize = 64;
 
     pub(super) const fn is_wanted(&self) -> bool {
         self.wanted
     }
 
-    /// An operator sets an emergency, as often as they like.
+    /// Sets the emergency. May be repeated at any rate.
     pub(super) fn set(
         &mut self,
         now: Instant,
@@ -57,7 +57,7 @@ impl Alarm {
         self.handle_time(now, picture, client);
     }
 
-    /// An operator takes it back.
+    /// Clears the emergency.
     pub(super) fn clear(
         &mut self,
         now: Instant,
@@ -85,12 +85,12 @@ impl Alarm {
         }
     }
 
-    /// A part has been told; what its status is the picture knows.
+    /// Handles the end of a delivery. The result shows in the reported status.
     pub(super) fn handle_told(&mut self, part: JausId) {
         self.busy.remove(&part);
     }
 
-    /// Tells whoever has to be told, and answers whoever waits.
+    /// Starts the pending deliveries and answers waiting requesters.
     pub(super) fn handle_time(&mut self, now: Instant, picture: &Picture, client: &mut Client) {
         let left: Vec<JausId> = if self.wanted {
             picture.not_in_emergency(now).collect()

@@ -1,4 +1,4 @@
-//! The JAUS client of the session: each operation is a job of its own, which reports its end.
+//! The session's JAUS client: each operation is a separate job that reports its completion.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -16,33 +16,33 @@ use jaus::component::{Component, Control, ControlError, DeliverError};
 use jaus::messages::core::{QueryStatus, ReportStatus};
 use jaus::messages::mobility::SetWrenchEffort;
 
-/// A job's end.
+/// Completion of a job.
 pub(super) enum Finished {
-    /// Control was asked for.
+    /// Result of a control request.
     Taken {
         peer: JausId,
         result: Result<Control, ControlError>,
     },
-    /// What a page wished has been done, or not.
+    /// Result of a page's request.
     Told {
         reply: Reply,
         result: Result<(), String>,
     },
-    /// The primitive driver was told what the stick says.
+    /// The primitive driver received the stick's setpoint, or did not acknowledge it.
     Steered { push: Push, acknowledged: bool },
-    /// The cells of a map were asked for.
+    /// Result of a request for map cells.
     Mapped {
         edition: Edition,
         result: Result<Bytes, String>,
     },
-    /// A part was told that there is an emergency, or that it is over; what its status is then.
+    /// A part received the start or the end of an emergency, with its status afterwards.
     Alarmed {
         peer: JausId,
         status: Option<ReportStatus>,
     },
 }
 
-/// The component, and the operations under way.
+/// The component and its operations in progress.
 pub(super) struct Client {
     component: Component,
     authority: u8,
@@ -50,20 +50,20 @@ pub(super) struct Client {
     effort: Option<Effort>,
 }
 
-/// The last effort that was sent, until it is acknowledged or a newer one takes its place.
+/// The last effort sent, until it is acknowledged or replaced.
 struct Effort {
     push: Push,
     sent: Instant,
     job: AbortHandle,
 }
 
-/// How long a job that somebody waits for may take.
+/// Timeout of a job that a requester waits for.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// How long a part may take to say what became of an emergency, before it is told again.
+/// Timeout for a part to confirm an emergency before it is repeated.
 const ALARM_PATIENCE: Duration = Duration::from_millis(700);
 
 impl Client {
-    /// An effort that is not acknowledged for so long gives way to a newer one.
+    /// An effort without acknowledgement for this time is replaced by a newer one.
     const EFFORT_PATIENCE: Duration = Duration::from_millis(100);
 
     pub(super) fn new(component: Component, authority: u8) -> Self {
@@ -79,12 +79,12 @@ impl Client {
         &self.component
     }
 
-    /// The next end of a job; waits for ever if there is none.
+    /// The next completed job. Pending forever without jobs.
     pub(super) async fn finished(&mut self) -> Option<Finished> {
         loop {
             match self.jobs.join_next().await {
                 Some(Ok(finished)) => return Some(finished),
-                // An effort that a newer one has replaced.
+                // An effort replaced by a newer one.
                 Some(Err(_)) => {}
                 None => std::future::pending().await,
             }
@@ -96,7 +96,7 @@ impl Client {
         self.jobs.spawn(job);
     }
 
-    /// Asks for control.
+    /// Requests control.
     pub(super) fn take(&mut self, peer: JausId) {
         let (component, authority) = (self.component.clone(), self.authority);
         self.jobs.spawn(async move {
@@ -105,7 +105,7 @@ impl Client {
         });
     }
 
-    /// Does something for a page.
+    /// Runs an operation for a page.
     pub(super) fn tell(
         &mut self,
         reply: Reply,
@@ -121,8 +121,8 @@ impl Client {
         });
     }
 
-    /// Tells the primitive driver what the stick says. The newest word counts: an older one that is
-    /// still on its way is given up once it is late, and at once if the vehicle is to stop.
+    /// Sends the stick's setpoint to the primitive driver. The newest one counts: an older one
+    /// still in flight is dropped when it is late, and immediately if the vehicle has to stop.
     pub(super) fn steer(&mut self, now: Instant, control: &Arc<Control>, push: Push) {
         if let Some(effort) = self.effort.take_if(|it| !it.job.is_finished()) {
             let stops = push == Push::NONE && effort.push != Push::NONE;
@@ -134,7 +134,7 @@ impl Client {
             effort.job.abort();
         }
         let Ok(message) = effort(push) else {
-            // A push is within the range of the message.
+            // Cannot happen: a push is within the range of the message.
             return;
         };
         let control = Arc::clone(control);
@@ -149,14 +149,14 @@ impl Client {
         });
     }
 
-    /// Tells a part that there is an emergency or that ours is over, and asks how it is.
+    /// Sends the start or the end of our emergency to a part, then queries its status.
     pub(super) fn alarm(&mut self, peer: JausId, on: bool) {
         let component = self.component.clone();
         self.jobs.spawn(async move {
             let deed = async {
                 note(peer, emergency::deliver(&component, peer, on).await);
             };
-            // Some peers never acknowledge: what counts is their status.
+            // Some peers never acknowledge. Their status decides.
             let _ = timeout(ALARM_PATIENCE, deed).await;
             let status = component.query(peer, &QueryStatus {});
             let status = timeout(ALARM_PATIENCE, status).await;
@@ -165,7 +165,7 @@ impl Client {
         });
     }
 
-    /// Shouts that there is an emergency, without waiting for anything.
+    /// Sends an emergency without waiting for an acknowledgement.
     pub(super) fn shout(&self, peer: JausId) {
         if let Err(error) = emergency::send(&self.component, peer) {
             tracing::warn!(%peer, %error, "emergency could not be sent");
@@ -179,21 +179,21 @@ fn note(peer: JausId, delivered: Result<(), DeliverError>) {
     }
 }
 
-/// Sends a command, acknowledged, in words if it fails.
+/// Delivers a command with acknowledgement. Errors are returned as text.
 pub(super) async fn deliver<M: Message>(control: &Control, command: &M) -> Result<(), String> {
     let delivered = control.deliver(command).await;
     delivered.map_err(|error| error.to_string())
 }
 
-/// Gives control back and waits until that is confirmed, unless a job still uses it, which lets go
-/// of it in the end.
+/// Releases control and waits for the confirmation. If a job still uses the control, that job
+/// releases it at its end.
 pub(super) async fn release(control: Arc<Control>) {
     if let Ok(control) = Arc::try_unwrap(control) {
         control.release().await;
     }
 }
 
-/// The only ways in which an emergency leaves this station, so that its priority is decided here.
+/// The only functions that send an emergency, so that its priority is set in one place.
 mod emergency {
     use jaus::address::JausId;
     use jaus::component::{Component, DeliverError, SendError};
@@ -209,12 +209,12 @@ mod emergency {
         emergency_code: EmergencyCode(1),
     };
 
-    /// Sets an emergency at once, without an acknowledgement.
+    /// Sends a Set Emergency without acknowledgement.
     pub(super) fn send(component: &Component, peer: JausId) -> Result<(), SendError> {
         component.send_with(PRIORITY, peer, &SET)
     }
 
-    /// Sets an emergency or clears it, acknowledged.
+    /// Sets or clears an emergency, with acknowledgement.
     pub(super) async fn deliver(
         component: &Component,
         peer: JausId,
@@ -228,8 +228,8 @@ mod emergency {
     }
 }
 
-/// Propulsion as the stick says; a stick that is let go brakes, because a vehicle without effort may
-/// roll on.
+/// Converts a push to efforts. A released stick brakes, because a vehicle without effort may roll
+/// on.
 fn effort(push: Push) -> Result<SetWrenchEffort, OutOfRange> {
     let brake = if push == Push::NONE { 100.0 } else { 0.0 };
     let mut effort = SetWrenchEffort::default();

@@ -1,5 +1,5 @@
-//! The subscriptions of the session: every part of the vehicle is asked to tell what it can tell, and
-//! asked again for as long as it is there.
+//! The session's subscriptions to all reports of every vehicle part, renewed for as long as the
+//! part exists.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -26,7 +26,7 @@ use jaus_vehicle::messages::ground::{
     ReportRasterMaps, ReportStage, mission_planner, raster_maps,
 };
 
-/// What a part has told.
+/// A report with its sender.
 pub(super) type Sighting = (JausId, Report);
 
 /// The subscriptions to the parts of one vehicle.
@@ -36,13 +36,13 @@ pub(super) struct Following {
     parts: BTreeMap<JausId, Followed>,
 }
 
-/// What is followed of one part; dropping it ends that.
+/// The subscriptions to one part. Dropping this ends them.
 struct Followed {
     topics: Topics,
     _tasks: JoinSet<()>,
 }
 
-/// What a part can tell.
+/// The reports that a part offers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Topics {
     status: bool,
@@ -54,11 +54,11 @@ struct Topics {
     maps: bool,
 }
 
-/// Where it is and how fast.
+/// Rate of pose and velocity reports.
 const MOTION: When = When::hz(10.0);
-/// What a part is doing.
+/// Rate of status reports.
 const STATUS: When = When::hz(4.0);
-/// Before a part that would not be subscribed to is asked again.
+/// Delay before a failed subscription is retried.
 const PAUSE: Duration = Duration::from_secs(1);
 
 impl Topics {
@@ -84,7 +84,7 @@ impl Following {
         }
     }
 
-    /// Follows the parts of the vehicle as they are now, and nobody else.
+    /// Updates the subscriptions to match the current parts of the vehicle.
     pub(super) fn follow(&mut self, picture: &Picture) {
         self.parts.retain(|id, _| picture.parts().contains_key(id));
         for id in picture.parts().keys() {
@@ -134,7 +134,7 @@ impl Following {
         tasks
     }
 
-    /// Has one query answered again and again, until it is dropped.
+    /// Maintains one subscription until the future is dropped.
     fn ask<R, Q>(
         &self,
         peer: JausId,

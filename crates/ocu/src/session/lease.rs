@@ -1,5 +1,5 @@
-//! The session's lease on the vehicle: which parts it wants under control, which it holds, and what is
-//! in the way of the others.
+//! The session's control lease on the vehicle: which parts are wanted, which are held, and why
+//! others are not.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,28 +14,28 @@ use jaus::address::JausId;
 use jaus::component::{Control, ControlError};
 use jaus::service::State;
 
-/// The control lease: which parts are wanted under control, and which are held.
+/// The control lease: wanted and held parts.
 #[derive(Default)]
 pub(super) struct Lease {
     wanted: Wanted,
-    /// Whether what is held is to act on commands, also after it was started again; nothing while
-    /// nobody has said so since this station was started.
+    /// Whether held parts should act on commands, also after a restart. `None` until the operator
+    /// has decided, since the start of this station.
     ready: Option<bool>,
-    /// Whether parts are to stand by as soon as they are held, because what drove them is lost.
+    /// Whether parts go to standby as soon as they are held, because their previous client is lost.
     stops: bool,
     holds: BTreeMap<JausId, Hold>,
-    /// Who asked for control and waits for the answers of the parts.
+    /// Requesters of control, waiting for the answers of the parts.
     waiting: Vec<Reply>,
 }
 
-/// Of what control is wanted.
+/// The parts to control.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Wanted {
     #[default]
     Nothing,
-    /// Of all drivers and the planner: the operator drives.
+    /// All drivers and the planner: the operator drives.
     Everything,
-    /// Of the planner, which controls the drivers itself.
+    /// The planner only, which controls the drivers itself.
     Planner,
 }
 
@@ -44,10 +44,10 @@ enum Hold {
     Held {
         control: Arc<Control>,
         since: Instant,
-        /// When it was last told to act on commands.
+        /// Time of the last resume.
         resumed: Instant,
     },
-    /// Why it is not held, and when it may be asked for again.
+    /// Why the part is not held, and when the next request is due.
     Not {
         why: String,
         again: Instant,
@@ -65,11 +65,11 @@ impl Wanted {
 }
 
 impl Lease {
-    /// Before a part that could not be controlled is asked again, if nobody else controls it.
+    /// Delay before a refused request is repeated, unless another client is in control.
     const AGAIN: Duration = Duration::from_secs(1);
-    /// A part that has just granted control, or was told to act, may still report what was before.
+    /// After a grant or resume, a part may report its previous state for this time.
     const SETTLED: Duration = Duration::from_secs(1);
-    /// How many may wait for control; more are answered at once.
+    /// Limit of waiting requesters. Further ones are answered immediately.
     const MOST_WAITING: usize = 64;
 
     pub(super) const fn wanted(&self) -> Wanted {
@@ -80,8 +80,8 @@ impl Lease {
         self.ready == Some(true)
     }
 
-    /// What this operator left ready when the station before this one ended is to stay so: decided
-    /// when control is taken, or as soon as the driver tells whom it obeys.
+    /// Keeps the vehicle ready if this operator left it ready before the station restarted. Decided
+    /// when control is taken, or as soon as the driver reports its controller.
     fn go_on_ready(&mut self, now: Instant, picture: &Picture, client: &mut Client) {
         if self.ready.is_some() || self.wanted == Wanted::Nothing {
             return;
@@ -91,7 +91,7 @@ impl Lease {
         let Some((id, driver)) = known else {
             return;
         };
-        // Right after the grant it may still say what it was for somebody else.
+        // Immediately after the grant, the part may still report its state under another client.
         let settled = match self.holds.get(&id) {
             Some(Hold::Held { since, .. }) => now >= *since + Self::SETTLED,
             _ => true,
@@ -115,7 +115,7 @@ impl Lease {
         }
     }
 
-    /// The control over a part, if it is held.
+    /// The control over a part, if held.
     pub(super) fn held(&self, part: JausId) -> Option<Arc<Control>> {
         match self.holds.get(&part)? {
             Hold::Held { control, .. } if control.is_held() => Some(Arc::clone(control)),
@@ -123,7 +123,7 @@ impl Lease {
         }
     }
 
-    /// Everything that is held.
+    /// All held controls.
     pub(super) fn all_held(&self) -> Vec<Arc<Control>> {
         self.holds
             .keys()
@@ -131,7 +131,7 @@ impl Lease {
             .collect()
     }
 
-    /// Why a part is not held though it is wanted.
+    /// Why a wanted part is not held.
     pub(super) fn obstacle(&self, part: JausId) -> Option<String> {
         match self.holds.get(&part)? {
             Hold::Not { why, .. } => Some(why.clone()),
@@ -139,7 +139,7 @@ impl Lease {
         }
     }
 
-    /// An operator takes control; the answer comes when every part has answered.
+    /// Takes control. The reply follows when every part has answered.
     pub(super) fn take(
         &mut self,
         now: Instant,
@@ -150,7 +150,7 @@ impl Lease {
     ) {
         self.wanted = wanted;
         self.go_on_ready(now, picture, client);
-        // Whoever has it: it is asked for anew.
+        // Repeat refused requests, whoever is in control.
         self.holds
             .retain(|_, hold| !matches!(hold, Hold::Not { .. }));
         if self.waiting.len() < Self::MOST_WAITING {
@@ -165,33 +165,33 @@ impl Lease {
         self.handle_time(now, picture, client);
     }
 
-    /// What is wanted changes without anybody waiting for it. What is not wanted any more is handed
-    /// out, to be given back.
+    /// Changes the wanted parts without a waiting requester. Returns the controls to release.
     pub(super) fn want(&mut self, wanted: Wanted, picture: &Picture) -> Vec<Arc<Control>> {
         self.wanted = wanted;
         self.let_go(picture)
     }
 
-    /// Everything is wanted, and to stand by: what drove the vehicle is lost.
+    /// Takes control of everything for standby, because the vehicle's driving client is lost.
     pub(super) fn want_stopped(&mut self, now: Instant, picture: &Picture) {
         drop(self.want(Wanted::Everything, picture));
         self.set_ready(now, false);
         self.stops = true;
     }
 
-    /// Whether the vehicle was stopped because what drove it is lost, and its drivers are held.
+    /// Whether the vehicle was stopped because its driving client was lost, and its drivers are
+    /// held.
     pub(super) fn is_stopped(&self, picture: &Picture) -> bool {
         self.stops && self.state(picture).held
     }
 
-    /// Everything is to be given back.
+    /// Releases everything. Returns the controls to release.
     pub(super) fn release(&mut self, picture: &Picture) -> Vec<Arc<Control>> {
         self.ready = Some(false);
         self.stops = false;
         self.want(Wanted::Nothing, picture)
     }
 
-    /// Whether what is held is to act on commands; it is being told so.
+    /// Records whether held parts should act on commands. The caller sends the commands.
     pub(super) fn set_ready(&mut self, now: Instant, ready: bool) {
         self.ready = Some(ready);
         self.stops &= !ready;
@@ -202,7 +202,7 @@ impl Lease {
         }
     }
 
-    /// A part has granted control, or not.
+    /// Handles the result of a control request.
     pub(super) fn handle_taken(
         &mut self,
         now: Instant,
@@ -211,7 +211,7 @@ impl Lease {
         client: &mut Client,
     ) {
         let is_ready = self.is_ready();
-        // Otherwise it is not wanted any more, and given back by dropping it.
+        // The part is no longer wanted. Dropping the control releases it.
         let Some(hold @ Hold::Asking) = self.holds.get_mut(&part) else {
             return;
         };
@@ -234,8 +234,7 @@ impl Lease {
         }
     }
 
-    /// Asks for what is wanted and not held, lets go of what is not wanted, and notices what was
-    /// lost.
+    /// Requests wanted parts, releases unwanted ones, and detects lost control.
     pub(super) fn handle_time(&mut self, now: Instant, picture: &Picture, client: &mut Client) {
         drop(self.let_go(picture));
         self.go_on_ready(now, picture, client);
@@ -252,7 +251,7 @@ impl Lease {
                     }
                 }
                 Some(Hold::Not { again, .. }) => {
-                    // Whoever else took it had a reason.
+                    // Another client took control for a reason, so do not contend.
                     let free = part.controller().is_none_or(|id| id == own);
                     if free && *again <= now {
                         self.ask(id, client);
@@ -280,7 +279,7 @@ impl Lease {
         wanted.map(|(id, part)| (*id, part)).collect()
     }
 
-    /// Forgets what is not wanted or not there, and returns what was held of it.
+    /// Removes parts that are unwanted or absent. Returns the controls to release.
     fn let_go(&mut self, picture: &Picture) -> Vec<Arc<Control>> {
         let mut free = Vec::new();
         let wanted = self.wanted;
@@ -295,7 +294,7 @@ impl Lease {
         free
     }
 
-    /// Tells those who asked for control, once every part has answered.
+    /// Answers the requesters once every part has answered.
     fn answer(&mut self, picture: &Picture) {
         let asking = |hold: &Hold| matches!(hold, Hold::Asking);
         if self.waiting.is_empty() || self.holds.values().any(asking) {
@@ -313,7 +312,7 @@ impl Lease {
         }
     }
 
-    /// The part without which the operator can do nothing.
+    /// The part without which the operator cannot act.
     fn principal(&self, picture: &Picture) -> Option<JausId> {
         let driver = || picture.find(Role::PrimitiveDriver);
         let planner = || picture.find(Role::Planner);
@@ -323,7 +322,7 @@ impl Lease {
         }
     }
 
-    /// As pages show it.
+    /// Snapshot for pages.
     pub(super) fn state(&self, picture: &Picture) -> state::Control {
         let principal = self.principal(picture);
         let held = principal.is_some_and(|part| self.held(part).is_some());
@@ -352,7 +351,7 @@ impl Lease {
     }
 }
 
-/// Notices that control is lost, also when only the part knows it, because it was started again.
+/// Detects lost control, also if only the part knows because it was restarted.
 fn look_after(now: Instant, own: JausId, part: &Part, hold: &mut Hold) {
     let Hold::Held { control, since, .. } = hold else {
         return;
@@ -372,8 +371,8 @@ fn look_after(now: Instant, own: JausId, part: &Part, hold: &mut Hold) {
     }
 }
 
-/// Notices that a part does not act on commands though it should: control that is renewed outlives
-/// that the part was started again.
+/// Resumes a part that should act on commands but stands by. Renewed control outlives a restart of
+/// the part.
 fn keep_ready(now: Instant, part: &Part, hold: &mut Hold, client: &mut Client) {
     if let Hold::Held {
         control, resumed, ..
@@ -393,7 +392,7 @@ fn not(now: Instant, error: &ControlError) -> Hold {
     }
 }
 
-/// Makes a part act on commands as the others do; nobody waits for it.
+/// Resumes a part in the background.
 fn resume(control: &Arc<Control>, client: &mut Client) {
     let control = Arc::clone(control);
     client.tell(
@@ -406,7 +405,7 @@ fn resume(control: &Arc<Control>, client: &mut Client) {
     );
 }
 
-/// Makes a part stop acting on commands; nobody waits for it.
+/// Sends a part to standby in the background.
 fn stand_by(control: &Arc<Control>, client: &mut Client) {
     let control = Arc::clone(control);
     client.tell(
@@ -419,7 +418,7 @@ fn stand_by(control: &Arc<Control>, client: &mut Client) {
     );
 }
 
-/// Gives control of all these back, and waits until that is confirmed.
+/// Releases these controls and waits for the confirmations.
 pub(super) async fn release_all(controls: Vec<Arc<Control>>) {
     for control in controls {
         client::release(control).await;

@@ -1,5 +1,5 @@
-//! The cells of the map that pages show: asked for block by block when the first page wants them,
-//! and kept until the map is another.
+//! Cells of the map shown on pages: fetched in blocks at the first request, and cached until the
+//! map changes.
 
 use bytes::{Bytes, BytesMut};
 
@@ -9,10 +9,10 @@ use jaus::address::JausId;
 use jaus::component::Component;
 use jaus_vehicle::messages::ground::{QueryRasterCells, ReportRasterCells};
 
-/// Takes the cells, or hears why there are none.
+/// Callback for the cells or the reason why there are none.
 pub(crate) type CellsReply = Box<dyn FnOnce(Result<Bytes, String>) + Send>;
 
-/// The map that is kept, and who waits for one.
+/// The cached map, and the requesters waiting for a map.
 #[derive(Default)]
 pub(super) struct Maps {
     kept: Option<(Edition, Bytes)>,
@@ -21,10 +21,10 @@ pub(super) struct Maps {
 }
 
 impl Maps {
-    /// How many may wait for a map.
+    /// Limit of waiting requesters.
     const MOST_WAITING: usize = 64;
 
-    /// A page wants the cells of a map, of which the session knows `map` at `store`.
+    /// Handles a page's request for the cells of `map` at `store`.
     pub(super) fn want(
         &mut self,
         store: Option<JausId>,
@@ -55,7 +55,7 @@ impl Maps {
         }
     }
 
-    /// The cells have come, or not.
+    /// Handles the fetched cells or the failure.
     pub(super) fn handle_mapped(&mut self, edition: Edition, result: &Result<Bytes, String>) {
         self.wanted = None;
         self.kept = result.as_ref().ok().map(|cells| (edition, cells.clone()));
@@ -65,10 +65,10 @@ impl Maps {
     }
 }
 
-/// Cells that are asked for at once: what a store answers well within the time that a question has.
+/// Cells per request: a store answers this many well within the query timeout.
 const BLOCK: u32 = 1 << 18;
 
-/// All cells of a map, row by row.
+/// Fetches all cells of a map, row by row.
 async fn cells(component: &Component, store: JausId, map: &Map) -> Result<Bytes, String> {
     let columns = u32::from(map.columns).max(1);
     let step = u16::try_from((BLOCK / columns).max(1)).unwrap_or(u16::MAX);

@@ -1,6 +1,6 @@
-//! The operator's session: the component that watches a vehicle, takes it under control, drives and
-//! stops it, as the pages request. One task that never waits for the network: whatever takes time is a
-//! job, whose end comes back as news.
+//! The operator session: monitors a vehicle, takes control of it, drives and stops it, on request
+//! of the pages. A single task that never waits for the network: slow operations are jobs that
+//! report their completion.
 
 mod alarm;
 mod client;
@@ -34,23 +34,23 @@ use jaus::component::Component;
 use jaus_vehicle::parts::PartError;
 use jaus_view::Timestamp;
 
-/// What becomes of a request: done, or why not.
+/// Callback for the result of a request: success, or the reason for failure.
 pub(super) type Reply = Box<dyn FnOnce(Result<(), String>) + Send>;
 
-/// What pages tell the session.
+/// A message from a page to the session.
 pub(super) enum Order {
     OperatorRequest {
         page: PageId,
         request: OperatorRequest,
         reply: Reply,
     },
-    /// The cells of a map.
+    /// Request for the cells of a map.
     Cells { map: u16, reply: CellsReply },
-    /// A page is gone, and with it the hand that was on the stick.
+    /// A page is gone. If it held the stick, the stick is released.
     Gone(PageId),
 }
 
-/// How pages reach the session.
+/// The pages' interface to the session.
 #[derive(Clone)]
 pub(super) struct Access {
     pub(super) orders: mpsc::Sender<Order>,
@@ -67,9 +67,9 @@ pub(super) struct Session {
     lease: Lease,
     alarm: Alarm,
     maps: Maps,
-    /// Which parts were missing when that was last logged.
+    /// The missing parts that have been logged.
     missing: BTreeMap<JausId, Absence>,
-    /// Why driving was ended by the station, until a page drives again.
+    /// Why the station ended manual drive, until a page drives again.
     halted: Option<String>,
     orders: mpsc::Receiver<Order>,
     sightings: mpsc::Receiver<Sighting>,
@@ -78,15 +78,15 @@ pub(super) struct Session {
 }
 
 impl Session {
-    /// Between two commands of manual drive; everything else is looked after as often.
+    /// Period of manual drive commands and of all other periodic work.
     const BEAT: Duration = Duration::from_millis(50);
-    /// Beats between two snapshots.
+    /// Number of periods between two snapshots.
     const SNAPSHOT: u64 = 2;
-    /// Orders and reports that may wait for the session.
+    /// Capacity of the order and report queues.
     const QUEUE: usize = 256;
 
-    /// A session for a component: which vehicle it looks at if not the first that it finds, and with
-    /// which authority it asks for control.
+    /// Creates a session for a component. `vehicle` selects the vehicle, by default the first one
+    /// discovered; `authority` is used to request control.
     pub(super) fn new(component: Component, vehicle: Option<u16>, authority: u8) -> (Self, Access) {
         let (orders, inbox) = mpsc::channel(Self::QUEUE);
         let (sighted, sightings) = mpsc::channel(Self::QUEUE);
@@ -109,7 +109,7 @@ impl Session {
         (session, Access { orders, snapshots })
     }
 
-    /// Works until the component stops.
+    /// Runs until the component stops.
     pub(super) async fn run(mut self) -> PartError {
         let mut standing = self.client.component().watch_standing();
         let mut beat = interval(Self::BEAT);
@@ -157,7 +157,7 @@ impl Session {
         self.log_missing(now);
         self.halt_on_old_picture(now);
         if self.alarm.is_wanted() || self.picture.in_emergency().next().is_some() {
-            // Whoever has set it: nothing acts again by itself when it is over.
+            // Whatever the source of the emergency: nothing resumes on its own afterwards.
             self.stick.stop(now);
             self.lease.set_ready(now, false);
         }
@@ -180,7 +180,7 @@ impl Session {
         }
     }
 
-    /// Logs which parts disappear, fall silent, and come back.
+    /// Logs parts that disappear, fall silent or return.
     fn log_missing(&mut self, now: Instant) {
         let mut missing = BTreeMap::new();
         for (id, name, how) in self.picture.missing(now) {
@@ -209,8 +209,8 @@ impl Session {
         }
     }
 
-    /// A planner that is lost while it drives for this operator leaves the drivers without a client
-    /// that watches them: the station takes them and has them stand by.
+    /// Stops the vehicle after the planner was lost while driving for this operator. Its drivers
+    /// have no supervising client left, so the station takes control and sends them to standby.
     fn stop_after_lost_planner(&mut self, now: Instant) {
         let Some((planner, how)) = self.picture.lost_planner(now) else {
             return;
@@ -224,7 +224,7 @@ impl Session {
         }
     }
 
-    /// Why driving has ended although no page let go of the stick; empty otherwise.
+    /// Why driving ended without a release of the stick; empty otherwise.
     fn halt_reason(&self) -> String {
         if self.stick.fell_silent() {
             let limit = Stick::DEAD_MAN.as_millis();
@@ -235,7 +235,7 @@ impl Session {
         self.halted.clone().unwrap_or_default()
     }
 
-    /// Tells the vehicle what the stick says, until it has acknowledged that it is let go.
+    /// Sends the stick's setpoint to the vehicle, until it has acknowledged the release.
     fn steer(&mut self, now: Instant) {
         let Some(push) = self.stick.poll_push(now) else {
             return;
@@ -243,18 +243,18 @@ impl Session {
         let driver = self.picture.find(Role::PrimitiveDriver);
         match driver.and_then(|driver| self.lease.held(driver)) {
             Some(control) => self.client.steer(now, &control, push),
-            // Without control nothing that was said before has any effect on the vehicle.
+            // Without control, earlier commands no longer affect the vehicle.
             None => self.stick.handle_stopped(),
         }
     }
 
     fn publish(&mut self, now: Instant) {
         let state = self.state(now);
-        // Numbers and texts only, so that there is nothing that JSON can not say.
+        // Serialisation cannot fail for numbers and text.
         let Ok(json) = serde_json::to_string(&super::answer::Said::State(&state)) else {
             return;
         };
-        // Without pages there is nobody to tell, which the server's own copy hides.
+        // Unlike `send`, this never fails. The server holds a receiver even without pages.
         self.snapshots.send_replace(json.into());
     }
 
@@ -285,10 +285,10 @@ impl Session {
     }
 }
 
-/// Milliseconds are precise enough for people.
+/// Milliseconds are precise enough for display.
 const DECIMALS: u8 = 3;
 
-/// The time of day; the beginning of 1970 on a computer whose clock is before that.
+/// The time of day. Clocks before 1970 yield the start of 1970.
 fn time_of_day() -> Timestamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let since = since.unwrap_or_default();

@@ -1,4 +1,4 @@
-//! What becomes of each request: what it needs, what it does, and why it may be refused.
+//! Handling of requests: preconditions, actions, and reasons for refusal.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -16,7 +16,7 @@ use jaus::service::State;
 use jaus_vehicle::messages::ground::set_destination::Approved;
 use jaus_vehicle::messages::ground::{ApproveMission, SetDestination, StopMission};
 
-/// What is done, or why not.
+/// Success, or the reason for failure.
 type Outcome = Result<(), String>;
 
 impl Session {
@@ -68,7 +68,7 @@ impl Session {
         }
         self.picture.select(now, subsystem)?;
         self.stick.stop(now);
-        // What is held belongs to the other vehicle, and is given back by dropping it.
+        // The held controls belong to the previous vehicle. Dropping them releases them.
         drop(self.lease.release(&self.picture));
         self.following.follow(&self.picture);
         Ok(())
@@ -78,7 +78,7 @@ impl Session {
         if self.picture.parts().is_empty() {
             return reply(Err(NO_VEHICLE.to_owned()));
         }
-        // A mission that this operator has under way goes on.
+        // Keep a mission that this operator has in progress.
         let own = self.client.component().id();
         let planner = self.picture.find(Role::Planner);
         let planner = planner.and_then(|id| self.picture.parts().get(&id));
@@ -102,7 +102,7 @@ impl Session {
         });
     }
 
-    /// Resume or Standby, for everything that is held.
+    /// Resumes all held parts or sends them to standby.
     fn set_ready(&mut self, now: Instant, ready: bool, reply: Reply) {
         let controls = self.lease.all_held();
         if controls.is_empty() {
@@ -113,7 +113,7 @@ impl Session {
         }
         self.lease.set_ready(now, ready);
         if ready && self.lease.wanted() == Wanted::Planner && !self.is_driven_by_planner() {
-            // Its mission is over, and the operator goes on with everything.
+            // The planner's mission is over, so the operator continues with all parts.
             drop(self.lease.want(Wanted::Everything, &self.picture));
         }
         if !ready {
@@ -165,7 +165,7 @@ impl Session {
         Ok(())
     }
 
-    /// Takes the wheel from the planner, if it drives.
+    /// Takes over from the planner if it drives.
     fn take_over(&mut self, now: Instant) {
         if self.lease.wanted() != Wanted::Planner {
             return;
@@ -202,7 +202,8 @@ impl Session {
             .tell(reply, async move { deliver(&planner, &destination).await });
     }
 
-    /// Has the planner drive: the drivers are given back first, so that it can take them.
+    /// Lets the planner drive. The drivers are released first, so that the planner can control
+    /// them.
     fn approve(&mut self, now: Instant, number: u32, reply: Reply) {
         let planner = match self.ready_planner() {
             Ok(planner) => planner,
@@ -243,12 +244,12 @@ impl Session {
         );
     }
 
-    /// Control over the planner, if it is held.
+    /// The control over the planner, if held.
     fn planner(&self) -> Option<Arc<Control>> {
         self.lease.held(self.picture.find(Role::Planner)?)
     }
 
-    /// Control over the planner, which acts on commands.
+    /// The control over the planner, if it is held and ready.
     fn ready_planner(&self) -> Result<Arc<Control>, String> {
         let planner = self.picture.find(Role::Planner);
         let planner = planner.ok_or("the vehicle has no planner at present")?;
@@ -282,7 +283,7 @@ impl Session {
 const NO_VEHICLE: &str = "no vehicle is known yet";
 const NO_CONTROL: &str = "take control first";
 
-/// Makes all of them ready, or has them wait; in words what went wrong with any.
+/// Resumes these parts or sends them to standby. Errors are combined as text.
 async fn manage(controls: Vec<Arc<Control>>, ready: bool) -> Outcome {
     let mut wrong = Vec::new();
     for control in controls {

@@ -1,4 +1,4 @@
-//! Lines on a GPIO chip of Linux: those of a stepper motor's driver, and that of a stop input.
+//! Linux GPIO lines: pulse and direction outputs for a stepper driver, and a stop input.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -8,17 +8,17 @@ use gpiocdev::line::{Bias, Offset, Value};
 
 use super::{Lines, StopInput};
 
-/// Two lines of a chip: pulses and direction.
+/// Pulse and direction lines on one chip.
 #[derive(Debug)]
 pub struct GpioLines {
     request: Request,
     step: Offset,
     direction: Offset,
-    /// Whether the motor is mounted the other way round.
+    /// Whether the motor is mounted in reverse.
     reversed: bool,
 }
 
-/// Why lines cannot be opened.
+/// Error: GPIO lines cannot be opened.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{lines} of {} cannot be opened: {why}; `gpioinfo` lists the lines and who uses them, and the user \
@@ -30,15 +30,15 @@ pub struct GpioError {
     chip: PathBuf,
     /// The lines, such as `line 5`.
     lines: String,
-    /// What the kernel says.
+    /// The kernel's error.
     why: gpiocdev::Error,
 }
 
 impl GpioLines {
-    /// Takes two lines of a chip such as `/dev/gpiochip0` as outputs, both low.
+    /// Requests two lines of a chip such as `/dev/gpiochip0` as outputs, initially low.
     ///
     /// # Errors
-    /// If there is no such chip or line, or somebody else uses it.
+    /// If the chip or a line does not exist, or is in use.
     pub fn open(
         chip: &Path,
         step: Offset,
@@ -82,8 +82,8 @@ impl Lines for GpioLines {
     }
 }
 
-/// A stop input on a line of a chip, with the chip's pull-up: the contact connects the line to
-/// ground while it is closed, so that a cut wire reads as open.
+/// A stop input on a GPIO line with the chip's pull-up. The closed contact connects the line to
+/// ground, so a cut wire reads as open.
 #[derive(Debug)]
 pub struct GpioStop {
     request: Request,
@@ -91,10 +91,10 @@ pub struct GpioStop {
 }
 
 impl GpioStop {
-    /// Takes a line of a chip such as `/dev/gpiochip0` as an input.
+    /// Requests a line of a chip such as `/dev/gpiochip0` as an input.
     ///
     /// # Errors
-    /// If there is no such chip or line, or it is in use.
+    /// If the chip or the line does not exist, or is in use.
     pub fn open(chip: &Path, line: Offset) -> Result<Self, GpioError> {
         let request = Request::builder()
             .on_chip(chip)

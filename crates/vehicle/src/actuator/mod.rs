@@ -1,10 +1,10 @@
-//! What turns the wheels: a small trait for a drive, a simulated one, one of stepper pulses, and the
-//! platform that two of them make.
+//! Wheel drives: the trait [`Actuator`], a simulated motor, a stepper motor, and a platform of two
+//! drives.
 //!
-//! A real drive implements [`Actuator`]; [`SimulatedMotor`] is a simulated one, and
-//! [`Stepper`] counts out the pulses of a real one. [`Wheels`] makes a
-//! [`Platform`](crate::motion::Platform) of a left and a right drive, and keeps an [`Odometer`] of
-//! how far each has travelled.
+//! A driver for real hardware implements [`Actuator`]. [`SimulatedMotor`] simulates one, and
+//! [`Stepper`] generates the pulses for a stepper motor. [`Wheels`] combines a left and a right
+//! drive into a [`Platform`](crate::motion::Platform), and an [`Odometer`] reports the distance
+//! that each has travelled.
 //!
 //! ```
 //! use jaus_vehicle::actuator::{MotorConfig, Odometer, SimulatedMotor, Wheels, WheelsConfig};
@@ -36,48 +36,50 @@ pub use stepper::{Stepper, StepperConfig, StepperPoll};
 pub use stop::{Interlock, SimulatedStop, StopFile, StopInput};
 pub use wheels::{Odometer, Wheels, WheelsConfig};
 
-/// One drive: a wheel, or the wheels of one side, with the motor that turns them and counts how far.
+/// One drive: a wheel, or the wheels of one side, with motor and distance counter.
 ///
 /// A drive MUST have its own deadline: without a [`command`](Self::command) for 200 ms
-/// ([`CommandDeadline::DEFAULT`](crate::motion::CommandDeadline::DEFAULT), a setting of ours) it
-/// brakes to [`Command::STOP`] by itself. Commands are repeated every 20 ms while it moves, so that
-/// silence means that the program which drives it hangs. The deadline must not depend on that
-/// program: keep it in the motor controller, or on a thread that only writes to the motor, as
+/// ([`CommandDeadline::DEFAULT`](crate::motion::CommandDeadline::DEFAULT), chosen by this project)
+/// it brakes to [`Command::STOP`] on its own. Commands are repeated every 20 ms while the vehicle
+/// moves, so silence means that the controlling program hangs. The deadline must not depend on that
+/// program: implement it in the motor controller, or on a thread that only writes to the motor, as
+/// `PulseMotor` does.
 /// `PulseMotor` does.
 pub trait Actuator: Send {
-    /// It is `now`: moves on, or reads back what has been done.
+    /// Advances to time `now`: a simulation integrates, real hardware is read back.
     fn handle_time(&mut self, now: Instant);
 
-    /// What it is to do until the next command, and for at most the deadline.
+    /// Sets the command, which holds until the next one or until the deadline.
     fn command(&mut self, command: Command);
 
-    /// Metres that it has travelled since it was made, backwards negative.
+    /// Distance travelled since creation, in metres. Reverse travel is negative.
     fn travel(&self) -> f64;
 
-    /// Why it cannot do what it is commanded, as text for the operator; `None` while it can. It
-    /// reports a fault until it is gone.
+    /// The fault that prevents the drive from executing commands, as text for the operator; `None`
+    /// without a fault. A fault is reported until it is cleared.
     fn fault(&self) -> Option<String> {
         None
     }
 }
 
-/// What a drive is to do.
+/// A command to a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command {
-    /// Propulsion as a share of what there is: -1 is full speed backwards in the end, 1 forwards.
+    /// Propulsion as a fraction of the maximum. A sustained -1 reaches full reverse speed, 1 full
+    /// forward speed.
     pub drive: f64,
-    /// Braking as a share of what there is, 0 to 1.
+    /// Braking as a fraction of the maximum, 0 to 1.
     pub brake: f64,
 }
 
 impl Command {
-    /// To stand still, as soon as the brakes allow.
+    /// Stop as fast as the brakes allow.
     pub const STOP: Self = Self {
         drive: 0.0,
         brake: 1.0,
     };
 
-    /// The command, or [`STOP`](Self::STOP) in place of one that is not finite.
+    /// Returns the command, or [`STOP`](Self::STOP) if it is not finite.
     #[must_use]
     pub const fn or_stop(self) -> Self {
         if self.drive.is_finite() && self.brake.is_finite() {

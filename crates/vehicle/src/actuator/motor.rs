@@ -1,4 +1,4 @@
-//! A simulated drive: a motor whose speed follows its voltage after a moment, and a brake.
+//! A simulated drive: a motor with first-order lag from command to speed, and a brake.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -6,25 +6,26 @@ use std::time::{Duration, Instant};
 use super::{Actuator, Command};
 use crate::motion::{CommandDeadline, Random};
 
-/// How a simulated motor behaves.
+/// Parameters of a simulated motor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotorConfig {
-    /// The speed that it reaches at full propulsion, in metres per second.
+    /// Speed at full propulsion, in metres per second.
     pub top: f64,
-    /// After how many seconds it has come within a third of the speed that it is driven to.
+    /// Time constant in seconds: the error to the commanded speed falls to about a third in this
+    /// time.
     pub response: f64,
-    /// What its brake does at most, in metres per second squared.
+    /// Maximum deceleration of the brake, in metres per second squared.
     pub braking: f64,
-    /// How uneven it is: the standard deviation of its strength, as a share of it.
+    /// Standard deviation of the motor's strength, as a fraction of the nominal strength.
     pub noise: f64,
-    /// Where the unevenness comes from: the same seed and the same commands give the same travel.
+    /// Seed of the noise. The same seed and the same commands give the same travel.
     pub seed: u64,
-    /// It brakes by itself when its last command is older than this.
+    /// The motor brakes on its own when its last command is older than this.
     pub deadline: Duration,
 }
 
 impl Default for MotorConfig {
-    /// The motor of a small rover: 2 m/s, a quarter of a second, 4 m/s², even, 200 ms.
+    /// The motor of a small rover: 2 m/s, 0.25 s, 4 m/s², no noise, 200 ms.
     fn default() -> Self {
         Self {
             top: 2.0,
@@ -37,17 +38,17 @@ impl Default for MotorConfig {
     }
 }
 
-/// Breaks and mends a [`SimulatedMotor`]. Cheap to clone; the clones are one switch.
+/// Injects and clears a fault of a [`SimulatedMotor`]. Cheap to clone; all clones share one state.
 #[derive(Debug, Clone, Default)]
 pub struct FaultSwitch(Arc<Mutex<Option<String>>>);
 
 impl FaultSwitch {
-    /// From now on the motor has this fault: it turns the wheel no more, and can still brake.
+    /// Sets a fault: the motor no longer turns the wheel but can still brake.
     pub fn fail(&self, reason: impl Into<String>) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(reason.into());
     }
 
-    /// The motor works again.
+    /// Clears the fault.
     pub fn mend(&self) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
@@ -75,12 +76,12 @@ pub struct SimulatedMotor {
 impl SimulatedMotor {
     /// The longest step of the integration.
     pub const STEP: Duration = Duration::from_millis(10);
-    /// The longest time that is made up for at once.
+    /// The longest time simulated in one call. Longer gaps are truncated.
     pub const LONGEST_GAP: Duration = Duration::from_millis(100);
-    /// How fast unevenness forgets, per second.
+    /// Decay rate of the noise, per second.
     const CHANGE: f64 = 2.0;
 
-    /// A motor at rest.
+    /// Creates a motor at rest.
     #[must_use]
     pub fn new(config: MotorConfig) -> Self {
         Self {
@@ -96,7 +97,7 @@ impl SimulatedMotor {
         }
     }
 
-    /// A switch that breaks and mends this motor.
+    /// The switch that injects faults into this motor.
     #[must_use]
     pub fn fault_switch(&self) -> FaultSwitch {
         self.switch.clone()
@@ -117,7 +118,7 @@ impl SimulatedMotor {
         }
         let before = self.speed;
         let wanted = self.command.drive.clamp(-1.0, 1.0) * top * (1.0 + self.unevenness);
-        // Exactly what the lag does in this time, so that the length of the steps does not matter.
+        // Exact solution of the lag, so the result does not depend on the step length.
         self.speed += (wanted - self.speed) * (1.0 - (-seconds / response).exp());
         let braked = braking * self.command.brake.clamp(0.0, 1.0) * seconds;
         self.speed -= self.speed.clamp(-braked, braked);
@@ -165,7 +166,7 @@ impl Actuator for SimulatedMotor {
 mod tests {
     use super::*;
 
-    /// Travel and speed after a command of so many seconds.
+    /// Travel and speed after repeating a command for `seconds`.
     fn driven(motor: &mut SimulatedMotor, command: Command, seconds: f64) -> (f64, f64) {
         motor.command(command);
         let start = motor.time.unwrap_or_else(Instant::now);
@@ -197,7 +198,7 @@ mod tests {
         let last = motor.time.unwrap();
         let mut now = last;
         let step = Duration::from_millis(10);
-        // The last command came one step of the clock before.
+        // The last command was sent one clock step earlier.
         while now < last + CommandDeadline::DEFAULT - 2 * step {
             now += step;
             motor.handle_time(now);

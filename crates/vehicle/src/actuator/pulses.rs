@@ -1,5 +1,5 @@
-//! The thread that sends a stepper motor its pulses. The rest of the program cannot delay them; they
-//! end with the program, and by themselves when the program hangs and repeats no command.
+//! The thread that sends pulses to a stepper motor. The rest of the program cannot delay the
+//! pulses. They end with the program, and also when the program hangs and repeats no command.
 #![expect(
     clippy::disallowed_methods,
     reason = "pulses are made in real time, on a thread of their own"
@@ -13,23 +13,23 @@ use std::time::{Duration, Instant};
 use super::{Actuator, Command, Stepper, StepperConfig, StepperPoll};
 use crate::motion::CommandDeadline;
 
-/// The lines to the driver of a stepper motor.
+/// The lines to a stepper motor driver.
 pub trait Lines: Send {
-    /// Which way the next pulses turn the motor.
+    /// Sets the direction of the following pulses.
     ///
     /// # Errors
-    /// If the line can not be set.
+    /// If the line cannot be set.
     fn set_direction(&mut self, backwards: bool) -> io::Result<()>;
 
-    /// Begins or ends a pulse.
+    /// Starts or ends a pulse.
     ///
     /// # Errors
-    /// If the line can not be set.
+    /// If the line cannot be set.
     fn set_step(&mut self, high: bool) -> io::Result<()>;
 }
 
-/// A stepper motor on its lines. Dropping it ramps it down to a stop, and waits for that: half a second
-/// with the default settings, and 2 s at the most.
+/// A stepper motor driven through its lines. Dropping it ramps the motor down to a stop and waits
+/// for the ramp: half a second with the default settings, 2 s at most.
 pub struct PulseMotor {
     shared: Arc<Shared>,
     steps_per_metre: f64,
@@ -46,7 +46,7 @@ struct State {
     deadline: CommandDeadline,
     steps: i64,
     fault: Option<String>,
-    /// Since when the motor has been dropped.
+    /// When the motor was dropped.
     ends: Option<Instant>,
 }
 
@@ -67,7 +67,7 @@ impl State {
         }
     }
 
-    /// What to do now: to stop, if the last command has expired.
+    /// The command in force: stop, if the last command has expired.
     fn command_at(&mut self, now: Instant) -> Command {
         if self.command != Command::STOP && self.deadline.has_passed(now) {
             tracing::warn!("the motor stops: its command was not repeated");
@@ -76,14 +76,14 @@ impl State {
         self.command
     }
 
-    /// Whether the motor was dropped so long ago that its ramp must be over.
+    /// Whether the time allowed for the last ramp is over.
     fn has_ramped_down(&self, now: Instant) -> bool {
         let since = |ends| now.saturating_duration_since(ends);
         self.ends
             .is_some_and(|ends| since(ends) > PulseMotor::LAST_RAMP)
     }
 
-    /// When to look again: at the next pulse, or when the command expires.
+    /// Next wake-up: at the next pulse, or when the command expires.
     fn wakes_at(&self, next: Option<Instant>) -> Option<Instant> {
         let expires = self.deadline.expires_at();
         let expires = expires.filter(|_| self.command != Command::STOP);
@@ -92,18 +92,18 @@ impl State {
 }
 
 impl PulseMotor {
-    /// Between two attempts to use lines that could not be set.
+    /// Interval between attempts to use lines that could not be set.
     const RETRY: Duration = Duration::from_secs(1);
-    /// A motor that was dropped is given so long for its ramp to a stop.
+    /// Maximum time for a dropped motor to ramp down to a stop.
     const LAST_RAMP: Duration = Duration::from_secs(2);
-    /// How long a pulse lasts at least, and how long the direction is set before it: what slow
-    /// drivers need.
+    /// Minimum pulse length, and setup time of the direction line before a pulse. Sufficient for
+    /// slow drivers.
     const PULSE: Duration = Duration::from_micros(5);
 
-    /// A motor at rest, on these lines.
+    /// Starts a motor at rest on the given lines.
     ///
     /// # Errors
-    /// If the system has no thread left.
+    /// If the thread cannot be created.
     pub fn start(config: StepperConfig, lines: impl Lines + 'static) -> io::Result<Self> {
         let shared = Arc::new(Shared {
             state: Mutex::new(State::new(config.deadline)),
@@ -152,14 +152,14 @@ impl Drop for PulseMotor {
         drop(state);
         self.shared.news.notify_one();
         if let Some(thread) = self.thread.take() {
-            // A thread that has panicked sends no pulses either.
+            // A panicked thread sends no pulses either.
             let _ = thread.join();
         }
     }
 }
 
-/// Sends pulses until the motor is dropped, and then those of the ramp to a stop. While a line cannot
-/// be set the motor stands still and has a fault.
+/// Sends pulses until the motor is dropped, then those of the final ramp. While a line cannot be
+/// set, the motor stands still and reports a fault.
 fn run(shared: &Shared, mut stepper: Stepper, mut lines: impl Lines) {
     let mut direction = None;
     let mut state = shared.lock();
@@ -180,7 +180,7 @@ fn run(shared: &Shared, mut stepper: Stepper, mut lines: impl Lines) {
                 if let Err(error) = sent {
                     state.fault = Some(format!("the motor's lines cannot be set: {error}"));
                     state = mend(shared, state, &mut lines);
-                    // It begins from rest; the pulse that failed is not counted.
+                    // Restarts from rest. The failed pulse is not counted.
                     stepper = stepper.at_rest(state.steps);
                     direction = None;
                 } else {
@@ -191,8 +191,8 @@ fn run(shared: &Shared, mut stepper: Stepper, mut lines: impl Lines) {
     }
 }
 
-/// Waits until the lines can be set again, or the motor is dropped. Commands that come meanwhile are
-/// void.
+/// Waits until the lines can be set again or the motor is dropped. Commands received meanwhile are
+/// discarded.
 fn mend<'a>(
     shared: &'a Shared,
     mut state: MutexGuard<'a, State>,
@@ -218,7 +218,7 @@ fn mend<'a>(
     state
 }
 
-/// Waits for a new command or the end; until `wake` at most.
+/// Waits for a new command or the drop of the motor, at most until `wake`.
 fn wait_for_news<'a>(
     shared: &'a Shared,
     state: MutexGuard<'a, State>,
@@ -247,7 +247,7 @@ fn pulse(lines: &mut impl Lines, backwards: bool, direction: &mut Option<bool>) 
     lines.set_step(false)
 }
 
-/// Waits for less than a scheduler would.
+/// Busy-waits, because the time is shorter than the scheduler can sleep.
 fn wait(duration: Duration) {
     let start = Instant::now();
     while start.elapsed() < duration {
@@ -259,7 +259,7 @@ fn wait(duration: Duration) {
 mod tests {
     use super::*;
 
-    /// A chip that keeps what its lines were set to, and breaks after so many pulses.
+    /// Records the pulses and fails after a limited number.
     #[derive(Clone)]
     struct Chip {
         pulses: Arc<Mutex<Vec<bool>>>,
@@ -299,7 +299,7 @@ mod tests {
         Command { drive, brake: 0.0 }
     }
 
-    /// Repeats a command, as a pilot does.
+    /// Repeats a command as a pilot does, until the condition holds.
     fn command_until(motor: &mut PulseMotor, share: f64, is_so: impl Fn(&PulseMotor) -> bool) {
         let start = Instant::now();
         while !is_so(motor) {
@@ -342,7 +342,8 @@ mod tests {
         let chip = Chip::lasting(usize::MAX);
         let mut motor = PulseMotor::start(StepperConfig::default(), chip.clone()).unwrap();
         command_until(&mut motor, 0.2, |motor| motor.travel() > 0.02);
-        // The program hangs here: no command is repeated. 0.2 s and a ramp of 0.1 s are meant.
+        // The program hangs here: no command is repeated. Expected: 0.2 s deadline and a ramp of
+        // 0.1 s.
         std::thread::sleep(Duration::from_secs(2));
         let sent = chip.pulses.lock().unwrap().len();
         std::thread::sleep(Duration::from_millis(200));
@@ -357,7 +358,7 @@ mod tests {
         command_until(&mut motor, 1.0, |motor| motor.travel() > 0.3);
         let before = chip.pulses.lock().unwrap().len();
         drop(motor);
-        // 0.77 m/s and 2 m/s²: 0.15 m. A part of it was driven before the drop was noticed.
+        // 0.77 m/s at 2 m/s² is 0.15 m. Part of it was driven before the thread noticed the drop.
         let ramp = chip.pulses.lock().unwrap().len() - before;
         assert!(ramp > 150, "{ramp} pulses");
     }

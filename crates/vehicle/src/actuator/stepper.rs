@@ -1,28 +1,27 @@
-//! When a stepper motor's driver gets its pulses, so that the motor gets faster and slower no faster
-//! than it can.
+//! Pulse timing for a stepper motor, with ramps that respect its acceleration limits.
 
 use std::time::{Duration, Instant};
 
 use super::Command;
 use crate::motion::CommandDeadline;
 
-/// How a stepper motor drives its wheel.
+/// Parameters of a stepper motor and its wheel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepperConfig {
-    /// Pulses for a metre of travel.
+    /// Pulses per metre of travel.
     pub steps_per_metre: f64,
     /// The speed at full propulsion, in metres per second.
     pub top: f64,
-    /// Metres per second squared that it can do without losing steps, when getting faster.
+    /// Maximum acceleration without losing steps, in metres per second squared.
     pub acceleration: f64,
-    /// The same when getting slower.
+    /// Maximum deceleration without losing steps, in metres per second squared.
     pub deceleration: f64,
-    /// It slows down to a stop by itself when its last command is older than this.
+    /// The motor ramps down to a stop on its own when its last command is older than this.
     pub deadline: Duration,
 }
 
 impl Default for StepperConfig {
-    /// 1600 pulses a turn and a wheel of 0.2 m: 2546 pulses a metre, up to 1 m/s, 1 and 2 m/s²,
+    /// 1600 pulses per turn and a wheel of 0.2 m: 2546 pulses/m, 1 m/s, 1 m/s² up and 2 m/s² down,
     /// 200 ms.
     fn default() -> Self {
         Self {
@@ -35,26 +34,26 @@ impl Default for StepperConfig {
     }
 }
 
-/// What is to be done for a stepper motor.
+/// Next action for a stepper motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepperPoll {
-    /// A pulse.
+    /// Send a pulse.
     Step {
-        /// Whether it is one backwards.
+        /// Whether the pulse is backwards.
         backwards: bool,
     },
-    /// Nothing until then, or until it is commanded something else.
+    /// Wait until the given time or the next command.
     Wait(Option<Instant>),
 }
 
-/// Counts out the pulses of one stepper motor: a ramp that is reckoned anew at each pulse.
+/// Computes the pulses of one stepper motor. The ramp is recomputed at each pulse.
 ///
-/// A stepper motor that is pulsed holds where it is, so that a stop is a ramp down to 0 and nothing
-/// else; a brake is not needed.
+/// An energised stepper motor holds its position, so a stop is just a ramp down to 0. No brake is
+/// needed.
 #[derive(Debug, Clone)]
 pub struct Stepper {
     config: StepperConfig,
-    /// Pulses per second that are wanted and that there are, backwards negative.
+    /// Commanded and current rate in pulses per second, negative backwards.
     wanted: f64,
     rate: f64,
     next: Option<Instant>,
@@ -62,10 +61,10 @@ pub struct Stepper {
 }
 
 impl Stepper {
-    /// Pulses that are later than this are not made up for.
+    /// Pulses later than this are not caught up.
     const LATEST: Duration = Duration::from_millis(20);
 
-    /// A motor at rest.
+    /// Creates a motor at rest.
     #[must_use]
     pub const fn new(config: StepperConfig) -> Self {
         Self {
@@ -77,16 +76,16 @@ impl Stepper {
         }
     }
 
-    /// What it is to do until it is told something else.
+    /// Sets the command until the next one.
     pub fn command(&mut self, command: Command) {
         let command = command.or_stop();
         let share = command.drive.clamp(-1.0, 1.0) * (1.0 - command.brake.clamp(0.0, 1.0));
         let wanted = share * self.config.top * self.config.steps_per_metre;
-        // Slower than a pulse in ten seconds is as good as standing still.
+        // Below 0.1 pulses per second counts as standing still.
         self.wanted = if wanted.abs() < 0.1 { 0.0 } else { wanted };
     }
 
-    /// The same motor at rest, after so many pulses.
+    /// The same motor at rest, after `steps` pulses.
     pub(super) const fn at_rest(&self, steps: i64) -> Self {
         Self {
             steps,
@@ -94,13 +93,13 @@ impl Stepper {
         }
     }
 
-    /// Pulses so far, backwards negative.
+    /// Pulses so far. Backward pulses count negative.
     #[must_use]
     pub const fn steps(&self) -> i64 {
         self.steps
     }
 
-    /// What is to be done `now`. Whoever is told to step has to, and to ask again.
+    /// The next action at `now`. On `Step` the caller sends a pulse and polls again.
     pub fn poll(&mut self, now: Instant) -> StepperPoll {
         if self.rate == 0.0 {
             self.rate = self.first_rate();
@@ -120,18 +119,19 @@ impl Stepper {
         StepperPoll::Step { backwards }
     }
 
-    /// Pulses per second squared.
+    /// Converts metres per second squared to pulses per second squared.
     fn per_second_squared(&self, metres: f64) -> f64 {
         metres * self.config.steps_per_metre
     }
 
-    /// The rate of the first pulse from rest, if there is to be one: the mean while it is reached.
+    /// Rate of the first pulse from rest: the mean rate while accelerating over one step. 0 if no
+    /// motion is commanded.
     fn first_rate(&self) -> f64 {
         let mean = (self.per_second_squared(self.config.acceleration) / 2.0).sqrt();
         self.wanted.clamp(-mean, mean)
     }
 
-    /// The rate after one more pulse.
+    /// Updates the rate after one more pulse.
     fn ramp(&mut self) {
         let slows = self.wanted * self.rate < 0.0 || self.wanted.abs() < self.rate.abs();
         let limit = match slows {
@@ -140,7 +140,7 @@ impl Stepper {
         };
         let turns = self.wanted * self.rate < 0.0;
         let goal = if turns { 0.0 } else { self.wanted.abs() };
-        // What speed does in one step of way, it does to its square.
+        // At constant acceleration, the square of the speed changes linearly with distance.
         let change = 2.0 * self.per_second_squared(limit);
         let rate = self.rate.abs();
         let next = match slows {
@@ -168,7 +168,7 @@ mod tests {
         brake: 0.0,
     };
 
-    /// Runs in virtual time; the pauses between pulses.
+    /// Runs in virtual time. Returns the intervals between pulses.
     fn run(stepper: &mut Stepper, now: &mut Instant, seconds: f64) -> Vec<f64> {
         let end = *now + Duration::from_secs_f64(seconds);
         let mut pauses = Vec::new();
@@ -194,7 +194,7 @@ mod tests {
         stepper.command(AHEAD);
         let pauses = run(&mut stepper, &mut now, 3.0);
         assert!((1.0 / pauses[pauses.len() - 1] - 2546.0).abs() < 1.0);
-        // Half a metre while it gets faster, and two more seconds at 1 m/s.
+        // Half a metre while accelerating, then two more seconds at 1 m/s.
         let metres = stepper.steps() as f64 / 2546.0;
         assert!((metres - 2.5).abs() < 0.02, "{metres}");
     }

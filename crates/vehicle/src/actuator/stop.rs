@@ -1,23 +1,23 @@
-//! Stop inputs: a line that must be closed for anything to move, and what it locks.
+//! Stop inputs: lines that must be closed before anything moves, and the interlock they control.
 
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A stop input: a normally closed line, such as that of a mushroom button.
+/// A stop input: a normally closed line, such as an emergency stop button.
 ///
-/// An open line stops the vehicle, and so does one that cannot be read: a cut wire is a pressed
-/// button. It is read every 10 ms on a thread of its own.
+/// The vehicle stops when the line is open or cannot be read, so a cut wire acts like a pressed
+/// button. A dedicated thread reads the line every 10 ms.
 pub trait StopInput: Send {
     /// Whether the line is closed, so that the vehicle may move.
     ///
     /// # Errors
-    /// If it cannot be read; that counts as open.
+    /// If the line cannot be read, which counts as open.
     fn is_closed(&mut self) -> io::Result<bool>;
 }
 
-/// A simulated stop input. Cheap to clone; the clones are one button.
+/// A simulated stop input. Cheap to clone; all clones share one state.
 #[derive(Debug, Clone, Default)]
 pub struct SimulatedStop(Arc<AtomicBool>);
 
@@ -39,7 +39,7 @@ impl StopInput for SimulatedStop {
     }
 }
 
-/// A stop input for trying things out: it is pressed while a file exists.
+/// A stop input for experiments: pressed while a file exists.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StopFile(pub PathBuf);
 
@@ -49,23 +49,23 @@ impl StopInput for StopFile {
     }
 }
 
-/// Locks [`Wheels`](super::Wheels): while it is open both sides are commanded to stop, whatever
-/// commands come. Cheap to clone; the clones are one interlock.
+/// Locks [`Wheels`](super::Wheels): while the interlock is open, both sides are commanded to stop,
+/// whatever other commands arrive. Cheap to clone; all clones share one state.
 #[derive(Debug, Clone, Default)]
 pub struct Interlock(Arc<AtomicBool>);
 
 impl Interlock {
-    /// From now on nothing may move.
+    /// Blocks all motion from now on.
     pub fn open(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Commands are carried out again.
+    /// Allows commands to take effect again.
     pub fn close(&self) {
         self.0.store(false, Ordering::Relaxed);
     }
 
-    /// Whether nothing may move.
+    /// Whether motion is blocked.
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.0.load(Ordering::Relaxed)

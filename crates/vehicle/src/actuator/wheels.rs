@@ -1,4 +1,4 @@
-//! The platform that two drives make, one on each side, and how far they have travelled.
+//! The differential-drive platform of two drives, and its odometer.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -7,20 +7,20 @@ use super::{Actuator, Command, Interlock};
 use crate::motion::{Acceleration, Drive, Effort, Limits, Motion, Platform, Pose, Velocity};
 use crate::motion::{DeadReckoning, WheelCount};
 
-/// What two drives make together.
+/// Parameters of a platform with two drives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WheelsConfig {
-    /// Metres between the left and the right wheels, as it counts in turns.
+    /// Effective distance between left and right wheels in turns, in metres.
     pub track: f64,
-    /// The speed of either side at full propulsion, in metres per second.
+    /// Speed of each side at full propulsion, in metres per second.
     pub top: f64,
-    /// What the platform can do at most. Full effort forward is its speed, full effort backward its
-    /// reverse speed, full effort in a turn its yaw rate.
+    /// Limits of the platform. Full forward effort commands the maximum speed, full backward effort
+    /// the reverse speed, full turning effort the yaw rate.
     pub limits: Limits,
 }
 
 impl Default for WheelsConfig {
-    /// A small rover with half a metre between its wheels.
+    /// A small rover with a track of 0.5 m.
     fn default() -> Self {
         Self {
             track: 0.5,
@@ -30,7 +30,7 @@ impl Default for WheelsConfig {
     }
 }
 
-/// How far the wheels of a platform have travelled. Cheap to clone; the clones are one odometer.
+/// Distance travelled by the wheels of a platform. Cheap to clone; all clones share one state.
 #[derive(Debug, Clone)]
 pub struct Odometer(Arc<Mutex<Reading>>);
 
@@ -41,7 +41,7 @@ struct Reading {
 }
 
 impl Odometer {
-    /// An odometer at 0; `start` tells it from others and should be chosen at random.
+    /// Creates an odometer at 0. Choose `start` at random: it identifies this odometer run.
     #[must_use]
     pub fn new(start: u32) -> Self {
         let count = WheelCount {
@@ -51,13 +51,13 @@ impl Odometer {
         Self(Arc::new(Mutex::new(Reading { count, fault: None })))
     }
 
-    /// How far they had travelled when the platform was last told the time.
+    /// The count at the last time update of the platform.
     #[must_use]
     pub fn count(&self) -> WheelCount {
         self.lock().count
     }
 
-    /// What is broken about the drives, if anything.
+    /// The fault of the drives, if any.
     #[must_use]
     pub fn fault(&self) -> Option<String> {
         self.lock().fault.clone()
@@ -68,9 +68,9 @@ impl Odometer {
     }
 }
 
-/// A platform with a drive on each side, which steers by driving them at different speeds.
+/// A platform with one drive on each side, steered by the speed difference.
 ///
-/// It knows how far its wheels have turned and nothing else: its pose is dead reckoning.
+/// Its only sensor is the wheel odometry, so its pose is dead reckoning.
 pub struct Wheels<A> {
     left: A,
     right: A,
@@ -79,13 +79,13 @@ pub struct Wheels<A> {
     odometer: Odometer,
     reckoning: DeadReckoning,
     motion: Motion,
-    /// When the counter began, and when it was read last.
+    /// Start of the counter, and time of the last reading.
     times: Option<(Instant, Instant)>,
     interlock: Interlock,
 }
 
 impl<A: Actuator> Wheels<A> {
-    /// A platform that stands still.
+    /// Creates a platform at rest.
     #[must_use]
     pub fn new(left: A, right: A, config: WheelsConfig, odometer: Odometer) -> Self {
         odometer.lock().count.track = config.track;
@@ -102,20 +102,20 @@ impl<A: Actuator> Wheels<A> {
         }
     }
 
-    /// Stands still while an interlock is open.
+    /// Adds an interlock that holds the platform at rest while open.
     #[must_use]
     pub fn with_interlock(mut self, interlock: Interlock) -> Self {
         self.interlock = interlock;
         self
     }
 
-    /// Whether both sides have to stand still, whatever is commanded.
+    /// Whether both sides must stand still, whatever the command.
     fn is_locked(&self) -> bool {
         self.interlock.is_open() || self.fault().is_some()
     }
 
-    /// Drives both sides at speeds in metres per second; what is too fast for one side slows both,
-    /// so that the curve stays.
+    /// Drives both sides at speeds in metres per second. If one side exceeds its top speed, both
+    /// slow down so that the curvature is preserved.
     fn drive_at(&mut self, velocity: Velocity, brake: f64) {
         let lead = velocity.yaw * self.config.track / 2.0;
         let sides = [velocity.x + lead, velocity.x - lead].map(|speed| speed / self.config.top);
@@ -127,7 +127,8 @@ impl<A: Actuator> Wheels<A> {
         self.command(left, right);
     }
 
-    /// Commands both sides. With a fault on either, both stop: one side alone would turn the vehicle.
+    /// Commands both sides. A fault on one side stops both, since a single drive would turn the
+    /// vehicle.
     fn command(&mut self, left: Command, right: Command) {
         let locked = self.is_locked();
         let [left, right] = [left, right].map(|it| if locked { Command::STOP } else { it });
@@ -160,7 +161,7 @@ impl<A: Actuator> Wheels<A> {
             reading.fault = fault;
             reading.count.left = self.left.travel();
             reading.count.right = self.right.travel();
-            // Begins again at 0 after 49 days, as the report has it.
+            // Wraps to 0 after 49 days, as specified for the report.
             reading.count.time_ms = milliseconds as u32;
             reading.count
         };

@@ -1,7 +1,7 @@
-//! The services of a ground vehicle, which are our own: what no published set has.
+//! Ground vehicle services specific to this project, which no published service set covers.
 //!
-//! Each service tells others of something that lives elsewhere, and is a thin cover over it: the
-//! mission in [`mission`](crate::mission), objects and maps in [`world`](crate::world).
+//! Each service is a thin layer over a model in another module: missions in
+//! [`mission`](crate::mission), objects and maps in [`world`](crate::world).
 
 mod knowledge_store;
 mod odometry;

@@ -1,4 +1,4 @@
-//! Wheel Odometry: tells how far the wheels of both sides have travelled.
+//! Wheel Odometry: reports the distance travelled by the wheels of each side.
 
 use std::time::Instant;
 
@@ -10,17 +10,17 @@ use jaus::codec::{Message, ServiceId};
 use jaus::endpoint::Received;
 use jaus::service::{Context, Handled, Service, code_of};
 
-/// Tells anyone what an odometer counts.
+/// Reports the count of an odometer to any client.
 #[derive(Debug)]
 pub struct WheelOdometry {
     odometer: Odometer,
     vehicle: Vehicle,
-    /// What was told last to whoever wants to hear of changes.
+    /// The distances of the last change event.
     told: (f64, f64),
 }
 
 impl WheelOdometry {
-    /// The odometer of a vehicle, which is brought up to date before it is read.
+    /// Creates the service. The vehicle is updated before each reading.
     #[must_use]
     pub const fn new(odometer: Odometer, vehicle: Vehicle) -> Self {
         Self {

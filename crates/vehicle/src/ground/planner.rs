@@ -1,8 +1,7 @@
-//! Mission Planner: an operator sets a destination, approves the path, and sees how far it is.
+//! Mission Planner: the operator sets a destination, approves the path and follows the progress.
 //!
-//! The service tells a [`Mission`] what the operator wants, and the operator how the mission is.
-//! Whoever carries the mission out holds the same [`Missions`] and is woken when there is something
-//! to do.
+//! The service passes commands to a [`Mission`] and reports its state. The mission's executor holds
+//! the same [`Missions`] and is woken when there is work to do.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -21,25 +20,25 @@ use jaus::service::{
     Context, Handled, Hazards, Service, Standing, State, StopCause, code_of, read,
 };
 
-/// A planner's mission, shared by the service and whoever carries it out.
+/// A planner's mission, shared by the service and the executor.
 #[derive(Clone)]
 pub struct Missions {
     mission: Arc<Mutex<Mission>>,
     wake: Arc<dyn Fn() + Send + Sync>,
 }
 
-/// What has changed of a mission.
+/// Changes of a mission that subscribers receive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct News {
-    /// What Report Mission tells.
+    /// Whether Report Mission has changed.
     pub mission: bool,
-    /// What Report Planned Path tells.
+    /// Whether Report Planned Path has changed.
     pub path: bool,
 }
 
 impl Missions {
-    /// No mission yet. `wake` is called when the operator has said something that has to be acted
-    /// upon; it must not wait for anything.
+    /// Creates an idle planner. `wake` is called after operator input that requires action. It must
+    /// not block.
     #[must_use]
     pub fn new(settings: Settings, wake: impl Fn() + Send + Sync + 'static) -> Self {
         Self {
@@ -48,7 +47,7 @@ impl Missions {
         }
     }
 
-    /// Tells the mission something, or asks it; says what has changed by that.
+    /// Runs `words` on the mission and returns its result with the resulting changes.
     pub fn tell<T>(&self, words: impl FnOnce(&mut Mission) -> T) -> (T, News) {
         let mut mission = self.mission.lock().unwrap_or_else(PoisonError::into_inner);
         let before = (mission.report().clone(), Arc::clone(mission.path()));
@@ -60,7 +59,7 @@ impl Missions {
         (answer, news)
     }
 
-    /// The service over the mission.
+    /// Creates the service for the mission.
     #[must_use]
     pub fn service(&self) -> MissionPlanner {
         MissionPlanner {
@@ -75,9 +74,9 @@ impl std::fmt::Debug for Missions {
     }
 }
 
-/// Takes commands from the client in control while the component is ready, and tells anyone how the
-/// mission is. The mission is stopped when the component may no longer act or another client takes
-/// control; it does not go on by itself afterwards.
+/// Accepts commands from the client in control while the component is ready, and reports the
+/// mission to any client. The mission stops when the component may no longer act or another client
+/// takes control. It does not resume on its own.
 #[derive(Debug)]
 pub struct MissionPlanner {
     missions: Missions,
@@ -163,7 +162,7 @@ impl Service for MissionPlanner {
     }
 
     fn handle_stop(&mut self, cause: &StopCause, context: &mut Context<'_>) {
-        // The other causes are changes of the standing, which say more.
+        // The other causes are changes of the standing, which carry more detail.
         if *cause == StopCause::Ended {
             self.tell(context, |mission| mission.stop("the planner has ended"));
         }
@@ -195,14 +194,14 @@ fn wanted(command: &SetDestination) -> (Destination, bool) {
     (destination, command.approved == Approved::YES)
 }
 
-/// The client whose control has ended, if there is nothing else that stops the planner.
+/// The client whose control ended, if nothing else stops the planner.
 fn lost_client(before: &Standing, now: &Standing) -> Option<JausId> {
     let is_well = matches!(now.state, State::Ready | State::Standby);
     let client = before.controller.filter(|_| is_well)?;
     now.controller.is_none().then_some(client.id)
 }
 
-/// Why the planner may not go on with what it was told `before`.
+/// Why the planner must abandon its current mission.
 fn why_stopped(before: &Standing, now: &Standing) -> String {
     let client = |standing: &Standing| standing.controller.map(|controller| controller.id);
     match (now.state, client(now)) {
@@ -231,14 +230,14 @@ fn report(report: &Report) -> ReportMission {
     }
 }
 
-/// As much of a reason as a report can hold.
+/// The longest prefix of a reason that fits into the report.
 fn told(reason: &str) -> &str {
     let longest = (0..=MAX_REASON.min(reason.len())).rev();
     let mut ends = longest.filter(|&end| reason.is_char_boundary(end));
     &reason[..ends.next().unwrap_or_default()]
 }
 
-/// Octets.
+/// Maximum length in octets.
 const MAX_REASON: usize = 255;
 
 fn report_path(mission: u32, path: &Path) -> ReportPlannedPath {
@@ -294,7 +293,7 @@ mod tests {
             self.rig.ask(&QueryMission {}).unwrap()
         }
 
-        /// As far as a path that awaits approval.
+        /// Advances to a path that awaits approval.
         fn plan(&mut self, points: Vec<(f64, f64)>) {
             let now = self.rig.now;
             let _ = self.missions.tell(|mission| {
@@ -380,7 +379,7 @@ mod tests {
         }
     }
 
-    /// A planner that holds a mission, or drives back, when the link is lost; it drives.
+    /// A planner that is driving, with the given lost-link behaviour.
     fn driving(lost_link: LostLink) -> Bench {
         let mut bench = Bench::with(Settings {
             lost_link,

@@ -1,4 +1,4 @@
-//! Raster Maps: which maps there are, their cells, and changes of them.
+//! Raster Maps: lists the maps, reports their cells and changes them.
 
 use std::time::Instant;
 
@@ -17,16 +17,16 @@ use jaus::service::{Context, Handled, Service, code_of, read};
 use super::WorldStore;
 use super::world_store::Answer;
 
-/// Tells anyone which maps there are and what their cells are, and takes changes from whoever may
-/// command the component. Every change is answered once it is on the disk, or with what is wrong.
+/// Reports maps and cells to any client, and accepts changes from clients that may command the
+/// component. Every change is answered once it is on disk, or with the reason for the refusal.
 #[derive(Debug)]
 pub struct RasterMaps {
     store: WorldStore,
 }
 
 impl RasterMaps {
-    /// The most cells of one report. Of a larger window it has as many whole rows as fit, from the
-    /// south, and says how many those are.
+    /// The most cells of one report. For a larger window the report holds as many whole rows as
+    /// fit, from the south, and states their number.
     pub const MOST_TOLD: usize = 2048 * 2048;
 
     pub(super) const fn new(store: WorldStore) -> Self {
@@ -87,7 +87,7 @@ impl RasterMaps {
         }
     }
 
-    /// Takes a change with the number of its request, and the map that it is about.
+    /// Queues a change together with the number of its request and the map concerned.
     fn change(
         &self,
         now: Instant,

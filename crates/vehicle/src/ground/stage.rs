@@ -1,4 +1,4 @@
-//! Stage: how far one driver of the chain is, and why it does not go on.
+//! Stage: the state of one driver of the chain, and what blocks it.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,37 +7,37 @@ use crate::messages::ground::{QueryStage, ReportStage, report_stage, stage};
 use jaus::address::JausId;
 use jaus::service::Handlers;
 
-/// How a driver of the chain is doing, as whoever runs it says. Cheap to clone; the clones are one.
+/// The published state of a driver of the chain. Cheap to clone; all clones share one state.
 #[derive(Debug, Clone, Default)]
 pub struct StageBoard(Arc<Mutex<StageReport>>);
 
-/// What a driver of the chain tells of itself.
+/// State report of a driver of the chain.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct StageReport {
-    /// How far it is.
+    /// The driver's state.
     pub state: StageState,
-    /// How much of what was commanded is done, in percent.
+    /// Completed part of the command, in percent.
     pub progress: u8,
-    /// The component that it commands, or wants to.
+    /// The component that the driver commands or tries to control.
     pub next: Option<JausId>,
-    /// Why it does not go on, for people; empty if it does.
+    /// Why the driver is blocked, as text for the operator; empty if it is not.
     pub reason: String,
 }
 
-/// How far a driver is. The numbers are those of Report Stage.
+/// State of a driver. The numbers are those of Report Stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StageState {
-    /// Nothing is to be done.
+    /// Nothing to do.
     #[default]
     Idle = 0,
-    /// It takes the next driver under control.
+    /// Taking control of the next driver.
     Engaging = 1,
-    /// It does what was commanded.
+    /// Executing the command.
     Active = 2,
-    /// It can not go on. If it commands nobody it has stood down: it does not go on by itself, and
-    /// has to be commanded anew.
+    /// Unable to continue. If it commands no driver, it has stood down: it does not resume on its
+    /// own and needs a new command.
     Blocked = 3,
-    /// It has done what was commanded.
+    /// The command is complete.
     Done = 4,
 }
 
@@ -54,14 +54,14 @@ impl fmt::Display for StageState {
 }
 
 impl StageBoard {
-    /// The service that tells it.
+    /// Creates the service that reports the state.
     #[must_use]
     pub fn service(&self) -> Handlers {
         let board = self.clone();
         Handlers::new(stage::LATEST).answer(move |_: QueryStage| board.report().to_message())
     }
 
-    /// What is told now.
+    /// The current report.
     #[must_use]
     pub fn report(&self) -> StageReport {
         self.0
@@ -70,7 +70,7 @@ impl StageBoard {
             .clone()
     }
 
-    /// From now on this is told; says whether it is something else than before.
+    /// Replaces the report. Returns whether it differs from the previous one.
     pub fn tell(&self, report: StageReport) -> bool {
         let mut told = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let is_news = *told != report;
@@ -80,7 +80,7 @@ impl StageBoard {
 }
 
 impl StageReport {
-    /// Octets that the message has for a reason.
+    /// Maximum length of a reason in the message, in octets.
     const MAX_REASON: usize = 255;
 
     fn to_message(&self) -> ReportStage {
@@ -105,7 +105,7 @@ impl StageReport {
         &self.reason[..end]
     }
 
-    /// Whether it has stood down, and will not go on by itself.
+    /// Whether the driver has stood down and will not resume on its own.
     #[must_use]
     pub fn stands_down(&self) -> bool {
         self.state == StageState::Blocked && self.next.is_none()

@@ -1,10 +1,10 @@
-//! A world that several services of one component tell of and change.
+//! A world shared by several services of one component, which report and change it.
 //!
-//! Changes wait a moment for others, so that one write to the disk serves all of them; the answers
-//! follow when everything is on the disk. A query is answered with what is on the disk. The write
-//! itself happens in the component's task: order and answers need no second place then, and a store
-//! has nothing to say while it does not know whether it keeps what it was told. The services of one
-//! store wait for the disk, a few milliseconds; other components have tasks of their own.
+//! Changes wait briefly for others, so that one disk write serves all of them. Replies are sent
+//! once everything is on disk, and queries return what is on disk. The component's own task
+//! performs the write. This keeps changes and replies in one order, and a store must not reply
+//! anyway while it is uncertain whether the changes will be kept. The services of one store wait a
+//! few milliseconds for the disk; other components have their own tasks.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -23,7 +23,7 @@ use jaus::service::Context;
 
 use super::{RasterMaps, VectorKnowledgeStore};
 
-/// A world, shared by the services over it.
+/// A world shared by the services that use it.
 #[derive(Clone)]
 pub struct WorldStore {
     shared: Arc<Mutex<Shared>>,
@@ -34,39 +34,39 @@ pub struct WorldStore {
 struct Shared {
     world: World,
     waiting: Vec<Waiting>,
-    /// When those that wait are written.
+    /// When the waiting changes are written.
     due: Option<Instant>,
 }
 
-/// A change, and who wants it.
+/// A change and the request for it.
 struct Waiting {
     request: Received,
     change: Change,
     answer: Answer,
 }
 
-/// What is answered once a change is kept or refused.
+/// The reply to a change after it is kept or refused.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Answer {
-    /// Nothing.
+    /// No reply.
     None,
-    /// Report VKS Objects Creation for so many objects.
+    /// Report VKS Objects Creation for `count` objects.
     Creation { request_id: u8, count: usize },
-    /// Report Raster Change about a map, 0 if there is none yet.
+    /// Report Raster Change for a map, 0 if it does not exist yet.
     Raster { request_id: u8, map: u16 },
 }
 
 impl WorldStore {
     /// How long the first change waits for others.
     pub const LINGER: Duration = Duration::from_millis(2);
-    /// How many changes wait at most; then they are written at once.
+    /// Maximum number of waiting changes. At this number they are written immediately.
     pub const MOST_WAITING: usize = 64;
-    /// How many octets of changes wait at most; then they are written at once.
+    /// Maximum size of waiting changes in octets. At this size they are written immediately.
     const MOST_OCTETS: usize = 4 << 20;
 
-    /// A world whose local frame lies at `frame`. `fail` is called when something can not be kept,
-    /// after which the world answers nothing more and has to be opened again; it must not wait for
-    /// anything.
+    /// Creates a store for a world whose local frame is `frame`. `fail` is called when a change
+    /// cannot be kept. After that the world answers no requests and must be opened again. `fail`
+    /// must not block.
     #[must_use]
     pub fn new(
         world: World,
@@ -85,30 +85,30 @@ impl WorldStore {
         }
     }
 
-    /// The service Raster Maps.
+    /// Creates the service Raster Maps.
     #[must_use]
     pub fn raster_maps(&self) -> RasterMaps {
         RasterMaps::new(self.clone())
     }
 
-    /// The service Vector Knowledge Store.
+    /// Creates the service Vector Knowledge Store.
     #[must_use]
     pub fn vector_knowledge_store(&self) -> VectorKnowledgeStore {
         VectorKnowledgeStore::new(self.clone())
     }
 
-    /// Where the local frame is.
+    /// The local frame.
     pub(super) const fn frame(&self) -> &Frame {
         &self.frame
     }
 
-    /// Asks the world; `None` once it has failed.
+    /// Reads from the world; `None` once it has failed.
     pub(super) fn ask<T>(&self, question: impl FnOnce(&World) -> T) -> Option<T> {
         let shared = self.lock();
         (!shared.world.has_failed()).then(|| question(&shared.world))
     }
 
-    /// The same for questions that the file has to be read for.
+    /// Like [`ask`](Self::ask), for reads that access the file.
     pub(super) fn read<T>(
         &self,
         question: impl FnOnce(&World) -> Result<T, KeepError>,
@@ -118,7 +118,7 @@ impl WorldStore {
             .ok()
     }
 
-    /// Takes a change from a client that may make it.
+    /// Queues a change if the client may make it.
     pub(super) fn change(
         &self,
         now: Instant,
@@ -151,7 +151,7 @@ impl WorldStore {
         }
     }
 
-    /// Writes what waits, if its time has come.
+    /// Writes the waiting changes when they are due.
     pub(super) fn handle_timeout(&self, now: Instant, context: &mut Context<'_>) {
         if self.lock().due.is_some_and(|due| due <= now) {
             self.write(context);
@@ -201,7 +201,7 @@ impl fmt::Debug for WorldStore {
     }
 }
 
-/// Tells whoever subscribed what has changed.
+/// Notifies the subscribers of a change.
 fn announce(done: &Done, context: &mut Context<'_>) {
     match done {
         Done::Added(_) | Done::Removed(_) => {
@@ -303,7 +303,7 @@ const fn result_of(refusal: &Refusal) -> ChangeResult {
     }
 }
 
-/// As much of a text as has at most so many octets.
+/// The longest prefix of a text within `most` octets.
 fn beginning(text: &str, most: usize) -> &str {
     let mut end = most.min(text.len());
     while !text.is_char_boundary(end) {

@@ -1,26 +1,26 @@
-//! Square blocks of cells, for the search on large maps: each piece of connected ground in a block
-//! is one node, so that a way over nodes exists exactly if there is one over cells.
+//! Square blocks of cells for path search on large maps. Each connected piece of ground within a
+//! block is one node, so a path over nodes exists exactly if one over cells exists.
 
 use super::ground::{Cell, Ground};
 
-/// The cells on a side of a block.
+/// Side length of a block in cells.
 const SIDE: usize = 8;
-/// The most pieces of ground in a block that do not touch.
+/// Maximum number of disjoint pieces of ground in a block.
 const PIECES: usize = SIDE * SIDE / 2;
-/// What a cell is labelled that belongs to no piece.
+/// Label of a cell that belongs to no piece.
 const NONE: u8 = u8::MAX;
 
-/// A piece of connected ground in a block: the block's number times [`PIECES`], plus the piece's.
+/// A connected piece of ground in a block: block number times [`PIECES`] plus piece number.
 pub(super) type Node = u32;
 
-/// The ground in blocks.
+/// The ground divided into blocks.
 pub(super) struct Blocks<'a> {
     ground: &'a Ground,
     rows: usize,
     columns: usize,
-    /// The piece of its block that each cell belongs to.
+    /// For each cell, its piece within its block.
     labels: Vec<u8>,
-    /// What the open cells of each block cost on average.
+    /// Average weight of the open cells of each block.
     weights: Vec<u16>,
 }
 
@@ -43,12 +43,12 @@ impl<'a> Blocks<'a> {
         blocks
     }
 
-    /// How many blocks there are.
+    /// Number of blocks.
     pub(super) const fn len(&self) -> usize {
         self.rows * self.columns
     }
 
-    /// The rows and the columns of a block's cells.
+    /// The row and column ranges of a block's cells.
     fn cells(&self, block: usize) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
         let (row, column) = (block / self.columns * SIDE, block % self.columns * SIDE);
         (
@@ -57,7 +57,7 @@ impl<'a> Blocks<'a> {
         )
     }
 
-    /// Finds the pieces of a block and what it costs.
+    /// Labels the pieces of a block and computes its weight.
     fn label(&mut self, block: usize) {
         let (rows, columns) = self.cells(block);
         let mut pieces = 0;
@@ -80,7 +80,8 @@ impl<'a> Blocks<'a> {
                         continue;
                     }
                     self.labels[cell] = pieces;
-                    // Over a corner it goes only past two open cells, so that sides suffice.
+                    // Diagonal moves require both adjacent cells to be open, so checking sides
+                    // suffices.
                     let beside = [
                         (row.wrapping_sub(1), column),
                         (row + 1, column),
@@ -99,13 +100,13 @@ impl<'a> Blocks<'a> {
         self.weights[block] = sum.checked_div(open).unwrap_or_default() as u16;
     }
 
-    /// The block that a cell is in.
+    /// The block that contains a cell.
     pub(super) const fn block_of(&self, cell: Cell) -> usize {
         let (row, column) = self.ground.place(cell);
         row / SIDE * self.columns + column / SIDE
     }
 
-    /// The node that a cell belongs to, if it is open.
+    /// The node that contains a cell, if the cell is open.
     pub(super) fn node_of(&self, cell: Cell) -> Option<Node> {
         match self.labels[cell as usize] {
             NONE => None,
@@ -124,7 +125,7 @@ impl<'a> Blocks<'a> {
         self.ground.cell(middle(rows), middle(columns))
     }
 
-    /// Names the block of a node and those around it.
+    /// Calls `name` for the block of a node and for the surrounding blocks.
     pub(super) fn around(&self, node: Node, mut name: impl FnMut(usize)) {
         let block = Self::block(node);
         let (row, column) = (block / self.columns, block % self.columns);
@@ -135,8 +136,8 @@ impl<'a> Blocks<'a> {
         }
     }
 
-    /// The nodes beside a node, and what it costs to go there; over corners too, where it goes
-    /// through a node beside both.
+    /// The neighbours of a node with the cost of moving there, including diagonal ones reachable
+    /// through a common neighbour.
     pub(super) fn neighbours(&self, node: Node) -> Vec<(Node, u64)> {
         let mut found: Vec<(Node, u64)> = Vec::with_capacity(8);
         let beside = self.beside(node);
@@ -159,7 +160,7 @@ impl<'a> Blocks<'a> {
         length * (weight(from) + weight(to)) / 2 * SIDE as u64
     }
 
-    /// The nodes over the sides of a node's block, and whether they are in another row.
+    /// The nodes adjacent to a node across block sides, and whether they are in another row.
     fn beside(&self, node: Node) -> Vec<(Node, bool)> {
         let (rows, columns) = self.cells(Self::block(node));
         let mut found = Vec::with_capacity(4);
@@ -196,7 +197,7 @@ impl<'a> Blocks<'a> {
         found
     }
 
-    /// What it costs at least to go from one node to another: the blocks between them.
+    /// Lower bound of the cost between two nodes, from the distance of their blocks.
     pub(super) fn at_least(&self, from: Node, to: Node) -> u64 {
         let place = |node| {
             let block = Self::block(node);

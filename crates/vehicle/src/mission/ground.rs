@@ -1,30 +1,30 @@
-//! The cells that the middle of a vehicle may be in, and what it costs to drive over them.
+//! The cells open to the centre of a vehicle, and the cost of driving over them.
 
 use super::Terrain;
 
-/// The cells of a [`Terrain`] that are open to the middle of a vehicle.
+/// The cells of a [`Terrain`] that the vehicle's centre may occupy.
 pub(super) struct Ground {
     rows: usize,
     columns: usize,
-    /// 0 where it may not be, else how well it can drive there.
+    /// 0 for closed cells, otherwise the traversability.
     cells: Vec<u8>,
-    /// What the best of them costs, as [`Ground::weight`] tells.
+    /// Weight of the best cell, as returned by [`Ground::weight`].
     least: u64,
 }
 
-/// The number of a cell, row by row.
+/// Cell number, counted row by row.
 pub(super) type Cell = u32;
 
-/// What a step over the side of two cells costs for each unit of their weights, and over a corner.
+/// Cost of a step across a side per unit of weight; below it, the cost across a corner.
 const SIDE: u64 = 10;
 const CORNER: u64 = 14;
 
 impl Ground {
-    /// The ground for a vehicle that keeps `clearance` metres between its middle and everything
-    /// that nothing can drive on. Beyond the map there is nothing to keep away from.
+    /// Creates the ground for a vehicle whose centre keeps `clearance` metres from everything that
+    /// is not traversable. The edge of the map is no obstacle.
     ///
-    /// A vehicle that already stands closer than that to an obstacle may leave: around `start`,
-    /// counted in rows and columns, only what nothing can drive on is closed.
+    /// A vehicle already closer than that to an obstacle may leave: around `start`, in rows and
+    /// columns, only cells that are not traversable are closed.
     pub(super) fn new(terrain: &Terrain, clearance: f64, start: (f64, f64)) -> Self {
         let (rows, columns) = (terrain.rows().into(), terrain.columns().into());
         let radius = clearance / terrain.cell();
@@ -43,7 +43,7 @@ impl Ground {
         ground
     }
 
-    /// Closes the cells whose middle is closer than `radius` cells to a cell that is closed.
+    /// Closes all cells whose centre is closer than `radius` cells to a closed cell.
     fn keep_away(&mut self, radius: f64) {
         let widths = widths(radius);
         let aside = self.distances_in_rows(widths[0]);
@@ -63,8 +63,8 @@ impl Ground {
         }
     }
 
-    /// For each cell how many columns the nearest closed cell of its row is away, and no more than
-    /// one beyond `most`.
+    /// For each cell, the distance in columns to the nearest closed cell of its row, limited to
+    /// `most` + 1.
     fn distances_in_rows(&self, most: u8) -> Vec<u8> {
         let far = most.saturating_add(1);
         let mut aside = vec![far; self.cells.len()];
@@ -76,8 +76,7 @@ impl Ground {
         aside
     }
 
-    /// Opens what can be driven on at all close to a point, so that a vehicle which stands there
-    /// can leave.
+    /// Opens all traversable cells near a point, so that a vehicle standing there can leave.
     fn open_around(&mut self, (row, column): (f64, f64), radius: f64, cells: &[u8]) {
         let reach = radius + 1.0;
         let span = |middle: f64, side: usize| {
@@ -90,7 +89,7 @@ impl Ground {
                 let (up, aside) = (at_row as f64 + 0.5 - row, at_column as f64 + 0.5 - column);
                 let at = at_row * self.columns + at_column;
                 if up.hypot(aside) <= reach && self.cells[at] == 0 {
-                    // As bad as can be: it is better to be farther away.
+                    // Worst traversability, so that the path leads away from here.
                     self.cells[at] = cells[at].min(1);
                 }
             }
@@ -105,7 +104,7 @@ impl Ground {
         self.columns
     }
 
-    /// How many cells there are, open or not.
+    /// Number of cells, open or closed.
     pub(super) const fn len(&self) -> usize {
         self.cells.len()
     }
@@ -114,7 +113,7 @@ impl Ground {
         self.cells[row * self.columns + column] != 0
     }
 
-    /// The cell around a point that is counted in rows and columns and lies on the map.
+    /// The cell that contains a point of the map, given in rows and columns.
     pub(super) fn cell_at(&self, (row, column): (f64, f64)) -> Cell {
         let row = (row as usize).min(self.rows - 1);
         let column = (column as usize).min(self.columns - 1);
@@ -126,19 +125,19 @@ impl Ground {
         (row * self.columns + column) as Cell
     }
 
-    /// The row and the column of a cell.
+    /// The row and column of a cell.
     pub(super) const fn place(&self, cell: Cell) -> (usize, usize) {
         let cell = cell as usize;
         (cell / self.columns, cell % self.columns)
     }
 
-    /// The middle of a cell, counted in rows and columns.
+    /// The centre of a cell in rows and columns.
     pub(super) fn middle(&self, cell: Cell) -> (f64, f64) {
         let (row, column) = self.place(cell);
         (row as f64 + 0.5, column as f64 + 0.5)
     }
 
-    /// What a cell costs for each unit of way over it; `None` if it is closed.
+    /// The cost of a cell per unit of distance; `None` if it is closed.
     pub(super) fn weight(&self, row: usize, column: usize) -> Option<u64> {
         match self.cells[row * self.columns + column] {
             0 => None,
@@ -146,8 +145,8 @@ impl Ground {
         }
     }
 
-    /// The cells next to a cell, and what it costs to go there. Over a corner it goes only where
-    /// both cells beside it are open.
+    /// The open neighbours of a cell and the cost of moving there. Diagonal moves require both
+    /// adjacent cells to be open.
     pub(super) fn neighbours(&self, cell: Cell) -> impl Iterator<Item = (Cell, u64)> {
         let (row, column) = self.place(cell);
         let own = self.weight(row, column).unwrap_or_default();
@@ -171,14 +170,14 @@ impl Ground {
         STEPS.into_iter().filter_map(step)
     }
 
-    /// What it costs at least to go so many rows and columns.
+    /// Lower bound of the cost of a displacement in rows and columns.
     pub(super) fn at_least(&self, rows: usize, columns: usize) -> u64 {
         let (short, long) = (rows.min(columns) as u64, rows.max(columns) as u64);
         (CORNER * short + SIDE * (long - short)) * self.least
     }
 }
 
-/// Counts from closed cells on, in the order of the row, and keeps what is less than before.
+/// Counts the distance from closed cells in iteration order, and keeps the minimum.
 fn measure<'a>(row: impl Iterator<Item = (&'a u8, &'a mut u8)>, far: u8) {
     let mut distance = far;
     for (&cell, aside) in row {
@@ -201,17 +200,17 @@ const STEPS: [(isize, isize); 8] = [
     (1, -1),
 ];
 
-/// What the best ground costs for each unit of way, and by how much the worst costs more.
+/// Cost of the best ground per unit of distance, and the additional cost of the worst.
 const BEST: u64 = 64;
 const WORSE: u64 = 4 * BEST;
 
-/// What ground costs that can be driven on as well as `open` says, for each unit of way.
+/// Cost per unit of distance of ground with traversability `open`.
 fn weight_of(open: u8) -> u64 {
     BEST + WORSE * u64::from(u8::MAX - open) / u64::from(u8::MAX - 1)
 }
 
-/// For each number of rows away: how many columns away a closed cell may be and still be closer
-/// than `radius` cells to the middle of a cell. It is the nearest side or corner that counts.
+/// For each distance in rows, the largest distance in columns at which a closed cell is closer than
+/// `radius` cells to the centre of a cell. Distances are to the nearest side or corner.
 fn widths(radius: f64) -> Vec<u8> {
     let rows = (0..).map(|row: u8| (f64::from(row) - 0.5).max(0.0));
     rows.take_while(|&rise| rise < radius)

@@ -1,23 +1,22 @@
-//! What a mission does when its operator's link is lost, and the way back.
+//! Lost-link behaviour of a mission, and the return path.
 
 use super::{Path, Point};
 
-/// What becomes of a mission when control of the planner ends without a release.
+/// Behaviour of a mission when control of the planner ends without a release.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LostLink {
-    /// The vehicle stops, and the mission is over.
+    /// The vehicle stops, and the mission ends.
     #[default]
     Stop,
     /// The vehicle stops and holds its position. The mission is kept: a client with a new lease can
-    /// approve it again, and it is planned anew from there.
+    /// approve it again, and it is replanned from there.
     Hold,
-    /// The vehicle stops, and then drives back to where the mission began, along the way that it
-    /// came, controlled by the planner. A stop input, an emergency or any new lease ends that.
+    /// The vehicle stops, then the planner drives it back to the start of the mission along the
+    /// path it came. A stop input, an emergency or any new lease ends the return.
     Return,
 }
 
-/// The way that a vehicle has driven, as points that are not closer together than
-/// [`SPACING`](Self::SPACING).
+/// The path driven so far, as points at least [`SPACING`](Self::SPACING) apart.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Trail {
     points: Vec<Point>,
@@ -25,12 +24,12 @@ pub(super) struct Trail {
 }
 
 impl Trail {
-    /// Metres between two points.
+    /// Minimum distance between two points in metres.
     const SPACING: f64 = 0.5;
-    /// Points that are kept. A longer way is told by fewer points: every other one is dropped.
+    /// Maximum number of points. On overflow every other point is dropped.
     const MOST: usize = 1024;
 
-    /// The vehicle is at a point.
+    /// Records the vehicle's position.
     pub(super) fn note(&mut self, (x, y): Point) {
         if !x.is_finite() || !y.is_finite() {
             return;
@@ -49,7 +48,7 @@ impl Trail {
         }
     }
 
-    /// The path from where the vehicle is to where it came from; `None` if it has not gone far enough.
+    /// The path back to the start; `None` if the vehicle has not moved far enough.
     pub(super) fn back(&self) -> Option<Path> {
         let here = self.last?;
         let mut points = vec![here];

@@ -1,9 +1,8 @@
-//! Missions: a path to a destination over a map, and the waterfall of stages that drives it.
+//! Missions: path planning over a map, and the sequence of stages that drives the path.
 //!
-//! [`plan`] finds a [`Path`] over a [`Terrain`]. A [`Mission`] is a state machine that has the map
-//! fetched, the path planned, approved, handed to the path segment driver and driven, stage after
-//! stage, and begins again when a stage is blocked. Neither does I/O or reads a clock, and neither
-//! knows a message.
+//! [`plan`] finds a [`Path`] over a [`Terrain`]. A [`Mission`] is a state machine. It has the map
+//! fetched, and the path planned, approved, handed to the path segment driver and driven. When a
+//! stage is blocked it starts over. Neither does I/O, reads a clock or depends on messages.
 
 mod blocks;
 mod ground;

@@ -1,4 +1,4 @@
-//! Planning: from where the vehicle is to where it is to be, over a map.
+//! Path planning from the vehicle's position to its destination over a map.
 
 use super::ground::Ground;
 use super::{Terrain, search, sight};
@@ -6,12 +6,12 @@ use super::{Terrain, search, sight};
 /// A point of the local frame: X (north) and Y (east) in metres.
 pub type Point = (f64, f64);
 
-/// What the vehicle needs of its way.
+/// Dimensions of the vehicle for planning.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vehicle {
-    /// How wide it is, in metres.
+    /// Width in metres.
     pub width: f64,
-    /// How much room it is to have on both sides, in metres.
+    /// Clearance on each side in metres.
     pub margin: f64,
 }
 
@@ -25,48 +25,48 @@ impl Default for Vehicle {
 }
 
 impl Vehicle {
-    /// How far its middle stays from what nothing can drive on, in metres.
+    /// Minimum distance of the vehicle's centre from obstacles, in metres.
     #[must_use]
     pub fn clearance(&self) -> f64 {
         self.width / 2.0 + self.margin
     }
 }
 
-/// A way that can be driven: straight segments from corner to corner.
+/// A drivable path of straight segments.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Path {
     points: Vec<Point>,
 }
 
 impl Path {
-    /// The most segments that a path may have: what a list of a driver holds.
+    /// The most segments of a path: the capacity of a driver's list.
     pub const MAX_SEGMENTS: usize = 4096;
 
-    /// A path over these corners, the start first.
+    /// Creates a path over these corners, starting with the first.
     #[must_use]
     pub const fn new(points: Vec<Point>) -> Self {
         Self { points }
     }
 
-    /// Its corners, the start first and the destination last.
+    /// The corners, from start to destination.
     #[must_use]
     pub fn points(&self) -> &[Point] {
         &self.points
     }
 
-    /// Its segments: start and end of each.
+    /// The start and end of each segment.
     pub fn segments(&self) -> impl ExactSizeIterator<Item = (Point, Point)> {
         let ends = self.points.iter().skip(1);
         self.points.iter().zip(ends).map(|(&from, &to)| (from, to))
     }
 
-    /// How long it is, in metres.
+    /// Length in metres.
     #[must_use]
     pub fn length(&self) -> f64 {
         self.remaining(0)
     }
 
-    /// How long it is from the beginning of a segment on, counted from 0, in metres.
+    /// Remaining length in metres from the start of a segment, counted from 0.
     #[must_use]
     pub fn remaining(&self, segment: usize) -> f64 {
         let segments = self.segments().skip(segment);
@@ -74,7 +74,7 @@ impl Path {
     }
 }
 
-/// Why there is no path.
+/// Why planning found no path.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoPath {
@@ -84,20 +84,20 @@ pub enum NoPath {
          or give the store a larger map", At(*.destination), At(.corners[0]), At(.corners[1])
     )]
     DestinationOutside {
-        /// Where it is.
+        /// The destination.
         destination: Point,
         /// The south-west and the north-east corner of the map.
         corners: [Point; 2],
     },
-    /// The destination is in an obstacle, or too close to one.
+    /// The destination is in an obstacle or too close to one.
     #[error(
         "the destination at {} is closer than {clearance:.2} m to an obstacle: choose one in the open",
         At(*.destination)
     )]
     DestinationBlocked {
-        /// Where it is.
+        /// The destination.
         destination: Point,
-        /// How far the vehicle's middle has to be from obstacles, in metres.
+        /// Required distance of the vehicle's centre from obstacles, in metres.
         clearance: f64,
     },
     /// The vehicle is not on the map.
@@ -106,56 +106,55 @@ pub enum NoPath {
          set its pose right", At(*.start), At(.corners[0]), At(.corners[1])
     )]
     StartOutside {
-        /// Where it is.
+        /// The vehicle's position.
         start: Point,
         /// The south-west and the north-east corner of the map.
         corners: [Point; 2],
     },
-    /// The vehicle is in an obstacle, as the map has it.
+    /// The vehicle is in an obstacle according to the map.
     #[error(
         "the vehicle at {} is in an obstacle, as the map has it: drive it out by hand, or set its \
          pose or the map right", At(*.start)
     )]
     StartBlocked {
-        /// Where it is.
+        /// The vehicle's position.
         start: Point,
     },
-    /// There is no way to the destination for a vehicle of this size.
+    /// No path to the destination exists for a vehicle of this size.
     #[error(
         "no way leads from {} to {} for a vehicle that keeps {clearance:.2} m from obstacles: clear \
          one, correct the map, or choose another destination", At(*.start), At(*.destination)
     )]
     Unreachable {
-        /// Where the vehicle is.
+        /// The vehicle's position.
         start: Point,
-        /// Where it is to be.
+        /// The destination.
         destination: Point,
-        /// How far the vehicle's middle has to be from obstacles, in metres.
+        /// Required distance of the vehicle's centre from obstacles, in metres.
         clearance: f64,
     },
-    /// The way has too many segments for a driver's list.
+    /// The path has more segments than a driver's list holds.
     #[error(
         "the way to {} has {segments} segments, and a driver takes {} at most: choose a destination \
          on the way", At(*.destination), Path::MAX_SEGMENTS
     )]
     TooLong {
-        /// Where it leads.
+        /// The destination.
         destination: Point,
-        /// How many segments it has.
+        /// Number of segments.
         segments: usize,
     },
 }
 
 impl NoPath {
-    /// Whether there may be a path later although nobody changes the wish: what stands in the way
-    /// now may move.
+    /// Whether the same request may succeed later, because the obstacle may move.
     #[must_use]
     pub const fn may_pass(&self) -> bool {
         matches!(self, Self::Unreachable { .. })
     }
 }
 
-/// A point for people.
+/// Formats a point for the operator.
 struct At(Point);
 
 impl std::fmt::Display for At {
@@ -165,14 +164,15 @@ impl std::fmt::Display for At {
     }
 }
 
-/// The best path over a map that the vehicle has room on: short, and over good ground rather than
-/// bad. On maps with more than 512 times 512 cells it may be a little dearer than the best.
+/// Finds the cheapest path with sufficient clearance for the vehicle. Cost combines distance and
+/// traversability. On maps with more than 512 x 512 cells the path may cost slightly more than the
+/// optimum.
 ///
-/// On the largest map, 4096 times 4096 cells, this takes some 60 MB and a second or two at most;
-/// `docs/performance.md` has the figures. An async caller gives it a thread of its own.
+/// On the largest map, 4096 x 4096 cells, planning takes some 60 MB and up to one or two seconds;
+/// `docs/performance.md` has the figures. Async callers should run it on a separate thread.
 ///
 /// # Errors
-/// [`NoPath`] says why there is none and what to do.
+/// [`NoPath`] with the cause and a remedy.
 pub fn plan(
     terrain: &Terrain,
     vehicle: &Vehicle,
@@ -212,7 +212,7 @@ pub fn plan(
     })?;
     let corners = sight::straighten(&ground, &way, from, to);
     let mut points: Vec<Point> = corners.iter().map(|&it| terrain.to_local(it)).collect();
-    // Without the rounding of the way to rows and columns and back.
+    // Restores the exact ends, without rounding from the grid conversion.
     if let [first, .., last] = points.as_mut_slice() {
         (*first, *last) = (start, destination);
     }

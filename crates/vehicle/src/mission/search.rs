@@ -1,18 +1,18 @@
-//! The way over the ground: A* over its cells, and on a large map first over blocks of cells, so
-//! that neither time nor memory grow out of hand.
+//! Path search over the ground: A* over cells, on large maps preceded by A* over blocks of cells,
+//! to bound time and memory.
 
 use pathfinding::directed::astar::astar;
 
 use super::blocks::{Blocks, Node};
 use super::ground::{Cell, Ground};
 
-/// How many cells are searched at once. A cell that is looked at takes some 60 octets.
+/// The largest number of cells searched directly. Each visited cell takes some 60 octets.
 const AT_ONCE: usize = 512 * 512;
-/// How many blocks of the way are searched cell by cell at once.
+/// Number of path blocks refined to cells in one search.
 const STRETCH: usize = 48;
 
-/// The cheapest way from an open cell to another, both included; on a map with more than
-/// [`AT_ONCE`] cells one that is not much dearer. `None` if there is none.
+/// The cheapest path between two open cells, both included. On maps with more than [`AT_ONCE`]
+/// cells it may cost slightly more than the optimum. `None` if no path exists.
 pub(super) fn find(ground: &Ground, start: Cell, end: Cell) -> Option<Vec<Cell>> {
     if ground.len() <= AT_ONCE {
         return find_in(ground, start, |_| true, |cell| cell == end, end);
@@ -20,15 +20,15 @@ pub(super) fn find(ground: &Ground, start: Cell, end: Cell) -> Option<Vec<Cell>>
     find_by_blocks(ground, start, end)
 }
 
-/// The same for a map of any size, over blocks.
+/// The same for maps of any size, by searching blocks first.
 pub(super) fn find_by_blocks(ground: &Ground, start: Cell, end: Cell) -> Option<Vec<Cell>> {
     let blocks = Blocks::new(ground);
     let way = over_blocks(&blocks, blocks.node_of(start)?, blocks.node_of(end)?)?;
     over_cells(ground, &blocks, &way, start, end)
 }
 
-/// A* over those cells that are `allowed`, towards the cell `target`. If another one counts as
-/// reached before, the way there is a little dearer than it must be.
+/// A* over the `allowed` cells towards `target`. If `reached` accepts another cell earlier, the
+/// path may cost slightly more than necessary.
 fn find_in(
     ground: &Ground,
     start: Cell,
@@ -61,8 +61,8 @@ fn over_blocks(blocks: &Blocks<'_>, start: Node, end: Node) -> Option<Vec<Node>>
     found.map(|(way, _)| way)
 }
 
-/// Goes the way over blocks cell by cell, one stretch after the other: through the blocks of the
-/// stretch and those around them, which always hold a way.
+/// Refines a path over blocks to cells, section by section. Each search covers the blocks of the
+/// section and their neighbours, which always contain a path.
 fn over_cells(
     ground: &Ground,
     blocks: &Blocks<'_>,

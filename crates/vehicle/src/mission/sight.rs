@@ -1,17 +1,17 @@
-//! Straight lines over the ground, and the simplification of a way to as few of them as will do.
+//! Straight lines over the ground, and simplification of a path to few of them.
 
 use super::ground::{Cell, Ground};
 
-/// A point counted in rows and columns.
+/// A point in rows and columns.
 type Point = (f64, f64);
 
-/// How much dearer a straight line may be than the way that it replaces.
+/// Maximum cost of a straight line relative to the path section it replaces.
 const DEARER: f64 = 1.02;
 
-/// The corners of a way from `start` to `end`, which lie in its first and its last cell.
+/// The corners of a path from `start` to `end`, which lie in its first and last cell.
 ///
-/// Between two corners the straight line leads over open cells only, and costs no more than the
-/// way did but for rounding: it does not lead over bad ground that the way went around.
+/// Straight lines between corners cross open cells only and cost no more than the path they
+/// replace, within [`DEARER`]. They never cross bad ground that the path avoids.
 pub(super) fn straighten(ground: &Ground, way: &[Cell], start: Point, end: Point) -> Vec<Point> {
     let last = way.len().saturating_sub(1);
     let point = |index: usize| match index {
@@ -38,20 +38,20 @@ pub(super) fn straighten(ground: &Ground, way: &[Cell], start: Point, end: Point
     corners
 }
 
-/// What it has cost to come to each point of the way.
+/// The accumulated cost at each point of the path.
 fn costs(ground: &Ground, len: usize, point: impl Fn(usize) -> Point) -> Vec<f64> {
     let mut sum = 0.0;
     let mut costs = vec![sum];
     for index in 1..len {
-        // Neighbours are in sight of each other.
+        // Neighbouring cells always have a line of sight.
         sum += cost(ground, point(index - 1), point(index)).unwrap_or_default();
         costs.push(sum);
     }
     costs
 }
 
-/// A point far along the way that may be gone to straight: strides that double until one is too
-/// long, and then the middle between the longest good and the shortest bad one, and so on.
+/// A far point of the path that can be reached in a straight line. The stride doubles until a line
+/// fails, then bisection narrows the gap between the longest success and the shortest failure.
 fn farthest(from: usize, last: usize, may_skip: impl Fn(usize, usize) -> bool) -> usize {
     let mut good = from + 1;
     let mut stride = 2;
@@ -77,7 +77,7 @@ fn farthest(from: usize, last: usize, may_skip: impl Fn(usize, usize) -> bool) -
     good
 }
 
-/// What a straight line costs; `None` if it touches a closed cell.
+/// The cost of a straight line; `None` if it touches a closed cell.
 pub(super) fn cost(ground: &Ground, from: Point, to: Point) -> Option<f64> {
     let (rise, run) = (to.0 - from.0, to.1 - from.1);
     let length = rise.hypot(run);
@@ -100,7 +100,7 @@ pub(super) fn cost(ground: &Ground, from: Point, to: Point) -> Option<f64> {
         }
         here = next;
         if (rows.next - columns.next).abs() < CORNER {
-            // Over a corner: what lies beside it is touched, too.
+            // Crossing a corner also touches both cells beside it.
             weight(rows.cell + rows.step, columns.cell)?;
             weight(rows.cell, columns.cell + columns.step)?;
             rows.advance();
@@ -113,16 +113,16 @@ pub(super) fn cost(ground: &Ground, from: Point, to: Point) -> Option<f64> {
     }
 }
 
-/// Lines that pass a corner closer than this share of their length go over it.
+/// A line crosses a corner if it passes within this fraction of its length.
 const CORNER: f64 = 1e-9;
 
-/// Where a line goes from one row, or one column, to the next.
+/// Traversal of rows or columns along a line.
 struct Axis {
     cell: isize,
     step: isize,
-    /// At which share of the line the next one begins.
+    /// Fraction of the line at which the next cell begins.
     next: f64,
-    /// How much of the line one takes.
+    /// Fraction of the line per cell.
     each: f64,
 }
 

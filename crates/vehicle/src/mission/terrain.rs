@@ -1,9 +1,9 @@
-//! The map that is planned on: a raster that says how well the ground of each cell can be driven on.
+//! The planning map: a raster with the traversability of each cell.
 
-/// How well each cell of a rectangle of the local frame can be driven on.
+/// Traversability of the cells of a rectangle in the local frame.
 ///
-/// Rows grow with X, columns with Y; the first cell is the one in the south-west. A cell is 0 where
-/// nothing can drive, and 255 where nothing is in the way.
+/// Rows grow with X, columns with Y; the first cell is at the south-west corner. 0 means not
+/// traversable, 255 means unobstructed.
 #[derive(Clone, PartialEq)]
 pub struct Terrain {
     rows: u16,
@@ -13,55 +13,55 @@ pub struct Terrain {
     cells: Vec<u8>,
 }
 
-/// Why a raster is no map to plan on.
+/// Error: a raster is unsuitable for planning.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TerrainError {
-    /// It has no cells, or too many.
+    /// The map has no cells, or too many.
     #[error(
         "a map of {rows} x {columns} cells can not be planned on; from 1 to {} rows and columns can",
         Terrain::MAX_SIDE
     )]
     Size {
-        /// Its rows.
+        /// Number of rows.
         rows: u16,
-        /// Its columns.
+        /// Number of columns.
         columns: u16,
     },
-    /// The cells do not fill it.
+    /// The number of cells does not match the dimensions.
     #[error("the map has {found} cells instead of {rows} x {columns}; ask for it once more")]
     Cells {
-        /// Its rows.
+        /// Number of rows.
         rows: u16,
-        /// Its columns.
+        /// Number of columns.
         columns: u16,
-        /// How many cells there are.
+        /// Number of cells.
         found: usize,
     },
-    /// Its cells have no size, or it lies nowhere.
+    /// The cell size or the position is invalid.
     #[error(
         "the map's cells are {cell} m wide and it begins at x {x} m, y {y} m, which is no place; \
          create it with cells from 0.001 to 1000 m"
     )]
     Place {
-        /// Metres.
+        /// Cell size in metres.
         cell: f64,
-        /// Metres.
+        /// X of the corner in metres.
         x: f64,
-        /// Metres.
+        /// Y of the corner in metres.
         y: f64,
     },
 }
 
 impl Terrain {
-    /// The most rows, and the most columns.
+    /// The most rows and the most columns.
     pub const MAX_SIDE: u16 = 4096;
 
-    /// A map of `rows` times `columns` cells, each `cell` metres wide, whose south-west corner lies
-    /// at `corner` in the local frame.
+    /// Creates a map of `rows` x `columns` cells, each `cell` metres wide, with its south-west
+    /// corner at `corner` in the local frame.
     ///
     /// # Errors
-    /// If there are too few or too many cells, or they lie nowhere.
+    /// If the dimensions, the number of cells, the cell size or the position is invalid.
     pub fn new(
         rows: u16,
         columns: u16,
@@ -94,19 +94,19 @@ impl Terrain {
         })
     }
 
-    /// How many rows there are.
+    /// Number of rows.
     #[must_use]
     pub const fn rows(&self) -> u16 {
         self.rows
     }
 
-    /// How many columns there are.
+    /// Number of columns.
     #[must_use]
     pub const fn columns(&self) -> u16 {
         self.columns
     }
 
-    /// How wide a cell is, in metres.
+    /// Cell size in metres.
     #[must_use]
     pub const fn cell(&self) -> f64 {
         self.cell
@@ -118,7 +118,7 @@ impl Terrain {
         &self.cells
     }
 
-    /// The south-west and the north-east corner: X and Y in metres.
+    /// The south-west and the north-east corner, as X and Y in metres.
     #[must_use]
     pub fn corners(&self) -> [(f64, f64); 2] {
         let (x, y) = self.corner;
@@ -127,7 +127,7 @@ impl Terrain {
         [self.corner, (north, east)]
     }
 
-    /// A point of the local frame, counted in rows and columns; `None` outside of the map.
+    /// Converts a point of the local frame to rows and columns; `None` outside the map.
     pub(super) fn to_grid(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
         let row = (x - self.corner.0) / self.cell;
         let column = (y - self.corner.1) / self.cell;
@@ -135,7 +135,7 @@ impl Terrain {
         (inside(row, self.rows) && inside(column, self.columns)).then_some((row, column))
     }
 
-    /// A point counted in rows and columns, in the local frame.
+    /// Converts rows and columns to a point of the local frame.
     pub(super) fn to_local(&self, (row, column): (f64, f64)) -> (f64, f64) {
         let (x, y) = self.corner;
         (x + row * self.cell, y + column * self.cell)

@@ -1,5 +1,5 @@
-//! The waterfall: the stages of a mission, of which each begins when the one before it has
-//! succeeded, and which begins again from the first when one of them is blocked.
+//! The mission state machine: stages that start in sequence as each one succeeds, and restart from
+//! the first when one is blocked.
 
 mod stage;
 mod watch;
@@ -15,22 +15,22 @@ use watch::Links;
 use super::lost_link::Trail;
 use super::{LostLink, Path, Point};
 
-/// How patient a mission is.
+/// Retry limits, timeouts and defaults of a mission.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// How often it is begun at most; at least once.
+    /// Maximum number of attempts, at least one.
     pub attempts: u8,
-    /// Between an attempt that was blocked and the next one.
+    /// Delay between a blocked attempt and the next one.
     pub pause: Duration,
-    /// How long a stage may take to begin, or to come back.
+    /// Timeout for a stage to start or recover.
     pub patience: Duration,
-    /// How long a stage may say that it is blocked until it counts.
+    /// How long a stage may report a block before the attempt fails.
     pub settling: Duration,
-    /// How long the vehicle may drive without getting on.
+    /// How long the vehicle may drive without progress.
     pub stall: Duration,
-    /// The greatest speed, in metres per second, for whoever does not choose one.
+    /// Default speed limit in metres per second, for destinations without one.
     pub speed: f64,
-    /// What becomes of it when the operator's link is lost.
+    /// Behaviour when the operator's link is lost.
     pub lost_link: LostLink,
 }
 
@@ -48,22 +48,22 @@ impl Default for Settings {
     }
 }
 
-/// Where to go.
+/// Destination of a mission.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Destination {
-    /// Metres along X of the local frame.
+    /// X in the local frame, in metres.
     pub x: f64,
-    /// Metres along Y of the local frame.
+    /// Y in the local frame, in metres.
     pub y: f64,
-    /// The greatest speed, in metres per second.
+    /// Speed limit in metres per second.
     pub speed: Option<f64>,
 }
 
 impl Destination {
-    /// The greatest speed that may be asked for, in metres per second.
+    /// The highest speed limit that a client may request, in metres per second.
     pub const MAX_SPEED: f64 = 100.0;
 
-    /// What is wrong with it, and what would do.
+    /// Describes what is invalid, with a remedy.
     fn mistake(&self) -> Option<String> {
         let Self { x, y, speed } = *self;
         if !x.is_finite() || !y.is_finite() {
@@ -79,7 +79,7 @@ impl Destination {
     }
 }
 
-/// One attempt of one mission. What is reported of an earlier one does not count any more.
+/// One attempt of one mission. Results of earlier attempts are ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Run {
     /// The mission, counted from 1.
@@ -88,86 +88,86 @@ pub struct Run {
     pub attempt: u8,
 }
 
-/// What the owner of a [`Mission`] has to do for it.
+/// An action that the owner of a [`Mission`] carries out.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Action {
-    /// Stop the vehicle, give back what is controlled, and give up any earlier action.
+    /// Stop the vehicle, release controlled components and cancel all earlier actions.
     Halt,
-    /// Fetch the map, and [say how it went](Mission::handle_map).
+    /// Fetch the map and [report the result](Mission::handle_map).
     FetchMap(Run),
-    /// Plan a path to the destination over it, and [say how it went](Mission::handle_path).
+    /// Plan a path to the destination and [report the result](Mission::handle_path).
     Plan(Run, Destination),
-    /// Take the path segment driver under control, hand the path over, have it driven at this
-    /// speed in metres per second, and [say how it went](Mission::handle_handed_over).
+    /// Take control of the path segment driver, hand over the path, start it at this speed in
+    /// metres per second, and [report the result](Mission::handle_handed_over).
     HandOver(Run, Arc<Path>, f64),
-    /// Find out whether the client that has lost control is still alive, and
-    /// [say so](Mission::handle_lost_client).
+    /// Check whether the client that lost control is still alive, and [report the
+    /// result](Mission::handle_lost_client).
     CheckClient(Run, JausId),
 }
 
-/// How far a mission is.
+/// Progress of a mission.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Report {
-    /// Which attempt of which mission; mission 0 before the first.
+    /// The current attempt and mission. Mission 0 before the first.
     pub run: Run,
-    /// How often it is begun at most.
+    /// Maximum number of attempts.
     pub attempts: u8,
-    /// The stage that it is in.
+    /// The current stage.
     pub stage: Stage,
-    /// How much of the path is driven, from 0 to 100 %.
+    /// Completed part of the path, from 0 to 100 %.
     pub progress: u8,
-    /// Where it goes.
+    /// The destination.
     pub destination: Destination,
-    /// How much of the path lies ahead, in metres.
+    /// Remaining length of the path in metres.
     pub remaining: f64,
-    /// Why it does not go on, or why it was begun again; may be empty.
+    /// Why the mission is blocked or was restarted; may be empty.
     pub reason: String,
 }
 
-/// Why a wish was not granted.
+/// Why an approval was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// It is about a mission that is not the last one.
+    /// The approval concerns a mission that has been replaced.
     #[error("mission {wanted} can not be approved: mission {current} has replaced it")]
     Replaced {
-        /// The one that was meant.
+        /// The mission in the approval.
         wanted: u32,
-        /// The last one.
+        /// The current mission.
         current: u32,
     },
-    /// There is nothing to approve.
+    /// The mission is over.
     #[error("mission {mission} can not be approved: it is over ({stage})")]
     Over {
-        /// The one that was meant.
+        /// The mission in the approval.
         mission: u32,
-        /// How it ended.
+        /// Its final stage.
         stage: Stage,
     },
 }
 
-/// The mission of a planner: the last one that was asked for.
+/// The current mission of a planner: the last one requested.
 #[derive(Debug)]
 pub struct Mission {
     settings: Settings,
     report: Report,
     approved: bool,
-    /// Whether it waits for a new lease after the link was lost.
+    /// Whether the mission waits for a new lease after a lost link.
     held: bool,
-    /// The way from where it began.
+    /// The path driven from its start.
     trail: Trail,
     path: Arc<Path>,
     links: Links,
-    /// When the next attempt begins.
+    /// When the next attempt starts.
     again: Option<Instant>,
-    /// When the stage has taken too long.
+    /// When the stage times out.
     deadline: Option<Instant>,
     halts: bool,
     action: Option<Action>,
 }
 
 impl Mission {
-    /// No mission yet.
+    /// Creates an idle planner.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         let settings = Settings {
@@ -192,21 +192,20 @@ impl Mission {
         }
     }
 
-    /// How far it is.
+    /// The progress report.
     #[must_use]
     pub const fn report(&self) -> &Report {
         &self.report
     }
 
-    /// The path that was planned last for it; empty before.
+    /// The last planned path; empty before planning.
     #[must_use]
     pub const fn path(&self) -> &Arc<Path> {
         &self.path
     }
 
-    /// Begins another mission, instead of any that is under way; says its number. With `approved`
-    /// it drives as soon as there is a path. To a destination that is none, or with a speed that is
-    /// none, it has failed at once.
+    /// Starts a new mission in place of any current one, and returns its number. With `approved` it
+    /// drives as soon as a path exists. With an invalid destination or speed it fails immediately.
     pub fn go_to(&mut self, now: Instant, destination: Destination, approved: bool) -> u32 {
         self.halt();
         let mission = self.report.run.mission.wrapping_add(1).max(1);
@@ -229,10 +228,10 @@ impl Mission {
         mission
     }
 
-    /// The operator approves the path, or the mission before there is one.
+    /// Records the operator's approval of the path, or of the mission before a path exists.
     ///
     /// # Errors
-    /// If that mission is over or was replaced.
+    /// If the mission is over or was replaced.
     pub fn approve(&mut self, now: Instant, mission: u32) -> Result<(), Refusal> {
         let current = self.report.run.mission;
         let stage = self.report.stage;
@@ -247,7 +246,7 @@ impl Mission {
         }
         self.approved = true;
         if self.held {
-            // The vehicle is no longer where the path began.
+            // The vehicle is no longer at the start of the path.
             self.held = false;
             self.begin(now);
         } else if stage == Stage::AwaitingApproval {
@@ -256,23 +255,23 @@ impl Mission {
         Ok(())
     }
 
-    /// Ends the mission, if one is under way, and says why: the operator wants it, has taken over,
-    /// or there is an emergency. Only another destination makes the vehicle drive again.
+    /// Ends an active mission with a reason: a request of the operator, a takeover or an emergency.
+    /// The vehicle drives again only after a new destination.
     pub fn stop(&mut self, reason: &str) {
         if self.report.stage.is_under_way() {
             self.end(Stage::Stopped, reason);
         }
     }
 
-    /// Another client has taken control: ends the mission, unless it is held for that.
+    /// Handles a new client in control: ends the mission, unless it is held for a new lease.
     pub fn handle_new_client(&mut self, reason: &str) {
         if !self.held || self.settings.lost_link != LostLink::Hold {
             self.stop(reason);
         }
     }
 
-    /// Control of `client` has ended without another client's taking it: stops the vehicle, and goes
-    /// on as [`Settings::lost_link`] says.
+    /// Handles the end of control by `client` without a takeover: stops the vehicle and proceeds
+    /// according to [`Settings::lost_link`].
     pub fn lose_client(&mut self, client: JausId, reason: &str) {
         if !self.report.stage.is_under_way() {
             return;
@@ -288,7 +287,7 @@ impl Mission {
         }
     }
 
-    /// Stops the vehicle and keeps the mission.
+    /// Stops the vehicle and holds the mission.
     fn hold(&mut self, reason: &str) {
         self.halt();
         self.held = true;
@@ -297,8 +296,8 @@ impl Mission {
         reason.clone_into(&mut self.report.reason);
     }
 
-    /// Whether the client that has lost control is alive. If it is, it has released control, and the
-    /// mission is over; if it is not, the vehicle drives back.
+    /// Handles the liveness of the client that lost control. A live client has released control, so
+    /// the mission ends. Otherwise the vehicle returns.
     pub fn handle_lost_client(&mut self, now: Instant, run: Run, is_alive: bool) {
         if self.report.run != run || !self.held || self.settings.lost_link != LostLink::Return {
             return;
@@ -308,7 +307,7 @@ impl Mission {
             return self.end(Stage::Stopped, &reason);
         };
         self.held = false;
-        // One attempt: a new one would drive to the destination.
+        // No retries: another attempt would drive to the destination.
         self.report.run.attempt = self.report.attempts;
         self.report.progress = 0;
         self.report.remaining = back.length();
@@ -324,14 +323,14 @@ impl Mission {
         self.hand_over(now);
     }
 
-    /// The vehicle is at a point of the local frame.
+    /// Records the vehicle's position in the local frame.
     pub fn handle_pose(&mut self, point: Point) {
         if self.report.stage.is_handed_over() {
             self.trail.note(point);
         }
     }
 
-    /// The map is there, or why it is not.
+    /// Handles the fetched map or the failure to fetch it.
     pub fn handle_map(&mut self, now: Instant, run: Run, result: Result<(), String>) {
         if !self.is_in(run, Stage::Map) {
             return;
@@ -345,7 +344,7 @@ impl Mission {
         }
     }
 
-    /// There is a path, or why there is none. A mission that is `hopeless` is not begun again.
+    /// Handles the planned path or the failure to plan. A `hopeless` failure is not retried.
     pub fn handle_path(&mut self, now: Instant, run: Run, result: Result<Path, NotPlanned>) {
         if !self.is_in(run, Stage::Planning) {
             return;
@@ -364,7 +363,7 @@ impl Mission {
         }
     }
 
-    /// The path segment driver has the path and was told to drive it, or why not.
+    /// Handles the result of the hand-over to the path segment driver.
     pub fn handle_handed_over(&mut self, now: Instant, run: Run, result: Result<(), String>) {
         if !self.is_in(run, Stage::Path) {
             return;
@@ -372,7 +371,7 @@ impl Mission {
         match result {
             Ok(()) => {
                 self.links.open();
-                // From here on the drivers are watched one by one.
+                // From here on the drivers are monitored individually.
                 self.deadline = None;
                 self.go_on(now);
             }
@@ -380,13 +379,13 @@ impl Mission {
         }
     }
 
-    /// A stage of the chain has told how it is.
+    /// Handles a state report of a driver of the chain.
     pub fn handle_link(&mut self, now: Instant, link: Link, state: LinkState) {
         self.links.note(now, link, state);
         self.go_on(now);
     }
 
-    /// How much of the path is driven, from 0 to 100 %, and how much lies ahead in metres.
+    /// Handles progress along the path: completed part from 0 to 100 %, remaining length in metres.
     pub fn handle_progress(&mut self, now: Instant, run: Run, progress: u8, remaining: f64) {
         if self.report.run != run || !self.report.stage.is_handed_over() {
             return;
@@ -399,14 +398,14 @@ impl Mission {
         self.report.remaining = remaining;
     }
 
-    /// The attempt can not go on, for a reason that no stage has told.
+    /// Fails the attempt for a reason that no driver has reported.
     pub fn handle_setback(&mut self, now: Instant, run: Run, reason: &str) {
         if self.report.run == run && self.again.is_none() && self.report.stage.is_under_way() {
             self.set_back(now, reason);
         }
     }
 
-    /// It is `now`.
+    /// Advances to time `now`.
     pub fn handle_time(&mut self, now: Instant) {
         if self.again.is_some_and(|again| again <= now) {
             self.begin(now);
@@ -418,7 +417,7 @@ impl Mission {
         }
     }
 
-    /// When [`handle_time`](Self::handle_time) must be called.
+    /// When [`handle_time`](Self::handle_time) must be called next.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let stage = self.report.stage;
@@ -427,7 +426,7 @@ impl Mission {
         times.into_iter().flatten().min()
     }
 
-    /// What is to be done next.
+    /// Takes the next action.
     pub fn poll_action(&mut self) -> Option<Action> {
         if std::mem::take(&mut self.halts) {
             return Some(Action::Halt);
@@ -435,12 +434,12 @@ impl Mission {
         self.action.take()
     }
 
-    /// Whether an attempt is in a stage, and not waiting for its beginning.
+    /// Whether an attempt is in a stage and not waiting to restart.
     fn is_in(&self, run: Run, stage: Stage) -> bool {
         self.report.run == run && self.report.stage == stage && self.again.is_none()
     }
 
-    /// Begins an attempt.
+    /// Starts an attempt.
     fn begin(&mut self, now: Instant) {
         self.again = None;
         self.links.close();
@@ -454,7 +453,7 @@ impl Mission {
         let patience = match stage {
             Stage::Map | Stage::Planning | Stage::Path => Some(self.settings.patience),
             Stage::Driving => Some(self.settings.stall),
-            // An operator may take as long as they like; drivers are watched one by one.
+            // The operator has no time limit, and drivers are monitored individually.
             _ => None,
         };
         self.deadline = patience.and_then(|patience| now.checked_add(patience));
@@ -470,7 +469,7 @@ impl Mission {
         ));
     }
 
-    /// Goes through the stages of the chain as far as they have succeeded.
+    /// Advances through the stages of the chain that have succeeded.
     fn go_on(&mut self, now: Instant) {
         while let Some(next) = self.links.next(self.report.stage) {
             if next == Stage::Arrived {
@@ -486,7 +485,7 @@ impl Mission {
         }
     }
 
-    /// An attempt has failed: another one, unless that was the last.
+    /// Handles a failed attempt: schedules another one, unless it was the last.
     fn set_back(&mut self, now: Instant, reason: &str) {
         let Report { run, attempts, .. } = self.report;
         if run.attempt >= attempts {
@@ -506,7 +505,7 @@ impl Mission {
         reason.clone_into(&mut self.report.reason);
     }
 
-    /// Nothing goes on any more.
+    /// Cancels everything that is under way.
     fn halt(&mut self) {
         self.halts |= self.report.stage.is_under_way();
         self.held = false;
@@ -531,12 +530,12 @@ impl Mission {
     }
 }
 
-/// Why there is no path.
+/// Why planning failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NotPlanned {
-    /// For people.
+    /// The reason, as text for the operator.
     pub reason: String,
-    /// Whether another attempt would come to the same end.
+    /// Whether a retry would fail in the same way.
     pub hopeless: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Acceleration State Sensor: how the vehicle's velocity changes, along and about its own axes.
+//! Acceleration State Sensor: the vehicle's acceleration along and about its own axes.
 
 use super::behaviour::Behaviour;
 use super::controls::Controls;

@@ -1,4 +1,4 @@
-//! The time stamps of reports: when their samples were taken, by the component's time of day.
+//! Time stamps of reports: sample times in the component's time of day.
 
 use std::time::{Duration, Instant};
 
@@ -6,11 +6,11 @@ use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::service::Date;
 use jaus::service::TimeOfDay;
 
-/// Stamps samples. The same sample always has the same stamp, until the time is set.
+/// Stamps samples. A sample keeps its stamp until the time is set.
 #[derive(Debug)]
 pub(super) struct SampleClock {
     time: TimeOfDay,
-    /// The last sample, by how much the time had been corrected then, and its stamp.
+    /// The last sample, the time correction at that moment, and its stamp.
     last: Option<(Instant, i64, Duration)>,
 }
 
@@ -19,7 +19,7 @@ impl SampleClock {
         Self { time, last: None }
     }
 
-    /// When a sample was taken, since the beginning of 1970; it is `now`.
+    /// Time of a sample since the start of 1970. The current time is `now`.
     pub(super) fn since_1970(&mut self, now: Instant, sampled_at: Option<Instant>) -> Duration {
         let Some(sampled_at) = sampled_at else {
             return self.time.now();
@@ -37,7 +37,7 @@ impl SampleClock {
     }
 }
 
-/// The time as the reports of version 1.0 tell it: the day of the month, and the time of day.
+/// The time stamp of version 1.0 reports: day of the month and time of day.
 pub(super) fn stamp(since_1970: Duration) -> Option<TimeStamp> {
     let seconds = since_1970.as_secs();
     let part = |value: u64| u8::try_from(value).ok();

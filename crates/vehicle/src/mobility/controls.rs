@@ -1,7 +1,7 @@
-//! What all services of a vehicle have their hands on: who steers, the time, the list, and the
-//! journey to a place or along the list.
+//! State shared by all services of a vehicle: pilot, motion guard, clock, list, and the current
+//! journey.
 //!
-//! A component has one of each, whichever of its drivers is asked.
+//! A component has one instance, whichever of its drivers receives a message.
 
 use std::time::{Duration, Instant};
 
@@ -16,30 +16,30 @@ use jaus::messages::mobility::{
 };
 use jaus::service::{Context, Elements, MotionGuard, State, StopCause};
 
-/// A journey to a place, or along a list of places.
+/// A journey to a place or along a list of places.
 #[derive(Debug, Default)]
 pub(super) struct Travel {
-    /// Metres per second, as a client wants it; what the vehicle cannot do it does not.
+    /// The requested speed in metres per second. The pilot limits it to what the vehicle can do.
     speed: f64,
     place: Option<Place>,
-    /// Where the way to the place begins, in the local frame.
+    /// Start of the path to the place, in the local frame.
     start: (f64, f64),
-    /// The element that is driven to, if a list is worked off.
+    /// The list element being driven to, if a list is being executed.
     active: Option<u16>,
-    /// The element after it, 0 if it is the last.
+    /// The element after it, 0 for the last.
     next: u16,
     ticket: Option<Ticket>,
-    /// The code of the command that the journey carries out, until its end is told.
+    /// Code of the command that the journey executes, until its completion is reported.
     command: Option<u16>,
 }
 
 impl Travel {
-    /// The element that is driven to, if a list is worked off.
+    /// The list element being driven to, if a list is being executed.
     pub(super) const fn active(&self) -> Option<u16> {
         self.active
     }
 
-    /// The wanted speed in metres per second.
+    /// The requested speed in metres per second.
     pub(super) const fn speed(&self) -> f64 {
         self.speed
     }
@@ -50,28 +50,28 @@ impl Travel {
     }
 }
 
-/// Between two looks at a vehicle in trouble.
+/// Interval between checks while a fault persists.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// State shared by the services of a vehicle: pilot, motion guard, list.
 pub(super) struct Controls {
     pub(super) pilot: Pilot,
     pub(super) guard: MotionGuard,
-    /// How often it has been stopped, for each service to see that it was.
+    /// Number of stops, so that each service notices a stop.
     pub(super) stops: u64,
-    /// What keeps it from driving until it is gone.
+    /// The fault that prevents driving, until it clears.
     trouble: Option<StopCause>,
     looked: Option<Instant>,
-    /// The list that the list drivers work off.
+    /// The list that the list drivers execute.
     pub(super) elements: Elements,
     pub(super) travel: Travel,
     pub(super) clock: Option<SampleClock>,
-    /// Magnetic north as seen from true north, in radians, once set.
+    /// Magnetic variation from true north in radians, once set.
     pub(super) magnetic_variation: f64,
 }
 
 impl Controls {
-    /// Nobody drives yet, and nobody knows what time it is.
+    /// Creates the state without a driver and without a clock.
     pub(super) fn new(pilot: Pilot) -> Self {
         Self {
             pilot,
@@ -86,7 +86,7 @@ impl Controls {
         }
     }
 
-    /// Moves on to `now`, and stops at the end of the setpoint in force, or in trouble.
+    /// Advances to `now`. Stops if the setpoint in force expires or a fault occurs.
     pub(super) fn advance(&mut self, now: Instant, context: &mut Context<'_>) {
         self.guard.note_life(|owner| context.last_sign(owner));
         self.advance_within(now);
@@ -101,13 +101,13 @@ impl Controls {
         self.follow_trouble(now, context);
     }
 
-    /// Moves on to `now`, but not beyond the end of the setpoint in force.
+    /// Advances to `now`, but not beyond the expiry of the setpoint in force.
     pub(super) fn advance_within(&mut self, now: Instant) {
         let end = self.guard.expires_at().unwrap_or(now);
         self.pilot.handle_time(now.min(end));
     }
 
-    /// The one stop of a vehicle.
+    /// Stops the vehicle. All stops go through here.
     pub(super) fn halt(&mut self, cause: &StopCause) {
         if self.guard.is_active() || self.pilot.is_under_way() {
             self.stops += 1;
@@ -116,7 +116,7 @@ impl Controls {
         self.pilot.stop();
     }
 
-    /// A vehicle in trouble puts its component into failure, until the trouble is gone.
+    /// Puts the component into failure on a fault, until the fault clears.
     fn follow_trouble(&mut self, now: Instant, context: &mut Context<'_>) {
         let trouble = self.pilot.take_trouble().or_else(|| self.pilot.fault());
         if let Some(cause) = trouble.map(StopCause::from) {
@@ -137,25 +137,25 @@ impl Controls {
         }
     }
 
-    /// Whether something keeps it from driving.
+    /// Whether a fault prevents driving.
     pub(super) const fn is_in_trouble(&self) -> bool {
         self.trouble.is_some()
     }
 
-    /// When to look again whether the trouble is gone.
+    /// When to check again whether the fault has cleared.
     pub(super) fn next_look(&self) -> Option<Instant> {
         self.looked
             .filter(|_| self.trouble.is_some())
             .map(|at| at + LOOK)
     }
 
-    /// Whether it drives to a place.
+    /// Whether the vehicle is driving to a place.
     pub(super) fn is_travelling(&self) -> bool {
         let ticket = self.travel.ticket;
         ticket.is_some_and(|ticket| self.pilot.pursues(ticket))
     }
 
-    /// How many elements of the list lie before the one that is driven to, in percent of all.
+    /// Number of list elements before the current one, in percent of all.
     pub(super) fn progress(&self) -> u8 {
         let Some(active) = self.travel.active else {
             return 0;
@@ -164,21 +164,21 @@ impl Controls {
         u8::try_from(100 * before / all.max(1)).unwrap_or(100)
     }
 
-    /// The place that was set last, or that is the first one of the list.
+    /// The place set last, or the first one of the list.
     pub(super) fn place(&self) -> Option<Place> {
         let first = || Place::of(&self.elements.get(0)?);
         self.travel.place.or_else(first)
     }
 
-    /// Whether a place is close enough to be driven to.
+    /// Whether a place is within reach.
     pub(super) fn can_reach(&self, place: &Place) -> bool {
         place
             .goal(self.pilot.frame(), (0.0, 0.0), 0.0, false)
             .is_some()
     }
 
-    /// Sets the place to drive to, for a command with this code, and sets out if it acts and there is
-    /// a speed.
+    /// Sets the place to drive to on behalf of the command `command`. Starts if `acts` is set and
+    /// the speed is positive.
     pub(super) fn set_place(
         &mut self,
         place: Place,
@@ -194,23 +194,23 @@ impl Controls {
         self.set_out(acts);
     }
 
-    /// From now on the journey is for another command.
+    /// Assigns the journey to another command.
     pub(super) fn take_up(&mut self, command: u16, context: &mut Context<'_>) {
         let before = self.travel.command.replace(command);
-        // Another command of the same code replaces the one before by itself.
+        // A repeated command with the same code replaces its predecessor implicitly.
         if let Some(before) = before.filter(|&before| before != command) {
             context.ended(before, false);
         }
     }
 
-    /// Tells the end of the command that the journey was for.
+    /// Reports the completion of the command that the journey executes.
     fn finish(&mut self, successful: bool, context: &mut Context<'_>) {
         if let Some(command) = self.travel.command.take() {
             context.ended(command, successful);
         }
     }
 
-    /// Changes the speed; if it acts, sets out or stops accordingly.
+    /// Changes the speed. If `acts` is set, starts or stops accordingly.
     pub(super) fn set_speed(&mut self, speed: f64, acts: bool) {
         self.travel.speed = speed;
         match self.travel.ticket.filter(|_| speed > 0.0) {
@@ -219,8 +219,8 @@ impl Controls {
         }
     }
 
-    /// Works the list off from an element on; 0 stands for the first one. Says whether that is in
-    /// the list.
+    /// Executes the list from an element; 0 stands for the first. Returns whether the element
+    /// exists.
     pub(super) fn execute(&mut self, uid: u16, speed: f64, acts: bool) -> bool {
         let Some(element) = self.elements.get(uid) else {
             return false;
@@ -239,13 +239,13 @@ impl Controls {
         self.set_out(acts);
     }
 
-    /// Where the vehicle is, in the local frame.
+    /// The vehicle's position in the local frame.
     fn here(&self) -> (f64, f64) {
         let pose = self.pilot.motion().pose;
         (pose.x, pose.y)
     }
 
-    /// Drives to the place if it acts and there is a speed, and stops otherwise.
+    /// Drives to the place if `acts` is set and the speed is positive. Stops otherwise.
     fn set_out(&mut self, acts: bool) {
         let Travel {
             speed, next, start, ..
@@ -265,7 +265,7 @@ impl Controls {
         }
     }
 
-    /// The local frame lies elsewhere now: what is on the globe is elsewhere in it.
+    /// Handles a moved local frame: places on the globe have new local coordinates.
     pub(super) fn handle_new_frame(&mut self) {
         let on_globe = matches!(
             self.travel.place,
@@ -278,13 +278,13 @@ impl Controls {
         }
     }
 
-    /// Goes on to the next element of the list when one has been reached.
+    /// Continues with the next element of the list when one has been reached.
     pub(super) fn work_off(&mut self, context: &mut Context<'_>) {
         let Some(ticket) = self.travel.ticket else {
             return;
         };
         if !self.pilot.pursues(ticket) {
-            // Another driver has taken over.
+            // Another driver has replaced the goal.
             self.abandon(context);
             return;
         }
@@ -294,7 +294,7 @@ impl Controls {
             }
             return;
         };
-        // The list may have been changed meanwhile.
+        // The list may have changed in the meantime.
         let Some(element) = self.elements.get(active) else {
             tracing::warn!(active, "the element that was driven to has been deleted");
             self.pilot.give_up(ticket);
@@ -308,7 +308,7 @@ impl Controls {
             self.set_out(true);
         } else if self.pilot.has_arrived(ticket) {
             tracing::info!(element = active, next = element.next_uid, "element reached");
-            // The next way begins where this one should have ended.
+            // The next path starts where this one should have ended.
             if let Some(place) = self.travel.place {
                 let end = place.waypoint(self.pilot.frame());
                 self.travel.start = (end.x, end.y);
@@ -325,7 +325,7 @@ impl Controls {
         }
     }
 
-    /// Gives the journey up and forgets it, but not the place.
+    /// Abandons the journey but keeps the place.
     pub(super) fn abandon(&mut self, context: &mut Context<'_>) {
         if let Some(ticket) = self.travel.ticket {
             self.pilot.give_up(ticket);
@@ -341,7 +341,7 @@ impl Controls {
     }
 }
 
-/// Says that everything about a journey may be another now.
+/// Announces that every report about a journey may have changed.
 pub(super) fn changed(context: &mut Context<'_>) {
     context.changed::<QueryTravelSpeed>();
     context.changed::<QueryTravelSpeedExt>();

@@ -1,4 +1,4 @@
-//! A message that has come for a vehicle, and all that is needed to deal with it.
+//! A message to a vehicle, with everything needed to handle it.
 
 use std::time::{Duration, Instant};
 
@@ -11,14 +11,14 @@ use jaus::endpoint::Received;
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::service::{Context, Standing, State, Validity, read};
 
-/// A command of the client in control.
+/// A command from the client in control.
 pub(super) struct Command<M> {
     pub(super) message: M,
-    /// Whether the vehicle acts on it, or only keeps it.
+    /// Whether the vehicle executes the command or only stores it.
     pub(super) acts: bool,
 }
 
-/// One message, with the vehicle and the context in which it came.
+/// One message with the vehicle and its context.
 pub(super) struct Exchange<'a, 'c> {
     pub(super) now: Instant,
     pub(super) controls: &'a mut Controls,
@@ -27,18 +27,18 @@ pub(super) struct Exchange<'a, 'c> {
 }
 
 impl Exchange<'_, '_> {
-    /// Reads a query, whoever asks.
+    /// Reads a query from any client.
     pub(super) fn query<Q: Message>(&self) -> Option<Q> {
         read(self.message)
     }
 
-    /// Reads what sets something up; only the client in control may.
+    /// Reads a configuration command, which only the client in control may send.
     pub(super) fn configure<M: Message>(&self) -> Option<M> {
         self.read_if(Standing::obeys)
     }
 
-    /// Reads a command of the client in control. In standby it is to be kept and reported, and
-    /// nothing moves by it, also not later; the public contests' judges look for that.
+    /// Reads a command from the client in control. In standby the command is stored and reported
+    /// but never moves the vehicle, not even later. The judges of the public contests check this.
     pub(super) fn command<M: Message>(&self) -> Option<Command<M>> {
         let may = |standing: &Standing, client| match standing.state {
             State::Ready | State::Standby => standing.obeys(client),
@@ -50,13 +50,13 @@ impl Exchange<'_, '_> {
         Some(Command { message, acts })
     }
 
-    /// Pursues a goal on behalf of the sender for as long as its command is valid.
+    /// Pursues a goal for the sender as long as its command is valid.
     pub(super) fn pursue(&mut self, goal: Goal, validity: Validity) -> Ticket {
         self.accept(validity);
         self.controls.pilot.pursue(goal)
     }
 
-    /// The sender's command is in force from now on.
+    /// Puts the sender's command in force.
     pub(super) fn accept(&mut self, validity: Validity) {
         let guard = &mut self.controls.guard;
         guard.accept(self.now, self.message.source, validity);
@@ -72,12 +72,12 @@ impl Exchange<'_, '_> {
         None
     }
 
-    /// Answers.
+    /// Sends the reply.
     pub(super) fn reply<R: Message>(&mut self, report: &R) {
         self.context.reply(self.message, report);
     }
 
-    /// Answers, unless the answer has a number that the report cannot hold.
+    /// Sends the reply, unless it contains a number outside the range of its field.
     pub(super) fn reply_if<R: Message>(&mut self, report: Result<R, OutOfRange>) {
         match report {
             Ok(report) => self.reply(&report),
@@ -85,15 +85,15 @@ impl Exchange<'_, '_> {
         }
     }
 
-    /// When the vehicle's motion was sampled, since the beginning of 1970; `None` without a clock.
+    /// Sample time of the vehicle's motion since the start of 1970; `None` without a clock.
     fn sampled_since_1970(&mut self) -> Option<Duration> {
         let sampled_at = self.controls.pilot.motion().sampled_at;
         let clock = self.controls.clock.as_mut()?;
         Some(clock.since_1970(self.now, sampled_at))
     }
 
-    /// When the motion was sampled, for the reports of version 1.1: seconds since 1970, and the rest
-    /// in nanoseconds.
+    /// Sample time of the motion for version 1.1 reports: seconds since 1970, and the remainder in
+    /// nanoseconds.
     pub(super) fn seconds_and_nanoseconds(&mut self) -> (Option<u32>, Option<u32>) {
         let Some(time) = self.sampled_since_1970() else {
             return (None, None);
@@ -104,7 +104,7 @@ impl Exchange<'_, '_> {
         )
     }
 
-    /// When the motion was sampled, for the reports of version 1.0.
+    /// Sample time of the motion for version 1.0 reports.
     pub(super) fn stamp(&mut self) -> Option<TimeStamp> {
         clock::stamp(self.sampled_since_1970()?)
     }

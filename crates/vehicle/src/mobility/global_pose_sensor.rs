@@ -1,4 +1,4 @@
-//! Global Pose Sensor: where the vehicle is on the globe, and where magnetic north is there.
+//! Global Pose Sensor: the vehicle's pose on the globe, and the magnetic variation.
 
 use super::behaviour::Behaviour;
 use super::both_versions;
@@ -92,7 +92,7 @@ fn set(pose: GlobalPose, exchange: &mut Exchange<'_, '_>) {
     changed(exchange.context);
 }
 
-/// A pose with what a client tells of it; what it does not tell stays.
+/// A pose updated with the fields that the client sets. The others keep their values.
 fn told(message: &SetGlobalPose, pose: &GlobalPose) -> GlobalPose {
     GlobalPose {
         latitude: message.latitude_deg().unwrap_or(pose.latitude),
@@ -107,7 +107,7 @@ fn told(message: &SetGlobalPose, pose: &GlobalPose) -> GlobalPose {
 fn told_ext(message: &SetGlobalPoseExt, pose: &GlobalPose) -> GlobalPose {
     let altitude = match message.z_position {
         Some(ZPosition::AltitudeMsl(altitude)) => altitude.value(),
-        // How high the ground or the water is here is not known.
+        // The local height of the ground or the water is unknown.
         _ => pose.altitude,
     };
     GlobalPose {

@@ -1,4 +1,4 @@
-//! A waypoint on the globe, whatever message it came in.
+//! A waypoint on the globe, independent of the message version.
 
 use super::wanted::Wanted;
 use crate::motion::{Frame, GlobalPose, Waypoint};
@@ -10,7 +10,7 @@ use jaus::messages::mobility::{
     ReportGlobalWaypoint, ReportGlobalWaypointExt, SetGlobalWaypoint, SetGlobalWaypointExt,
 };
 
-/// A waypoint on the globe: degrees, metres and radians.
+/// A waypoint on the globe, in degrees, metres and radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct GlobalWaypoint {
     latitude: f64,
@@ -42,7 +42,7 @@ impl From<SetGlobalWaypointExt> for GlobalWaypoint {
     fn from(message: SetGlobalWaypointExt) -> Self {
         let altitude = match message.z_position {
             Some(ZPosition::AltitudeMsl(altitude)) => Some(altitude.value()),
-            // A ground vehicle has no choice of heights.
+            // A ground vehicle cannot choose its height.
             _ => None,
         };
         Self {
@@ -59,7 +59,7 @@ impl From<SetGlobalWaypointExt> for GlobalWaypoint {
 }
 
 impl GlobalWaypoint {
-    /// What the vehicle is to drive to.
+    /// The waypoint in the local frame, for the pilot.
     pub(super) fn waypoint(&self, frame: &Frame) -> Waypoint {
         let place = frame.to_local(&GlobalPose {
             latitude: self.latitude,

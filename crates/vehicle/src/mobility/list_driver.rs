@@ -1,4 +1,4 @@
-//! The drivers that work a list off: Local and Global Waypoint List Driver, Local and Global Path
+//! The drivers that execute a list: Local and Global Waypoint List Driver, Local and Global Path
 //! Segment Driver.
 
 use std::marker::PhantomData;
@@ -13,11 +13,11 @@ use jaus::codec::{Message, ServiceId};
 use jaus::messages::mobility::ExecuteList;
 use jaus::service::{Context, Elements, Handled};
 
-/// A driver to the places of one kind in a list, one after the other.
+/// Drives to the places of one kind in a list, in sequence.
 pub(super) struct ListDriver<K>(PhantomData<K>);
 
 impl<K: Kind> ListDriver<K> {
-    /// A driver that works the vehicle's list off, which takes its places from now on.
+    /// Creates a driver for the vehicle's list and registers its kind of place with the list.
     pub(super) fn on(elements: &Elements) -> Self {
         K::accept(elements);
         Self(PhantomData)

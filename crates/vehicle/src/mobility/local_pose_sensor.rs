@@ -1,4 +1,4 @@
-//! Local Pose Sensor: where the vehicle is in its local frame, and where that frame is.
+//! Local Pose Sensor: the vehicle's pose in its local frame, and setting that pose.
 
 use super::behaviour::Behaviour;
 use super::both_versions;
@@ -78,7 +78,7 @@ fn set(pose: Pose, exchange: &mut Exchange<'_, '_>) {
     changed(exchange.context);
 }
 
-/// A pose with what a client tells of it; what it does not tell stays.
+/// A pose updated with the fields that the client sets. The others keep their values.
 fn told(message: &SetLocalPose, pose: &Pose) -> Pose {
     Pose {
         x: message.x_m().unwrap_or(pose.x),
@@ -93,7 +93,7 @@ fn told(message: &SetLocalPose, pose: &Pose) -> Pose {
 fn told_ext(message: &SetLocalPoseExt, pose: &Pose) -> Pose {
     let z = match message.z_position {
         Some(ZPosition::ZLocal(z)) => z.value(),
-        // Heights above something else say nothing about the local frame.
+        // Heights above another reference say nothing about the local frame.
         _ => pose.z,
     };
     Pose {

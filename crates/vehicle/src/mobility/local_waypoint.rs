@@ -1,4 +1,4 @@
-//! A waypoint in the local frame, whatever message it came in.
+//! A waypoint in the local frame, independent of the message version.
 
 use super::wanted::Wanted;
 use crate::motion::Waypoint;
@@ -10,7 +10,7 @@ use jaus::messages::mobility::{
     ReportLocalWaypoint, ReportLocalWaypointExt, SetLocalWaypoint, SetLocalWaypointExt,
 };
 
-/// A waypoint in the local frame: metres and radians.
+/// A waypoint in the local frame, in metres and radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LocalWaypoint {
     x: f64,
@@ -42,7 +42,7 @@ impl From<SetLocalWaypointExt> for LocalWaypoint {
     fn from(message: SetLocalWaypointExt) -> Self {
         let z = match message.z_position {
             Some(ZPosition::ZLocal(z)) => Some(z.value()),
-            // A ground vehicle has no choice of heights.
+            // A ground vehicle cannot choose its height.
             _ => None,
         };
         Self {
@@ -59,7 +59,7 @@ impl From<SetLocalWaypointExt> for LocalWaypoint {
 }
 
 impl LocalWaypoint {
-    /// What the vehicle is to drive to.
+    /// The waypoint for the pilot.
     pub(super) fn waypoint(&self) -> Waypoint {
         Waypoint {
             x: self.x,

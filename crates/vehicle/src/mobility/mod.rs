@@ -1,6 +1,6 @@
-//! The mobility services (AS6009) over a vehicle: its sensors and its drivers.
+//! The mobility services (AS6009) of a vehicle: its sensors and drivers.
 //!
-//! All services of one component share one [`Vehicle`], and each takes part in driving it:
+//! All services of one component share one [`Vehicle`]:
 //!
 //! ```
 //! use jaus_vehicle::mobility::Vehicle;
@@ -15,10 +15,9 @@
 //! ];
 //! ```
 //!
-//! Sensors answer anyone. Poses and waypoints are set by the client in control alone, and what
-//! moves the vehicle is obeyed only while the component is ready, too. The vehicle stops when the
-//! component may no longer act or another client takes control; it does not go on by itself
-//! afterwards.
+//! Sensors answer any client. Only the client in control may set poses and waypoints, and commands
+//! that move the vehicle also require the component to be ready. The vehicle stops when the
+//! component may no longer act or another client takes control. It does not resume on its own.
 
 mod acceleration_state_sensor;
 mod behaviour;
@@ -50,7 +49,7 @@ pub use vehicle::{OnVehicle, Vehicle};
 
 use jaus::codec::ServiceId;
 
-/// A service in its versions 1.1 and 1.0: the second has no messages that the first has not.
+/// A service in versions 1.1 and 1.0. Version 1.0 has no messages that version 1.1 lacks.
 const fn both_versions(newest: ServiceId) -> [ServiceId; 2] {
     [newest, ServiceId { minor: 0, ..newest }]
 }

@@ -1,4 +1,4 @@
-//! Path segments in the local frame and on the globe, as the drivers along them take and tell them.
+//! Path segments in the local frame and on the globe, as kinds of places for the list drivers.
 
 use super::exchange::Exchange;
 use super::kind::Kind;
@@ -13,7 +13,7 @@ use jaus::messages::mobility::{
 };
 use jaus::service::{Elements, Handled, code_of};
 
-/// Segments in the local frame.
+/// Path segments in the local frame.
 pub(super) struct LocalPath;
 
 impl Kind for LocalPath {
@@ -45,7 +45,7 @@ impl Kind for LocalPath {
     }
 }
 
-/// Segments on the globe.
+/// Path segments on the globe.
 pub(super) struct GlobalPath;
 
 impl Kind for GlobalPath {
@@ -79,7 +79,7 @@ impl Kind for GlobalPath {
     }
 }
 
-/// Has a list take segments from messages with these codes, if they end in reach.
+/// Registers segments from messages with these codes with a list, if their end is within reach.
 fn accept(elements: &Elements, codes: [u16; 2]) {
     for code in codes {
         elements.accept_code(code, |octets| {
@@ -107,8 +107,7 @@ fn global(exchange: &Exchange<'_, '_>) -> Option<PathSegment> {
     }
 }
 
-/// Reports the segment that is driven along or that is the first of the list; without one there is
-/// no answer.
+/// Reports the current segment or the first of the list. Without one there is no reply.
 fn tell<R: Message>(
     path: Option<PathSegment>,
     exchange: &mut Exchange<'_, '_>,

@@ -1,7 +1,7 @@
-//! A path segment, in the local frame or on the globe, as the elements of a list hold it.
+//! A path segment in the local frame or on the globe, as stored in list elements.
 //!
-//! Set Local and Set Global Path Segment (0410h, 04B0h, 040Fh, 04AFh) come only inside of Set
-//! Element. Their definitions are those of the reports, so that they are read as such.
+//! Set Local and Set Global Path Segment (0410h, 04B0h, 040Fh, 04AFh) occur only inside Set
+//! Element. Their layouts are those of the reports and are decoded as such.
 
 use bytes::Bytes;
 
@@ -17,24 +17,24 @@ use jaus::messages::mobility::{
     ReportLocalPathSegmentExt,
 };
 
-/// A curve from wherever the vehicle is to an end, drawn towards a control point.
+/// A curve from the start of the segment to its end, drawn towards a control point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PathSegment {
-    /// P1: metres along X and Y, or degrees of latitude and longitude.
+    /// P1: X and Y in metres, or latitude and longitude in degrees.
     control: (f64, f64),
     /// P2, in the same units.
     end: (f64, f64),
     weight: f64,
-    /// Metres.
+    /// In metres.
     path_tolerance: Option<f64>,
 }
 
-/// The codes of the messages that set segments in the local frame, in versions 1.0 and 1.1.
+/// Codes of the messages that set segments in the local frame, versions 1.0 and 1.1.
 pub(super) const LOCAL: [u16; 2] = [0x0410, 0x04B0];
-/// The same for segments on the globe.
+/// Codes of the messages that set segments on the globe, versions 1.0 and 1.1.
 pub(super) const GLOBAL: [u16; 2] = [0x040F, 0x04AF];
 
-/// The segment in a message that sets one in the local frame.
+/// Reads a segment in the local frame from its message.
 pub(super) fn local(code: u16, octets: &Bytes) -> Option<PathSegment> {
     let [basic, ext] = LOCAL;
     match code {
@@ -60,7 +60,7 @@ pub(super) fn local(code: u16, octets: &Bytes) -> Option<PathSegment> {
     }
 }
 
-/// The segment in a message that sets one on the globe.
+/// Reads a segment on the globe from its message.
 pub(super) fn global(code: u16, octets: &Bytes) -> Option<PathSegment> {
     let [basic, ext] = GLOBAL;
     match code {
@@ -86,14 +86,14 @@ pub(super) fn global(code: u16, octets: &Bytes) -> Option<PathSegment> {
     }
 }
 
-/// Reads a message that has the layout of another one.
+/// Reads a message that has the layout of `M`.
 fn read_as<M: Message>(octets: &Bytes) -> Option<M> {
     let body = octets.get(2..)?;
     M::decode(&[&M::CODE.to_le_bytes(), body].concat().into()).ok()
 }
 
 impl PathSegment {
-    /// The curve from a start in the local frame.
+    /// The curve from a start point in the local frame.
     pub(super) const fn curve(&self, start: (f64, f64)) -> Curve {
         Curve {
             start,
@@ -103,7 +103,7 @@ impl PathSegment {
         }
     }
 
-    /// The same for a segment on the globe: this one in the local frame.
+    /// Converts a segment on the globe to the local frame.
     pub(super) fn in_frame(&self, frame: &Frame) -> Self {
         let local = |(latitude, longitude)| {
             let pose = frame.to_local(&GlobalPose {
@@ -120,7 +120,7 @@ impl PathSegment {
         }
     }
 
-    /// Where it ends, in the local frame.
+    /// The end of the segment in the local frame.
     pub(super) const fn waypoint(&self) -> Waypoint {
         Waypoint::at(self.end.0, self.end.1)
     }

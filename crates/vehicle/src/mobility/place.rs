@@ -1,4 +1,4 @@
-//! Where a vehicle may be sent to: what clients set, and what elements of a list hold.
+//! Destinations of a vehicle: places set by clients or stored in list elements.
 
 use std::f64::consts::SQRT_2;
 
@@ -15,7 +15,7 @@ use jaus::messages::mobility::{
 };
 use jaus::service::code_of;
 
-/// Somewhere to drive to.
+/// A waypoint or path segment to drive to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Place {
     Local(LocalWaypoint),
@@ -42,11 +42,11 @@ set_by! {
 }
 
 impl Place {
-    /// How far along each axis of the local frame a place may be, in metres: the range of Set
-    /// Local Waypoint. Further away the globe is no plane any more.
+    /// Largest distance of a place along each axis of the local frame, in metres: the range of Set
+    /// Local Waypoint. Beyond it the globe cannot be treated as a plane.
     const REACH: f64 = 100_000.0;
 
-    /// What an element of a list holds, if it is a place.
+    /// The place in a list element, if it holds one.
     pub(super) fn of(element: &ElementRec) -> Option<Self> {
         let octets = &element.element_data.data;
         match code_of(octets)? {
@@ -58,15 +58,15 @@ impl Place {
         }
     }
 
-    /// The place at the end of the path that a message with this code sets.
+    /// The path segment in a message with this code.
     pub(super) fn of_path(code: u16, octets: &Bytes) -> Option<Self> {
         let local = || path_segment::local(code, octets).map(Self::LocalPath);
         let global = || path_segment::global(code, octets).map(Self::GlobalPath);
         local().or_else(global)
     }
 
-    /// Whether it can be reached, as far as it can be told without knowing where on the globe the
-    /// vehicle is.
+    /// Whether the place is within reach. Places on the globe pass, since the position of the local
+    /// frame is not known here.
     pub(super) fn is_in_reach(&self) -> bool {
         match self {
             Self::Local(waypoint) => in_reach(&waypoint.waypoint()),
@@ -75,7 +75,7 @@ impl Place {
         }
     }
 
-    /// What to pursue to get there from a start; `None` if it is out of reach.
+    /// The goal for the pilot from a start point; `None` if the place is out of reach.
     pub(super) fn goal(
         &self,
         frame: &Frame,
@@ -96,7 +96,7 @@ impl Place {
         in_reach(&to).then_some(goal)
     }
 
-    /// Where it is in the local frame, or where it ends.
+    /// The place, or the end of the path segment, in the local frame.
     pub(super) fn waypoint(&self, frame: &Frame) -> Waypoint {
         match self {
             Self::Local(waypoint) => waypoint.waypoint(),
@@ -106,7 +106,7 @@ impl Place {
         }
     }
 
-    /// The way to it in the local frame, if that is given.
+    /// The path segment in the local frame, if the place is one.
     fn path(&self, frame: &Frame) -> Option<PathSegment> {
         match self {
             Self::LocalPath(path) => Some(*path),

@@ -1,4 +1,4 @@
-//! Primitive Driver: uses the vehicle's drives and brakes directly, without feedback.
+//! Primitive Driver: controls the vehicle's drives and brakes directly, without feedback.
 
 use super::behaviour::Behaviour;
 use super::both_versions;
@@ -13,8 +13,8 @@ use jaus::messages::mobility::{
 };
 use jaus::service::{Context, Handled, Validity};
 
-/// Of the twelve efforts of the message a ground vehicle has four: along X, about Z, and their
-/// brakes. The others are kept and reported, and have no effect.
+/// A ground vehicle uses four of the twelve efforts in the message: along X, about Z, and their
+/// brakes. The others are stored and reported but have no effect.
 #[derive(Default)]
 pub(super) struct PrimitiveDriver {
     effort: SetWrenchEffort,
@@ -70,7 +70,7 @@ impl PrimitiveDriver {
         exchange.context.changed::<QueryWrenchEffort>();
     }
 
-    /// What another driver has replaced is no longer what the vehicle does.
+    /// Clears the effort if another driver has replaced it.
     fn forget_what_others_replaced(&mut self, controls: &Controls) {
         if self
             .ticket
@@ -80,7 +80,7 @@ impl PrimitiveDriver {
         }
     }
 
-    /// The efforts that were set, and 0 for those that were not.
+    /// Reports the efforts that were set, and 0 for the others.
     fn report(&self, query: &QueryWrenchEffort) -> ReportWrenchEffort {
         let wanted = Wanted(query.presence_vector.into());
         let effort = &self.effort;

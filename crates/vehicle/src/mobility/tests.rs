@@ -1,4 +1,4 @@
-//! The mobility services on a simulated vehicle, under virtual time.
+//! The mobility services on a simulated vehicle in virtual time.
 
 mod commands;
 mod lists;
@@ -19,12 +19,12 @@ use jaus::messages::mobility::{ExecuteList, SetLocalWaypoint};
 use jaus::service::rig::{CLIENT, Rig, STRANGER};
 use jaus::service::{MotionPolicy, Service, State, StopCause, Time, TimeOfDay};
 
-/// Berlin, where the vehicle of the tests stands.
+/// Berlin, the location of the test vehicle.
 const FRAME: (f64, f64) = (52.5, 13.4);
 
 fn vehicle() -> Vehicle {
     let rover = SkidSteer::new(SkidSteerConfig::default());
-    // One command is enough for as long as its client lives.
+    // One command suffices for as long as its client is alive.
     Vehicle::new(Pilot::new(rover, Frame::at(FRAME.0, FRAME.1))).motion_policy(MotionPolicy::Hold)
 }
 
@@ -66,7 +66,7 @@ fn local_waypoint(x: f64, y: f64) -> SetLocalWaypoint {
     waypoint
 }
 
-/// A message as an element of a list.
+/// Wraps a message in a list element.
 fn element(uid: u16, previous_uid: u16, next_uid: u16, message: &impl Message) -> ElementRec {
     let data = message.encode().unwrap();
     ElementRec {
@@ -77,7 +77,7 @@ fn element(uid: u16, previous_uid: u16, next_uid: u16, message: &impl Message) -
     }
 }
 
-/// Sets elements; says whether that was confirmed.
+/// Sets elements. Returns whether the change was confirmed.
 fn set_elements(rig: &mut Rig, element_list: Vec<ElementRec>) -> bool {
     let request_id_rec = RequestIdRec { request_id: 44 };
     let request = SetElement {

@@ -1,5 +1,4 @@
-//! What the drivers that go to places do with the messages that all of them have: the travel speed,
-//! and the execution of a list.
+//! Messages common to all waypoint and list drivers: travel speed and list execution.
 
 use super::controls::changed;
 use super::exchange::{Command, Exchange};
@@ -12,7 +11,7 @@ use jaus::messages::mobility::{
 };
 use jaus::service::{Handled, Validity};
 
-/// What drivers to a single place do with messages about the travel speed.
+/// Handles travel speed messages for drivers to a single place.
 pub(super) fn handle_speed(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
     match code {
         SetTravelSpeed::CODE => {
@@ -32,12 +31,12 @@ pub(super) fn handle_speed(code: u16, exchange: &mut Exchange<'_, '_>) -> Handle
     Handled::Yes
 }
 
-/// Whether drivers along a list tell the end of a command with this code.
+/// Whether list drivers report the completion of commands with this code.
 pub(super) const fn tells_end_of(command: u16) -> bool {
     matches!(command, ExecuteList::CODE | ExecuteListExt::CODE)
 }
 
-/// What drivers along a list do with messages about its execution.
+/// Handles list execution messages for list drivers.
 pub(super) fn handle_list(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
     match code {
         ExecuteList::CODE => {
@@ -79,7 +78,7 @@ fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
     Handled::Yes
 }
 
-/// A speed for a place; without a place there is nothing to drive to.
+/// Sets the speed to the place. Ignored if there is no place.
 fn set_speed(speed: f64, acts: bool, exchange: &mut Exchange<'_, '_>) {
     let source = exchange.message.source;
     if exchange.controls.travel.has_place() {
@@ -92,8 +91,7 @@ fn set_speed(speed: f64, acts: bool, exchange: &mut Exchange<'_, '_>) {
     }
 }
 
-/// Begins with an element of the list; without one, the speed of a list that is being worked off
-/// is changed.
+/// Starts the list at an element. Without an element, changes the speed of the list being executed.
 fn execute(code: u16, uid: Option<u16>, speed: f64, acts: bool, exchange: &mut Exchange<'_, '_>) {
     let source = exchange.message.source;
     match uid {
@@ -115,15 +113,15 @@ fn execute(code: u16, uid: Option<u16>, speed: f64, acts: bool, exchange: &mut E
     changed(exchange.context);
 }
 
-/// A journey that has been set out on is in force until it is done.
+/// Keeps the command in force until the journey is done.
 pub(super) fn accept(exchange: &mut Exchange<'_, '_>) {
     if exchange.controls.is_travelling() {
         exchange.accept(Validity::UntilDone);
     }
 }
 
-/// A speed over ground. Through still air that is also the one relative to the medium; rotations
-/// are no speed of this vehicle, and it does not travel backwards.
+/// The speed over ground. In still air it equals the speed relative to the medium. Rotation speeds
+/// do not apply to this vehicle, and it does not travel backwards.
 pub(super) fn metres_per_second(speed: Speed) -> Option<f64> {
     let speed = match speed {
         Speed::SpeedOverGround(speed) => speed.value(),
@@ -131,6 +129,6 @@ pub(super) fn metres_per_second(speed: Speed) -> Option<f64> {
         Speed::IndicatedSpeed(speed) => speed.value(),
         Speed::RotationsPerMinute(_) => return None,
     };
-    // The step of the field next to 0 is not exactly 0.
+    // The step of the field nearest to 0 is not exactly 0.
     (speed > -0.005).then_some(speed.max(0.0))
 }

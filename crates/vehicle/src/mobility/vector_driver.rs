@@ -1,4 +1,4 @@
-//! Local and Global Vector Driver: keep a speed and a heading.
+//! Local and Global Vector Driver: hold a speed and a heading.
 
 use super::behaviour::Behaviour;
 use super::controls::Controls;
@@ -16,27 +16,28 @@ use jaus::messages::mobility::{
 };
 use jaus::service::{Context, Handled, Validity};
 
-/// The speed and heading that a client wants.
+/// The requested speed and heading.
 #[derive(Debug, Default, Clone, Copy)]
 struct Vector {
-    /// Metres per second.
+    /// Speed in metres per second.
     speed: f64,
-    /// Radians clockwise from the local X axis or from north; straight on without one.
+    /// Heading in radians clockwise from the local X axis or from north. `None` drives straight
+    /// ahead.
     heading: Option<f64>,
     ticket: Option<Ticket>,
 }
 
-/// Keeps a heading in the local frame.
+/// Holds a heading in the local frame.
 #[derive(Default)]
 pub(super) struct LocalVectorDriver(Vector);
 
-/// Keeps a heading on the globe.
+/// Holds a heading on the globe.
 #[derive(Default)]
 pub(super) struct GlobalVectorDriver(Vector);
 
 impl Vector {
-    /// Keeps a vector, and sets out if the vehicle is to act; `origin` says what the headings of this
-    /// driver are measured from.
+    /// Stores a vector, and starts if `acts` is set. `origin` is the reference of this driver's
+    /// headings.
     fn set(
         &mut self,
         (speed, heading): (f64, Option<f64>),
@@ -57,7 +58,7 @@ impl Vector {
         changed(exchange.context);
     }
 
-    /// What is in force, or is kept in standby: nothing if another driver has replaced it.
+    /// The vector in force or stored in standby; the default if another driver has replaced it.
     fn current(&self, controls: &Controls) -> Self {
         match self.ticket {
             Some(ticket) if !controls.pilot.pursues(ticket) => Self::default(),

@@ -1,5 +1,5 @@
-//! The vehicle that all mobility services of a component share, and each of them as a component
-//! offers it.
+//! The vehicle shared by all mobility services of a component, and the constructors of these
+//! services.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -28,15 +28,14 @@ use jaus::service::{
     TimeOfDay, code_of,
 };
 
-/// A vehicle as the mobility services see it. Cheap to clone; the clones are one vehicle.
+/// A vehicle as used by the mobility services. Cheap to clone; all clones share one state.
 #[derive(Clone)]
 pub struct Vehicle {
     controls: Arc<Mutex<Controls>>,
 }
 
 impl Vehicle {
-    /// A vehicle that nobody drives yet, and that does not know what time it is: its reports carry
-    /// no time stamps.
+    /// Creates a vehicle without a command and without a clock. Its reports carry no time stamps.
     #[must_use]
     pub fn new(pilot: Pilot) -> Self {
         Self {
@@ -44,96 +43,94 @@ impl Vehicle {
         }
     }
 
-    /// Stamps its reports with the times at which their samples were taken. Share the time with the
-    /// component's [`Time`](jaus::service::Time) service, so that Set Time sets the stamps, too.
+    /// Stamps reports with their sample times. Share the clock with the component's
+    /// [`Time`](jaus::service::Time) service, so that Set Time also affects the stamps.
     #[must_use]
     pub fn with_clock(self, time: TimeOfDay) -> Self {
         self.lock().clock = Some(SampleClock::new(time));
         self
     }
 
-    /// What becomes of efforts and velocities that their client does not repeat.
+    /// Sets the policy for efforts and velocities that their client does not repeat.
     #[must_use]
     pub fn motion_policy(self, policy: MotionPolicy) -> Self {
         self.lock().guard.set_policy(policy);
         self
     }
 
-    /// Moves on to `now`, for readers outside of the component; not beyond the end of the command in
-    /// force, which the component alone can see to.
+    /// Advances to `now`, for readers outside the component, but not beyond the end of the command
+    /// in force. Only the component handles that end.
     pub fn handle_time(&self, now: Instant) {
         self.lock().advance_within(now);
     }
 
-    /// Stops, whatever it was commanded to do.
+    /// Stops, whatever the current command.
     pub fn stop(&self) {
         self.lock().halt(&StopCause::Requested);
     }
 
-    /// Whether it has something to do that is not done.
+    /// Whether a command is still being executed.
     #[must_use]
     pub fn is_under_way(&self) -> bool {
         self.lock().pilot.is_under_way()
     }
 
-    /// Whether it has done what it was driven to do.
+    /// Whether the last command is complete.
     #[must_use]
     pub fn has_arrived(&self) -> bool {
         let controls = self.lock();
         controls.pilot.is_there() && controls.travel.active().is_none()
     }
 
-    /// How much of the list that it works off lies behind it, in percent.
+    /// Completed part of the list being executed, in percent.
     #[must_use]
     pub fn progress(&self) -> u8 {
         self.lock().progress()
     }
 
-    /// Why it was stopped last, unless it was commanded again since.
+    /// The cause of the last stop, unless a command followed it.
     #[must_use]
     pub fn last_stop(&self) -> Option<StopCause> {
         self.lock().guard.last_stop().cloned()
     }
 
-    /// Where it was last and how it moved.
+    /// The latest pose and velocity.
     #[must_use]
     pub fn motion(&self) -> Motion {
         self.lock().pilot.motion()
     }
 
-    /// Where on the globe it was last.
+    /// The latest pose on the globe.
     #[must_use]
     pub fn global_pose(&self) -> GlobalPose {
         self.lock().pilot.global_pose()
     }
 
-    /// Velocity State Sensor: tells how fast it moves.
+    /// Velocity State Sensor: reports the velocity.
     #[must_use]
     pub fn velocity_state_sensor(&self) -> OnVehicle {
         self.service(VelocityStateSensor)
     }
 
-    /// Acceleration State Sensor: tells how its velocity changes.
+    /// Acceleration State Sensor: reports the acceleration.
     #[must_use]
     pub fn acceleration_state_sensor(&self) -> OnVehicle {
         self.service(AccelerationStateSensor)
     }
 
-    /// Local Pose Sensor: tells where it is in its local frame, and lets the client in control
-    /// say where that is.
+    /// Local Pose Sensor: reports the pose in the local frame. The client in control may set it.
     #[must_use]
     pub fn local_pose_sensor(&self) -> OnVehicle {
         self.service(LocalPoseSensor)
     }
 
-    /// Global Pose Sensor: tells where it is on the globe, and lets the client in control say
-    /// where that is.
+    /// Global Pose Sensor: reports the pose on the globe. The client in control may set it.
     #[must_use]
     pub fn global_pose_sensor(&self) -> OnVehicle {
         self.service(GlobalPoseSensor)
     }
 
-    /// Primitive Driver: uses its drives and brakes without feedback.
+    /// Primitive Driver: controls drives and brakes without feedback.
     #[must_use]
     pub fn primitive_driver(&self) -> OnVehicle {
         self.service(PrimitiveDriver::default())
@@ -151,54 +148,54 @@ impl Vehicle {
         self.service(WaypointDriver::<Global>::new())
     }
 
-    /// List Manager: keeps the list of the list drivers, one for all of them. It takes what they
-    /// can drive to.
+    /// List Manager: maintains the list shared by all list drivers. It accepts the elements that
+    /// they can drive to.
     #[must_use]
     pub fn list_manager(&self) -> ListManager {
         ListManager::new(self.elements())
     }
 
-    /// Local Waypoint List Driver: drives to waypoints in the local frame, one after the other.
-    /// Needs the [`list_manager`](Self::list_manager) beside it.
+    /// Local Waypoint List Driver: drives to waypoints in the local frame in sequence. Requires the
+    /// [`list_manager`](Self::list_manager) in the same component.
     #[must_use]
     pub fn local_waypoint_list_driver(&self) -> OnVehicle {
         self.service(ListDriver::<Local>::on(&self.elements()))
     }
 
-    /// Global Waypoint List Driver: drives to waypoints on the globe, one after the other. Needs
-    /// the [`list_manager`](Self::list_manager) beside it.
+    /// Global Waypoint List Driver: drives to waypoints on the globe in sequence. Requires the
+    /// [`list_manager`](Self::list_manager) in the same component.
     #[must_use]
     pub fn global_waypoint_list_driver(&self) -> OnVehicle {
         self.service(ListDriver::<Global>::on(&self.elements()))
     }
 
-    /// Velocity State Driver: keeps a velocity.
+    /// Velocity State Driver: holds a velocity.
     #[must_use]
     pub fn velocity_state_driver(&self) -> OnVehicle {
         self.service(VelocityStateDriver::default())
     }
 
-    /// Local Vector Driver: keeps a speed and a heading in the local frame.
+    /// Local Vector Driver: holds a speed and a heading in the local frame.
     #[must_use]
     pub fn local_vector_driver(&self) -> OnVehicle {
         self.service(LocalVectorDriver::default())
     }
 
-    /// Global Vector Driver: keeps a speed and a heading on the globe.
+    /// Global Vector Driver: holds a speed and a heading on the globe.
     #[must_use]
     pub fn global_vector_driver(&self) -> OnVehicle {
         self.service(GlobalVectorDriver::default())
     }
 
-    /// Local Path Segment Driver: drives along curves in the local frame, one after the other.
-    /// Needs the [`list_manager`](Self::list_manager) beside it.
+    /// Local Path Segment Driver: drives along curves in the local frame in sequence. Requires the
+    /// [`list_manager`](Self::list_manager) in the same component.
     #[must_use]
     pub fn local_path_segment_driver(&self) -> OnVehicle {
         self.service(ListDriver::<LocalPath>::on(&self.elements()))
     }
 
-    /// Global Path Segment Driver: drives along curves on the globe, one after the other. Needs
-    /// the [`list_manager`](Self::list_manager) beside it.
+    /// Global Path Segment Driver: drives along curves on the globe in sequence. Requires the
+    /// [`list_manager`](Self::list_manager) in the same component.
     #[must_use]
     pub fn global_path_segment_driver(&self) -> OnVehicle {
         self.service(ListDriver::<GlobalPath>::on(&self.elements()))
@@ -231,23 +228,22 @@ impl std::fmt::Debug for Vehicle {
     }
 }
 
-/// A mobility service of a [`Vehicle`], to be offered by a component.
+/// A mobility service of a [`Vehicle`], for use in a component.
 pub struct OnVehicle {
     vehicle: Vehicle,
     behaviour: Box<dyn Behaviour>,
     only_newest: bool,
-    /// The step of the vehicle that was looked at last.
+    /// The last vehicle step processed.
     steps: u64,
-    /// The stop of the vehicle that was followed last.
+    /// The last vehicle stop processed.
     stops: u64,
 }
 
 impl OnVehicle {
-    /// Lists only the newest version, whose messages include those of the older ones.
+    /// Offers only the newest version, whose messages include those of older ones.
     ///
-    /// What a component tells about its services should fit into one packet, because some peers
-    /// (JAUS++) cannot read longer messages of others. A component with many services saves room
-    /// like this.
+    /// A component's list of services should fit into one packet, because some peers (JAUS++)
+    /// cannot read longer messages. This saves space in components with many services.
     #[must_use]
     pub const fn only_newest(mut self) -> Self {
         self.only_newest = true;
@@ -321,7 +317,7 @@ impl Service for OnVehicle {
         self.behaviour.handle_stop(&mut controls, context);
     }
 
-    /// What was kept in standby does not come into force when the component is made ready.
+    /// Discards commands stored in standby when the component becomes ready.
     fn handle_standing(&mut self, _: Instant, before: &Standing, context: &mut Context<'_>) {
         if context.standing().may_act() && !before.may_act() {
             let mut controls = self.vehicle.lock();
@@ -356,7 +352,7 @@ impl Service for OnVehicle {
     }
 }
 
-/// Moves the vehicle on to `now`, and has a service follow if that stopped it.
+/// Advances the vehicle to `now`, and notifies a service if the vehicle has stopped.
 fn follow(
     now: Instant,
     controls: &mut Controls,

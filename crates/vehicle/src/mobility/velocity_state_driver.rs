@@ -1,4 +1,4 @@
-//! Velocity State Driver: keeps a velocity, within limits that clients may narrow.
+//! Velocity State Driver: holds a velocity, within limits that clients may narrow.
 
 use super::behaviour::Behaviour;
 use super::both_versions;
@@ -17,7 +17,7 @@ use jaus::messages::mobility::{
 };
 use jaus::service::{Context, Handled, State, Validity};
 
-/// The velocity that a client wants, and the one to fall back to.
+/// The commanded velocity and the default velocity.
 #[derive(Default)]
 pub(super) struct VelocityStateDriver {
     current: Velocity,
@@ -25,8 +25,8 @@ pub(super) struct VelocityStateDriver {
     ticket: Option<Ticket>,
 }
 
-/// Which velocity a message is about. Through still air or water it makes no difference whether
-/// that is over ground (0 to 3) or relative to the medium (4 to 7).
+/// The velocity that a message refers to. In still air or water, over ground (0 to 3) and relative
+/// to the medium (4 to 7) are the same.
 #[derive(Clone, Copy, PartialEq)]
 enum Which {
     Current,
@@ -47,9 +47,9 @@ impl Which {
     }
 }
 
-/// Command type of Set Acceleration Limit: for speeding up.
+/// Command type of Set Acceleration Limit: acceleration.
 const SPEEDING_UP: u8 = 1;
-/// Command type of Set Acceleration Limit: for slowing down.
+/// Command type of Set Acceleration Limit: deceleration.
 const SLOWING_DOWN: u8 = 2;
 
 impl Behaviour for VelocityStateDriver {
@@ -126,8 +126,8 @@ fn changed(context: &mut Context<'_>) {
 }
 
 impl VelocityStateDriver {
-    /// Takes a velocity command. What it does not name stays as it is. To drive, the component
-    /// must be ready; limits may be set at any time.
+    /// Handles a velocity command. Omitted fields keep their values. Driving requires the component
+    /// to be ready; limits can be set at any time.
     fn set(
         &mut self,
         command_type: u8,
@@ -213,8 +213,8 @@ impl VelocityStateDriver {
     }
 }
 
-/// Narrows the acceleration. A limit for slowing down may come with either sign. One of 0 would
-/// leave the vehicle without brakes, and is ignored.
+/// Narrows the acceleration limits. A deceleration limit may have either sign. A limit of 0 would
+/// disable the brakes and is ignored.
 fn limit_acceleration(message: &SetAccelerationLimit, exchange: &mut Exchange<'_, '_>) {
     let pilot = &mut exchange.controls.pilot;
     let limits = *pilot.limits();

@@ -1,4 +1,4 @@
-//! Velocity State Sensor: how fast the vehicle moves, along and about its own axes.
+//! Velocity State Sensor: the vehicle's velocity along and about its own axes.
 
 use super::behaviour::Behaviour;
 use super::both_versions;

@@ -1,4 +1,4 @@
-//! Local and Global Waypoint Driver: drive to one waypoint.
+//! Local and Global Waypoint Driver: drive to a single waypoint.
 
 use std::marker::PhantomData;
 
@@ -12,7 +12,7 @@ use super::travel;
 use jaus::codec::{Message, ServiceId};
 use jaus::service::{Context, Handled};
 
-/// A driver to waypoints of one kind.
+/// Drives to waypoints of one kind.
 pub(super) struct WaypointDriver<K>(PhantomData<K>);
 
 impl<K: Waypoints> WaypointDriver<K> {
@@ -54,7 +54,7 @@ impl<K: Waypoints> Behaviour for WaypointDriver<K> {
     }
 }
 
-/// Takes a waypoint; with a travel speed, the vehicle sets out at once.
+/// Sets a waypoint. If a travel speed is set, the vehicle starts immediately.
 fn set<M: Message + Into<Place>>(command: Option<Command<M>>, exchange: &mut Exchange<'_, '_>) {
     let Some(Command { message, acts }) = command else {
         return;

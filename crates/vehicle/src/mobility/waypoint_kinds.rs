@@ -1,4 +1,4 @@
-//! Waypoints in the local frame and on the globe, as the drivers to them take and tell them.
+//! Waypoints in the local frame and on the globe, as kinds of places for the drivers.
 
 use super::exchange::Exchange;
 use super::kind::{Kind, Waypoints};
@@ -89,7 +89,7 @@ impl Kind for Local {
     }
 }
 
-/// Has a list take a waypoint that is in reach.
+/// Registers a waypoint message with a list, accepting waypoints within reach.
 fn accept<M: Message + Clone + Into<Place>>(elements: &Elements) {
     elements.accept_if(|message: &M| message.clone().into().is_in_reach());
 }

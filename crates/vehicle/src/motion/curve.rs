@@ -1,22 +1,22 @@
-//! The path segments of AS6009: rational quadratic curves from a start to an end, drawn towards a
+//! Path segments of AS6009: rational quadratic curves from a start to an end, drawn towards a
 //! control point.
 
-/// A curve from one point to another, drawn towards a third: a rational Bézier curve whose ends
-/// weigh 1.
+/// A curve between two points, drawn towards a third: a rational quadratic Bézier curve with end
+/// weights of 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curve {
-    /// Where it starts (P0): X and Y in metres.
+    /// Start point (P0): X and Y in metres.
     pub start: (f64, f64),
-    /// What draws it (P1).
+    /// Control point (P1).
     pub control: (f64, f64),
-    /// Where it ends (P2).
+    /// End point (P2).
     pub end: (f64, f64),
-    /// How strongly the control point draws, 0 to 500; 0 makes a straight line.
+    /// Weight of the control point, 0 to 500. 0 gives a straight line.
     pub weight: f64,
 }
 
 impl Curve {
-    /// The point at a parameter from 0 (the start) to 1 (the end).
+    /// The point at a parameter between 0 (start) and 1 (end).
     #[must_use]
     pub fn point(&self, parameter: f64) -> (f64, f64) {
         let u = parameter.clamp(0.0, 1.0);
@@ -33,7 +33,7 @@ impl Curve {
         )
     }
 
-    /// Points along the curve, dense enough to drive along.
+    /// Points along the curve, dense enough to follow.
     pub(super) fn points(&self) -> Vec<(f64, f64)> {
         (0..=Self::POINTS)
             .map(|index| self.point(f64::from(index) / f64::from(Self::POINTS)))

@@ -1,11 +1,11 @@
-//! How long a command holds that is not repeated.
+//! Deadline of drive commands: how long a command holds without repetition.
 
 use std::time::{Duration, Instant};
 
-/// The deadline of a platform or drive: it brakes by itself when its last command is older.
+/// Command deadline of a platform or drive: it brakes on its own when its last command is older.
 ///
-/// [`Pilot`](super::Pilot) repeats its command every [`STEP`](super::Pilot::STEP) (20 ms) while
-/// something moves. A program that hangs repeats nothing, so that what it drives stops.
+/// [`Pilot`](super::Pilot) repeats its command every [`STEP`](super::Pilot::STEP) (20 ms) during
+/// motion. A program that hangs repeats nothing, so the vehicle stops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CommandDeadline {
     limit: Duration,
@@ -13,17 +13,17 @@ pub struct CommandDeadline {
 }
 
 impl CommandDeadline {
-    /// 200 ms: ten steps of a pilot.
+    /// 200 ms: ten pilot steps.
     pub const DEFAULT: Duration = Duration::from_millis(200);
 
-    /// A deadline of `limit` after each command; no command has come yet.
+    /// Creates a deadline of `limit` after each command, without a command so far.
     #[must_use]
     pub const fn new(limit: Duration) -> Self {
         Self { limit, since: None }
     }
 
-    /// A command has come at `now`. Where no clock is at hand, pass the time of the last
-    /// [`has_passed`](Self::has_passed), or `None` to count from the next one.
+    /// Restarts the deadline for a command at `now`. Callers without a clock pass the time of the
+    /// last [`has_passed`](Self::has_passed), or `None` to count from the next one.
     pub const fn restart(&mut self, now: Option<Instant>) {
         self.since = now;
     }
@@ -34,7 +34,7 @@ impl CommandDeadline {
         now.saturating_duration_since(since) > self.limit
     }
 
-    /// When the last command expires; `None` if no command has come.
+    /// When the last command expires; `None` before the first command.
     #[must_use]
     pub fn expires_at(&self) -> Option<Instant> {
         self.since?.checked_add(self.limit)

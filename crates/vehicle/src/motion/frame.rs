@@ -1,28 +1,28 @@
-//! Where on the globe the local frame lies.
+//! Conversion between the local frame and positions on the globe.
 
 use super::{Pose, wrap};
 
-/// A position on the globe (WGS 84), and how a vehicle is turned there.
+/// A position (WGS 84) and attitude on the globe.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GlobalPose {
-    /// Degrees, north positive.
+    /// Latitude in degrees, north positive.
     pub latitude: f64,
-    /// Degrees, east positive.
+    /// Longitude in degrees, east positive.
     pub longitude: f64,
-    /// Metres above the ellipsoid.
+    /// Altitude in metres above the ellipsoid.
     pub altitude: f64,
-    /// Radians about the forward axis.
+    /// Roll in radians about the forward axis.
     pub roll: f64,
-    /// Radians about the axis to the right.
+    /// Pitch in radians about the axis to the right.
     pub pitch: f64,
-    /// Radians clockwise from true north.
+    /// Yaw in radians clockwise from true north.
     pub yaw: f64,
 }
 
-/// The local frame: a plane that touches the globe at the origin.
+/// The local frame: a plane tangent to the globe at the origin.
 ///
-/// Distances of a few kilometres from the origin are right within a part in a thousand; the frame
-/// does not reach the poles.
+/// Distances within a few kilometres of the origin are accurate to one part in a thousand. The
+/// frame does not extend to the poles.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Frame {
     /// The origin's latitude in degrees, -90 to 90.
@@ -31,17 +31,17 @@ pub struct Frame {
     pub longitude: f64,
     /// The origin's altitude in metres above the ellipsoid.
     pub altitude: f64,
-    /// Where the local X axis points: radians clockwise from true north.
+    /// Direction of the local X axis in radians clockwise from true north.
     pub heading: f64,
 }
 
 impl Frame {
-    /// Half of the greater axis of WGS 84, in metres.
+    /// Semi-major axis of WGS 84 in metres.
     const SEMI_MAJOR_AXIS: f64 = 6_378_137.0;
-    /// The first eccentricity of WGS 84, squared.
+    /// Square of the first eccentricity of WGS 84.
     const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_14e-3;
 
-    /// A frame at a position, its X axis pointing north.
+    /// Creates a frame at a position, with its X axis pointing north.
     #[must_use]
     pub fn at(latitude: f64, longitude: f64) -> Self {
         Self {
@@ -51,7 +51,7 @@ impl Frame {
         }
     }
 
-    /// Where on the globe a pose in this frame is.
+    /// Converts a pose in this frame to a pose on the globe.
     #[must_use]
     pub fn to_global(&self, pose: &Pose) -> GlobalPose {
         let (sin, cos) = self.heading.sin_cos();
@@ -68,7 +68,7 @@ impl Frame {
         }
     }
 
-    /// Where in this frame a pose on the globe is.
+    /// Converts a pose on the globe to this frame.
     #[must_use]
     pub fn to_local(&self, global: &GlobalPose) -> Pose {
         let (sin, cos) = self.heading.sin_cos();
@@ -85,7 +85,7 @@ impl Frame {
         }
     }
 
-    /// The frame in which one and the same place has this local and that global pose.
+    /// The frame in which `local` and `global` describe the same pose.
     #[must_use]
     pub fn joining(local: &Pose, global: &GlobalPose) -> Self {
         let mut frame = Self {
@@ -94,7 +94,7 @@ impl Frame {
             altitude: global.altitude + local.z,
             heading: wrap(global.yaw - local.yaw),
         };
-        // How long a degree is depends on where the origin is; each round divides the error by
+        // The length of a degree depends on the origin. Each iteration divides the error by
         // thousands.
         for _ in 0..4 {
             let found = frame.to_global(local);
@@ -105,19 +105,19 @@ impl Frame {
         frame
     }
 
-    /// Metres in a degree of latitude and of longitude at the origin.
+    /// Metres per degree of latitude and of longitude at the origin.
     fn metres_per_degree(&self) -> (f64, f64) {
         let (sin, cos) = self.latitude.to_radians().sin_cos();
         let bulge = 1.0 - Self::ECCENTRICITY_SQUARED * sin * sin;
         let normal = Self::SEMI_MAJOR_AXIS / bulge.sqrt();
         let meridian = normal * (1.0 - Self::ECCENTRICITY_SQUARED) / bulge;
-        // At a pole every longitude is the same place; this keeps the division meaningful.
+        // At a pole all longitudes coincide. The minimum avoids a division by zero.
         let parallel = (normal * cos).max(1.0);
         (meridian.to_radians(), parallel.to_radians())
     }
 }
 
-/// The same longitude between -180 and 180 degrees.
+/// Wraps a longitude to -180 to 180 degrees.
 fn wrap_degrees(degrees: f64) -> f64 {
     wrap(degrees.to_radians()).to_degrees()
 }

@@ -1,26 +1,26 @@
-//! Where a vehicle is and how it moves, in the units and axes of AS6009.
+//! Pose, velocity and acceleration of a vehicle, in the units and axes of AS6009.
 
 use std::f64::consts::{PI, TAU};
 use std::time::Instant;
 
-/// Where a vehicle is in the local frame, and how it is turned.
+/// Position and attitude of a vehicle in the local frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Pose {
-    /// Metres along the local X axis.
+    /// X in metres.
     pub x: f64,
-    /// Metres along the local Y axis.
+    /// Y in metres.
     pub y: f64,
-    /// Metres along the local Z axis, down positive.
+    /// Z in metres, down positive.
     pub z: f64,
-    /// Radians about the forward axis.
+    /// Roll in radians about the forward axis.
     pub roll: f64,
-    /// Radians about the axis to the right.
+    /// Pitch in radians about the axis to the right.
     pub pitch: f64,
-    /// Radians about the axis that points down; 0 looks along the local X axis.
+    /// Yaw in radians about the downward axis; 0 points along the local X axis.
     pub yaw: f64,
 }
 
-/// How fast a vehicle moves, along and about its own axes.
+/// Velocity of a vehicle along and about its own axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Velocity {
     /// Metres per second forward.
@@ -33,11 +33,11 @@ pub struct Velocity {
     pub roll: f64,
     /// Radians per second about the axis to the right.
     pub pitch: f64,
-    /// Radians per second about the axis that points down: positive turns to the right.
+    /// Radians per second about the downward axis. Positive turns right.
     pub yaw: f64,
 }
 
-/// How a vehicle's velocity changes, along and about its own axes.
+/// Acceleration of a vehicle along and about its own axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Acceleration {
     /// Metres per second squared forward.
@@ -50,25 +50,25 @@ pub struct Acceleration {
     pub roll: f64,
     /// Radians per second squared about the axis to the right.
     pub pitch: f64,
-    /// Radians per second squared about the axis that points down.
+    /// Radians per second squared about the downward axis.
     pub yaw: f64,
 }
 
 /// Pose, velocity and acceleration of a platform at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Motion {
-    /// Where it is.
+    /// The pose.
     pub pose: Pose,
-    /// How fast it moves.
+    /// The velocity.
     pub velocity: Velocity,
-    /// How that changes.
+    /// The acceleration.
     pub acceleration: Acceleration,
-    /// When it was measured; `None` if that is not known.
+    /// Time of the measurement; `None` if unknown.
     pub sampled_at: Option<Instant>,
 }
 
 impl Pose {
-    /// A pose on the ground, looking along the local X axis.
+    /// A pose on the ground, facing along the local X axis.
     #[must_use]
     pub fn at(x: f64, y: f64) -> Self {
         Self {
@@ -78,13 +78,13 @@ impl Pose {
         }
     }
 
-    /// Metres over ground from here to a point.
+    /// Horizontal distance to a point in metres.
     #[must_use]
     pub fn distance(&self, x: f64, y: f64) -> f64 {
         (x - self.x).hypot(y - self.y)
     }
 
-    /// The heading in which a point lies; 0 if it is here.
+    /// Heading to a point; 0 if it coincides with this pose.
     #[must_use]
     pub fn bearing(&self, x: f64, y: f64) -> f64 {
         (y - self.y).atan2(x - self.x)
@@ -92,7 +92,7 @@ impl Pose {
 }
 
 impl Velocity {
-    /// Forward at a speed in metres per second, while turning right at so many radians per second.
+    /// Forward velocity in metres per second and right turn in radians per second.
     #[must_use]
     pub fn forward(x: f64, yaw: f64) -> Self {
         Self {
@@ -102,14 +102,14 @@ impl Velocity {
         }
     }
 
-    /// Whether this is known to be as good as standing still: below 1 mm/s and 1 mrad/s. An unknown
+    /// Whether the velocity is known to be practically zero: below 1 mm/s and 1 mrad/s. An unknown
     /// velocity (NaN) is not rest.
     #[must_use]
     pub fn is_rest(&self) -> bool {
         self.components().iter().all(|value| value.abs() < 0.001)
     }
 
-    /// Whether any component is known, and is more than rest.
+    /// Whether any known component exceeds the limits of rest.
     #[must_use]
     pub fn is_moving(&self) -> bool {
         self.components().iter().any(|value| value.abs() >= 0.001)
@@ -126,7 +126,7 @@ impl Velocity {
     }
 }
 
-/// The same angle between -π (excluded) and π (included).
+/// Wraps an angle to -π (exclusive) to π (inclusive).
 #[must_use]
 pub fn wrap(angle: f64) -> f64 {
     let turned = angle.rem_euclid(TAU);

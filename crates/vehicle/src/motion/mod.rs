@@ -1,11 +1,10 @@
-//! What moves: the platform behind the mobility services, and the motion control over it.
+//! The platform behind the mobility services, and the motion control that drives it.
 //!
 //! A real vehicle implements [`Platform`]; [`SkidSteer`] is a simulated one. A [`Pilot`] drives
 //! either to its [`Goal`]: a velocity, a heading, a waypoint, a curve. Nothing here reads a clock
-//! or knows a message; the services in [`service::mobility`](crate::mobility) do the
-//! talking.
+//! or handles messages; the services in [`mobility`](crate::mobility) do.
 //!
-//! What it takes to make a real one drive:
+//! A minimal implementation for a real vehicle:
 //!
 //! ```
 //! use std::time::Instant;
@@ -46,8 +45,8 @@
 //! assert!(pilot.is_at_rest());
 //! ```
 //!
-//! Axes are those of AS6009: X forward or north, Y to the right or east, Z down; angles are in
-//! radians, yaw and heading clockwise from X, seen from above.
+//! Axes follow AS6009: X forward or north, Y right or east, Z down. Angles are in radians. Yaw and
+//! heading are clockwise from X, seen from above.
 
 mod curve;
 mod deadline;

@@ -1,26 +1,26 @@
-//! A vehicle that is watched and not driven: what sensors report about.
+//! A passively observed vehicle, for sensor services that report measured motion.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use super::{Drive, Limits, Motion, Platform, Pose};
 
-/// The motion of a vehicle as somebody has measured it. Cheap to clone; the clones are one vehicle.
+/// Externally measured motion of a vehicle. Cheap to clone; all clones share one state.
 ///
-/// It is a [`Platform`] that can not be driven: what it is told to do it does not do. What is not
-/// known of its motion is NaN, and is left out of reports.
+/// It implements [`Platform`] but ignores drive commands. Unknown components of the motion are NaN
+/// and are omitted from reports.
 #[derive(Debug, Clone, Default)]
 pub struct Observed(Arc<Mutex<Observation>>);
 
 #[derive(Debug, Default)]
 struct Observation {
     motion: Motion,
-    /// The pose that a client has said it has.
+    /// The pose set by a client.
     told: Option<Pose>,
 }
 
 impl Observed {
-    /// A vehicle that moves like this.
+    /// Creates a vehicle with this motion.
     #[must_use]
     pub fn new(motion: Motion) -> Self {
         let observed = Self::default();
@@ -28,12 +28,12 @@ impl Observed {
         observed
     }
 
-    /// Replaces the motion; its age is judged by [`Motion::sampled_at`].
+    /// Replaces the motion. [`Motion::sampled_at`] determines its age.
     pub fn set(&self, motion: Motion) {
         self.lock().motion = motion;
     }
 
-    /// The pose that a client has said that it has, once.
+    /// Takes the pose set by a client, if there is a new one.
     #[must_use]
     pub fn take_told(&self) -> Option<Pose> {
         self.lock().told.take()

@@ -1,4 +1,4 @@
-//! The motion control: pursues one goal at a time, and stops the platform when there is none.
+//! Motion control: pursues one goal at a time, and stops the platform without one.
 
 use std::time::{Duration, Instant};
 
@@ -8,48 +8,48 @@ use super::{
     wrap,
 };
 
-/// What a vehicle is to do.
+/// A motion goal of a vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Goal {
-    /// To use its drives and brakes without feedback.
+    /// Control drives and brakes without feedback.
     Effort(Effort),
-    /// To move with a velocity along and about its own axes.
+    /// Move with a velocity along and about the vehicle's axes.
     Velocity(Velocity),
-    /// To keep a speed and a heading; without a heading, to go straight on.
+    /// Hold a speed and a heading. Without a heading, drive straight ahead.
     Vector {
-        /// Metres per second.
+        /// Speed in metres per second.
         speed: f64,
-        /// Where to head for.
+        /// The heading to hold.
         heading: Option<Heading>,
     },
-    /// To drive to a place.
+    /// Drive to a waypoint.
     Waypoint {
-        /// The place.
+        /// The waypoint.
         to: Waypoint,
-        /// Metres per second at most.
+        /// Maximum speed in metres per second.
         speed: f64,
-        /// Whether it goes on from there, so that it need not stop.
+        /// Whether another goal follows, so that the vehicle need not stop.
         goes_on: bool,
     },
-    /// To drive along a curve to its end.
+    /// Drive along a curve to its end.
     Path {
         /// The curve.
         curve: Curve,
-        /// Metres per second at most.
+        /// Maximum speed in metres per second.
         speed: f64,
-        /// At what distance in metres the end counts as reached.
+        /// Distance in metres at which the end counts as reached.
         tolerance: f64,
-        /// Whether it goes on from there, so that it need not stop.
+        /// Whether another goal follows, so that the vehicle need not stop.
         goes_on: bool,
     },
 }
 
-/// A heading in radians, clockwise seen from above.
+/// A heading in radians, clockwise as seen from above.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Heading {
-    /// From the local X axis.
+    /// Relative to the local X axis.
     Local(f64),
-    /// From true north, wherever the local frame lies at the time.
+    /// Relative to true north, whatever the current local frame.
     North(f64),
 }
 
@@ -58,66 +58,66 @@ pub enum Heading {
 pub enum Trouble {
     /// The platform reports a fault.
     Fault(String),
-    /// The pose is older than may be steered by.
+    /// The pose is too old to steer by.
     PoseStale(Duration),
-    /// Part of the pose is not known (NaN).
+    /// Part of the pose is unknown (NaN).
     PoseUnknown,
 }
 
-/// Names one goal of a [`Pilot`], so that whoever set it can tell it from later ones.
+/// Identifies one goal of a [`Pilot`], to distinguish it from later ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Ticket(u64);
 
 /// Drives a platform to its goal.
 ///
-/// Time comes through [`handle_time`](Self::handle_time), whoever calls it and however often; the
-/// platform is controlled every [`STEP`](Self::STEP) of it.
+/// Time advances through [`handle_time`](Self::handle_time), which any caller may call at any rate.
+/// The control loop runs once per [`STEP`](Self::STEP) of that time.
 pub struct Pilot {
     platform: Box<dyn Platform>,
     frame: Frame,
     limits: Limits,
     course: Option<Course>,
-    /// What the platform was told last.
+    /// The last command to the platform.
     command: Drive,
     tickets: u64,
     steps: u64,
     time: Option<Instant>,
-    /// The oldest pose that is steered by.
+    /// Maximum age of a pose to steer by.
     max_pose_age: Duration,
-    /// What has ended the last goal, until that is asked for.
+    /// The trouble that ended the last goal, until it is taken.
     trouble: Option<Trouble>,
 }
 
-/// What a course demands of the platform.
+/// Setpoint that a course requests from the platform.
 enum Setpoint {
     Drive(Drive),
     Head { heading: f64, speed: f64 },
 }
 
-/// A goal that is pursued.
+/// A goal in progress.
 #[derive(Debug)]
 struct Course {
     goal: Goal,
     ticket: Ticket,
     has_arrived: bool,
-    /// Whether it is at its waypoint, and only turns.
+    /// Whether the vehicle has reached its waypoint and only turns.
     is_turning: bool,
-    /// The points of a curve that lie ahead.
+    /// The remaining points of a curve.
     ahead: Vec<(f64, f64)>,
-    /// The heading of somebody who goes straight on.
+    /// The heading for driving straight ahead.
     straight: f64,
 }
 
 impl Pilot {
-    /// Between two moments of control.
+    /// Period of the control loop.
     pub const STEP: Duration = Duration::from_millis(20);
-    /// The longest time that is made up for at once. What is longer was no driving, but a computer
-    /// that slept.
+    /// The longest gap in time that is caught up. A longer gap means that the computer was
+    /// suspended.
     pub const LONGEST_GAP: Duration = Duration::from_secs(2);
-    /// The oldest pose that is steered by, unless another limit is chosen.
+    /// Default maximum age of a pose to steer by.
     pub const MAX_POSE_AGE: Duration = Duration::from_millis(500);
 
-    /// A pilot without a goal, on a platform whose local frame lies at a place of the globe.
+    /// Creates a pilot without a goal for a platform with this local frame.
     #[must_use]
     pub fn new(platform: impl Platform + 'static, frame: Frame) -> Self {
         let limits = platform.limits();
@@ -135,15 +135,16 @@ impl Pilot {
         }
     }
 
-    /// The oldest pose that is steered by; [`MAX_POSE_AGE`](Self::MAX_POSE_AGE) without this. It
-    /// counts for platforms that say [when they measured](Motion::sampled_at).
+    /// Sets the maximum age of a pose to steer by; the default is
+    /// [`MAX_POSE_AGE`](Self::MAX_POSE_AGE). It applies to platforms that report [the time of
+    /// measurement](Motion::sampled_at).
     #[must_use]
     pub const fn max_pose_age(mut self, age: Duration) -> Self {
         self.max_pose_age = age;
         self
     }
 
-    /// It is `now`. May be called as often as one likes.
+    /// Advances to time `now`. May be called at any rate.
     pub fn handle_time(&mut self, now: Instant) {
         let mut time = self.time.unwrap_or(now);
         if self.is_idle() {
@@ -169,7 +170,7 @@ impl Pilot {
         }
     }
 
-    /// Pursues another goal from now on, instead of any earlier one.
+    /// Pursues a goal from now on, in place of any earlier one.
     pub fn pursue(&mut self, goal: Goal) -> Ticket {
         self.tickets += 1;
         let ticket = Ticket(self.tickets);
@@ -188,7 +189,7 @@ impl Pilot {
         ticket
     }
 
-    /// The points of a curve from the one on that is nearest.
+    /// The points of a curve from the one nearest to the vehicle.
     fn ahead_on(&self, curve: &Curve) -> Vec<(f64, f64)> {
         let pose = self.motion().pose;
         let distance = |&(x, y): &(f64, f64)| pose.distance(x, y);
@@ -208,26 +209,26 @@ impl Pilot {
         course.is_some_and(|course| !course.has_arrived)
     }
 
-    /// Whether the last goal has been reached, whoever has set it.
+    /// Whether the last goal has been reached, whichever caller set it.
     #[must_use]
     pub fn is_there(&self) -> bool {
         let course = self.course.as_ref();
         course.is_some_and(|course| course.has_arrived)
     }
 
-    /// What has ended a goal since this was asked last: a fault of the platform, or a pose that was
-    /// not known or too old for a goal that needs one.
+    /// Takes the trouble that ended a goal since the last call: a fault of the platform, or a pose
+    /// unknown or too old for a goal that needs one.
     pub const fn take_trouble(&mut self) -> Option<Trouble> {
         self.trouble.take()
     }
 
-    /// A fault of the platform.
+    /// The fault of the platform, if any.
     #[must_use]
     pub fn fault(&self) -> Option<Trouble> {
         self.platform.fault().map(Trouble::Fault)
     }
 
-    /// What keeps the pose from being steered by at `now`.
+    /// Why the pose is unusable for steering at `now`, if it is.
     #[must_use]
     pub fn pose_trouble(&self, now: Instant) -> Option<Trouble> {
         let Motion {
@@ -240,20 +241,20 @@ impl Pilot {
         (age > self.max_pose_age).then_some(Trouble::PoseStale(age))
     }
 
-    /// Gives up whatever goal there is, and stops.
+    /// Drops the goal, if any, and stops.
     pub fn stop(&mut self) {
         self.course = None;
         self.drive(Drive::Stop);
     }
 
-    /// Gives up a goal and stops, unless another one has been set since.
+    /// Drops a goal and stops, unless a later goal has replaced it.
     pub fn give_up(&mut self, ticket: Ticket) {
         if self.pursues(ticket) {
             self.stop();
         }
     }
 
-    /// Whether this is the goal that is pursued, or that has been reached.
+    /// Whether this is the current goal, reached or not.
     #[must_use]
     pub fn pursues(&self, ticket: Ticket) -> bool {
         self.course
@@ -261,14 +262,14 @@ impl Pilot {
             .is_some_and(|course| course.ticket == ticket)
     }
 
-    /// Whether this goal is the last one, and has been reached.
+    /// Whether this is the current goal and has been reached.
     #[must_use]
     pub fn has_arrived(&self, ticket: Ticket) -> bool {
         let course = self.course.as_ref();
         course.is_some_and(|course| course.ticket == ticket && course.has_arrived)
     }
 
-    /// Changes the speed with which a goal is pursued, in metres per second.
+    /// Changes the speed of a goal, in metres per second.
     pub fn set_speed(&mut self, ticket: Ticket, wanted: f64) {
         let course = self
             .course
@@ -282,32 +283,31 @@ impl Pilot {
         }
     }
 
-    /// Where the platform is and how it moves.
+    /// The platform's pose, velocity and acceleration.
     #[must_use]
     pub fn motion(&self) -> Motion {
         self.platform.motion()
     }
 
-    /// How many steps the platform has been controlled so far: as long as this is the same, nothing
-    /// has moved.
+    /// Number of control steps so far. While it is unchanged, nothing has moved.
     #[must_use]
     pub const fn steps(&self) -> u64 {
         self.steps
     }
 
-    /// Where on the globe it is.
+    /// The platform's pose on the globe.
     #[must_use]
     pub fn global_pose(&self) -> GlobalPose {
         self.frame.to_global(&self.motion().pose)
     }
 
-    /// Where the local frame lies.
+    /// The local frame.
     #[must_use]
     pub const fn frame(&self) -> &Frame {
         &self.frame
     }
 
-    /// From now on the place where the platform is has this local pose. Its global pose stays.
+    /// Sets the platform's local pose by moving the local frame. Its global pose is unchanged.
     pub fn set_pose(&mut self, pose: Pose) {
         let pose = Pose {
             yaw: wrap(pose.yaw),
@@ -317,35 +317,35 @@ impl Pilot {
         self.platform.set_pose(pose);
     }
 
-    /// From now on the place where the platform is has this global pose. Its local pose stays.
+    /// Sets the platform's global pose by moving the local frame. Its local pose is unchanged.
     pub fn set_global_pose(&mut self, pose: GlobalPose) {
         self.frame = Frame::joining(&self.motion().pose, &pose);
     }
 
-    /// The limits that are kept: those of the platform, or narrower ones.
+    /// The limits in force: those of the platform, or narrower ones.
     #[must_use]
     pub const fn limits(&self) -> &Limits {
         &self.limits
     }
 
-    /// Narrows the limits; the platform's own hold in any case.
+    /// Narrows the limits. The platform's own limits always apply.
     pub fn set_limits(&mut self, limits: Limits) {
         self.limits = limits.and(&self.platform.limits());
         self.platform.set_limits(self.limits);
     }
 
-    /// Goes back to the platform's own limits.
+    /// Restores the platform's own limits.
     pub fn reset_limits(&mut self) {
         self.set_limits(self.platform.limits());
     }
 
-    /// Whether it stands still, and wants to.
+    /// Whether the platform stands still and is commanded to.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
         self.command == Drive::Stop && self.motion().velocity.is_rest()
     }
 
-    /// When [`handle_time`](Self::handle_time) must be called.
+    /// When [`handle_time`](Self::handle_time) must be called next.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         if self.is_idle() {
@@ -354,15 +354,15 @@ impl Pilot {
         Some(self.time? + Self::STEP)
     }
 
-    /// Whether it stands still and has nothing to do.
+    /// Whether the platform stands still and has no goal left.
     fn is_idle(&self) -> bool {
         let course = self.course.as_ref();
-        // A platform whose velocity is not known cannot be waited for.
+        // An unknown velocity would otherwise keep the control loop running forever.
         let stands = self.command == Drive::Stop && !self.motion().velocity.is_moving();
         stands && course.is_none_or(|course| course.has_arrived)
     }
 
-    /// One moment of control. In trouble it stops, and does not go on afterwards.
+    /// One control step. On trouble it stops and drops the goal.
     fn control(&mut self, time: Instant) {
         let course = self.course.as_ref().filter(|course| !course.has_arrived);
         if let Some(course) = course {
@@ -404,14 +404,14 @@ fn head_for(pose: &Pose, to: (f64, f64), speed: f64, way: f64, limits: &Limits) 
 }
 
 impl Drop for Pilot {
-    /// A platform that nobody drives any more stands still.
+    /// Stops the platform.
     fn drop(&mut self) {
         self.platform.drive(Drive::Stop);
     }
 }
 
 impl Goal {
-    /// Whether it takes a pose to pursue it.
+    /// Whether pursuing the goal requires a pose.
     const fn needs_pose(&self) -> bool {
         match self {
             Self::Effort(_) | Self::Velocity(_) => false,
@@ -421,7 +421,7 @@ impl Goal {
 }
 
 impl Course {
-    /// What to do now; notes the arrival.
+    /// The current setpoint. Records the arrival.
     fn command(&mut self, pose: &Pose, north: f64, limits: &Limits) -> Setpoint {
         match self.goal {
             Goal::Effort(effort) => Setpoint::Drive(Drive::Effort(effort)),
@@ -472,9 +472,9 @@ impl Course {
         }
     }
 
-    /// At the waypoint, turns to the heading that is wanted there.
+    /// Turns to the requested heading at the waypoint.
     fn turn(&mut self, pose: &Pose, heading: f64, limits: &Limits) -> Setpoint {
-        // From here on it turns, even should it slip out of the tolerance.
+        // Keeps turning from here on, even if the vehicle slips out of the tolerance.
         self.is_turning = true;
         let error = wrap(heading - pose.yaw).abs();
         self.has_arrived |= error <= Waypoint::HEADING_TOLERANCE;
@@ -508,12 +508,12 @@ impl Course {
         head_for(pose, target, speed, way, limits)
     }
 
-    /// How far ahead on a curve it aims, in metres.
+    /// Look-ahead distance on a curve in metres.
     const LOOK_AHEAD: f64 = 0.4;
-    /// The same in seconds of driving.
+    /// Look-ahead distance in seconds of driving.
     const LOOK_AHEAD_TIME: f64 = 0.5;
 
-    /// Leaves those points of the curve behind that are closer than it aims.
+    /// Drops the points of the curve within the look-ahead distance.
     fn pass(&mut self, pose: &Pose, look: f64) {
         let ahead = |&(x, y): &(f64, f64)| pose.distance(x, y) > look;
         let passed = self.ahead.iter().position(ahead);

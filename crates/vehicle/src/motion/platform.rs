@@ -1,4 +1,4 @@
-//! What a vehicle must be able to do so that the mobility services can drive it.
+//! The trait that a vehicle implements so that the mobility services can drive it.
 
 use std::time::Instant;
 
@@ -7,66 +7,69 @@ use super::{Motion, Pose, Velocity};
 
 /// A vehicle, real or simulated.
 ///
-/// A real one reads its sensors in [`handle_time`](Self::handle_time) and writes to its actuators
-/// in [`drive`](Self::drive). It keeps its own limits whatever it is commanded.
+/// An implementation for real hardware reads its sensors in [`handle_time`](Self::handle_time) and
+/// writes to its actuators in [`drive`](Self::drive). It enforces its own limits, whatever the
+/// command.
 ///
-/// A platform MUST stop by itself when neither [`drive`](Self::drive) nor [`head`](Self::head) has
-/// been called for 200 ms ([`CommandDeadline::DEFAULT`](super::CommandDeadline::DEFAULT)), outside of
-/// the program that calls it: in the motor controller, or on a thread that only writes to the
-/// motors. While it moves it is commanded every [`Pilot::STEP`](super::Pilot::STEP) (20 ms), so that
-/// silence means that the program hangs. [`CommandDeadline`](super::CommandDeadline) keeps the time.
+/// A platform MUST stop on its own when neither [`drive`](Self::drive) nor [`head`](Self::head) has
+/// been called for 200 ms ([`CommandDeadline::DEFAULT`](super::CommandDeadline::DEFAULT)). This
+/// must not depend on the calling program: implement it in the motor controller, or on a thread
+/// that only writes to the motors. Commands are repeated every [`Pilot::STEP`](super::Pilot::STEP)
+/// (20 ms) during motion, so silence means that the program hangs.
+/// [`CommandDeadline`](super::CommandDeadline) implements the timing.
 pub trait Platform: Send {
-    /// It is `now`: reads the sensors, or moves on. While something is to be done this is called
-    /// every [`Pilot::STEP`](super::Pilot::STEP).
+    /// Advances to time `now`: reads the sensors, or integrates. Called every
+    /// [`Pilot::STEP`](super::Pilot::STEP) while there is a goal.
     fn handle_time(&mut self, now: Instant);
 
-    /// Where it is and how it moves, as of the last [`handle_time`](Self::handle_time).
+    /// Pose, velocity and acceleration as of the last [`handle_time`](Self::handle_time).
     fn motion(&self) -> Motion;
 
-    /// From now on the place where it is has this pose in the local frame.
+    /// Sets the current pose in the local frame.
     fn set_pose(&mut self, pose: Pose);
 
-    /// What it is to do until the next command, and for at most the deadline above. A command that
-    /// is [not finite](Drive::is_finite) must stop it.
+    /// Sets the command until the next one, or until the deadline above. A command that is [not
+    /// finite](Drive::is_finite) must stop the platform.
     fn drive(&mut self, command: Drive);
 
-    /// To keep a heading in radians clockwise from the local X axis, at a speed in metres per second,
-    /// until it is told something else. Most platforms leave it at this: they are told, every
-    /// [`Pilot::STEP`](super::Pilot::STEP), the velocity within `limits` that turns to the heading.
+    /// Holds a heading in radians clockwise from the local X axis, at a speed in metres per second,
+    /// until the next command. The default, sufficient for most platforms, commands the velocity
+    /// within `limits` that turns to the heading. It is called every
+    /// [`Pilot::STEP`](super::Pilot::STEP).
     fn head(&mut self, heading: f64, speed: f64, limits: &Limits) {
         let velocity = along(self.motion().pose.yaw, heading, speed, limits);
         self.drive(Drive::Velocity(limits.clamp(velocity)));
     }
 
-    /// What it can do at most.
+    /// The platform's own limits.
     fn limits(&self) -> Limits;
 
-    /// From now on it keeps these limits, none of which is wider than its own.
+    /// Sets the limits to enforce. None is wider than the platform's own.
     fn set_limits(&mut self, limits: Limits);
 
-    /// Why it cannot drive, as text for the operator; `None` while it can.
+    /// The fault that prevents driving, as text for the operator; `None` without a fault.
     ///
-    /// A platform with a fault stops all of its drives by itself, and reports the fault until it is
-    /// gone.
+    /// A platform with a fault stops all of its drives on its own, and reports the fault until it
+    /// is cleared.
     fn fault(&self) -> Option<String> {
         None
     }
 }
 
-/// What a platform is to do.
+/// A command to a platform.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Drive {
-    /// To stand still, as soon as its brakes allow.
+    /// Stop as fast as the brakes allow.
     #[default]
     Stop,
-    /// To move with a velocity along and about its own axes.
+    /// Move with a velocity along and about the platform's axes.
     Velocity(Velocity),
-    /// To use its drives and brakes without any feedback.
+    /// Control drives and brakes without feedback.
     Effort(Effort),
 }
 
 impl Drive {
-    /// Whether all of its numbers are finite.
+    /// Whether all numbers are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         match self {
@@ -86,14 +89,14 @@ impl Drive {
         }
     }
 
-    /// The command, or [`Stop`](Self::Stop) in place of one that is not finite.
+    /// Returns the command, or [`Stop`](Self::Stop) if it is not finite.
     #[must_use]
     pub fn or_stop(self) -> Self {
         if self.is_finite() { self } else { Self::Stop }
     }
 }
 
-/// Effort about and along the axes that a ground vehicle has, as a share of what there is.
+/// Effort along and about the axes of a ground vehicle, as a fraction of the maximum.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Effort {
     /// Propulsion forward, -1 to 1.
@@ -106,26 +109,26 @@ pub struct Effort {
     pub turn_brake: f64,
 }
 
-/// The greatest velocity and acceleration, all positive.
+/// Maximum velocities and accelerations, all positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Metres per second, forward.
+    /// Forward speed in metres per second.
     pub speed: f64,
-    /// Metres per second, backward.
+    /// Reverse speed in metres per second.
     pub reverse: f64,
-    /// Metres per second squared, when getting faster.
+    /// Acceleration in metres per second squared.
     pub acceleration: f64,
-    /// Metres per second squared, when getting slower.
+    /// Deceleration in metres per second squared.
     pub deceleration: f64,
-    /// Radians per second.
+    /// Yaw rate in radians per second.
     pub yaw_rate: f64,
-    /// Radians per second squared.
+    /// Yaw acceleration in radians per second squared.
     pub yaw_acceleration: f64,
 }
 
 impl Limits {
-    /// The closest velocity that a ground vehicle with these limits can have; 0 in place of one that
-    /// is not finite.
+    /// The nearest velocity within these limits for a ground vehicle; 0 if the velocity is not
+    /// finite.
     #[must_use]
     pub fn clamp(&self, velocity: Velocity) -> Velocity {
         if !velocity.is_finite() {
@@ -137,7 +140,7 @@ impl Limits {
         )
     }
 
-    /// What both sets of limits allow.
+    /// The intersection of two sets of limits.
     #[must_use]
     pub fn and(&self, other: &Self) -> Self {
         Self {
@@ -152,8 +155,7 @@ impl Limits {
 }
 
 impl Default for Limits {
-    /// A small rover: 2 m/s forward, 1 m/s backward, 1 m/s², brakes of 2 m/s², a quarter turn a
-    /// second.
+    /// A small rover: 2 m/s forward, 1 m/s backward, 1 m/s², brakes of 2 m/s², 1.5 rad/s.
     fn default() -> Self {
         Self {
             speed: 2.0,

@@ -1,6 +1,6 @@
-//! Chance that is the same for the same seed.
+//! Reproducible random numbers for simulated noise.
 
-/// A small generator (SplitMix64) for noise; not for secrets.
+/// A small generator (SplitMix64) for noise. Not suitable for cryptography.
 #[derive(Debug, Clone)]
 pub(crate) struct Random(u64);
 
@@ -9,7 +9,7 @@ impl Random {
         Self(seed)
     }
 
-    /// A number from 0 to 1, evenly spread.
+    /// A uniformly distributed number from 0 to 1.
     fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut mixed = self.0;
@@ -19,7 +19,8 @@ impl Random {
         (mixed >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// A number around 0 with standard deviation 1, never beyond ±6: the sum of twelve even ones.
+    /// An approximately normal number with standard deviation 1, within ±6: the sum of twelve
+    /// uniform ones.
     pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }

@@ -1,30 +1,30 @@
-//! What wheel counts tell: how fast a vehicle moves, and where it has got to.
+//! Velocity and dead-reckoned pose of a vehicle from wheel counts.
 
 use std::collections::VecDeque;
 
 use super::{Pose, Velocity, wrap};
 
-/// How far the wheels of both sides have travelled, as an odometer tells it.
+/// Distance travelled by the wheels of each side, as reported by an odometer.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct WheelCount {
-    /// Names the counter: another number whenever it began again at 0.
+    /// Identifies the counter run: changes whenever the counter restarts at 0.
     pub start: u32,
-    /// When it was read, in milliseconds since it began; begins again at 0 after 49 days.
+    /// Time of the reading in milliseconds since the counter started. Wraps to 0 after 49 days.
     pub time_ms: u32,
-    /// Metres that the left wheels have travelled, backwards negative.
+    /// Distance travelled by the left wheels in metres, backwards negative.
     pub left: f64,
-    /// The same for the right wheels.
+    /// Distance travelled by the right wheels in metres, backwards negative.
     pub right: f64,
-    /// Metres between the left and the right wheels.
+    /// Distance between left and right wheels in metres.
     pub track: f64,
 }
 
 impl WheelCount {
-    /// The fastest that wheels may seem to turn, in metres per second; what is faster is no driving.
+    /// The highest plausible wheel speed in metres per second.
     const FASTEST: f64 = 50.0;
 
-    /// How many seconds later this was read than another count of the same counter; `None` if it is
-    /// of another one, or not later.
+    /// Seconds since an earlier reading of the same counter run; `None` if it is of another run, or
+    /// not earlier.
     #[must_use]
     pub fn seconds_since(&self, earlier: &Self) -> Option<f64> {
         let later = self.time_ms.wrapping_sub(earlier.time_ms);
@@ -32,7 +32,7 @@ impl WheelCount {
         (self.start == earlier.start && is_later).then(|| f64::from(later) / 1000.0)
     }
 
-    /// What was driven since an earlier count; `None` if it can not have been driven.
+    /// The motion since an earlier count; `None` if it is implausible.
     fn gone_since(&self, earlier: &Self, seconds: f64) -> Option<Gone> {
         let (left, right) = (self.left - earlier.left, self.right - earlier.right);
         let most = Self::FASTEST * seconds;
@@ -44,28 +44,28 @@ impl WheelCount {
     }
 }
 
-/// A piece of way.
+/// A section of travel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Gone {
-    /// Metres forward.
+    /// Distance forward in metres.
     pub forward: f64,
-    /// Radians to the right.
+    /// Right turn in radians.
     pub turn: f64,
 }
 
-/// Makes a velocity of wheel counts.
+/// Computes velocity from wheel counts.
 #[derive(Debug, Clone, Default)]
 pub struct Speedometer {
     counts: VecDeque<WheelCount>,
 }
 
 impl Speedometer {
-    /// Over so many seconds the velocity is averaged, so that the grain of the counter does not show.
+    /// Averaging window in seconds, to suppress the quantisation of the counter.
     const WINDOW: f64 = 0.08;
-    /// The most counts that are kept, however often they come.
+    /// Maximum number of counts kept, whatever their rate.
     const MOST: usize = 64;
 
-    /// The velocity after one more count; `None` as long as there is nothing to compare it with.
+    /// The velocity after another count; `None` without a count to compare with.
     pub fn handle_count(&mut self, count: WheelCount) -> Option<Velocity> {
         if self
             .counts
@@ -104,10 +104,9 @@ impl Speedometer {
     }
 }
 
-/// Makes a pose of wheel counts: where the vehicle was, and what it has driven since.
+/// Computes a pose by dead reckoning from wheel counts.
 ///
-/// A counter that began again does no harm: its first count says where it begins, and what it counts
-/// from there on is driven.
+/// A counter restart is harmless: the first count after it becomes the new reference.
 #[derive(Debug, Clone, Default)]
 pub struct DeadReckoning {
     pose: Pose,
@@ -115,19 +114,18 @@ pub struct DeadReckoning {
 }
 
 impl DeadReckoning {
-    /// The longest piece of a turn, in radians, that is taken for an arc at once.
+    /// Longest turn in radians treated as a single arc.
     const LONGEST_ARC: f64 = 0.1;
-    /// The most pieces that one count is cut into.
+    /// Maximum number of arcs per count.
     const MOST_PIECES: f64 = 100.0;
 
-    /// Begins at a pose, with whatever count comes first.
+    /// Starts at a pose; the first count becomes the reference.
     #[must_use]
     pub const fn at(pose: Pose) -> Self {
         Self { pose, last: None }
     }
 
-    /// Goes on from a pose that was reached at a count: what the same counter has counted since is
-    /// driven.
+    /// Resumes from a pose reached at a count. Later counts of the same run are added as travel.
     #[must_use]
     pub const fn resume(pose: Pose, last: WheelCount) -> Self {
         Self {
@@ -136,19 +134,19 @@ impl DeadReckoning {
         }
     }
 
-    /// Where the vehicle is now.
+    /// The current pose.
     #[must_use]
     pub const fn pose(&self) -> Pose {
         self.pose
     }
 
-    /// The count that belongs to the pose, once there has been one.
+    /// The count at the current pose, after the first one.
     #[must_use]
     pub const fn count(&self) -> Option<WheelCount> {
         self.last
     }
 
-    /// From now on the place where it is has this pose. What is not known (NaN) stays.
+    /// Sets the current pose. Unknown components (NaN) keep their values.
     pub fn set_pose(&mut self, pose: Pose) {
         let or = |new: f64, old: f64| if new.is_finite() { new } else { old };
         let old = self.pose;
@@ -162,7 +160,7 @@ impl DeadReckoning {
         };
     }
 
-    /// Drives on as far as a count says; tells how far that was.
+    /// Advances the pose to a count. Returns the travel since the last count.
     pub fn handle_count(&mut self, count: WheelCount) -> Gone {
         let Some(last) = self.last else {
             self.last = Some(count);
@@ -221,7 +219,7 @@ mod tests {
     #[test]
     fn a_quarter_circle_to_the_right_ends_where_it_should() {
         let mut reckoning = DeadReckoning::at(Pose::default());
-        // Radius 2 m: the left wheels run at 2.25 m, the right ones at 1.75 m.
+        // Radius 2 m: the left wheels run on a radius of 2.25 m, the right ones on 1.75 m.
         for step in 0..=100_u32 {
             let turned = FRAC_PI_2 * f64::from(step) / 100.0;
             reckoning.handle_count(count(1, step * 20 + 1, 2.25 * turned, 1.75 * turned));

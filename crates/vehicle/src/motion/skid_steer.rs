@@ -1,4 +1,4 @@
-//! A simulated vehicle that steers by turning its left and right wheels at different speeds.
+//! A simulated skid-steer vehicle, steered by different speeds of its left and right wheels.
 
 use std::time::{Duration, Instant};
 
@@ -7,15 +7,15 @@ use super::{
     Acceleration, CommandDeadline, Drive, Effort, Limits, Motion, Platform, Pose, Velocity, wrap,
 };
 
-/// How a simulated vehicle behaves.
+/// Parameters of a simulated vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SkidSteerConfig {
-    /// What it can do at most.
+    /// Limits of the vehicle.
     pub limits: Limits,
-    /// How much its wheels slip: the standard deviation of its velocity, as a share of the
-    /// velocity. 0 means that it moves exactly as it wants to.
+    /// Wheel slip: standard deviation of the velocity as a fraction of the velocity. 0 disables
+    /// slip.
     pub noise: f64,
-    /// Where the noise comes from: the same seed and the same commands give the same course.
+    /// Seed of the noise. The same seed and the same commands give the same course.
     pub seed: u64,
 }
 
@@ -31,18 +31,18 @@ impl Default for SkidSteerConfig {
 
 /// A simulated skid-steer platform on flat ground.
 ///
-/// It is integrated in steps of at most [`STEP`](Self::STEP), and stops by itself 200 ms after its
-/// last command ([`CommandDeadline::DEFAULT`]). Its speed and yaw rate follow what
-/// is wanted within the limits; full effort reaches full speed, because drag grows with speed.
+/// It is integrated in steps of at most [`STEP`](Self::STEP), and stops on its own 200 ms after its
+/// last command ([`CommandDeadline::DEFAULT`]). Speed and yaw rate follow the command within the
+/// limits. Full effort converges to full speed, because drag grows with speed.
 #[derive(Debug, Clone)]
 pub struct SkidSteer {
     config: SkidSteerConfig,
-    /// What it keeps to; at most what the configuration allows.
+    /// The limits in force, at most those of the configuration.
     limits: Limits,
     command: Drive,
     deadline: CommandDeadline,
     motion: Motion,
-    /// Speed and yaw rate of the wheels; the vehicle's own are these and the slip.
+    /// Speed and yaw rate of the wheels. Slip is added to give those of the vehicle.
     wheels: (f64, f64),
     slip: (f64, f64),
     random: Random,
@@ -52,12 +52,12 @@ pub struct SkidSteer {
 impl SkidSteer {
     /// The longest step of the integration.
     pub const STEP: Duration = Duration::from_millis(10);
-    /// The longest time that is made up for at once: several times what it is called after.
+    /// The longest time simulated in one call: several times the usual call interval.
     pub const LONGEST_GAP: Duration = Duration::from_millis(100);
-    /// How fast slip forgets, per second.
+    /// Decay rate of slip, per second.
     const SLIP_CHANGE: f64 = 2.0;
 
-    /// A vehicle that stands at the origin of its local frame.
+    /// Creates a vehicle at rest at the origin of its local frame.
     #[must_use]
     pub fn new(config: SkidSteerConfig) -> Self {
         Self {
@@ -78,7 +78,8 @@ impl SkidSteer {
         let (speed, turn) = self.wheels;
         let (speed, turn) = match self.command {
             Drive::Stop => (
-                // The brakes are the platform's own, however gently a client wants to slow down.
+                // Stopping uses the platform's full braking, even if a client has narrowed the
+                // limits.
                 approach(speed, 0.0, self.config.limits.deceleration * seconds),
                 approach(turn, 0.0, self.config.limits.yaw_acceleration * seconds),
             ),
@@ -96,7 +97,7 @@ impl SkidSteer {
         self.integrate(seconds);
     }
 
-    /// A speed closer to the one that is wanted; slowing down is quicker than getting faster.
+    /// Moves a speed towards the commanded one. Deceleration has its own limit.
     fn towards(&self, speed: f64, wanted: f64, seconds: f64) -> f64 {
         let limits = &self.limits;
         let slows = wanted.abs() < speed.abs() || wanted * speed < 0.0;
@@ -109,7 +110,7 @@ impl SkidSteer {
         approach(speed, goal, rate * seconds)
     }
 
-    /// Speed and yaw rate after a moment of effort, drag and brakes.
+    /// Speed and yaw rate after a time step under effort, drag and brakes.
     fn push(&self, effort: Effort, seconds: f64) -> (f64, f64) {
         let limits = &self.limits;
         let (speed, turn) = self.wheels;
@@ -128,14 +129,14 @@ impl SkidSteer {
             approach(speed + drive * seconds, 0.0, brake * seconds),
             approach(turn + twist * seconds, 0.0, turn_brake * seconds),
         ));
-        // Drag and brakes together hold no better than the tyres.
+        // Tyre grip limits the combined effect of drag and brakes.
         (
             approach(speed, pushed.x, limits.deceleration * seconds),
             approach(turn, pushed.yaw, limits.yaw_acceleration * seconds),
         )
     }
 
-    /// Slip wanders around 0, without jumps.
+    /// Slip drifts around 0 without jumps.
     fn let_slip(&mut self, seconds: f64) {
         if self.config.noise == 0.0 {
             return;
@@ -147,7 +148,7 @@ impl SkidSteer {
     }
 
     fn integrate(&mut self, seconds: f64) {
-        // Not the narrowed ones, which a moving vehicle only comes down to.
+        // Not the narrowed limits: a moving vehicle only approaches them gradually.
         let limits = &self.config.limits;
         let before = self.motion.velocity;
         let (speed, turn) = self.wheels;
@@ -156,7 +157,7 @@ impl SkidSteer {
             turn * (1.0 + self.slip.1),
         ));
         let pose = &mut self.motion.pose;
-        // Along an arc, which half of the turn describes well enough within a step.
+        // Midpoint approximation of the arc, accurate enough within one step.
         let heading = pose.yaw + velocity.yaw * seconds / 2.0;
         pose.x += velocity.x * heading.cos() * seconds;
         pose.y += velocity.x * heading.sin() * seconds;
@@ -164,7 +165,7 @@ impl SkidSteer {
         self.motion.velocity = velocity;
         self.motion.acceleration = Acceleration {
             x: (velocity.x - before.x) / seconds,
-            // What the passengers feel in a curve.
+            // Lateral acceleration in a curve.
             y: velocity.x * velocity.yaw,
             yaw: (velocity.yaw - before.yaw) / seconds,
             ..Acceleration::default()
@@ -213,10 +214,10 @@ impl Platform for SkidSteer {
     }
 }
 
-/// A velocity next to none.
+/// A minimal speed that avoids division by zero.
 const LEAST: f64 = 1e-6;
 
-/// A value closer to a goal by at most `most`.
+/// Moves a value towards a goal by at most `most`.
 fn approach(value: f64, goal: f64, most: f64) -> f64 {
     value + (goal - value).clamp(-most, most)
 }

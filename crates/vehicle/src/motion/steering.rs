@@ -1,31 +1,31 @@
-//! How to get somewhere: from where a vehicle is and where it is to be, the velocity to drive.
+//! Steering: the heading, speed and turn rate that lead a vehicle to its target.
 
 use std::f64::consts::FRAC_PI_3;
 
 use super::{Limits, Pose, Velocity, wrap};
 
-/// A place to drive to.
+/// A waypoint in the local frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Waypoint {
-    /// Metres along the local X axis.
+    /// X in metres.
     pub x: f64,
-    /// Metres along the local Y axis.
+    /// Y in metres.
     pub y: f64,
-    /// How to stand there, in radians, if it matters.
+    /// Final heading in radians, if required.
     pub heading: Option<f64>,
-    /// At what distance in metres it counts as reached.
+    /// Distance in metres at which the waypoint counts as reached.
     pub tolerance: f64,
 }
 
 impl Waypoint {
-    /// The tolerance of whoever does not choose one, in metres.
+    /// Default tolerance in metres.
     pub const TOLERANCE: f64 = 0.5;
-    /// The least tolerance that can be kept, in metres.
+    /// The smallest achievable tolerance in metres.
     pub const LEAST_TOLERANCE: f64 = 0.05;
-    /// How exactly a heading is kept, in radians.
+    /// Heading accuracy in radians.
     pub(super) const HEADING_TOLERANCE: f64 = 0.03;
 
-    /// A place at which any heading will do.
+    /// A waypoint with any final heading.
     #[must_use]
     pub const fn at(x: f64, y: f64) -> Self {
         Self {
@@ -36,31 +36,31 @@ impl Waypoint {
         }
     }
 
-    /// Whether a vehicle with this pose has reached the place, not counting the heading.
+    /// Whether a vehicle with this pose has reached the waypoint, ignoring the heading.
     #[must_use]
     pub fn is_reached(&self, pose: &Pose) -> bool {
         pose.distance(self.x, self.y) <= self.tolerance.max(Self::LEAST_TOLERANCE)
     }
 }
 
-/// How quickly a wrong heading is put right, per second.
+/// Proportional gain from heading error to turn rate, per second.
 const TURN_GAIN: f64 = 2.0;
-/// A place further to the side than this is turned to before it is driven to.
+/// With a larger heading error, the vehicle turns on the spot before it drives.
 const TURN_FIRST: f64 = FRAC_PI_3;
-/// The share of the brakes and of the yaw rate that is planned with; the rest makes up for errors.
+/// Fraction of braking and yaw rate used for planning. The rest is reserve for errors.
 const MARGIN: f64 = 0.8;
 
-/// Turns to a heading.
+/// The turn rate towards a heading.
 pub(super) fn turn_rate(yaw: f64, heading: f64, limits: &Limits) -> f64 {
     let error = wrap(heading - yaw);
-    // What can still be slowed down before the heading is reached.
+    // The rate from which the turn can still stop at the heading.
     let most = (2.0 * MARGIN * limits.yaw_acceleration * error.abs()).sqrt();
     let most = most.min(limits.yaw_rate);
     (TURN_GAIN * error).clamp(-most, most)
 }
 
-/// Keeps a heading and a speed; slower as long as the heading is wrong. Stands still if any of the
-/// numbers is unknown (NaN).
+/// The velocity for a heading and a speed, reduced while the heading error is large. Zero if any
+/// input is unknown (NaN).
 pub(crate) fn along(yaw: f64, heading: f64, speed: f64, limits: &Limits) -> Velocity {
     let error = wrap(heading - yaw);
     if !error.is_finite() || !speed.is_finite() {
@@ -74,8 +74,8 @@ pub(crate) fn along(yaw: f64, heading: f64, speed: f64, limits: &Limits) -> Velo
     Velocity::forward(speed * share, turn_rate(yaw, heading, limits))
 }
 
-/// The heading and the speed that lead to a point: at most with a speed, so that it could stop after
-/// `way` more metres. The speed is 0 if the pose is unknown (NaN).
+/// The heading and speed towards a point. The speed is at most `speed`, and low enough to stop
+/// after `way` metres. It is 0 if the pose is unknown (NaN).
 pub(super) fn towards(
     pose: &Pose,
     (x, y): (f64, f64),
@@ -85,7 +85,7 @@ pub(super) fn towards(
 ) -> (f64, f64) {
     let heading = pose.bearing(x, y);
     let error = wrap(heading - pose.yaw);
-    // `min` would ignore an unknown term, and leave the full speed.
+    // `min` would ignore a NaN operand and keep the full speed.
     if !error.is_finite() || speed.is_nan() || way.is_nan() {
         return (heading, 0.0);
     }

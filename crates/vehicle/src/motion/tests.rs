@@ -1,4 +1,4 @@
-//! A simulated vehicle under virtual time: where it gets to, and what it never does on the way.
+//! A simulated vehicle in virtual time: it reaches its goals and keeps its limits on the way.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::{Arc, Mutex};
@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::*;
 
-/// A vehicle and its time, watched at every step.
+/// A vehicle and its time, checked at every step.
 struct Track {
     pilot: Pilot,
     now: Instant,
@@ -33,7 +33,7 @@ impl Track {
         }
     }
 
-    /// One step, in which nothing may jump and no limit may be broken.
+    /// Advances one step. Checks that nothing jumps and no limit is exceeded.
     fn step(&mut self) {
         let before = self.pilot.motion();
         self.now += Pilot::STEP;
@@ -68,7 +68,7 @@ impl Track {
         }
     }
 
-    /// Runs until a goal is reached, and then until the vehicle stands.
+    /// Runs until a goal is reached, then until the vehicle stands still.
     fn arrive(&mut self, goal: Goal, limit: f64) -> Pose {
         let ticket = self.pilot.pursue(goal);
         let end = self.seconds + limit;
@@ -134,7 +134,7 @@ fn a_waypoint_is_reached_with_wheels_that_slip() {
         };
         let mut track = Track::with(config);
         track.pilot.pursue(waypoint(Waypoint::at(10.0, 5.0), 2.0));
-        // Its speed may change faster than its wheels can, so that the limits are not watched.
+        // Its speed may change faster than that of its wheels, so the limits are not checked.
         for _ in 0..1500 {
             track.now += Pilot::STEP;
             track.pilot.handle_time(track.now);
@@ -253,7 +253,7 @@ fn whoever_is_told_to_stop_stops_within_its_brakes_and_then_wants_no_more_time()
 
 #[test]
 fn a_platform_whose_pilot_goes_away_is_told_to_stop() {
-    /// A platform that shows what it was told last.
+    /// A platform that records its last command.
     struct Reported(Arc<Mutex<Drive>>);
 
     impl Platform for Reported {

@@ -1,11 +1,11 @@
-//! From a wanted velocity to efforts: what should do, and more of it as long as it does not.
+//! Velocity control by effort: feed-forward plus proportional feedback.
 
 use std::time::{Duration, Instant};
 
 use super::{Effort, Limits, Velocity};
 
-/// Pushes a vehicle to a velocity: feed-forward of the effort that keeps it, and proportional to
-/// what is still missing. What is wanted changes no faster than the limits allow.
+/// Controls the velocity of a vehicle through efforts: feed-forward of the effort that sustains the
+/// velocity, plus feedback proportional to the error. The setpoint is ramped within the limits.
 #[derive(Debug, Clone)]
 pub struct Throttle {
     limits: Limits,
@@ -13,23 +13,24 @@ pub struct Throttle {
 }
 
 impl Throttle {
-    /// Effort for a missing velocity, as a share of the effort that would keep it.
+    /// Feedback gain, relative to the effort that sustains the missing velocity.
     const GAIN: f64 = 0.6;
-    /// The longest time that the ramp makes up for at once.
+    /// The longest time that the ramp catches up in one call.
     const LONGEST_STEP: Duration = Duration::from_millis(200);
 
-    /// For a vehicle whose full effort reaches the speed and the yaw rate of its limits.
+    /// Creates a controller for a vehicle whose full effort reaches the speed and yaw rate of its
+    /// limits.
     #[must_use]
     pub const fn new(limits: Limits) -> Self {
         Self { limits, ramp: None }
     }
 
-    /// Begins anew with the velocity that is measured then.
+    /// Restarts the ramp from the next measured velocity.
     pub const fn reset(&mut self) {
         self.ramp = None;
     }
 
-    /// The effort at `now`, for a velocity that is wanted and one that is measured.
+    /// The effort at `now` for a requested and a measured velocity.
     pub fn push(&mut self, now: Instant, wanted: Velocity, measured: &Velocity) -> Effort {
         let limits = self.limits;
         let wanted = limits.clamp(wanted);
@@ -57,14 +58,14 @@ impl Throttle {
     }
 }
 
-/// The share of the full effort for a wanted and a measured speed; full effort reaches another speed
-/// forward than backward.
+/// The fraction of full effort for a requested and a measured speed. Full effort reaches different
+/// speeds forward and backward.
 fn share(wanted: f64, measured: f64, ahead: f64, back: f64) -> f64 {
     let missing = wanted - measured;
     let pushed = wanted + Throttle::GAIN * missing;
     let full = if pushed < 0.0 { back } else { ahead };
     let effort = pushed / full.max(f64::MIN_POSITIVE);
-    // What is not a number pushes nothing.
+    // NaN produces no effort.
     if effort.is_nan() {
         0.0
     } else {
@@ -72,7 +73,7 @@ fn share(wanted: f64, measured: f64, ahead: f64, back: f64) -> f64 {
     }
 }
 
-/// A value closer to a goal by at most `most`.
+/// Moves a value towards a goal by at most `most`.
 fn approach(value: f64, goal: f64, most: f64) -> f64 {
     value + (goal - value).clamp(-most, most)
 }
@@ -86,7 +87,7 @@ mod tests {
     use super::*;
     use crate::motion::{Drive, Platform, SkidSteer, SkidSteerConfig};
 
-    /// Drives for some seconds with what was measured a tenth of a second ago.
+    /// Drives for `seconds` on measurements that are 0.1 s old.
     fn drive(wanted: Velocity, strength: f64, seconds: f64) -> Velocity {
         let mut rover = SkidSteer::new(SkidSteerConfig::default());
         let mut throttle = Throttle::new(Limits::default());
@@ -113,7 +114,7 @@ mod tests {
 
     #[test]
     fn a_weak_motor_is_driven_harder() {
-        // With the same effort it would come to 0.7 m/s.
+        // Feed-forward alone would reach 0.7 m/s.
         let velocity = drive(Velocity::forward(1.0, 0.0), 0.7, 10.0);
         assert!(velocity.x > 0.75, "{velocity:?}");
     }

@@ -1,8 +1,9 @@
-//! The communicator: the vehicle's node. It passes messages on between the boards, the operator's
-//! network and a radio, tells who comes and goes, keeps the log, and has the debug view.
+//! The communicator: the vehicle's node. It routes messages between the boards, the operator's
+//! network and a radio, logs component arrivals and departures, keeps the journal, and serves the
+//! debug view.
 //!
-//! The routing itself is the node's ([`Config::routing`](jaus::node::Config)); here is what people
-//! want of the node that everything passes.
+//! The node itself does the routing ([`Config::routing`](jaus::node::Config)). This module adds
+//! what operators expect of the node that all messages pass.
 
 use std::collections::BTreeSet;
 use std::convert::Infallible;
@@ -17,21 +18,21 @@ use jaus::node::{ComponentEvents, Events, Node};
 use jaus_view::debug::{self, DebugView};
 use jaus_view::{Dictionary, Journal, JournalSettings, tree};
 
-/// Where the debug view is unless another address is chosen.
+/// Default address of the debug view.
 pub const DEBUG_ADDRESS: SocketAddr =
     SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 8794);
 
-/// Components of the tree whose coming is told one by one; an attacker may invent more.
+/// Limit on individually logged ID conflicts, since an attacker may invent any number.
 const MOST_CONFLICTS: usize = 256;
 
-/// What the vehicle's node does besides being one.
+/// Settings of the vehicle's node beyond routing.
 #[derive(Debug, Clone, Default)]
 pub struct Communicator {
-    /// Where the debug view is served.
+    /// Address of the debug view, if it is served.
     pub debug: Option<SocketAddr>,
-    /// Whether it is an error if that is not possible.
+    /// Whether failure to open the debug view is an error.
     pub debug_is_needed: bool,
-    /// The log on disk.
+    /// The journal on disk.
     pub log: Option<JournalSettings>,
 }
 
@@ -67,7 +68,7 @@ impl Communicator {
             .map_err(|error| PartError::Broken(error.to_string()))
     }
 
-    /// Opens the debug view, if there is to be one; the future serves it and ends with an error.
+    /// Opens the debug view, if enabled. The future serves it and ends with an error.
     async fn serve(
         &self,
         node: &Node,
@@ -107,7 +108,7 @@ fn dictionary() -> Dictionary {
     Dictionary::new().with_messages(messages::registry())
 }
 
-/// Tells what the node is and does.
+/// Logs the node's addresses and services.
 fn tell_place(node: &Node, log: Option<&JournalSettings>) {
     let config = node.config();
     if config.routing.forward {
@@ -132,11 +133,11 @@ fn tell_place(node: &Node, log: Option<&JournalSettings>) {
     }
 }
 
-/// Tells who comes, changes and goes, until the node has stopped.
+/// Logs arrivals, changes and departures until the node has stopped.
 async fn tell(component: &Component, news: (Events, ComponentEvents)) -> PartError {
     let (mut events, mut arrivals) = news;
     let mut changes: Watch = component.watch();
-    // A conflict is news with every message of the other; once is enough for people.
+    // Every message of the other component repeats the conflict event. Log it once.
     let mut conflicts: BTreeSet<Remote> = BTreeSet::new();
     loop {
         let words = tokio::select! {

@@ -1,4 +1,4 @@
-//! Writes what must survive a restart, beside the loop that makes it and never awaited by that loop.
+//! Persistent values written in the background, so that the disk never delays the control loop.
 
 use std::fmt::Display;
 use std::future::Future;
@@ -7,29 +7,30 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio::time::sleep;
 
-/// Hands values over to be written. Only the latest waits; handing over never waits for the writer.
+/// The sending end. Only the latest value waits, and sending never blocks.
 #[derive(Debug)]
 pub(super) struct Keeper<T>(watch::Sender<Option<T>>);
 
-/// The other end of a [`Keeper`].
+/// The receiving end of a [`Keeper`].
 pub(super) struct Kept<T>(watch::Receiver<Option<T>>);
 
-/// Both ends.
+/// Creates both ends.
 pub(super) fn keeper<T>() -> (Keeper<T>, Kept<T>) {
     let (sender, receiver) = watch::channel(None);
     (Keeper(sender), Kept(receiver))
 }
 
 impl<T> Keeper<T> {
-    /// Has a value written as soon as the writer is free, instead of any that waits.
+    /// Queues a value for writing, in place of any waiting one.
     pub(super) fn keep(&self, value: T) {
         self.0.send_replace(Some(value));
     }
 }
 
 impl<T: Clone> Kept<T> {
-    /// Writes what is handed over, with a pause after each write, until the keeper is dropped. After
-    /// an error, which is logged, the latest value is tried again: a full disk stops no vehicle.
+    /// Writes the queued values with a pause after each write, until the keeper is dropped. After
+    /// an error, which is logged, the latest value is retried: a full disk must not stop the
+    /// vehicle.
     #[expect(
         clippy::disallowed_methods,
         reason = "the pause spares the disk, and delays nothing else"

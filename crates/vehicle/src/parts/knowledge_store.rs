@@ -1,4 +1,4 @@
-//! The vector knowledge store: objects and maps for all parts of a vehicle, kept in a file.
+//! The vector knowledge store: objects and maps for all parts of a vehicle, stored in a file.
 
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
@@ -12,28 +12,28 @@ use crate::motion::Frame;
 use crate::world::{Change, Done, OpenError, Picture, Raster, World};
 use jaus::component::Component;
 
-/// Keeps the world of a vehicle and tells of it.
+/// Stores the world of a vehicle and serves it to all clients.
 ///
-/// It offers Vector Knowledge Store and Raster Maps, to anyone.
+/// It offers Vector Knowledge Store and Raster Maps, without access control.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnowledgeStore {
-    /// The file. It is made if it is not there.
+    /// The file. It is created if it does not exist.
     pub file: PathBuf,
-    /// What to do with a file that is damaged.
+    /// Handling of a damaged file.
     pub broken: Broken,
-    /// A map to begin with, unless there is one of its name already.
+    /// An initial map, created unless a map of its name exists.
     pub map: Option<(Raster, Picture)>,
-    /// Where the local frame is on the globe, for maps as objects.
+    /// Position of the local frame on the globe, for maps as objects.
     pub frame: Frame,
 }
 
-/// What to do with a file that is damaged or no store.
+/// Handling of a file that is damaged or not a store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Broken {
-    /// Not to run; the file stays as it is.
+    /// Refuse to start. The file is left unchanged.
     #[default]
     Refuse,
-    /// To keep it under another name and begin with an empty store.
+    /// Rename the file and start with an empty store.
     SetAside,
 }
 
@@ -49,10 +49,10 @@ impl Default for KnowledgeStore {
 }
 
 impl KnowledgeStore {
-    /// What the file is called where nothing else is said.
+    /// Default file name.
     pub const FILE: &'static str = "knowledge-store.redb";
 
-    /// The map of 16 x 16 cells that a vehicle is shown on, around the origin of the local frame.
+    /// The demonstration map of 16 x 16 cells, centred on the origin of the local frame.
     #[must_use]
     pub fn demo_map() -> (Raster, Picture) {
         let picture = Picture::demo();
@@ -84,7 +84,7 @@ impl Part for KnowledgeStore {
         let world = opening.await.map_err(|_| PartError::NodeStopped)??;
         let (fail, mut failures) = mpsc::unbounded_channel();
         let store = WorldStore::new(world, frame, move |error| {
-            // Without a listener the part has ended already.
+            // Without a receiver the part has already ended.
             let _ = fail.send(error.to_string());
         });
         let component = slot
@@ -92,7 +92,7 @@ impl Part for KnowledgeStore {
             .offer(store.vector_knowledge_store())
             .offer(store.raster_maps())
             .live_on(slot.port)?;
-        // Whoever holds the store beside the component would keep the file open after its end.
+        // A remaining copy of the store would keep the file open after the component's end.
         drop(store);
         tokio::select! {
             failure = failures.recv() => Err(failure.map_or(PartError::NodeStopped, PartError::Broken)),
@@ -136,7 +136,7 @@ fn tell(file: &Path, world: &World) {
     tracing::info!("{}: {objects} objects, {maps} maps", file.display());
 }
 
-/// What is wrong, and what can be done about it.
+/// The error with a remedy.
 fn advice(error: &OpenError) -> String {
     match error {
         OpenError::Broken { .. } => format!(
@@ -147,7 +147,7 @@ fn advice(error: &OpenError) -> String {
     }
 }
 
-/// Gives the file a name that no other one has.
+/// Renames the file to an unused name.
 fn set_aside(file: &Path, error: &OpenError) -> Result<(), PartError> {
     let name = |number: u32| {
         let mut name = file.as_os_str().to_owned();

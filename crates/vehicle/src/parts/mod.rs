@@ -1,9 +1,9 @@
-//! Ready components of a ground vehicle: what the programs `jaus-…` run, and what a system in one
-//! process is put together from.
+//! Complete components of a ground vehicle, for the programs `jaus-…` and for systems in a single
+//! process.
 //!
-//! A [`Part`] is a set of plain settings with sensible defaults. Given a [`Slot`] on a node it runs
-//! until it is dropped. Parts find each other by discovery alone, in any order of start, and go on
-//! when another one is started again.
+//! A [`Part`] is a plain settings struct with sensible defaults. Given a [`Slot`] on a node, it
+//! runs until it is dropped. Parts find each other by discovery alone, in any start order, and
+//! continue when another one restarts.
 
 mod communicator;
 mod drivers;
@@ -38,51 +38,54 @@ pub use primitive_driver::{Hardware, Motors, PrimitiveDriver, Stop};
 pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
 
-/// A ready component: what it is to do, not yet running.
+/// A complete component, configured but not yet running.
 pub trait Part: Send + 'static {
-    /// Runs, and ends only when it can not go on. Dropping the future stops the component.
+    /// Runs the component. Ends only when it cannot continue. Dropping the future stops the
+    /// component.
     fn run(self, slot: Slot) -> impl Future<Output = Result<Infallible, PartError>> + Send;
 }
 
-/// A component's place on a node, and what its subsystem is called.
+/// A component's place on a node, and the identity of its subsystem.
 #[derive(Debug)]
 pub struct Slot {
-    /// Its door to the node.
+    /// The port on the node.
     pub port: Port,
-    /// The node, if it is in the same process.
+    /// The node, if it runs in the same process.
     pub node: Option<Node>,
-    /// What the subsystem is.
+    /// Kind of the subsystem.
     pub kind: Kind,
-    /// What the subsystem is called.
+    /// Name of the subsystem.
     pub name: String,
 }
 
 impl Slot {
-    /// A component of this subsystem, to be [started](Builder::live_on) on the slot's port.
+    /// Creates a builder for a component of this subsystem, to [start](Builder::live_on) on the
+    /// slot's port.
     pub fn component(&self, name: &str) -> Builder {
         Component::builder(self.kind, self.name.clone()).component_name(name)
     }
 }
 
-/// Why a part can not go on.
+/// Why a part cannot continue.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PartError {
-    /// It can not be attached.
+    /// The component cannot be attached.
     #[error(transparent)]
     Attach(#[from] component::AttachError),
     /// The client in control has shut it down (Management's Shutdown).
     #[error("shut down by the client in control")]
     ShutDown,
-    /// The node below it has stopped.
+    /// The underlying node has stopped.
     #[error("the node has stopped")]
     NodeStopped,
-    /// What it needs is not there, or is broken: what is wrong and what to do, for people.
+    /// A resource is missing or defective. The text contains the cause and a remedy, for the
+    /// operator.
     #[error("{0}")]
     Broken(String),
 }
 
-/// The host's clock, which stamps the samples of parts; 1970 on a computer whose clock is before that.
+/// The host's clock for time stamps of samples. Clocks before 1970 yield 1970.
 #[expect(
     clippy::disallowed_methods,
     reason = "parts run in real time, and their reports carry the time of day"

@@ -1,4 +1,4 @@
-//! The local path segment driver: drives along curves by commanding the local vector driver.
+//! The local path segment driver: follows curves by commanding the local vector driver.
 
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
@@ -13,20 +13,20 @@ use crate::mobility::Vehicle;
 use crate::motion::{Frame, Limits, Motion, Pilot};
 use jaus::messages::mobility::{SetLocalVector, local_vector_driver, set_local_vector};
 
-/// Drives along the segments of a list, by headings and speeds of the vector driver, with what the
-/// pose sensor reports.
+/// Follows the segments of a list by sending headings and speeds to the vector driver, based on the
+/// pose sensor's reports.
 ///
-/// It offers Local Path Segment Driver, List Manager and Stage, behind Management and Access
-/// Control. Vector driver and sensor are found in its own subsystem.
+/// It offers Local Path Segment Driver, List Manager and Stage, with Management and Access Control.
+/// It finds vector driver and sensor in its own subsystem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathDriver {
-    /// What the vehicle can do at most, and how well it slows down.
+    /// Limits of the vehicle, including its deceleration.
     pub limits: Limits,
-    /// It stops when the pose is older than this.
+    /// Maximum age of the pose. The vehicle stops when it is older.
     pub stale: Duration,
-    /// The authority with which it controls the vector driver.
+    /// The authority used to control the vector driver.
     pub authority: u8,
-    /// After how many seconds control ends unless its client asks for it again; 0 for never.
+    /// Control timeout in seconds unless the client renews control; 0 disables it.
     pub control_timeout: u8,
 }
 
@@ -34,7 +34,7 @@ impl Default for PathDriver {
     fn default() -> Self {
         Self {
             limits: Limits {
-                // What is left after the delays of the drivers below.
+                // Reduced to allow for the delays of the drivers below.
                 deceleration: 1.0,
                 ..Limits::default()
             },
@@ -46,7 +46,7 @@ impl Default for PathDriver {
 }
 
 impl PathDriver {
-    /// How often the sensor is asked to report, in hertz.
+    /// Report rate requested from the sensor, in hertz.
     const HZ: f64 = 25.0;
 }
 
@@ -75,7 +75,7 @@ impl Part for PathDriver {
             board,
             language: Vectors,
             authority: self.authority,
-            // A list is executed once, and on purpose.
+            // A list is executed once, on explicit command, so nothing has to settle.
             settling: Duration::ZERO,
             sensors: FaultMonitor::default(),
         };
@@ -87,7 +87,7 @@ impl Part for PathDriver {
     }
 }
 
-/// Speaks to the vector driver.
+/// Command interface of the vector driver.
 struct Vectors;
 
 impl Language for Vectors {
@@ -107,7 +107,7 @@ impl Language for Vectors {
         }
     }
 
-    /// Speed 0, straight on.
+    /// Speed 0, straight ahead.
     fn halt(&mut self) -> SetLocalVector {
         SetLocalVector::default()
     }

@@ -1,9 +1,9 @@
-//! The planner (component 36): carries out what an operator wants of a mission.
+//! The planner (component 36): carries out the missions of an operator.
 //!
-//! It offers the Mission Planner, asks the knowledge store for the map and the pose sensor for the
-//! pose, plans, takes the path segment driver under control, hands it the segments, and watches all
-//! drivers of the chain until the vehicle has arrived. Whom it needs it finds in its own subsystem,
-//! again and again if need be.
+//! It offers Mission Planner, gets the map from the knowledge store and the pose from the pose
+//! sensor, plans, takes control of the path segment driver, hands over the segments, and monitors
+//! all drivers of the chain until the vehicle has arrived. It discovers these components in its own
+//! subsystem, repeatedly if necessary.
 #![expect(clippy::disallowed_methods, reason = "here patience is counted")]
 
 pub(super) mod chain;
@@ -25,21 +25,20 @@ use jaus::address::JausId;
 use jaus::component::{AccessControl, Component, Management};
 use task::PlannerTask;
 
-/// The settings of a planner.
+/// Settings of a planner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planner {
-    /// How much room the vehicle needs.
+    /// Dimensions of the vehicle.
     pub vehicle: Vehicle,
-    /// How patient missions are, and how fast.
+    /// Timeouts, retries and speed of missions.
     pub mission: Settings,
-    /// What the map is called that is planned on; if there is only one, it is taken whatever it is
-    /// called.
+    /// Name of the map to plan on. A single map is used whatever its name.
     pub map: String,
-    /// With which authority, from 0 to 255, the path segment driver is controlled.
+    /// The authority used to control the path segment driver, from 0 to 255.
     pub authority: u8,
-    /// The least authority that a client needs to control the planner.
+    /// The minimum authority of a client to control the planner.
     pub least_authority: u8,
-    /// How far from the straight line of a segment the vehicle may be, in metres.
+    /// Maximum distance of the vehicle from the line of a segment, in metres.
     pub tolerance: f64,
 }
 
@@ -71,7 +70,7 @@ impl Part for Planner {
         let task = PlannerTask::new(&self, &component, missions, &wake);
         let watch = |link| chain::watch(&component, link, &tell);
         let poses = Sense::pose(&component, POSES)?;
-        // They go on until one of them can not.
+        // Each of these runs until it cannot continue.
         tokio::select! {
             () = task.work(news) => {}
             () = watch(Link::Path) => {}
@@ -84,11 +83,11 @@ impl Part for Planner {
     }
 }
 
-/// How often the pose is asked for, in hertz: for the way back.
+/// Report rate requested for the pose, in hertz. The pose is recorded for the return path.
 const POSES: f64 = 2.0;
 
-/// Waits until another component of the subsystem is known that offers all of these services;
-/// `None` when the component has stopped.
+/// Waits for another component of the subsystem that offers all of these services; `None` when the
+/// component has stopped.
 async fn find(component: &Component, services: &[&str]) -> Option<JausId> {
     let mut changes = component.watch();
     loop {
@@ -108,7 +107,7 @@ async fn find(component: &Component, services: &[&str]) -> Option<JausId> {
     }
 }
 
-/// The same for at most [`PATIENCE`], with an error for people.
+/// Like [`find`], with a timeout of [`PATIENCE`] and an error for the operator.
 async fn find_soon(component: &Component, services: &[&str], what: &str) -> Result<JausId, String> {
     match tokio::time::timeout(PATIENCE, find(component, services)).await {
         Ok(Some(found)) => Ok(found),

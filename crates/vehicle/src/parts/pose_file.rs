@@ -1,5 +1,5 @@
-//! The small file in which the pose sensor keeps where the vehicle is, together with the wheels'
-//! counts that belong to it. It is replaced as a whole, so that a power cut leaves the old or the new.
+//! The file in which the pose sensor stores the pose and the matching wheel counts. It is replaced
+//! atomically, so after a power cut either the old or the new content exists.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -12,18 +12,18 @@ use tokio::io::AsyncWriteExt;
 use super::PartError;
 use crate::motion::{Pose, WheelCount};
 
-/// What is kept.
+/// The stored content.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Kept {
     pub(super) pose: Pose,
     pub(super) count: WheelCount,
 }
 
-/// The longest file that is read: several times what is written.
+/// The longest file that is read: several times the usual size.
 const MOST: u64 = 4096;
 
 impl Kept {
-    /// Whether it tells another place or counter; a later time alone is not worth writing.
+    /// Whether pose or counts differ. A later time alone is not worth a write.
     pub(super) fn differs(&self, other: &Self) -> bool {
         let count = WheelCount {
             time_ms: self.count.time_ms,
@@ -49,7 +49,7 @@ impl Kept {
             ("time_ms", count.time_ms.into()),
         ];
         for (key, number) in numbers {
-            // Writing to a string can not fail.
+            // Writing to a string cannot fail.
             let _ = writeln!(text, "{key} = {number:?}");
         }
         text
@@ -91,7 +91,7 @@ impl Kept {
     }
 }
 
-/// Reads the file; `None` if there is none yet.
+/// Reads the file; `None` if it does not exist.
 pub(super) async fn read(file: &Path) -> Result<Option<Kept>, PartError> {
     let broken = |why: String| {
         PartError::Broken(format!(
@@ -131,7 +131,7 @@ async fn replace(file: &Path, text: &str) -> io::Result<()> {
     let new = Path::new(&name);
     let mut writer = File::create(new).await?;
     writer.write_all(text.as_bytes()).await?;
-    // Without this a power cut after the renaming could leave an empty file.
+    // Without this, a power cut after the rename could leave an empty file.
     writer.sync_data().await?;
     fs::rename(new, file).await
 }

@@ -1,4 +1,4 @@
-//! The local pose sensor: where the vehicle is, reckoned from the travel of its wheels.
+//! The local pose sensor: dead reckoning from wheel travel.
 #![expect(
     clippy::disallowed_methods,
     reason = "here the sensor gets its time, and waits for it"
@@ -20,20 +20,20 @@ use crate::motion::{DeadReckoning, Frame, Motion, Observed, Pilot, Pose, WheelCo
 use jaus::component::{AccessControl, Component};
 use jaus::messages::mobility::{QueryLocalPose, QueryLocalPoseExt};
 
-/// Reckons where the vehicle is from where it was and what its wheels have travelled since.
+/// Estimates the pose by dead reckoning from a start pose and the wheel travel since.
 ///
-/// It offers Local Pose Sensor; a client in control may tell it the pose. While the wheels can not
-/// be heard its reports leave the pose out. What it knows it keeps in a small file, so that it goes
-/// on from there when it is started again, as if it had been there all the time.
+/// It offers Local Pose Sensor. A client in control may set the pose. Without wheel reports the
+/// pose is omitted from its own reports. It stores pose and counts in a small file, so that after a
+/// restart it resumes without losing the travel in between.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseSensor {
-    /// The file; without one it begins at `start` whenever it is started.
+    /// The file. Without one, every start begins at `start`.
     pub file: Option<PathBuf>,
-    /// Where it begins if nothing is kept.
+    /// The initial pose if none is stored.
     pub start: Pose,
-    /// How often the wheels are asked for, in hertz.
+    /// Report rate requested for the wheels, in hertz.
     pub hz: f64,
-    /// The pose is not known any more when the wheels have not been heard for so long.
+    /// The pose becomes unknown without wheel reports for this time.
     pub silence: Duration,
 }
 
@@ -79,7 +79,7 @@ impl Part for PoseSensor {
         let Some(file) = &self.file else {
             return reckoning.await;
         };
-        // A disk that stalls must delay no pose.
+        // A stalled disk must not delay the pose.
         let writing = kept.write(PAUSE, async |kept: Kept| {
             pose_file::write(file, &kept).await
         });
@@ -90,7 +90,7 @@ impl Part for PoseSensor {
     }
 }
 
-/// The file is written at most so often: what is driven meanwhile is in the wheels' counts.
+/// Minimum interval between writes. The wheel counts cover the travel in between.
 const PAUSE: Duration = Duration::from_millis(500);
 
 impl PoseSensor {
@@ -112,7 +112,7 @@ struct Running {
     observed: Observed,
     reckoning: DeadReckoning,
     keeper: Option<Keeper<Kept>>,
-    /// What was handed over to be written last.
+    /// The last content handed over for writing.
     kept: Option<Kept>,
 }
 
@@ -153,7 +153,7 @@ impl Running {
         }
     }
 
-    /// Takes the pose that a client has set, if one has.
+    /// Applies the pose set by a client, if there is one.
     fn take_told(&mut self) {
         if let Some(pose) = self.observed.take_told() {
             self.reckoning.set_pose(pose);
@@ -162,7 +162,7 @@ impl Running {
         }
     }
 
-    /// Has the pose written if it is another one.
+    /// Queues the pose for writing if it has changed.
     fn keep(&mut self) {
         let (Some(keeper), Some(count)) = (&self.keeper, self.reckoning.count()) else {
             return;
@@ -186,7 +186,7 @@ fn standing(pose: Pose, sampled_at: Option<Instant>) -> Motion {
     }
 }
 
-/// What is not known is not reported.
+/// NaN components are omitted from reports.
 fn unknown() -> Pose {
     Pose {
         x: f64::NAN,

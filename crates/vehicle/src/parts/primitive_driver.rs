@@ -1,4 +1,4 @@
-//! The primitive driver: wrench efforts to two wheel drives, and how far the wheels have travelled.
+//! The primitive driver: wrench efforts for two wheel drives, and wheel odometry.
 #![expect(
     clippy::disallowed_methods,
     reason = "here the motors are looked after in real time"
@@ -24,44 +24,44 @@ use crate::motion::{Frame, Pilot};
 use jaus::component::{Component, Condition, State};
 use jaus::service::{MotionPolicy, StopCause};
 
-/// Drives the wheels of a vehicle as it is told, and stops them when it is not told any more. While a
-/// motor has a fault both sides stand still and the component is in Failure.
+/// Drives the wheels of a vehicle as commanded, and stops them when commands cease. While a motor
+/// has a fault, both sides stand still and the component is in Failure.
 ///
-/// With a stop input, an open line stops the motors at once and sets the component's emergency. A line
-/// that is closed again ends all emergencies: the operator on the spot has seen to it. The component is
-/// in Standby then, and nothing moves before it is resumed.
+/// With a stop input, an open line stops the motors immediately and sets the component's emergency.
+/// Closing the line clears all emergencies, on the assumption that the operator on site has dealt
+/// with them. The component is then in Standby, and nothing moves before it is resumed.
 ///
-/// It offers Primitive Driver, Wheel Odometry and Stage, behind Management and Access Control.
+/// It offers Primitive Driver, Wheel Odometry and Stage, with Management and Access Control.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrimitiveDriver {
-    /// What turns the wheels.
+    /// The motors.
     pub motors: Motors,
     /// The stop input, if there is one.
     pub stop: Option<Stop>,
-    /// The vehicle that the wheels carry.
+    /// Parameters of the platform.
     pub wheels: WheelsConfig,
-    /// The motors stop when no effort has come for so long.
+    /// The motors stop without an effort command for this time.
     pub silence: Duration,
-    /// After how many seconds control ends unless its client asks for it again; 0 for never.
+    /// Control timeout in seconds unless the client renews control; 0 disables it.
     pub control_timeout: u8,
 }
 
-/// What turns the wheels of both sides.
+/// The motors of both sides.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Motors {
-    /// Simulated ones, the right one with the next seed after the left one's.
+    /// Simulated motors. The right one uses the seed after the left one's.
     Simulated(MotorConfig),
     /// Stepper motors on lines of a GPIO chip.
     #[cfg(all(feature = "gpio", target_os = "linux"))]
     Gpio(GpioMotors),
 }
 
-/// What stops the vehicle on the vehicle itself.
+/// The stop input on the vehicle.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Stop {
-    /// A simulated input, which is pressed while a file exists.
+    /// A simulated input, pressed while a file exists.
     File(std::path::PathBuf),
     /// A normally closed contact between a line of a GPIO chip and ground.
     #[cfg(all(feature = "gpio", target_os = "linux"))]
@@ -88,9 +88,9 @@ impl Stop {
 
 /// The hardware of a primitive driver.
 pub struct Hardware {
-    /// What turns the wheels of the left side.
+    /// The drive of the left side.
     pub left: Box<dyn Actuator>,
-    /// What turns the wheels of the right side.
+    /// The drive of the right side.
     pub right: Box<dyn Actuator>,
     /// The stop input, if there is one.
     pub stop: Option<Box<dyn StopInput>>,
@@ -110,11 +110,11 @@ impl std::fmt::Debug for Hardware {
 pub struct GpioMotors {
     /// The chip, such as `/dev/gpiochip0`.
     pub chip: std::path::PathBuf,
-    /// How both motors drive their wheels.
+    /// Parameters of both motors and their wheels.
     pub stepper: crate::actuator::StepperConfig,
     /// The lines of the left motor: pulses and direction.
     pub left: (u32, u32),
-    /// The same for the right motor, which is mounted the other way round.
+    /// The lines of the right motor, which is mounted in reverse.
     pub right: (u32, u32),
 }
 
@@ -170,11 +170,10 @@ impl Part for PrimitiveDriver {
 }
 
 impl PrimitiveDriver {
-    /// The same on hardware of your own, instead of [`motors`](Self::motors) and
-    /// [`stop`](Self::stop).
+    /// Runs on custom hardware in place of [`motors`](Self::motors) and [`stop`](Self::stop).
     ///
     /// # Errors
-    /// Why it cannot go on.
+    /// Why the component cannot continue.
     pub async fn run_on(self, hardware: Hardware, slot: Slot) -> Result<Infallible, PartError> {
         let Hardware { left, right, stop } = hardware;
         let interlock = Interlock::default();
@@ -213,13 +212,13 @@ impl PrimitiveDriver {
     }
 }
 
-/// Names a counter of wheel travel.
+/// A random identifier for an odometer run.
 fn random() -> u32 {
-    // The keys of a hasher are random, and nothing more is wanted than that restarts differ.
+    // Hasher keys are random, which suffices to distinguish restarts.
     RandomState::new().build_hasher().finish() as u32
 }
 
-/// Waits until a stop input is opened or closed, if there is one.
+/// Waits until the stop input changes, if there is one.
 async fn pressed(stop: &mut Option<StopLine>) {
     match stop {
         Some(stop) => stop.changed().await,
@@ -234,12 +233,12 @@ struct Running {
     board: StageBoard,
     interlock: Interlock,
     stop: Option<StopLine>,
-    /// Whether the stop input has set an emergency that lasts.
+    /// Whether an emergency set by the stop input is in effect.
     stopped: bool,
 }
 
 impl Running {
-    /// Between two looks at how the driver is.
+    /// Interval between two status checks.
     const LOOK: Duration = Duration::from_millis(100);
 
     async fn watch(mut self) -> Result<Infallible, PartError> {
@@ -263,14 +262,14 @@ impl Running {
         }
     }
 
-    /// An open stop input is an emergency of the component as long as it lasts, and the end of all
-    /// emergencies when it is closed again.
+    /// Keeps the component in emergency while the stop input is open, and clears all emergencies
+    /// when it is closed.
     async fn check_stop(&mut self) {
         let Some(stop) = &mut self.stop else {
             return;
         };
         let open = stop.pressed();
-        // The interlock keeps also a press that was shorter than a look.
+        // The interlock also latches presses shorter than the check interval.
         if self.interlock.is_open() && !self.stopped {
             let why = open.as_deref().unwrap_or("the stop input was pressed");
             tracing::warn!("emergency: {why}");
@@ -288,12 +287,12 @@ impl Running {
             tracing::warn!("the stop input is closed again: all emergencies end");
             self.component.set_condition(Condition::Safe).await;
             self.stopped = false;
-            // Nothing moves before the component is resumed.
+            // The component must be resumed before anything moves.
             self.interlock.close();
         }
     }
 
-    /// A motor's fault is a failure as long as it lasts.
+    /// A motor fault is a failure as long as it lasts.
     async fn check_motors(&self, faults: &mut FaultMonitor) {
         // Also at rest, when nothing else reads the motors.
         self.vehicle.handle_time(Instant::now());

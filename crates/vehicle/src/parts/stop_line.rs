@@ -1,4 +1,4 @@
-//! The thread that reads a stop input: nothing else of the program delays it.
+//! The thread that reads a stop input, independent of delays in the rest of the program.
 #![expect(
     clippy::disallowed_methods,
     reason = "the line is read in real time, on a thread of its own"
@@ -14,27 +14,27 @@ use tokio::sync::watch;
 
 use crate::actuator::{Interlock, StopInput};
 
-/// A stop input that is being read. An open line opens the interlock at once, by itself.
+/// A monitored stop input. An open line opens the interlock directly.
 #[derive(Debug)]
 pub(super) struct StopLine {
     pressed: watch::Receiver<Option<String>>,
     interlock: Interlock,
-    /// When the line was read last.
+    /// Time of the last reading.
     read_at: Arc<Mutex<Instant>>,
     ends: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl StopLine {
-    /// Between two readings.
+    /// Interval between two readings.
     const PERIOD: Duration = Duration::from_millis(10);
-    /// A reading that takes longer counts as an open line.
+    /// Without a reading for this time, the line counts as open.
     const STUCK: Duration = Duration::from_millis(500);
 
-    /// Begins to read.
+    /// Starts the thread.
     ///
     /// # Errors
-    /// If the system has no thread left.
+    /// If the thread cannot be created.
     pub(super) fn start(mut input: Box<dyn StopInput>, interlock: Interlock) -> io::Result<Self> {
         let first = read(input.as_mut(), &interlock);
         let (tell, pressed) = watch::channel(first);
@@ -66,7 +66,7 @@ impl StopLine {
 
     /// Why the line is open; `None` while it is closed.
     pub(super) fn pressed(&mut self) -> Option<String> {
-        // A thread that has ended, or waits for its driver, reads nothing any more.
+        // The thread has ended or is blocked in its driver, so there are no readings.
         if self.pressed.has_changed().is_err() || self.is_stuck() {
             self.interlock.open();
             return Some("the stop input is not read any more".to_owned());
@@ -79,10 +79,10 @@ impl StopLine {
         read_at.elapsed() > Self::STUCK
     }
 
-    /// Waits until the line is opened or closed.
+    /// Waits for a change of the line.
     pub(super) async fn changed(&mut self) {
         if self.pressed.changed().await.is_err() {
-            // `pressed` tells, whenever it is asked.
+            // `pressed` reports the end of the thread.
             std::future::pending::<()>().await;
         }
     }
@@ -92,14 +92,14 @@ impl Drop for StopLine {
     fn drop(&mut self) {
         self.ends.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take().filter(|_| !self.is_stuck()) {
-            // A thread that has panicked reads nothing either.
+            // A panicked thread reads nothing either.
             let _ = thread.join();
         }
     }
 }
 
-/// Why the line is open. That opens the interlock, which the component closes again after it has
-/// noted the stop.
+/// Why the line is open, if it is. An open line opens the interlock. The component closes it again
+/// after it has handled the stop.
 fn read(input: &mut dyn StopInput, interlock: &Interlock) -> Option<String> {
     let why = match input.is_closed() {
         Ok(true) => return None,

@@ -1,5 +1,5 @@
-//! The tester: a mission through the whole chain, checked message by message, and a chart of what
-//! a load measured. What the program `jaus-tester` runs.
+//! The tester behind the program `jaus-tester`: a mission through the whole chain, checked message
+//! by message, and charts of load measurements.
 
 mod alone;
 pub mod figure;

@@ -1,4 +1,4 @@
-//! The local vector driver: keeps a speed and a heading by commanding the primitive driver.
+//! The local vector driver: holds a speed and a heading by commanding the primitive driver.
 
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
@@ -13,22 +13,22 @@ use crate::mobility::Vehicle;
 use crate::motion::{Effort, Frame, Limits, Motion, Pilot, Throttle};
 use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
 
-/// Keeps the speed and the heading that it is told, by efforts of the primitive driver, with what
-/// the pose and the velocity sensor report.
+/// Holds the commanded speed and heading by sending efforts to the primitive driver, based on the
+/// reports of the pose and the velocity sensor.
 ///
-/// It offers Local Vector Driver and Stage, behind Management and Access Control. Primitive driver
-/// and sensors are found in its own subsystem.
+/// It offers Local Vector Driver and Stage, with Management and Access Control. It finds primitive
+/// driver and sensors in its own subsystem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VectorDriver {
-    /// What the vehicle can do at most; speed and yaw rate are those of full effort.
+    /// Limits of the vehicle. Speed and yaw rate are those of full effort.
     pub limits: Limits,
-    /// After it has stood down it obeys again when it has not been commanded for so long.
+    /// After standing down, commands are accepted again once they have ceased for this time.
     pub silence: Duration,
-    /// It stops when pose or velocity are older than this.
+    /// Maximum age of pose and velocity. The vehicle stops when they are older.
     pub stale: Duration,
-    /// The authority with which it controls the primitive driver.
+    /// The authority used to control the primitive driver.
     pub authority: u8,
-    /// After how many seconds control ends unless its client asks for it again; 0 for never.
+    /// Control timeout in seconds unless the client renews control; 0 disables it.
     pub control_timeout: u8,
 }
 
@@ -45,7 +45,7 @@ impl Default for VectorDriver {
 }
 
 impl VectorDriver {
-    /// How often the sensors are asked to report, in hertz.
+    /// Report rate requested from the sensors, in hertz.
     const HZ: f64 = 25.0;
 }
 
@@ -87,7 +87,7 @@ impl Part for VectorDriver {
     }
 }
 
-/// Speaks to the primitive driver.
+/// Command interface of the primitive driver.
 struct Efforts(Throttle);
 
 impl Language for Efforts {

@@ -1,4 +1,4 @@
-//! The velocity state sensor: how fast the vehicle moves, as its wheels tell.
+//! The velocity state sensor: velocity from wheel travel.
 #![expect(
     clippy::disallowed_methods,
     reason = "here the sensor gets its time, and waits for it"
@@ -16,15 +16,15 @@ use crate::mobility::Vehicle;
 use crate::motion::{Frame, Motion, Observed, Pilot, Speedometer, Velocity, WheelCount};
 use jaus::messages::mobility::{QueryVelocityState, QueryVelocityStateExt};
 
-/// Makes the velocity of the vehicle out of the travel of its wheels.
+/// Computes the velocity of the vehicle from the travel of its wheels.
 ///
-/// It offers Velocity State Sensor. While the wheels can not be heard its reports leave out what is
-/// not known.
+/// It offers Velocity State Sensor. Without wheel reports, the unknown components are omitted from
+/// its own reports.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VelocitySensor {
-    /// How often the wheels are asked for, in hertz.
+    /// Report rate requested for the wheels, in hertz.
     pub hz: f64,
-    /// The velocity is not known any more when the wheels have not been heard for so long.
+    /// The velocity becomes unknown without wheel reports for this time.
     pub silence: Duration,
 }
 
@@ -93,7 +93,7 @@ fn moving(velocity: Velocity, sampled_at: Option<Instant>) -> Motion {
     }
 }
 
-/// What is not known is not reported.
+/// NaN components are omitted from reports.
 fn unknown() -> Velocity {
     Velocity::forward(f64::NAN, f64::NAN)
 }

@@ -1,4 +1,4 @@
-//! What can be changed in a world, and what may come of it.
+//! Changes to a world, and their results.
 
 use bytes::Bytes;
 
@@ -6,74 +6,74 @@ use super::object::{Object, ObjectId};
 use super::raster::{MapId, Raster, Window};
 use super::selection::Selection;
 
-/// A change that somebody wants.
+/// A requested change.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
-    /// To add objects; each one that is not sound or does not fit is left out.
+    /// Add objects. Each one that is invalid or does not fit is skipped.
     AddObjects(Vec<Object>),
-    /// To remove the objects that are meant.
+    /// Remove the selected objects.
     RemoveObjects(Selection),
-    /// To change what is known about a feature class.
+    /// Change the description of a feature class.
     DescribeClass(u16, Describe),
-    /// To add a map with its cells, row by row from the south; without cells, all have its fill. Its
-    /// revision becomes 1.
+    /// Add a map with its cells, row by row from the south. Without cells, all have the fill value.
+    /// Its revision becomes 1.
     AddRaster(Raster, Bytes),
-    /// To set the cells of a window, row by row from the south.
+    /// Set the cells of a window, row by row from the south.
     SetCells(MapId, Window, Bytes),
-    /// To remove a map.
+    /// Remove a map.
     RemoveRaster(MapId),
 }
 
-/// How to change what is known about a feature class.
+/// How to change the description of a feature class.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Describe {
-    /// Put this behind it.
+    /// Append a text.
     Append(String),
-    /// Put this before it.
+    /// Prepend a text.
     Prepend(String),
-    /// Put this in its place.
+    /// Replace the description.
     Overwrite(String),
-    /// Forget it.
+    /// Delete the description.
     Erase,
 }
 
-/// What has come of a change. It is on the disk.
+/// Result of a change that is on disk.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Done {
-    /// The numbers of the new objects in the order in which they came; `None` for what was left out.
+    /// The numbers of the new objects in request order; `None` for skipped ones.
     Added(Vec<Option<ObjectId>>),
-    /// How many objects were removed.
+    /// Number of objects removed.
     Removed(usize),
-    /// The class has another description now.
+    /// The description of the class has changed.
     Described,
-    /// The map was added, changed or removed, and has or had this revision.
+    /// A map was added, changed or removed, with its current or last revision.
     Raster(MapId, u32),
 }
 
-/// Why a change was not made.
+/// Why a change was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// There is no such map.
+    /// The map does not exist.
     #[error("there is no {0}")]
     NoSuchMap(MapId),
-    /// It can not be, or cells and window do not agree: what is wrong and what would do.
+    /// The dimensions are invalid, or cells and window do not match. The text includes a remedy.
     #[error("{0}")]
     Size(String),
-    /// The window is not on the map.
+    /// The window extends beyond the map.
     #[error("{window} are not all on the map, which has {rows} x {columns}")]
     Outside {
-        /// What was to be changed.
+        /// The requested window.
         window: Window,
-        /// Of the map.
+        /// Number of rows of the map.
         rows: u16,
-        /// Of the map.
+        /// Number of columns of the map.
         columns: u16,
     },
-    /// There is no room.
+    /// The store is full.
     #[error("the store is full: {0}")]
     Full(&'static str),
-    /// The region has no points or too many, or its buffer is no distance.
+    /// The region has no points or too many, or its buffer is invalid.
     #[error("the region can not be looked for")]
     Region,
 }

@@ -1,4 +1,4 @@
-//! All objects in memory, with an index over space.
+//! The in-memory collection of all objects, with a spatial index.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use super::shape::METRES_PER_DEGREE;
 type Corner = [f64; 2];
 type Entry = GeomWithData<Rectangle<Corner>, ObjectId>;
 
-/// Objects by number and by place.
+/// Objects by number and by location.
 #[derive(Debug, Default)]
 pub struct Collection {
     objects: BTreeMap<ObjectId, Arc<Object>>,
@@ -23,12 +23,12 @@ pub struct Collection {
 }
 
 impl Collection {
-    /// The most objects.
+    /// Maximum number of objects.
     pub const MOST_OBJECTS: usize = 100_000;
-    /// The most points of all objects together: 8 MB of them.
+    /// Maximum number of points of all objects together: 8 MB of memory.
     pub const MOST_POINTS: usize = 1_000_000;
 
-    /// These objects.
+    /// Creates a collection of these objects.
     #[must_use]
     pub fn new(objects: impl Iterator<Item = (ObjectId, Object)>) -> Self {
         let objects: BTreeMap<_, _> = objects.map(|(id, it)| (id, Arc::new(it))).collect();
@@ -39,25 +39,25 @@ impl Collection {
         }
     }
 
-    /// How many there are.
+    /// Number of objects.
     #[must_use]
     pub fn len(&self) -> usize {
         self.objects.len()
     }
 
-    /// Whether there are none.
+    /// Whether the collection is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.objects.is_empty()
     }
 
-    /// Whether one more object fits.
+    /// Whether another object fits.
     pub(super) fn has_room_for(&self, object: &Object) -> bool {
         self.objects.len() < Self::MOST_OBJECTS
             && self.points + object.points.len() <= Self::MOST_POINTS
     }
 
-    /// One object.
+    /// The object with this number.
     #[must_use]
     pub fn get(&self, id: ObjectId) -> Option<&Arc<Object>> {
         self.objects.get(&id)
@@ -77,7 +77,7 @@ impl Collection {
         }
     }
 
-    /// The objects that are meant, in order of their numbers.
+    /// The numbers of the selected objects, sorted.
     #[must_use]
     pub fn select(&self, selection: &Selection) -> Vec<ObjectId> {
         if !selection.is_sound() {
@@ -98,7 +98,7 @@ impl Collection {
         found
     }
 
-    /// The south-western and the north-eastern corner of all objects of a class.
+    /// The south-west and north-east corners of the bounding box of a class.
     #[must_use]
     pub fn bounds(&self, class: u16) -> Option<(Place, Place)> {
         let of_class = self.objects.values().filter(|it| it.belongs_to(class));
@@ -127,8 +127,8 @@ fn around(region: &Region) -> AABB<Corner> {
     envelope(&region.points, region.buffer)
 }
 
-/// A rectangle that nothing of a shape lies outside of. What reaches over the date line or close to
-/// a pole is taken to go all the way around.
+/// A bounding box of a shape with its buffer. A box that crosses the date line or comes close to a
+/// pole extends around the whole globe.
 fn envelope(points: &[Place], buffer: f32) -> AABB<Corner> {
     let corners = points.iter().map(|point| <Corner>::from(point.degrees()));
     let (mut low, mut high) = ([90.0_f64, 180.0_f64], [-90.0_f64, -180.0_f64]);
@@ -138,7 +138,7 @@ fn envelope(points: &[Place], buffer: f32) -> AABB<Corner> {
             high[axis] = high[axis].max(corner[axis]);
         }
     }
-    // A little more, for the rounding of the distances that decide in the end.
+    // Slightly enlarged to allow for rounding in the exact distance test.
     let reach = f64::from(buffer) * 1.001 / METRES_PER_DEGREE;
     let widest = low[0].abs().max(high[0].abs()) + reach;
     let aside = reach / widest.min(90.0).to_radians().cos().max(1e-6);

@@ -1,9 +1,8 @@
-//! What is kept on the disk, and how: one file, whose every change is whole and lasting or has not
-//! happened.
+//! Persistent storage of a world: one file with atomic and durable changes.
 //!
-//! The file is a `redb` database: a change is written to free pages first, then made valid by one
-//! write of a checked header, with the disk told to keep both in that order. Which format it has is
-//! kept in it.
+//! The file is a `redb` database. A change is written to free pages first, then committed by one
+//! write of a checksummed header, with disk flushes to enforce this order. The file records its
+//! format version.
 
 use std::fs;
 use std::io;
@@ -20,19 +19,19 @@ use super::raster::{MapId, Raster, Window};
 use super::record;
 use super::tiles::{self, TileId};
 
-/// The format of the file. A newer program reads older ones, or says that it does not.
+/// Format version of the file. A newer program reads older formats or rejects them explicitly.
 const FORMAT: u64 = 1;
-/// Memory for parts of the file, in octets. A map of 1024 x 1024 cells fits.
+/// Size of the page cache in octets. A map of 1024 x 1024 cells fits.
 const CACHE: usize = 4 << 20;
 
 const NUMBERS: TableDefinition<'_, &str, u64> = TableDefinition::new("numbers");
 const OBJECTS: TableDefinition<'_, u32, &[u8]> = TableDefinition::new("objects");
 const CLASSES: TableDefinition<'_, u16, &str> = TableDefinition::new("classes");
 const RASTERS: TableDefinition<'_, u16, &[u8]> = TableDefinition::new("rasters");
-/// By map, row and column of the tile.
+/// Key: map, row and column of the tile.
 const TILES: TableDefinition<'_, (u16, u16, u16), &[u8]> = TableDefinition::new("tiles");
 
-/// A number that is counted up and never used again.
+/// A counter whose values are never reused.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Counter {
     LastObject,
@@ -48,30 +47,30 @@ impl Counter {
     }
 }
 
-/// Why a file can not be used. Whatever it is, the file is as it was.
+/// Why a file cannot be opened. The file is left unchanged.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OpenError {
-    /// It can not be read or written.
+    /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The cause.
         source: io::Error,
     },
-    /// Another process has it.
+    /// Another process has the file open.
     #[error("{}: another process has this store open; end that one or use another file", .0.display())]
     InUse(PathBuf),
-    /// It is damaged, or no store.
+    /// The file is damaged or not a store.
     #[error("{}: this is no store, or it is damaged: {why}", path.display())]
     Broken {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The cause.
         why: String,
     },
-    /// It was written by a newer version of this program.
+    /// The file was written by a newer version of this program.
     #[error(
         "{}: the store has format {found}, and this program knows formats up to {FORMAT}; use a newer one",
         path.display()
@@ -79,7 +78,7 @@ pub enum OpenError {
     Newer {
         /// The file.
         path: PathBuf,
-        /// Its format.
+        /// Its format version.
         found: u64,
     },
 }
@@ -100,7 +99,7 @@ impl OpenError {
     }
 }
 
-/// Why something could not be kept or read. The file is as it was before; it has to be opened again.
+/// Error: data cannot be written or read. The file is unchanged and must be opened again.
 #[derive(Debug, thiserror::Error)]
 #[error("the store can not be read or written: {0}")]
 pub struct KeepError(String);
@@ -116,13 +115,13 @@ impl KeepError {
         Self(error.to_string())
     }
 
-    /// What is said to whoever still wants something after the first failure.
+    /// The error for requests after the first failure.
     pub(super) fn closed() -> Self {
         Self("it has failed before and is closed".to_owned())
     }
 }
 
-/// Everything but cells, as it was kept.
+/// Everything but the cells, as loaded from the file.
 #[derive(Default)]
 pub(super) struct Loaded {
     pub(super) objects: Collection,
@@ -139,7 +138,7 @@ pub(super) struct File {
 }
 
 impl File {
-    /// Opens a file, and makes it if it is not there.
+    /// Opens a file, or creates it if it does not exist.
     pub(super) fn open(path: &Path) -> Result<(Self, Loaded), OpenError> {
         match fs::metadata(path) {
             Ok(_) => Self::check(path, builder().open(path)),
@@ -148,7 +147,8 @@ impl File {
         }
     }
 
-    /// Makes a file under another name first, so that a power cut leaves it whole or not there.
+    /// Creates the file under a temporary name first, so that after a power cut it is complete or
+    /// absent.
     fn create(path: &Path) -> Result<(Self, Loaded), OpenError> {
         let fail = |error| OpenError::io(path, error);
         let directory = path.parent().filter(|it| !it.as_os_str().is_empty());
@@ -166,7 +166,7 @@ impl File {
         Ok(made)
     }
 
-    /// Opens what is kept elsewhere than in a file.
+    /// Opens a store on another backend than a file.
     pub(super) fn on(backend: impl StorageBackend) -> Result<(Self, Loaded), OpenError> {
         Self::check(
             Path::new("(not a file)"),
@@ -204,7 +204,7 @@ impl File {
         Ok((file, loaded))
     }
 
-    /// The format of the file, which is written into a new one.
+    /// The format version of the file. Initialises a new file.
     fn format(&self) -> Result<u64, KeepError> {
         const KEY: &str = "format";
         let reading = self.database.begin_read()?;
@@ -263,7 +263,7 @@ impl File {
         })
     }
 
-    /// The cells of a window that is on the map.
+    /// The cells of a window within the map.
     pub(super) fn cells(&self, map: MapId, fill: u8, window: Window) -> Result<Vec<u8>, KeepError> {
         let tiles = self.database.begin_read()?.open_table(TILES)?;
         let mut cells = vec![fill; window.cells()];
@@ -276,7 +276,7 @@ impl File {
         Ok(cells)
     }
 
-    /// Begins a change, which has not happened until it is [kept](Writing::keep).
+    /// Begins a change. It takes effect when it is [kept](Writing::keep).
     pub(super) fn begin(&self) -> Result<Writing, KeepError> {
         Ok(Writing {
             transaction: self.database.begin_write()?,
@@ -284,7 +284,7 @@ impl File {
     }
 }
 
-/// A change on its way to the disk; dropped before its end, it has not happened.
+/// A pending change. Dropping it discards it.
 pub(super) struct Writing {
     transaction: WriteTransaction,
 }
@@ -302,7 +302,7 @@ impl Writing {
         Ok(())
     }
 
-    /// `None` forgets it.
+    /// Sets the description of a class; `None` deletes it.
     pub(super) fn describe(&self, class: u16, text: Option<&str>) -> Result<(), KeepError> {
         let mut classes = self.transaction.open_table(CLASSES)?;
         match text {
@@ -319,7 +319,7 @@ impl Writing {
         Ok(())
     }
 
-    /// With all its tiles.
+    /// Removes a map with all its tiles.
     pub(super) fn remove_raster(&self, id: MapId) -> Result<(), KeepError> {
         self.transaction.open_table(RASTERS)?.remove(id.0)?;
         let mut tiles = self.transaction.open_table(TILES)?;
@@ -327,7 +327,7 @@ impl Writing {
         Ok(())
     }
 
-    /// Sets the cells of a window that is on the map.
+    /// Sets the cells of a window within the map.
     pub(super) fn put_cells(
         &self,
         map: MapId,
@@ -359,7 +359,7 @@ impl Writing {
         Ok(())
     }
 
-    /// Returns once all of it is on the disk.
+    /// Commits the change. Returns once it is on disk.
     pub(super) fn keep(self) -> Result<(), KeepError> {
         Ok(self.transaction.commit()?)
     }
@@ -380,7 +380,7 @@ fn whole(tile: &[u8]) -> Result<&[u8], KeepError> {
     }
 }
 
-/// Has the disk keep which files there are. Only Unix needs and knows it.
+/// Flushes the directory entry to disk. Needed and supported only on Unix.
 fn sync(directory: &Path) -> io::Result<()> {
     if cfg!(unix) {
         fs::File::open(directory)?.sync_all()?;

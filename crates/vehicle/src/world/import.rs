@@ -1,75 +1,75 @@
-//! Maps from files that people make: PGM pictures, and text.
+//! Import of maps from PGM images and text files.
 //!
-//! In a PGM picture (`P2` or `P5`) black is impassable and white is free. In text each line is a row:
-//! `#` is impassable, `.` and a blank are free, `0` to `9` are in between. North is at the top.
+//! In a PGM image (`P2` or `P5`) black is impassable and white is free. In text each line is a row:
+//! `#` is impassable, `.` and space are free, `0` to `9` are in between. North is at the top.
 
 use super::raster::Raster;
 
-/// The cells of a map, without its place.
+/// The cells of a map, without its position.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
-    /// From south to north.
+    /// Number of rows, from south to north.
     pub rows: u16,
-    /// From west to east.
+    /// Number of columns, from west to east.
     pub columns: u16,
-    /// Row by row from the south.
+    /// The cells, row by row from the south.
     pub cells: Vec<u8>,
 }
 
-/// Why a file is no map.
+/// Why a file is not a valid map.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
-    /// The head of a picture can not be read.
+    /// The header of an image is invalid.
     #[error(
         "the picture's head is not that of a PGM file: P2 or P5, width, height, greatest value up to 65535"
     )]
     Head,
-    /// There are no cells or too many.
+    /// The map has no cells or too many.
     #[error("{rows} rows and {columns} columns can not be a map: 1 to 4096 of each can")]
     Size {
-        /// Of the file.
+        /// Number of rows in the file.
         rows: usize,
-        /// Of the file.
+        /// Number of columns in the file.
         columns: usize,
     },
-    /// The picture ends too early, or has something that is no value.
+    /// The image ends early or contains an invalid value.
     #[error("the picture has {found} values that can be read instead of {wanted}")]
     Cells {
         /// Width times height.
         wanted: usize,
-        /// How many there are.
+        /// Number of valid values.
         found: usize,
     },
-    /// A line is shorter or longer than the first.
+    /// A line differs in length from the first.
     #[error(
         "line {line} has {found} cells instead of {wanted} as the first; make them equally long"
     )]
     Line {
-        /// From 1.
+        /// Line number, starting at 1.
         line: usize,
-        /// As the first line has.
+        /// Number of cells in the first line.
         wanted: usize,
-        /// In this line.
+        /// Number of cells in this line.
         found: usize,
     },
-    /// A character does not stand for a cell.
+    /// A character does not represent a cell.
     #[error(
         "line {line}: '{found}' is no cell; write # for impassable, . for free, 0 to 9 for in between"
     )]
     Character {
-        /// From 1.
+        /// Line number, starting at 1.
         line: usize,
-        /// What it is.
+        /// The character.
         found: char,
     },
 }
 
 impl Picture {
-    /// Reads the octets of a file.
+    /// Reads the content of a file.
     ///
     /// # Errors
-    /// What is wrong with the file.
+    /// If the file is not a valid map.
     pub fn read(octets: &[u8]) -> Result<Self, ImportError> {
         match octets {
             [b'P', b'2' | b'5', b' ' | b'\t' | b'\r' | b'\n' | b'#', ..] => read_pgm(octets),
@@ -77,7 +77,7 @@ impl Picture {
         }
     }
 
-    /// The map of 16 x 16 cells that a vehicle is shown on: two walls with gaps, and rough ground.
+    /// The demonstration map of 16 x 16 cells: two walls with gaps, and rough ground.
     #[must_use]
     pub fn demo() -> Self {
         read_text(DEMO).unwrap_or(Self {
@@ -87,7 +87,7 @@ impl Picture {
         })
     }
 
-    /// The map at a place.
+    /// The map at a position.
     #[must_use]
     pub fn at(&self, name: String, cell: f32, (x, y): (f64, f64)) -> Raster {
         Raster {
@@ -102,7 +102,7 @@ impl Picture {
         }
     }
 
-    /// From cells whose first row is the northernmost.
+    /// Creates a picture from cells whose first row is the northernmost.
     fn from_north(rows: usize, columns: usize, cells: &[u8]) -> Result<Self, ImportError> {
         let side = |count: usize| {
             u16::try_from(count)
@@ -198,7 +198,7 @@ fn read_pgm(octets: &[u8]) -> Result<Picture, ImportError> {
     let wanted = rows * columns;
     let scaled = |value: usize| (value.min(greatest) * 255 / greatest) as u8;
     let cells: Vec<u8> = if binary {
-        // One blank ends the head.
+        // One whitespace octet ends the header.
         let values = rest.get(1..).unwrap_or_default();
         let size = if greatest > 255 { 2 } else { 1 };
         let values = values.chunks_exact(size);
@@ -219,7 +219,7 @@ fn read_pgm(octets: &[u8]) -> Result<Picture, ImportError> {
     Picture::from_north(rows, columns, &cells)
 }
 
-/// The next number of a picture's text, past blanks and comments.
+/// Reads the next number of an image, skipping whitespace and comments.
 fn next_number(rest: &mut &[u8]) -> Option<usize> {
     loop {
         match rest.first()? {

@@ -1,20 +1,19 @@
-//! What is known about the surroundings: objects on the globe, and maps of equal cells, kept in a file
-//! that survives power cuts.
+//! World model: objects on the globe and raster maps, stored in a file that survives power cuts.
 //!
-//! A [`World`] is opened from a file and changed by [`Change`]s, several at a time if several wait. A
-//! change is on the disk when [`World::apply`] returns; if the power fails before that, it has not
-//! happened. Nothing here knows of messages or of time.
+//! A [`World`] is opened from a file and changed by [`Change`]s, several at a time if several wait.
+//! A change is on disk when [`World::apply`] returns. If the power fails before that, the change
+//! has no effect. Nothing here handles messages or time.
 //!
-//! | room | what it knows |
+//! | module | contents |
 //! |---|---|
-//! | `object` | points, lines and polygons, and what they are |
-//! | `shape` | whether two of them meet |
-//! | `selection` | which objects somebody means |
-//! | `collection` | all objects, with an index over space |
+//! | `object` | points, lines and polygons, and their feature classes |
+//! | `shape` | whether two shapes meet |
+//! | `selection` | conditions that select objects |
+//! | `collection` | all objects, with a spatial index |
 //! | `raster` | maps of cells, their windows and tiles |
 //! | `traversability` | the cells of a map as objects |
-//! | `import` | maps from pictures and text |
-//! | `file` | what is on the disk and how |
+//! | `import` | maps from images and text |
+//! | `file` | the file and its format |
 
 mod change;
 mod collection;
@@ -41,5 +40,5 @@ pub use raster::{MapId, Raster, Window};
 pub use selection::{Region, Selection};
 pub use traversability::as_objects;
 
-/// For tests and for other places to keep a world in than a file.
+/// For tests, and for stores on other backends than a file.
 pub use redb::StorageBackend;

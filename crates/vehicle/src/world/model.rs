@@ -1,4 +1,4 @@
-//! A world: what is known, in memory for answers and in the file for good.
+//! The world: objects and maps, held in memory for queries and in the file for durability.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,8 +15,8 @@ use super::selection::Selection;
 
 /// Objects, feature classes and maps.
 ///
-/// Objects and descriptions are in memory, at most some tens of megabytes; cells stay in the file
-/// and are fetched when somebody asks.
+/// Objects and descriptions are in memory and take at most some tens of megabytes. Cells remain in
+/// the file and are read on demand.
 #[derive(Debug)]
 pub struct World {
     file: File,
@@ -29,25 +29,25 @@ pub struct World {
 }
 
 impl World {
-    /// The most maps.
+    /// Maximum number of maps.
     pub const MOST_MAPS: usize = 256;
-    /// The most cells of all maps together: four of the greatest.
+    /// Maximum number of cells of all maps together: four maps of maximum size.
     pub const MOST_CELLS: usize = 4 * 4096 * 4096;
-    /// The most octets of the description of one feature class.
+    /// Maximum size of the description of a feature class in octets.
     pub const MOST_DESCRIPTION: usize = u16::MAX as usize;
-    /// The most feature classes with a description.
+    /// Maximum number of feature classes with a description.
     pub const MOST_CLASSES: usize = 256;
 
-    /// Opens the file of a world, or makes an empty one. A file that was being written when the power
-    /// failed is put right on the way.
+    /// Opens the file of a world, or creates an empty one. Recovers a file that was being written
+    /// during a power cut.
     ///
     /// # Errors
-    /// If the file is no store, is damaged, or can not be used; it is left as it is.
+    /// If the file is not a store, is damaged, or cannot be used. It is left unchanged.
     pub fn open(path: &Path) -> Result<Self, OpenError> {
         File::open(path).map(Self::new)
     }
 
-    /// Opens a world that is kept elsewhere than in a file.
+    /// Opens a world on another backend than a file.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -67,19 +67,19 @@ impl World {
         }
     }
 
-    /// The objects.
+    /// All objects.
     #[must_use]
     pub const fn objects(&self) -> &Collection {
         &self.objects
     }
 
-    /// One object.
+    /// The object with this number.
     #[must_use]
     pub fn object(&self, id: ObjectId) -> Option<&Arc<Object>> {
         self.objects.get(id)
     }
 
-    /// What is known about feature classes.
+    /// The descriptions of feature classes.
     #[must_use]
     pub const fn classes(&self) -> &BTreeMap<u16, String> {
         &self.classes
@@ -94,7 +94,7 @@ impl World {
     /// The cells of a window, row by row from the south.
     ///
     /// # Errors
-    /// If there is no such map, the window is not on it, or the file can not be read.
+    /// If the map does not exist, the window extends beyond it, or the file cannot be read.
     pub fn cells(&self, map: MapId, window: Window) -> Result<Result<Vec<u8>, Refusal>, KeepError> {
         let window = self.raster(map).and_then(|raster| {
             let on_it = inside(raster, window)?;
@@ -106,19 +106,19 @@ impl World {
         }
     }
 
-    /// Whether a change could not be kept. Then what is in memory may not be what is in the file, and
-    /// the world has to be opened again.
+    /// Whether writing a change has failed. Memory and file may then differ, and the world must be
+    /// opened again.
     #[must_use]
     pub const fn has_failed(&self) -> bool {
         self.failed
     }
 
-    /// Makes changes, all in one write; they are on the disk when this returns. One that is refused
-    /// does not keep the others from being made. Takes a few milliseconds, for the disk.
+    /// Applies changes in a single write. They are on disk when this returns. A refused change does
+    /// not affect the others. Takes a few milliseconds of disk time.
     ///
     /// # Errors
-    /// If the file can not be written: then none of them is made, and the world
-    /// [has failed](Self::has_failed).
+    /// If the file cannot be written. Then no change is applied, and the world [has
+    /// failed](Self::has_failed).
     pub fn apply(&mut self, changes: Vec<Change>) -> Result<Vec<Result<Done, Refusal>>, KeepError> {
         if self.failed {
             return Err(KeepError::closed());
@@ -262,7 +262,7 @@ impl World {
         Ok(())
     }
 
-    /// The next number; after 65535 maps, the next that is free.
+    /// The next number. After 65535 maps, the next free one.
     fn next_map(&self) -> MapId {
         let mut next = self.last_map;
         loop {

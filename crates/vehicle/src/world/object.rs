@@ -1,16 +1,16 @@
-//! Objects on the globe: what they are, where, and which feature classes they belong to.
+//! Objects on the globe: geometry, location and feature classes.
 
 use std::fmt;
 
 use deku::prelude::*;
 
-/// The number that a store gives an object: from 1 to [`LAST`](Self::LAST).
+/// The number of an object in the store: from 1 to [`LAST`](Self::LAST).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ObjectId(pub u32);
 
 impl ObjectId {
-    /// The greatest number that an object is given; those above are left to whoever derives objects
-    /// from something else.
+    /// The greatest number of a stored object. Higher numbers are reserved for objects derived from
+    /// other data.
     pub const LAST: Self = Self(0x7FFF_FFFF);
 }
 
@@ -20,7 +20,7 @@ impl fmt::Display for ObjectId {
     }
 }
 
-/// A place on the globe, in the steps of the messages, which therefore lose nothing.
+/// A position on the globe in the resolution of the messages, so that conversion is lossless.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, DekuRead, DekuWrite)]
 #[deku(endian = "endian", ctx = "endian: deku::ctx::Endian")]
 pub struct Place {
@@ -31,10 +31,10 @@ pub struct Place {
 }
 
 impl Place {
-    /// Steps from one limit of a range to the other.
+    /// Number of steps between the limits of a range.
     const STEPS: f64 = u32::MAX as f64;
 
-    /// The nearest place that can be told; beyond a pole that is the pole.
+    /// The nearest representable position. Latitudes beyond a pole become the pole.
     #[must_use]
     pub fn from_degrees(latitude: f64, longitude: f64) -> Self {
         let steps = |degrees: f64, range: f64| (degrees * (Self::STEPS / range)).round() as i32;
@@ -55,51 +55,51 @@ impl Place {
     }
 }
 
-/// What the points of an object are.
+/// The interpretation of an object's points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, DekuRead, DekuWrite)]
 #[deku(id_type = "u8", endian = "endian", ctx = "endian: deku::ctx::Endian")]
 pub enum Geometry {
-    /// One point.
+    /// A single point.
     #[default]
     #[deku(id = "0")]
     Point,
-    /// Points joined in their order.
+    /// A polyline through the points in order.
     #[deku(id = "1")]
     Line,
-    /// What the points enclose; the last is joined to the first.
+    /// The area enclosed by the points. The last point connects to the first.
     #[deku(id = "2")]
     Polygon,
 }
 
-/// A value that goes with a feature class.
+/// The attribute value of a feature class.
 #[derive(Debug, Clone, Copy, PartialEq, DekuRead, DekuWrite)]
 #[deku(id_type = "u8", endian = "endian", ctx = "endian: deku::ctx::Endian")]
 pub enum Attribute {
-    /// One octet.
+    /// One octet, unsigned.
     #[deku(id = "0")]
     Byte(u8),
-    /// Two octets.
+    /// Two octets, signed.
     #[deku(id = "1")]
     Short(i16),
-    /// Four octets.
+    /// Four octets, signed.
     #[deku(id = "2")]
     Integer(i32),
-    /// Eight octets.
+    /// Eight octets, signed.
     #[deku(id = "3")]
     Long(i64),
-    /// Two octets, not negative.
+    /// Two octets, unsigned.
     #[deku(id = "4")]
     UnsignedShort(u16),
-    /// Four octets, not negative.
+    /// Four octets, unsigned.
     #[deku(id = "5")]
     UnsignedInteger(u32),
-    /// Eight octets, not negative.
+    /// Eight octets, unsigned.
     #[deku(id = "6")]
     UnsignedLong(u64),
-    /// A real number.
+    /// A single-precision number.
     #[deku(id = "7")]
     Float(f32),
-    /// A real number of double precision.
+    /// A double-precision number.
     #[deku(id = "8")]
     LongFloat(f64),
     /// Red, green, blue.
@@ -113,44 +113,44 @@ impl Default for Attribute {
     }
 }
 
-/// A class that an object belongs to.
+/// Membership of an object in a feature class.
 #[derive(Debug, Clone, Copy, PartialEq, Default, DekuRead, DekuWrite)]
 #[deku(endian = "endian", ctx = "endian: deku::ctx::Endian")]
 pub struct FeatureClass {
-    /// Its number.
+    /// Number of the class.
     pub id: u16,
-    /// What is known about the object as one of the class.
+    /// Attribute of the object in this class.
     pub attribute: Attribute,
 }
 
 impl FeatureClass {
-    /// Stands for all classes where a class is asked for.
+    /// Stands for all classes in queries.
     pub const ALL: u16 = u16::MAX;
-    /// How well a place can be driven on: a byte, 0 impassable to 255 free.
+    /// Traversability class: a byte, from 0 for impassable to 255 for free.
     pub const TRAVERSABILITY: u16 = 1;
 }
 
 /// A point, a line or a polygon.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Object {
-    /// What the points are.
+    /// Interpretation of the points.
     pub geometry: Geometry,
-    /// How far it reaches beyond its points, in metres.
+    /// Buffer around the points, in metres.
     pub buffer: f32,
-    /// The classes that it belongs to.
+    /// The classes of the object.
     pub classes: Vec<FeatureClass>,
-    /// Where it is.
+    /// The points.
     pub points: Vec<Place>,
 }
 
 impl Object {
-    /// The most classes of one object.
+    /// Maximum number of classes of one object.
     pub const MOST_CLASSES: usize = u8::MAX as usize;
-    /// The most points of one object.
+    /// Maximum number of points of one object.
     pub const MOST_POINTS: usize = u16::MAX as usize;
 
-    /// Whether it is an object: a point has one point, a line two or more, a polygon three or more,
-    /// and the buffer is a distance.
+    /// Whether the object is valid: a point has one point, a line two or more, a polygon three or
+    /// more, and the buffer is finite and not negative.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         let points = self.points.len();
@@ -166,7 +166,7 @@ impl Object {
             && self.buffer >= 0.0
     }
 
-    /// Whether it belongs to a class, or to any if that is [`FeatureClass::ALL`].
+    /// Whether the object belongs to a class. [`FeatureClass::ALL`] matches every object.
     #[must_use]
     pub fn belongs_to(&self, class: u16) -> bool {
         class == FeatureClass::ALL || self.classes.iter().any(|it| it.id == class)

@@ -1,8 +1,8 @@
-//! Maps of equal cells: what is known about one, and which part of it somebody means.
+//! Raster maps and windows of their cells.
 
 use std::fmt;
 
-/// The number that a store gives a map, from 1 on.
+/// The number of a map in the store, starting at 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MapId(pub u16);
 
@@ -12,42 +12,43 @@ impl fmt::Display for MapId {
     }
 }
 
-/// A rectangle of the local frame in equal square cells, one octet each: 0 is impassable, 255 free.
+/// A rectangle of the local frame divided into equal square cells of one octet each: 0 is
+/// impassable, 255 free.
 ///
-/// Rows grow with X, to the north, columns with Y, to the east.
+/// Rows grow with X, to the north; columns with Y, to the east.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Raster {
-    /// What it is called: at most 255 octets.
+    /// Name, at most 255 octets.
     pub name: String,
-    /// From south to north, 1 to [`MOST_SIDE`](Self::MOST_SIDE).
+    /// Number of rows from south to north, 1 to [`MOST_SIDE`](Self::MOST_SIDE).
     pub rows: u16,
-    /// From west to east, 1 to [`MOST_SIDE`](Self::MOST_SIDE).
+    /// Number of columns from west to east, 1 to [`MOST_SIDE`](Self::MOST_SIDE).
     pub columns: u16,
     /// Side of a cell in metres, 0.001 to 1000.
     pub cell: f32,
-    /// The south-western corner: X in metres.
+    /// X of the south-west corner in metres.
     pub x: f64,
-    /// The south-western corner: Y in metres.
+    /// Y of the south-west corner in metres.
     pub y: f64,
-    /// What cells are that nobody has set.
+    /// Value of cells that were never set.
     pub fill: u8,
-    /// Counts the changes, from 1 on.
+    /// Number of the current revision, starting at 1.
     pub revision: u32,
 }
 
 impl Raster {
-    /// The most rows, and the most columns.
+    /// Maximum number of rows and of columns.
     pub const MOST_SIDE: u16 = 4096;
-    /// The most octets of a name.
+    /// Maximum length of a name in octets.
     pub const MOST_NAME: usize = 255;
 
-    /// How many cells it has.
+    /// Number of cells.
     #[must_use]
     pub fn cells(&self) -> usize {
         usize::from(self.rows) * usize::from(self.columns)
     }
 
-    /// All of it.
+    /// The window that covers the whole map.
     #[must_use]
     pub const fn whole(&self) -> Window {
         Window {
@@ -58,7 +59,7 @@ impl Raster {
         }
     }
 
-    /// What is wrong with it, if anything.
+    /// Describes what is invalid, if anything.
     pub(super) fn fault(&self) -> Option<String> {
         let side = 1..=Self::MOST_SIDE;
         if !side.contains(&self.rows) || !side.contains(&self.columns) {
@@ -84,7 +85,8 @@ impl Raster {
         (self.name.len() > Self::MOST_NAME).then(|| "the name is longer than 255 octets".to_owned())
     }
 
-    /// A part of the map, with 0 rows or columns for all that follow; `None` if it is not on it.
+    /// Resolves a window, where 0 rows or columns mean all that follow. `None` if it extends beyond
+    /// the map.
     #[must_use]
     pub fn window(&self, asked: Window) -> Option<Window> {
         let span = |first: u16, count: u16, all: u16| match count {
@@ -106,14 +108,14 @@ pub struct Window {
     pub row: u16,
     /// The westernmost column.
     pub column: u16,
-    /// How many rows.
+    /// Number of rows.
     pub rows: u16,
-    /// How many columns.
+    /// Number of columns.
     pub columns: u16,
 }
 
 impl Window {
-    /// How many cells it has.
+    /// Number of cells.
     #[must_use]
     pub fn cells(&self) -> usize {
         usize::from(self.rows) * usize::from(self.columns)

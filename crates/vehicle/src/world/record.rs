@@ -1,5 +1,5 @@
-//! Objects and maps as octets in the file, little-endian. What changes here changes the version of
-//! the file.
+//! Binary records of objects and maps in the file, little-endian. Changing a layout requires a new
+//! format version of the file.
 
 use deku::prelude::*;
 
@@ -34,7 +34,7 @@ struct RasterRecord {
     revision: u32,
 }
 
-/// The octets of a sound object.
+/// Encodes a valid object.
 pub(super) fn write_object(object: &Object) -> Result<Vec<u8>, DekuError> {
     let record = ObjectRecord {
         geometry: object.geometry,
@@ -47,7 +47,7 @@ pub(super) fn write_object(object: &Object) -> Result<Vec<u8>, DekuError> {
     record.to_bytes()
 }
 
-/// The object, if these are the octets of one.
+/// Decodes an object.
 pub(super) fn read_object(octets: &[u8]) -> Result<Object, DekuError> {
     let record = ObjectRecord::try_from(octets)?;
     Ok(Object {
@@ -58,7 +58,7 @@ pub(super) fn read_object(octets: &[u8]) -> Result<Object, DekuError> {
     })
 }
 
-/// The octets of a sound map, without its cells.
+/// Encodes a valid map, without its cells.
 pub(super) fn write_raster(raster: &Raster) -> Result<Vec<u8>, DekuError> {
     let record = RasterRecord {
         name_length: raster.name.len() as u8,
@@ -74,7 +74,7 @@ pub(super) fn write_raster(raster: &Raster) -> Result<Vec<u8>, DekuError> {
     record.to_bytes()
 }
 
-/// The map, if these are the octets of one.
+/// Decodes a map, without its cells.
 pub(super) fn read_raster(octets: &[u8]) -> Result<Raster, DekuError> {
     let record = RasterRecord::try_from(octets)?;
     Ok(Raster {

@@ -1,37 +1,37 @@
-//! Which objects somebody means: by number, by where they are, by what they are.
+//! Selection of objects by number, location and class.
 
 use super::object::{Attribute, FeatureClass, Geometry, Object, ObjectId, Place};
 use super::shape::Shape;
 
-/// Conditions that all must hold; without any, every object is meant.
+/// Conditions that must all hold. Without conditions, every object is selected.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Selection {
-    /// Only these.
+    /// Only these objects.
     pub ids: Option<Vec<ObjectId>>,
-    /// Only what meets this region.
+    /// Only objects that meet this region.
     pub region: Option<Region>,
-    /// Only what belongs to this class; [`FeatureClass::ALL`] is any.
+    /// Only objects of this class. [`FeatureClass::ALL`] matches any.
     pub class: Option<u16>,
-    /// Only what has this attribute, in that class if one is given.
+    /// Only objects with this attribute, in the given class if there is one.
     pub attribute: Option<Attribute>,
 }
 
-/// A part of the globe.
+/// A region of the globe.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Region {
-    /// What the points are.
+    /// Interpretation of the points.
     pub geometry: Geometry,
-    /// How far it reaches beyond its points, in metres.
+    /// Buffer around the points, in metres.
     pub buffer: f32,
-    /// Where it is; from 1 to [`MOST_POINTS`](Self::MOST_POINTS).
+    /// The points, from 1 to [`MOST_POINTS`](Self::MOST_POINTS).
     pub points: Vec<Place>,
 }
 
 impl Region {
-    /// The most points, so that looking whether an object meets a region does not take seconds.
+    /// Maximum number of points, so that testing an object against a region does not take seconds.
     pub const MOST_POINTS: usize = 128;
 
-    /// Whether it is a region that can be looked for.
+    /// Whether the region is valid.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         let few = (1..=Self::MOST_POINTS).contains(&self.points.len());
@@ -50,13 +50,13 @@ impl Region {
 }
 
 impl Selection {
-    /// Whether it can be looked for: its region is one.
+    /// Whether the selection is valid, which depends on its region.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         self.region.as_ref().is_none_or(Region::is_sound)
     }
 
-    /// Whether all but the number holds for an object.
+    /// Whether all conditions but the number hold for an object.
     pub(super) fn describes(&self, object: &Object) -> bool {
         let class = self.class.is_none_or(|class| object.belongs_to(class));
         let has = |wanted: Attribute| {

@@ -1,21 +1,21 @@
-//! Whether what two sets of points describe meets, on a plane that touches the globe near them.
+//! Intersection test of two shapes, on a plane tangent to the globe near them.
 
 use super::object::{Geometry, Place};
 
-/// Metres in a degree of latitude on a globe of the mean radius of the earth.
+/// Metres per degree of latitude, for the mean radius of the earth.
 pub(super) const METRES_PER_DEGREE: f64 = 111_195.0;
 
-/// Metres north and east of somewhere.
+/// Metres north and east of the origin.
 type Point = [f64; 2];
 
-/// Points on a plane and what they are.
+/// Points on a plane, and their interpretation.
 pub(super) struct Shape {
     geometry: Geometry,
     points: Vec<Point>,
 }
 
 impl Shape {
-    /// A shape on the plane that touches the globe at `origin`.
+    /// Projects a shape onto the plane tangent to the globe at `origin`.
     pub(super) fn new(geometry: Geometry, places: &[Place], origin: Place) -> Self {
         let (latitude, longitude) = origin.degrees();
         let shrink = latitude.to_radians().cos();
@@ -32,7 +32,7 @@ impl Shape {
         }
     }
 
-    /// Whether the two come as close to each other as `reach` metres.
+    /// Whether the distance between two shapes is at most `reach` metres.
     pub(super) fn meets(&self, other: &Self, reach: f64) -> bool {
         self.holds_some_of(other) || other.holds_some_of(self) || {
             let reach = reach * reach;
@@ -43,8 +43,8 @@ impl Shape {
         }
     }
 
-    /// Whether this encloses a point of the other. If it encloses one of a connected shape, either
-    /// it encloses all of it or their edges cross; so the first will do.
+    /// Whether this shape encloses a point of the other. For a connected shape the first point
+    /// suffices: if any point is enclosed, either all are or the edges cross.
     fn holds_some_of(&self, other: &Self) -> bool {
         self.geometry == Geometry::Polygon
             && other.points.first().is_some_and(|point| self.holds(*point))
@@ -58,7 +58,7 @@ impl Shape {
         crossings.count() % 2 == 1
     }
 
-    /// The lines between neighbouring points; a lone point is a line without length.
+    /// The edges between consecutive points. A single point is an edge of zero length.
     fn edges(&self) -> impl Iterator<Item = [Point; 2]> + '_ {
         let closing = match (self.geometry, self.points.first(), self.points.last()) {
             (Geometry::Polygon, Some(&first), Some(&last)) => Some([last, first]),
@@ -70,12 +70,12 @@ impl Shape {
     }
 }
 
-/// A difference of longitudes the short way around the globe.
+/// A difference of longitudes, taken the short way around the globe.
 fn around(degrees: f64) -> f64 {
     (degrees + 180.0).rem_euclid(360.0) - 180.0
 }
 
-/// The square of the distance between two edges.
+/// The squared distance between two edges.
 fn between_edges(a: Point, b: Point, c: Point, d: Point) -> f64 {
     if cross(a, b, c, d) {
         return 0.0;
@@ -89,18 +89,18 @@ fn between_edges(a: Point, b: Point, c: Point, d: Point) -> f64 {
     ends.into_iter().fold(f64::INFINITY, f64::min)
 }
 
-/// Whether each edge has its ends on both sides of the other.
+/// Whether each edge has its ends on different sides of the other.
 fn cross(a: Point, b: Point, c: Point, d: Point) -> bool {
     let apart = |a, b, c, d| side(a, b, c) * side(a, b, d) < 0.0;
     apart(a, b, c, d) && apart(c, d, a, b)
 }
 
-/// On which side of the line from `a` to `b` a point is.
+/// The side of the line from `a` to `b` on which a point lies, as the sign.
 fn side(a: Point, b: Point, point: Point) -> f64 {
     (b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0])
 }
 
-/// The square of the distance from a point to an edge.
+/// The squared distance from a point to an edge.
 fn to_edge(point: Point, a: Point, b: Point) -> f64 {
     let along = [b[0] - a[0], b[1] - a[1]];
     let from = [point[0] - a[0], point[1] - a[1]];

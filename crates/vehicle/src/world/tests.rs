@@ -1,4 +1,4 @@
-//! A world that is changed, closed and opened again.
+//! A world that is changed, closed and reopened.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use bytes::Bytes;
 
 use super::*;
 
-/// A directory of a test, which is gone afterwards.
+/// A test directory, deleted afterwards.
 struct Directory(PathBuf);
 
 impl Directory {
@@ -223,7 +223,7 @@ fn objects_are_found_by_what_and_where_they_are() {
     assert_eq!(found(attribute_of_any), [1, 2]);
     let square = [(9.5, 9.5), (9.5, 10.5), (10.5, 10.5), (10.5, 9.5)];
     assert_eq!(found(region(Geometry::Polygon, &square, 0.0)), [1]);
-    // Half a degree of longitude is 54.7 km there.
+    // Half a degree of longitude is 54.7 km at this latitude.
     assert_eq!(found(region(Geometry::Polygon, &square, 54_000.0)), [1]);
     assert_eq!(found(region(Geometry::Polygon, &square, 55_500.0)), [1, 2]);
     assert_eq!(

@@ -1,25 +1,25 @@
-//! Maps are kept in square tiles, so that a change writes what it changes and little else, and cells
-//! that nobody has set take no room.
+//! Square tiles in which map cells are stored. A change writes little beyond the changed cells, and
+//! cells that were never set take no space.
 
 use super::raster::Window;
 
-/// Cells in a row of a tile, and rows in it.
+/// Number of rows and columns of a tile.
 pub(super) const SIDE: u16 = 32;
-/// Cells of a tile.
+/// Number of cells of a tile.
 pub(super) const CELLS: usize = SIDE as usize * SIDE as usize;
 
-/// A tile's row and column among the tiles of a map.
+/// Row and column of a tile within its map.
 pub(super) type TileId = (u16, u16);
 
-/// What a window and a tile have in common, row by row.
+/// The intersection of a window and a tile, row by row.
 pub(super) struct Overlap {
-    /// Which tile.
+    /// The tile.
     pub(super) tile: TileId,
     window: Window,
     common: Window,
 }
 
-/// All tiles that a window touches, in the order in which they are kept.
+/// All tiles that a window touches, in storage order.
 pub(super) fn overlaps(window: Window) -> impl Iterator<Item = Overlap> {
     let tiles = |first: u16, count: u16| {
         let last = first + count.saturating_sub(1);
@@ -53,21 +53,21 @@ impl Overlap {
         }
     }
 
-    /// Copies the common cells from the window's into the tile's.
+    /// Copies the common cells from the window to the tile.
     pub(super) fn put(&self, cells: &[u8], tile: &mut [u8]) {
         for (in_tile, in_window) in self.runs() {
             tile[in_tile].copy_from_slice(&cells[in_window]);
         }
     }
 
-    /// Copies the common cells from the tile's into the window's.
+    /// Copies the common cells from the tile to the window.
     pub(super) fn take(&self, tile: &[u8], cells: &mut [u8]) {
         for (in_tile, in_window) in self.runs() {
             cells[in_window].copy_from_slice(&tile[in_tile]);
         }
     }
 
-    /// The common cells of each row: where they are in the tile, and where in the window.
+    /// The index ranges of the common cells of each row, in the tile and in the window.
     fn runs(&self) -> impl Iterator<Item = (std::ops::Range<usize>, std::ops::Range<usize>)> {
         let (common, window) = (self.common, self.window);
         let length = usize::from(common.columns);

@@ -1,13 +1,12 @@
-//! The cells of a map as objects, for those who know objects only.
+//! Raster map cells as vector objects, for clients that support only objects.
 
 use super::object::{Attribute, FeatureClass, Geometry, Object, ObjectId, Place};
 use super::raster::Raster;
 use crate::motion::{Frame, Pose};
 
-/// Each run of equal cells of a row as a polygon of the class
-/// [`TRAVERSABILITY`](FeatureClass::TRAVERSABILITY), whose attribute is the cells' value. The number
-/// of such an object is that of its first cell, counted row by row, above
-/// [`ObjectId::LAST`].
+/// Converts each run of equal cells in a row to a polygon of the class
+/// [`TRAVERSABILITY`](FeatureClass::TRAVERSABILITY) with the cell value as attribute. The object
+/// number is the index of the run's first cell, counted row by row, plus [`ObjectId::LAST`] + 1.
 #[must_use]
 pub fn as_objects(raster: &Raster, cells: &[u8], frame: &Frame) -> Vec<(ObjectId, Object)> {
     let columns = usize::from(raster.columns).max(1);
@@ -33,7 +32,7 @@ pub fn as_objects(raster: &Raster, cells: &[u8], frame: &Frame) -> Vec<(ObjectId
     objects
 }
 
-/// The corners of a part of a row, from the south-west around over the south-east.
+/// The corners of a run of cells, from the south-west by way of the south-east.
 fn corners(
     raster: &Raster,
     frame: &Frame,

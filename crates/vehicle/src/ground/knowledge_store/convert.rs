@@ -1,4 +1,4 @@
-//! Objects and conditions between messages and the world.
+//! Conversion of objects and selections between messages and the world model.
 
 use crate::messages::ground::create_vks_objects::{
     Attribute as AttributeRec, ByteRec, ColourRec, FeatureClassRec, FeatureClassSeq, FloatRec,
@@ -12,14 +12,14 @@ use crate::messages::ground::{
 };
 use crate::world::{Attribute, FeatureClass, Geometry, Object, ObjectId, Place, Region, Selection};
 
-/// What a client wants to have created.
+/// A decoded Create VKS Objects request.
 pub(super) struct Creation {
     pub(super) request_id: u8,
     pub(super) confirm: bool,
     pub(super) objects: Vec<Object>,
 }
 
-/// Reads a creation. An object of a kind that there is not has no points, so that it is refused.
+/// Decodes a creation. An object of unknown kind gets no points, so the world refuses it.
 pub(super) fn creation(message: &CreateVksObjects) -> Creation {
     match &message.objects {
         Objects::PlainSeq(seq) => Creation {
@@ -70,7 +70,7 @@ fn object(
     }
 }
 
-/// The geometry with a number. An unknown one follows from how many points there are.
+/// The geometry for a number of the message. An unknown one is derived from the number of points.
 const fn geometry(number: u8, points: usize) -> Option<Geometry> {
     match (ObjectType(number), points) {
         (ObjectType::POINT, _) | (ObjectType::UNKNOWN, 0 | 1) => Some(Geometry::Point),
@@ -137,7 +137,7 @@ fn places(points: &[PointRec]) -> Vec<Place> {
     points.iter().map(place).collect()
 }
 
-/// An object as a report tells it.
+/// Converts an object to its report form.
 pub(super) fn told(id: ObjectId, object: &Object) -> ObjectSeq {
     let object_type = match object.geometry {
         Geometry::Point => ObjectType::POINT,
@@ -165,7 +165,7 @@ pub(super) fn told(id: ObjectId, object: &Object) -> ObjectSeq {
     }
 }
 
-/// The conditions of a query; `None` if they make no sense together.
+/// The conditions of a query; `None` if they contradict each other.
 pub(super) fn selection(query: &QueryVksObjects) -> Option<Selection> {
     let named = query.feature_class_rec.is_some() || query.attribute.is_some();
     let count = query.feature_class_count_rec.as_ref();
@@ -200,7 +200,7 @@ const fn region_geometry(kind: RegionType, points: usize) -> Option<Geometry> {
     geometry(kind.0, points)
 }
 
-/// The same conditions in a deletion.
+/// The conditions of a deletion as a query.
 pub(super) fn as_query(delete: DeleteVksObjects) -> QueryVksObjects {
     QueryVksObjects {
         object_id_list: delete.object_id_list,
@@ -214,7 +214,7 @@ pub(super) fn as_query(delete: DeleteVksObjects) -> QueryVksObjects {
     }
 }
 
-/// The same query under the other code.
+/// A traversability query as an objects query.
 pub(super) fn as_objects_query(query: QueryVksTraversability) -> QueryVksObjects {
     QueryVksObjects {
         request_rec: query.request_rec,

@@ -1,12 +1,12 @@
-//! Vector Knowledge Store: objects on the globe, with the codes and layouts of a draft that never
-//! became a standard.
+//! Vector Knowledge Store: objects on the globe, with the message codes and layouts of a draft that
+//! was never published as a standard.
 //!
-//! | a client wants | it is told |
+//! | request | reply |
 //! |---|---|
-//! | to create objects, with a confirmation | their numbers; 0 for each that is not kept |
-//! | objects by number, region, class or attribute | those for which all holds, in parts if they are many |
-//! | conditions that make no sense together | that there are 0 objects |
-//! | only how many there are | their count |
+//! | create objects, with confirmation | their numbers; 0 for each refused object |
+//! | objects by number, region, class or attribute | the matching objects, in parts if many |
+//! | contradictory conditions | a count of 0 objects |
+//! | count only | the number of objects |
 //! | the traversability map under 2423h | the cells of a raster map as objects |
 
 mod convert;
@@ -36,25 +36,26 @@ use super::WorldStore;
 use super::world_store::Answer;
 use transfer::{Code, Transfer, Transfers};
 
-/// Tells anyone of the objects, and takes changes from whoever may command the component.
+/// Reports objects to any client, and accepts changes from clients that may command it.
 #[derive(Debug)]
 pub struct VectorKnowledgeStore {
     store: WorldStore,
     transfers: Transfers,
 }
 
-/// What a query finds.
+/// Result of a query.
 enum Found {
     Objects(Vec<(ObjectId, Arc<Object>)>),
-    /// More than can be told as objects.
+    /// Too many objects to report.
     TooMany,
 }
 
 impl VectorKnowledgeStore {
-    /// The raster map that is told as objects; without one of this name, the first one is.
+    /// Name of the raster map reported as objects. Without a map of this name, the first map is
+    /// used.
     pub const TRAVERSABILITY: &'static str = "traversability";
-    /// The most cells of a raster map that is told as objects. Of a larger one only the greatest
-    /// count is told; Raster Maps has the cells.
+    /// The most cells of a raster map reported as objects. For a larger map the reply is only the
+    /// maximum count; the cells are available from Raster Maps.
     pub const MOST_CELLS: usize = 256 * 256;
 
     pub(super) fn new(store: WorldStore) -> Self {
@@ -115,7 +116,7 @@ impl VectorKnowledgeStore {
             .change(now, message, change, Answer::None, context);
     }
 
-    /// One report for the class, or for each class that there is something about.
+    /// Sends one report for the class, or one for each described class.
     fn metadata(&self, message: &Received, context: &mut Context<'_>) {
         let Some(query) = read::<QueryVksFeatureClassMetadata>(message) else {
             return;
@@ -160,7 +161,7 @@ impl VectorKnowledgeStore {
         context.reply(message, &report);
     }
 
-    /// Answers a query under either code with what `find` finds.
+    /// Answers a query under either code with the result of `find`.
     fn answer(
         &mut self,
         now: Instant,
@@ -226,7 +227,7 @@ impl VectorKnowledgeStore {
     }
 }
 
-/// Whether the objects themselves are wanted, not only how many there are.
+/// Whether the client requests the objects, not only their count.
 const fn wants_objects(query: &QueryVksObjects) -> bool {
     query.request_rec.response_presence_vector & 1 != 0
 }

@@ -1,4 +1,4 @@
-//! What clients of the Vector Knowledge Store are told.
+//! Replies of the Vector Knowledge Store to its clients.
 
 use redb::backends::InMemoryBackend;
 
@@ -68,7 +68,7 @@ fn create(message_properties: u8, plain_list: Vec<PlainObjectSeq>) -> CreateVksO
     }
 }
 
-/// Sends a change, and waits until it is on the disk.
+/// Sends a change and waits until it is on disk.
 fn change(rig: &mut Rig, message: &impl Message) {
     assert!(rig.send(CLIENT, message));
     rig.run(WorldStore::LINGER);
@@ -308,7 +308,7 @@ fn bounds_and_metadata_are_told() {
     assert_eq!((first.feature_class_id, second.feature_class_id), (6, 7));
 }
 
-/// More objects than one report holds: 40 lines of 2000 points.
+/// More objects than one report can hold: 40 lines of 2000 points.
 fn many(rig: &mut Rig) {
     let line = plain(ObjectType::LINE, class(5, 1), vec![point(1.0, 1.0); 2000]);
     change(rig, &create(0, vec![line; 40]));

@@ -1,5 +1,5 @@
-//! Answers that are too long for one message: their parts go out one after the other, until their
-//! client ends them.
+//! Replies too large for one message. The parts are sent one after the other until the client
+//! terminates the transfer.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use jaus::service::Context;
 
 use super::convert;
 
-/// Which of the two codes an answer has.
+/// The message code of a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Code {
     /// 4A23h
@@ -26,7 +26,7 @@ pub(super) enum Code {
     Traversability,
 }
 
-/// Objects on their way to a client.
+/// A transfer of objects to one client.
 #[derive(Debug)]
 pub(super) struct Transfer {
     pub(super) request: Received,
@@ -35,7 +35,7 @@ pub(super) struct Transfer {
     pub(super) objects: VecDeque<(ObjectId, Arc<Object>)>,
 }
 
-/// All that have not come to their end.
+/// The transfers in progress.
 #[derive(Debug, Default)]
 pub(super) struct Transfers {
     open: VecDeque<Transfer>,
@@ -43,14 +43,14 @@ pub(super) struct Transfers {
 }
 
 impl Transfers {
-    /// How many there are at most; one more client is told only how many objects there are.
+    /// Maximum number of transfers. Another client receives only the count.
     const MOST: usize = 16;
-    /// Octets of a part, a little more if a single object is greater.
+    /// Size of a part in octets. A part exceeds it only by its last object.
     const PART: usize = 256 * 1024;
-    /// Between two parts.
+    /// Interval between two parts.
     const PAUSE: Duration = Duration::from_millis(10);
 
-    /// Sends the first part, and keeps the rest.
+    /// Sends the first part and queues the rest.
     pub(super) fn begin(
         &mut self,
         now: Instant,
@@ -70,7 +70,7 @@ impl Transfers {
         }
     }
 
-    /// Sends one part of the transfer whose turn it is.
+    /// Sends one part of the next transfer in turn.
     pub(super) fn handle_timeout(&mut self, now: Instant, context: &mut Context<'_>) {
         if self.due.is_none_or(|due| due > now) {
             return;
@@ -89,7 +89,7 @@ impl Transfers {
         self.due
     }
 
-    /// Forgets what a client does not want any more.
+    /// Drops the transfers of a client.
     pub(super) fn terminate(&mut self, client: JausId) {
         self.open.retain(|it| it.request.source != client);
         if self.open.is_empty() {
@@ -123,7 +123,7 @@ impl Transfer {
     }
 }
 
-/// Answers with the code that was asked with.
+/// Replies under the code of the query.
 pub(super) fn reply(request: &Received, code: Code, objects: Objects, context: &mut Context<'_>) {
     match code {
         Code::Objects => {
@@ -135,7 +135,7 @@ pub(super) fn reply(request: &Received, code: Code, objects: Objects, context: &
     }
 }
 
-/// An answer without the objects; from 65535 on they are not counted any further.
+/// A reply with the count only, saturating at 65535.
 pub(super) fn count_of(request_id: u8, count: usize) -> Objects {
     Objects::CountRec(CountRec {
         request_id,

@@ -1,4 +1,4 @@
-//! Tests of planning and of the waterfall.
+//! Tests of planning and of the mission state machine.
 
 mod lost_link;
 mod paths;

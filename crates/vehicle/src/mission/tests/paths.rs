@@ -1,12 +1,12 @@
-//! Paths: they exist where they should, keep their distance, and lead over good ground.
+//! Path planning: paths exist where they should, keep their distance, and prefer good ground.
 
 use proptest::prelude::*;
 
 use crate::mission::ground::Ground;
 use crate::mission::{NoPath, Path, Point, Terrain, Vehicle, plan, search, sight};
 
-/// A map of 1 m cells from a picture whose first line is the south: `#` is closed, `.` open, a
-/// digit is worse the lower it is.
+/// A map of 1 m cells from text whose first line is the south: `#` is closed, `.` open. The lower a
+/// digit, the worse the ground.
 fn map(picture: &[&str]) -> Terrain {
     let cells = picture.iter().flat_map(|line| line.bytes());
     let cells = cells.map(|cell| match cell {
@@ -18,7 +18,7 @@ fn map(picture: &[&str]) -> Terrain {
     Terrain::new(rows, columns, 1.0, (0.0, 0.0), cells.collect()).unwrap()
 }
 
-/// A vehicle that needs no more room than its cell.
+/// A vehicle that fits within its cell.
 const THIN: Vehicle = Vehicle {
     width: 0.0,
     margin: 0.0,
@@ -28,7 +28,7 @@ fn wide(width: f64) -> Vehicle {
     Vehicle { width, margin: 0.0 }
 }
 
-/// How close the path comes to the middle of a cell that is closed.
+/// The distance of the path from the nearest centre of a closed cell.
 fn closest(path: &Path, terrain: &Terrain) -> f64 {
     let columns = usize::from(terrain.columns());
     let closed = terrain.cells().iter().enumerate();
@@ -105,7 +105,7 @@ fn it_keeps_its_distance_where_there_is_room() {
     rows[7] = ".....#####.....";
     let terrain = map(&rows);
     let path = plan(&terrain, &wide(4.0), (2.5, 7.5), (12.5, 7.5)).unwrap();
-    // To the middle of a closed cell it is half a cell more, and the line may pass the cells' middles.
+    // The centre of a closed cell is half a cell farther away, and the line may pass cell centres.
     assert!(closest(&path, &terrain) > 2.0, "{path:?}");
 }
 
@@ -172,7 +172,7 @@ fn a_raster_that_is_no_map_is_refused() {
     assert!(new(2, 2, f64::NAN, 4).contains("no place"));
 }
 
-/// Walls with gaps at alternating ends: the way is much longer than the distance.
+/// Walls with gaps at alternating ends: the path is much longer than the distance.
 fn comb(side: usize, apart: usize) -> Terrain {
     let cell = |at: usize| {
         let (row, column) = (at / side, at % side);
@@ -204,7 +204,7 @@ fn on_a_large_map_the_way_through_a_maze_is_found_block_by_block() {
     }
 }
 
-/// Random ground with a share of closed cells.
+/// Random ground with a given fraction of closed cells.
 fn ground() -> impl Strategy<Value = Terrain> {
     let cell = prop_oneof![1 => Just(0_u8), 2 => 1..=255_u8];
     (3..40_u16, 3..40_u16).prop_flat_map(move |(rows, columns)| {

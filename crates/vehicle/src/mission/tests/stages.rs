@@ -1,4 +1,4 @@
-//! The waterfall: its order, its retries, its end, and that it never goes on by itself after that.
+//! The mission state machine: stage order, retries, end, and no resumption on its own.
 
 use std::time::{Duration, Instant};
 
@@ -89,7 +89,7 @@ impl World {
         self.mission.report().run
     }
 
-    /// What is to be done, all at once.
+    /// Takes all pending actions.
     pub(super) fn take_actions(&mut self) -> Vec<Action> {
         let actions: Vec<_> = std::iter::from_fn(|| self.mission.poll_action()).collect();
         self.actions.extend(actions.iter().cloned());
@@ -130,7 +130,7 @@ impl World {
         self.mission.handle_setback(self.now, run, reason);
     }
 
-    /// As far as driving.
+    /// Advances to the driving stage.
     pub(super) fn drive(&mut self) {
         self.map();
         self.plan();
@@ -412,7 +412,7 @@ fn what_is_over_cannot_be_approved() {
     );
 }
 
-/// Anything that may happen.
+/// Any possible event.
 #[derive(Debug, Clone)]
 enum Event {
     GoTo(bool),
@@ -494,7 +494,7 @@ proptest! {
     #[test]
     fn whatever_happens_it_keeps_the_order_and_ends(events in prop::collection::vec(event(), 1..200)) {
         let mut world = World::new();
-        // Whether the drivers may be driving, as far as actions have told.
+        // Whether the drivers may be driving, according to the actions so far.
         let mut driving = false;
         for event in &events {
             let before = world.mission.report().clone();
@@ -526,7 +526,7 @@ proptest! {
             }
             prop_assert!(!driving || after.stage.is_handed_over(), "{:?}", after);
         }
-        // Nobody says anything any more: it ends, or waits for the operator.
+        // Without further events, the mission ends or waits for the operator.
         world.pass(Duration::from_secs(600));
         let stage = world.stage();
         prop_assert!(!stage.is_under_way() || stage == Stage::AwaitingApproval

@@ -1,37 +1,37 @@
-//! The stages of a mission, and what a stage of the chain of drivers says of itself.
+//! The stages of a mission, and the reported states of the driver chain.
 
 use std::fmt;
 
-/// How far a mission is. The numbers are those of Report Mission.
+/// Stage of a mission. The numbers are those of Report Mission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum Stage {
-    /// There is none yet.
+    /// No mission yet.
     #[default]
     Idle = 0,
-    /// The map is fetched, or an attempt waits for its beginning.
+    /// Fetching the map, or waiting for the next attempt.
     Map = 1,
-    /// A path is looked for.
+    /// Planning a path.
     Planning = 2,
-    /// There is a path; the operator has to approve it.
+    /// Waiting for the operator to approve the path.
     AwaitingApproval = 3,
-    /// The path goes to the path segment driver.
+    /// Handing the path to the path segment driver.
     Path = 4,
-    /// The path segment driver has succeeded; the vector driver is to obey it.
+    /// The path segment driver is active; waiting for the vector driver under its control.
     Vector = 5,
-    /// The vector driver has succeeded; the primitive driver is to obey it.
+    /// The vector driver is active; waiting for the primitive driver under its control.
     Primitive = 6,
-    /// The vehicle drives.
+    /// The vehicle is driving.
     Driving = 7,
-    /// The vehicle is where it was to be.
+    /// The vehicle is at its destination.
     Arrived = 8,
-    /// It was given up.
+    /// The mission was given up.
     Failed = 9,
-    /// It was ended by the operator, or in an emergency.
+    /// The mission was ended by the operator or an emergency.
     Stopped = 10,
 }
 
 impl Stage {
-    /// Whether something is still to happen.
+    /// Whether the mission is still in progress.
     #[must_use]
     pub const fn is_under_way(self) -> bool {
         !matches!(
@@ -40,7 +40,7 @@ impl Stage {
         )
     }
 
-    /// Whether the drivers have something to do with it.
+    /// Whether the drivers are involved.
     #[must_use]
     pub const fn is_handed_over(self) -> bool {
         matches!(
@@ -68,7 +68,7 @@ impl fmt::Display for Stage {
     }
 }
 
-/// A driver of the chain; each commands the next.
+/// A driver of the chain. Each commands the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Link {
     /// The path segment driver.
@@ -80,10 +80,10 @@ pub enum Link {
 }
 
 impl Link {
-    /// All of them, from the first to the last.
+    /// All drivers, from first to last.
     pub const ALL: [Self; 3] = [Self::Path, Self::Vector, Self::Primitive];
 
-    /// The stage in which it begins.
+    /// The stage in which the driver starts.
     pub(super) const fn stage(self) -> Stage {
         match self {
             Self::Path => Stage::Path,
@@ -103,21 +103,21 @@ impl fmt::Display for Link {
     }
 }
 
-/// How a driver of the chain is doing.
+/// State of a driver of the chain.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum LinkState {
-    /// It has not said anything, or can not be heard any more.
+    /// No report yet, or reports have ceased.
     #[default]
     Silent,
-    /// It has nothing to do.
+    /// Nothing to do.
     Idle,
-    /// It takes the next one under control.
+    /// Taking control of the next driver.
     Engaging,
-    /// It does what it was told.
+    /// Executing the command.
     Active,
-    /// It can not go on, and says why.
+    /// Unable to continue, with the reason.
     Blocked(String),
-    /// It has done what it was told.
+    /// The command is complete.
     Done,
 }
 

@@ -1,23 +1,23 @@
-//! Watches the drivers of the chain: when one has succeeded, and when one is to be given up.
+//! Monitoring of the driver chain: when a stage has succeeded, and when to give up on a driver.
 
 use std::time::Instant;
 
 use super::{Link, LinkState, Settings, Stage};
 
-/// What the drivers have said of themselves.
+/// The last reported states of the drivers.
 #[derive(Debug, Default)]
 pub(super) struct Links {
     states: [LinkState; 3],
-    /// Since when each has been in a state that is no success.
+    /// Start of the current unsuccessful state of each driver.
     since: [Option<Instant>; 3],
-    /// When the stage began.
+    /// When the stage started.
     begun: Option<Instant>,
-    /// Whether they have been told to drive.
+    /// Whether the drivers have been commanded to drive.
     is_open: bool,
 }
 
 impl Links {
-    /// They have been told to drive. What they said before was not about that.
+    /// Starts monitoring: the drivers have been commanded to drive. Earlier reports are discarded.
     pub(super) fn open(&mut self) {
         *self = Self {
             begun: self.begun,
@@ -26,12 +26,12 @@ impl Links {
         };
     }
 
-    /// They have nothing to do with the mission any more, or not yet.
+    /// Stops monitoring: the drivers are not involved in the mission.
     pub(super) const fn close(&mut self) {
         self.is_open = false;
     }
 
-    /// Another stage has begun.
+    /// Records the start of a stage.
     pub(super) const fn begin(&mut self, now: Instant) {
         self.begun = Some(now);
     }
@@ -47,7 +47,7 @@ impl Links {
         self.states[index] = state;
     }
 
-    /// The stage that begins now, if the one that there is has succeeded.
+    /// The next stage, if the current one has succeeded.
     pub(super) fn next(&self, stage: Stage) -> Option<Stage> {
         if !self.is_open {
             return None;
@@ -62,7 +62,7 @@ impl Links {
         }
     }
 
-    /// When the first of those drivers whose stage has begun has to be given up, and why.
+    /// When to give up on the first of the drivers whose stage has started, and why.
     pub(super) fn give_up_at(
         &self,
         stage: Stage,
@@ -92,7 +92,7 @@ impl Links {
             state => (settings.patience, waiting(link, state, settings)),
         };
         let since = self.since[index];
-        // What was so before its stage began counts from there on.
+        // Time before the start of the driver's own stage does not count.
         let since = if link.stage() == stage {
             since.max(self.begun)
         } else {

@@ -1,4 +1,4 @@
-//! The ends of commands, which command events tell.
+//! Completion of commands, as reported by command events.
 
 use super::*;
 use jaus::address::JausId;

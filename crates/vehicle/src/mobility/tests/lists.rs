@@ -1,4 +1,4 @@
-//! Working lists of waypoints off.
+//! Execution of waypoint lists.
 
 use super::*;
 use jaus::messages::core::delete_element::DeleteElementRec;
@@ -23,7 +23,7 @@ fn active(rig: &mut Rig) -> u16 {
     report.element_uid
 }
 
-/// Runs until the active element is another, and says when that was.
+/// Runs until the active element changes, and returns the time of the change.
 fn run_to_next(rig: &mut Rig, vehicle: &Vehicle) -> (u16, crate::motion::Pose) {
     let before = active(rig);
     for _ in 0..2000 {

@@ -1,4 +1,4 @@
-//! Driving along curves.
+//! Following curves.
 
 use super::*;
 use jaus::messages::mobility::{
@@ -7,7 +7,7 @@ use jaus::messages::mobility::{
     ReportLocalPathSegmentExt,
 };
 
-/// A message that has the layout of a report and another code, as an element of a list.
+/// A list element with the layout of a report under another message code.
 fn segment(uid: u16, previous: u16, next: u16, code: u16, layout: &impl Message) -> ElementRec {
     let mut element = element(uid, previous, next, layout);
     let body = element.element_data.data.slice(2..);

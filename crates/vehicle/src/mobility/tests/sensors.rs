@@ -1,4 +1,4 @@
-//! What the sensors tell and take, and that effort moves the vehicle only when it may.
+//! Reports and settings of the sensors, and the conditions under which effort moves the vehicle.
 
 use super::*;
 use jaus::messages::mobility::{
@@ -66,7 +66,7 @@ fn time_stamps_tell_the_time_of_day_and_advance() {
     assert_eq!((stamp.seconds(), stamp.milliseconds()), (5, 504));
 }
 
-/// A sensor's component, and the vehicle that it watches.
+/// A sensor component and the vehicle it observes.
 fn watched() -> (Rig, Observed) {
     let observed = Observed::default();
     let time = TimeOfDay::new(|| Duration::from_millis(1_433_725_323_004));

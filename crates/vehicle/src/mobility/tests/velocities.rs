@@ -1,4 +1,4 @@
-//! Keeping velocities and vectors, and the limits that clients set.
+//! Holding velocities and vectors, and the limits set by clients.
 
 use super::*;
 use jaus::messages::mobility::set_acceleration_limit::CommandType as AccelerationType;

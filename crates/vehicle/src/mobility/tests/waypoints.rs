@@ -1,4 +1,4 @@
-//! Driving to one waypoint, local and global, in both versions of the messages.
+//! Driving to one waypoint, local and global, with both message versions.
 
 use super::*;
 use jaus::messages::mobility::set_travel_speed_ext::{

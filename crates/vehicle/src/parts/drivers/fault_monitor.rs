@@ -1,23 +1,23 @@
-//! When a fault is a failure of the component, and when that is over.
+//! Turns a lasting fault into a failure of the component, and its end into a recovery.
 
 use std::time::{Duration, Instant};
 
 use jaus::component::Condition;
 
-/// Keeps a component's Failure in step with what it lacks.
+/// Keeps a component's Failure state in step with its faults.
 #[derive(Debug, Default)]
 pub(in crate::parts) struct FaultMonitor {
     since: Option<Instant>,
-    /// Why the component has failed.
+    /// The cause of the failure.
     failure: Option<String>,
 }
 
 impl FaultMonitor {
-    /// What is missing for longer than this while the vehicle should move is a failure.
+    /// A fault that lasts longer than this while the vehicle should move is a failure.
     pub(in crate::parts) const LIMIT: Duration = Duration::from_secs(2);
 
-    /// Something has been missing at `now` for `why`. Returns what to report of the component after
-    /// `limit`, once.
+    /// Reports a fault at `now` with its cause. Returns the condition to set once the fault has
+    /// lasted for `limit`.
     pub(in crate::parts) fn lacks(
         &mut self,
         now: Instant,
@@ -33,7 +33,7 @@ impl FaultMonitor {
         Some(Condition::Failed)
     }
 
-    /// Nothing is missing. Returns what to report of a component that had failed.
+    /// Reports that there is no fault. Returns the condition to set if the component had failed.
     pub(in crate::parts) fn is_over(&mut self) -> Option<Condition> {
         self.since = None;
         let failure = self.failure.take()?;
@@ -41,7 +41,7 @@ impl FaultMonitor {
         Some(Condition::Initialized)
     }
 
-    /// Why the component has failed, while it has.
+    /// The cause of the current failure.
     pub(in crate::parts) fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
     }

@@ -1,38 +1,37 @@
-//! How old a sensor's last sample is, judged by the times of its samples and not of its messages.
+//! Age of a sensor's last sample, derived from sample times instead of message arrival.
 
 use std::time::{Duration, Instant};
 
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 
-/// Judges the age of samples that carry a time stamp of the sensor's own clock.
+/// Estimates the age of samples that carry a time stamp of the sensor's own clock.
 ///
-/// The two clocks are never compared directly. A sample's age is the time since a report arrived
-/// whose stamp had advanced, plus the report's lag: how much later it came, in relation to its stamp,
-/// than the promptest report so far. So a stamp that stands still goes stale, and so do reports that
-/// waited in a queue. A step of the sensor's clock costs one report, which does not count. Without
+/// The two clocks are never compared directly. The age of a sample is the time since the last
+/// report whose stamp had advanced, plus the lag of that report: its delay relative to its stamp,
+/// compared with the promptest report so far. So a frozen stamp goes stale, and so do reports that
+/// waited in a queue. A step of the sensor's clock costs one report, which is ignored. Without
 /// stamps the age is that of the message.
 #[derive(Debug, Clone, Default)]
 pub(in crate::parts) struct Freshness {
-    /// The stamp of the last report.
+    /// Stamp of the last report.
     stamp: Option<Duration>,
-    /// Receipt minus stamp of the promptest report, and when that was.
+    /// Arrival time minus stamp of the promptest report, and when it arrived.
     promptest: Option<(f64, Instant)>,
-    /// The moment from which receipts are counted.
+    /// Origin of the arrival times.
     epoch: Option<Instant>,
-    /// When the last sample was taken that counts, by the own clock.
+    /// Time of the last valid sample, by the local clock.
     sampled_at: Option<Instant>,
 }
 
 impl Freshness {
-    /// A report that is so many seconds prompter than the promptest follows a step of the sensor's
-    /// clock, or the reports before it were late and it may be late itself.
+    /// A report that is this many seconds prompter than the promptest follows a step of the
+    /// sensor's clock, or the reports before it were late and it may be late as well.
     const CATCHING_UP: f64 = 0.02;
-    /// By how much clocks may drift against each other, in seconds per second: the promptest report
-    /// is forgotten at this rate.
+    /// Maximum clock drift in seconds per second. The promptest offset is relaxed at this rate.
     const DRIFT: f64 = 0.0005;
 
-    /// A report has come at `now`. Returns when its sample was taken, by the own clock; `None` if it
-    /// does not count.
+    /// Handles a report received at `now`. Returns the sample time by the local clock; `None` if
+    /// the report is ignored.
     pub(in crate::parts) fn handle(
         &mut self,
         now: Instant,
@@ -69,19 +68,19 @@ impl Freshness {
         self.sampled_at
     }
 
-    /// The sensor does not know what it measures, or is another one: nothing is known.
+    /// Discards all state, because the sensor has lost its measurement or was replaced.
     pub(in crate::parts) fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// How old the last sample is; `None` if there is none.
+    /// The age of the last sample; `None` without a sample.
     pub(in crate::parts) fn age(&self, now: Instant) -> Option<Duration> {
         Some(now.saturating_duration_since(self.sampled_at?))
     }
 }
 
-/// A stamp of the reports of version 1.0 as the time since the beginning of its month; `None` for
-/// the stamp 0 of sensors that do not know the time.
+/// Converts a stamp of version 1.0 reports to the time since the start of its month; `None` for
+/// stamp 0, which sensors without a clock send.
 pub(in crate::parts) fn time_in_month(stamp: TimeStamp) -> Option<Duration> {
     let hours = u64::from(stamp.day()) * 24 + u64::from(stamp.hour());
     let seconds = (hours * 60 + u64::from(stamp.minutes())) * 60 + u64::from(stamp.seconds());
@@ -98,10 +97,10 @@ mod tests {
     use super::*;
 
     const PERIOD: Duration = Duration::from_millis(40);
-    /// The age of a sample whose report came at once.
+    /// Maximum age of a sample whose report arrived immediately.
     const FRESH: Duration = Duration::from_millis(1);
 
-    /// A sensor whose reports take so long; its clock shows an hour at the beginning.
+    /// A sensor whose clock starts at one hour.
     struct Sensor {
         now: Instant,
         clock: Duration,
@@ -120,13 +119,13 @@ mod tests {
             sensor
         }
 
-        /// Time passes.
+        /// Advances both clocks.
         fn pass(&mut self, time: Duration) {
             self.now += time;
             self.clock += time;
         }
 
-        /// So many prompt reports.
+        /// Receives `count` prompt reports.
         fn report(&mut self, count: usize) {
             for _ in 0..count {
                 self.pass(PERIOD);
@@ -207,7 +206,7 @@ mod tests {
                 true => sensor.clock + step,
                 false => sensor.clock - step,
             } - Duration::from_secs(1);
-            // The queue is emptied at once.
+            // The whole queue arrives at once.
             for count in 0..25 {
                 sensor
                     .freshness

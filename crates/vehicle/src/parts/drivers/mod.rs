@@ -1,5 +1,5 @@
-//! What the drivers of the chain have in common: how they stand, what they sense, and how each
-//! commands the next.
+//! Common parts of the drivers of the chain: standing, sensor input, and the commands to the next
+//! driver.
 
 mod fault_monitor;
 mod freshness;

@@ -1,10 +1,10 @@
-//! The way from one driver to the next: found, taken under control, resumed, commanded, watched, and
-//! given back.
+//! The link from one driver to the next: discovery, control, resume, commands, supervision and
+//! release.
 //!
-//! Commands are acknowledged, one at a time: while one is on its way the later ones wait, and only the
-//! latest of them is sent. When the next driver was started again, or can not be reached for a
-//! moment, the way is made anew. When it was stopped by an emergency or taken over, the driver stands
-//! down: it gives up what it was told, and waits to be told anew.
+//! Commands are acknowledged one at a time. While one is in flight, later ones wait, and only the
+//! latest is sent. When the next driver restarts or is briefly unreachable, the link is
+//! re-established. When it was stopped by an emergency or taken over, the driver stands down: it
+//! drops its command and waits for a new one.
 #![expect(
     clippy::disallowed_methods,
     reason = "here the driver gets its time, and waits for it"
@@ -30,61 +30,61 @@ use jaus::component::{
 };
 use jaus::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatus};
 
-/// How a driver talks to the next one.
+/// The command interface of the next driver.
 pub(in crate::parts) trait Language: Send + 'static {
-    /// What it commands with.
+    /// The command message.
     type Command: Message + Send + Sync;
-    /// The service of the next driver …
+    /// URN of the next driver's service.
     const URN: &'static str;
-    /// … and what people call it.
+    /// Name of the next driver in log messages.
     const NAME: &'static str;
-    /// Between two commands.
+    /// Interval between two commands.
     const PAUSE: Duration;
 
     /// The command that carries out an order.
     fn command(&mut self, now: Instant, order: Order, motion: &Motion) -> Self::Command;
 
-    /// The command to stand still.
+    /// The command to stop.
     fn halt(&mut self) -> Self::Command;
 }
 
-/// A driver's way to the next one.
+/// A driver's link to the next one.
 pub(in crate::parts) struct Next<L> {
     pub(in crate::parts) component: Component,
     pub(in crate::parts) vehicle: Vehicle,
     pub(in crate::parts) remote_platform: RemotePlatform,
     pub(in crate::parts) board: StageBoard,
     pub(in crate::parts) language: L,
-    /// The authority with which the next one is controlled.
+    /// The authority used to control the next driver.
     pub(in crate::parts) authority: u8,
-    /// For how long its commanders must have said nothing before it listens to them again after it
-    /// has stood down.
+    /// After standing down, the driver accepts commands again once its clients have been silent for
+    /// this time.
     pub(in crate::parts) settling: Duration,
-    /// Notes sensors that are missing while the vehicle should move.
+    /// Monitors sensor faults while the vehicle should move.
     pub(in crate::parts) sensors: FaultMonitor,
 }
 
-/// How the way to the next driver has ended.
+/// How a link to the next driver ended.
 enum End {
-    /// There is nothing more to be done.
+    /// Nothing left to do.
     Rest,
-    /// It can be made anew.
+    /// The link can be re-established.
     Anew { peer: Option<JausId>, why: String },
-    /// Somebody meant it.
+    /// The stop was intentional.
     StandDown(String),
 }
 
 impl<L: Language> Next<L> {
-    /// The next driver is kept so long when there is nothing to do.
+    /// How long control of the next driver is kept while there is nothing to do.
     const LINGER: Duration = Duration::from_millis(500);
-    /// A command that is not acknowledged in so long is given up for a later one.
+    /// Timeout for the acknowledgement of a command. A later command then replaces it.
     const PATIENCE: Duration = Duration::from_millis(400);
-    /// Without any acknowledgement for so long the way is made anew.
+    /// Without any acknowledgement for this time, the link is re-established.
     const SILENCE: Duration = Duration::from_secs(2);
-    /// The first and the longest pause before the way is made anew.
+    /// First and longest delay before the link is re-established.
     const PAUSES: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(2));
 
-    /// Runs until the component has stopped; the owner notices that by other means, too.
+    /// Runs until the component has stopped. The owner also notices that by other means.
     pub(in crate::parts) async fn run(mut self) -> Result<Infallible, PartError> {
         let mut ticks = interval(L::PAUSE);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -100,7 +100,7 @@ impl<L: Language> Next<L> {
                     if begun.elapsed() > Self::PAUSES.1 {
                         pause = Self::PAUSES.0;
                     }
-                    // Blocked without a next one would mean that it has stood down.
+                    // Blocked without a next driver would mean standing down.
                     let state = peer.map_or(StageState::Engaging, |_| StageState::Blocked);
                     self.tell(state, peer, why).await;
                     sleep(pause).await;
@@ -116,7 +116,8 @@ impl<L: Language> Next<L> {
         }
     }
 
-    /// Waits for an order. Why it stood down is told until somebody else commands it, or it is resumed.
+    /// Waits for an order. Reports why the driver stood down until control changes or it is
+    /// resumed.
     async fn rest(
         &mut self,
         ticks: &mut Interval,
@@ -148,7 +149,7 @@ impl<L: Language> Next<L> {
         }
     }
 
-    /// Gives up what it was told, until whoever tells it has been silent for a while or is another.
+    /// Drops commands until the client has been silent for the settling time or control changes.
     async fn stand_down(&self, ticks: &mut Interval, watchman: &mut Watchman, why: &str) {
         let controller = self.component.standing().controller;
         self.vehicle.stop();
@@ -168,7 +169,7 @@ impl<L: Language> Next<L> {
         }
     }
 
-    /// Takes the next driver under control and commands it, to whatever end.
+    /// Takes control of the next driver and commands it until the link ends.
     async fn work(&mut self, ticks: &mut Interval, watchman: &mut Watchman) -> End {
         let Some(peer) = self.find() else {
             let why = format!("no {} is known", L::NAME);
@@ -186,7 +187,7 @@ impl<L: Language> Next<L> {
             end = self.command(&control, ticks, watchman) => end,
             end = supervise(&component, peer) => end,
         };
-        // Who has gone is not waited for.
+        // Limit the wait, in case the next driver is gone.
         let _ = timeout(Self::PATIENCE, control.release()).await;
         end
     }
@@ -208,7 +209,7 @@ impl<L: Language> Next<L> {
                 why: ControlRefused::NotAvailable,
                 ..
             }) => {
-                // Not in a failure either, but that ends by itself.
+                // A failure also refuses control, but it ends without intervention.
                 return Err(match examine(&self.component, peer).await {
                     Ok(Verdict::Anew) => anew(format!("{peer} has failed, or was started again")),
                     _ => End::StandDown(format!(
@@ -232,7 +233,7 @@ impl<L: Language> Next<L> {
         }
     }
 
-    /// Commands the next driver as long as there is something to do.
+    /// Commands the next driver as long as there is work.
     async fn command(
         &mut self,
         control: &Control,
@@ -287,9 +288,9 @@ impl<L: Language> Next<L> {
         }
     }
 
-    /// What sensors lack for too long while the vehicle should move is a failure of the component,
-    /// which stops and gives control up. It is over when they report again, and the component waits
-    /// in Standby.
+    /// A sensor fault that persists while the vehicle should move is a failure of the component,
+    /// which stops and releases control. It ends when the sensors report again. The component then
+    /// waits in Standby.
     async fn check_sensors(&mut self, lack: Option<&str>) {
         let now = Instant::now();
         let condition = match lack {
@@ -306,7 +307,7 @@ impl<L: Language> Next<L> {
         }
     }
 
-    /// Finds out why control was lost.
+    /// Determines why control was lost.
     async fn after_loss(&self, peer: JausId, why: String) -> End {
         match examine(&self.component, peer).await {
             Ok(Verdict::StandDown(why)) => End::StandDown(why),
@@ -317,7 +318,7 @@ impl<L: Language> Next<L> {
         }
     }
 
-    /// Tells that it has stood down: blocked, and commanding nobody.
+    /// Reports standing down: blocked, without a next driver.
     async fn tell_down(&self, why: &str) {
         self.tell(StageState::Blocked, None, why.to_owned()).await;
     }
@@ -347,17 +348,17 @@ impl<L: Language> Next<L> {
     }
 }
 
-/// Between two looks at how the next driver is.
+/// Interval between two status checks of the next driver.
 const LOOK: Duration = Duration::from_millis(250);
 
-/// Watches the next driver until there is something the matter with it.
+/// Supervises the next driver until it needs a reaction.
 async fn supervise(component: &Component, peer: JausId) -> End {
-    // What it said of itself before it was resumed does not count.
+    // Status from before the resume does not count.
     sleep(2 * LOOK).await;
     loop {
         sleep(LOOK).await;
         match examine(component, peer).await {
-            // That it is silent the commands notice.
+            // Silence shows in missing acknowledgements.
             Ok(Verdict::GoOn) | Err(_) => {}
             Ok(Verdict::Anew) => {
                 let why = format!("{peer} has failed, or was started again");
@@ -371,7 +372,7 @@ async fn supervise(component: &Component, peer: JausId) -> End {
     }
 }
 
-/// Asks the next driver how it is.
+/// Queries the status of the next driver.
 async fn examine(component: &Component, peer: JausId) -> Result<Verdict, QueryError> {
     let status: ReportStatus = component.query(peer, &QueryStatus {}).await?;
     let control: ReportControl = component.query(peer, &QueryControl {}).await?;

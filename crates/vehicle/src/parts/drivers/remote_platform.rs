@@ -1,5 +1,5 @@
-//! The platform of a driver that commands another driver: its motion is what sensors report, and what
-//! it is to do is an order for the next one.
+//! The platform of a driver that commands another driver: sensors report its motion, and its
+//! commands become orders for the next driver.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::Freshness;
 use crate::motion::{CommandDeadline, Drive, Limits, Motion, Platform, Pose, Velocity};
 
-/// What a driver knows and wants. Cheap to clone; the clones are one.
+/// Motion and orders of a driver. Cheap to clone; all clones share one state.
 #[derive(Debug, Clone)]
 pub(in crate::parts) struct RemotePlatform(Arc<Mutex<State>>);
 
@@ -19,39 +19,39 @@ struct State {
     pose: Freshness,
     velocity: Freshness,
     order: Option<Order>,
-    /// Since the pilot has controlled this platform last.
+    /// Deadline since the pilot's last control step.
     deadline: CommandDeadline,
 }
 
-/// How a driver does its work.
+/// Settings of a remote platform.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::parts) struct RemotePlatformSettings {
-    /// What the vehicle can do at most.
+    /// Limits of the vehicle.
     pub(in crate::parts) limits: Limits,
-    /// It stops when the samples of the sensors are older.
+    /// Maximum age of sensor samples. The vehicle stops when they are older.
     pub(in crate::parts) stale: Duration,
-    /// Whether the next driver keeps headings by itself. Else it needs to be told velocities, and
-    /// they need to be measured.
+    /// Whether the next driver holds headings. Otherwise it needs velocity commands, which require
+    /// velocity measurements.
     pub(in crate::parts) by_heading: bool,
 }
 
-/// What the next driver is to do.
+/// An order to the next driver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::parts) enum Order {
-    /// To move like this.
+    /// Move with this velocity.
     Velocity(Velocity),
-    /// To keep a heading in radians, from -π to π, and a speed in metres per second.
+    /// Hold a heading in radians, from -π to π, and a speed in metres per second.
     Heading { heading: f64, speed: f64 },
 }
 
-/// What can be done about an order now.
+/// The action possible now.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::parts) enum Plan {
-    /// There is none.
+    /// There is no order.
     Rest,
-    /// It can be carried out, the vehicle moving like this.
+    /// Carry out the order. The vehicle's motion is attached.
     Go(Order, Motion),
-    /// It can not, and why.
+    /// The order must wait, for the given reason.
     Wait(String),
 }
 
@@ -68,8 +68,8 @@ impl RemotePlatform {
         })))
     }
 
-    /// A sensor has reported a pose: X, Y and yaw, sampled at `stamp` of its clock. Without a pose it
-    /// does not know where the vehicle is, and the vehicle stops at once.
+    /// Handles a sensor report of a pose: X, Y and yaw, sampled at `stamp` of the sensor's clock.
+    /// Without a pose the sensor does not know the position, and the vehicle stops immediately.
     pub(in crate::parts) fn handle_pose(
         &self,
         now: Instant,
@@ -89,7 +89,7 @@ impl RemotePlatform {
         }
     }
 
-    /// The same for a velocity: speed forward and yaw rate.
+    /// Like [`handle_pose`](Self::handle_pose), for a velocity: forward speed and yaw rate.
     pub(in crate::parts) fn handle_velocity(
         &self,
         now: Instant,
@@ -106,7 +106,7 @@ impl RemotePlatform {
         }
     }
 
-    /// What is to be done now.
+    /// The action to take now.
     pub(in crate::parts) fn plan(&self, now: Instant) -> Plan {
         let mut state = self.lock();
         let Some(order) = state.order else {
@@ -121,7 +121,7 @@ impl RemotePlatform {
         }
     }
 
-    /// Which sensor's samples are missing or too old, if any are.
+    /// The sensor whose samples are missing or too old, if any.
     pub(in crate::parts) fn lack(&self, now: Instant) -> Option<String> {
         self.lock().lack(now)
     }
@@ -149,7 +149,7 @@ impl State {
 }
 
 impl Platform for RemotePlatform {
-    /// An order holds as long as the pilot goes on controlling this platform.
+    /// An order holds as long as the pilot keeps controlling this platform.
     fn handle_time(&mut self, now: Instant) {
         self.lock().deadline.restart(Some(now));
     }
@@ -159,7 +159,7 @@ impl Platform for RemotePlatform {
     }
 
     fn set_pose(&mut self, _: Pose) {
-        // Where it is the sensor says.
+        // The sensor determines the pose.
     }
 
     fn drive(&mut self, command: Drive) {
@@ -172,7 +172,7 @@ impl Platform for RemotePlatform {
                 speed: velocity.x.max(0.0),
             }),
             Drive::Velocity(velocity) => Some(Order::Velocity(velocity)),
-            // No driver above the primitive one is told efforts.
+            // Only the primitive driver accepts efforts.
             Drive::Stop | Drive::Effort(_) => None,
         };
     }
@@ -282,7 +282,7 @@ mod tests {
             let goes = matches!(plan(count, count), Plan::Go(..));
             assert_eq!(goes, count > 0, "{count}");
         }
-        // Reports go on coming, with the pose of the same moment.
+        // Reports continue, but with the pose of the same moment.
         let plans: Vec<_> = (10..30).map(|count| plan(count, 9)).collect();
         assert!(matches!(plans[14], Plan::Go(..)), "0.6 s old");
         assert_eq!(wait(&plans[15]), "the pose is 0.6 s old");

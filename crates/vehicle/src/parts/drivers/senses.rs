@@ -1,4 +1,4 @@
-//! Reports of whoever offers a service in the own subsystem: found, followed, and found again.
+//! Sensor input: subscriptions to a service of the own subsystem, with rediscovery after loss.
 
 #![expect(
     clippy::disallowed_methods,
@@ -19,9 +19,9 @@ use jaus::messages::mobility::{
     velocity_state_sensor,
 };
 
-/// The reports of one sensor of the own subsystem, whichever that is at the time.
+/// The reports of one sensor of the own subsystem, whichever provides them at the time.
 ///
-/// If there are several, the first that reports is listened to until it is silent.
+/// If there are several providers, the first one to report is used until it falls silent.
 pub(in crate::parts) struct Sense<R> {
     reports: GroupSubscription<R>,
     source: Option<JausId>,
@@ -31,7 +31,7 @@ pub(in crate::parts) struct Sense<R> {
 }
 
 impl<R: Message> Sense<R> {
-    /// Begins to look for providers of a service, and to listen to one; people know it as `what`.
+    /// Starts discovery of providers and subscribes to them. `what` names the data in log messages.
     pub(in crate::parts) fn of<Q: Message>(
         component: &Component,
         urn: &'static str,
@@ -49,7 +49,7 @@ impl<R: Message> Sense<R> {
         })
     }
 
-    /// Waits for the next report. Nothing is lost if the returned future is dropped.
+    /// Waits for the next report. The returned future is cancel safe.
     pub(in crate::parts) async fn next(&mut self) -> Result<R, PartError> {
         loop {
             let next = self.reports.next().await;
@@ -81,8 +81,8 @@ impl<R: Message> Sense<R> {
 }
 
 impl<R: Message> Sense<R> {
-    /// Whether the source was lost since this was asked last, so that the next report may be of
-    /// another one, with another clock.
+    /// Takes the flag that the source was lost. The next report may come from another source with
+    /// another clock.
     pub(in crate::parts) const fn take_loss(&mut self) -> bool {
         std::mem::replace(&mut self.was_lost, false)
     }

@@ -1,17 +1,17 @@
-//! How a driver stands with those who command it: told to people, and remembered after an emergency.
+//! A driver's standing: control and state changes, and the memory of an emergency.
 
 use std::convert::Infallible;
 
 use crate::parts::PartError;
 use jaus::component::{AccessControl, Component, Management, Standing, State};
 
-/// Management and Access Control of a driver: control ends after so many seconds unless its client
-/// asks for it again; 0 is for ever.
+/// Management and Access Control of a driver. Control times out after this many seconds unless its
+/// client renews it; 0 disables the timeout.
 pub(in crate::parts) fn guard(control_timeout: u8) -> Management {
     Management::new().access_control(AccessControl::new().timeout(control_timeout))
 }
 
-/// Waits until a client has shut the component down; its program ends then.
+/// Waits until a client has shut the component down. Its program then ends.
 pub(in crate::parts) async fn shut_down(component: &Component) -> Result<Infallible, PartError> {
     let mut standings = component.watch_standing();
     let is_down = |standing: &Standing| standing.state == State::Shutdown;
@@ -21,16 +21,16 @@ pub(in crate::parts) async fn shut_down(component: &Component) -> Result<Infalli
     }
 }
 
-/// Notes every change of a component's standing, and says what keeps it from acting.
+/// Logs every change of a component's standing, and remembers emergencies.
 #[derive(Debug, Default)]
 pub(in crate::parts) struct Watchman {
     last: Standing,
-    /// Whether there was an emergency since the component was ready last.
+    /// Whether an emergency occurred since the component was last ready.
     was_stopped: bool,
 }
 
 impl Watchman {
-    /// The standing may be another now. Tells people if it is.
+    /// Updates the standing and logs changes.
     pub(in crate::parts) fn note(&mut self, now: Standing) {
         let before = std::mem::replace(&mut self.last, now);
         if before.controller != now.controller {
@@ -55,7 +55,7 @@ impl Watchman {
         }
     }
 
-    /// Why it does not act although it may have been told to: an emergency, until it is resumed.
+    /// Why the component does not act on commands: an emergency, until it is resumed.
     pub(in crate::parts) fn emergency(&self) -> Option<&'static str> {
         match self.last.state {
             State::Emergency => Some("stopped by an emergency"),

@@ -1,35 +1,34 @@
-//! What to make of how the next driver says it is: go on, begin anew because it was started again, or
-//! stand down because somebody meant it to stop.
+//! Evaluates the status of the next driver: continue, re-engage after a restart, or stand down
+//! after an intentional stop.
 
 use crate::ground::StageReport;
 use jaus::address::JausId;
 use jaus::component::State;
 
-/// How the next driver is, as it tells.
+/// Status of the next driver, as it reports it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::parts) struct DriverStatus {
-    /// The code of its state, of Report Status.
+    /// The status code of Report Status.
     pub(in crate::parts) status: u8,
-    /// Who controls it.
+    /// The client in control.
     pub(in crate::parts) controller: Option<JausId>,
-    /// What it says of its own stage.
+    /// The reported stage.
     pub(in crate::parts) stage: StageReport,
 }
 
-/// What follows for the driver that commands it.
+/// Consequence for the commanding driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::parts) enum Verdict {
-    /// All is well.
+    /// Everything is in order.
     GoOn,
-    /// It has to be taken under control, or resumed, once more: it was started again, or has failed
-    /// because its sensors were silent, which ends when they report again.
+    /// Control or resume must be repeated: the driver was restarted, or has failed because its
+    /// sensors were silent, which ends when they report again.
     Anew,
-    /// It was stopped, or taken over, by somebody who had a reason: nothing must move again by
-    /// itself.
+    /// The driver was stopped or taken over on purpose. Nothing must move again on its own.
     StandDown(String),
 }
 
-/// What to make of what `peer` has told, it being commanded by `own`.
+/// Evaluates the status of `peer`, which `own` commands.
 pub(in crate::parts) fn judge(own: JausId, peer: JausId, told: &DriverStatus) -> Verdict {
     let ready = State::Ready as u8;
     let standby = State::Standby as u8;
@@ -96,7 +95,7 @@ mod tests {
 
     #[test]
     fn a_failure_of_sensors_is_waited_for_and_one_of_motors_ends_it() {
-        // A driver whose sensors have failed names the one that it commands.
+        // A driver whose sensors have failed still names the driver it commands.
         let sensors = judged(State::Failure, None, blocked(Some(PEER)));
         assert_eq!(sensors, Verdict::Anew);
         let motors = judged(State::Failure, None, blocked(None));

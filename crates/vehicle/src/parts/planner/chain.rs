@@ -1,4 +1,4 @@
-//! Watches a driver of the chain: how its stage is, who controls it, and whether it has been stopped.
+//! Monitoring of one driver of the chain: its stage, its controller and emergencies.
 #![expect(
     clippy::disallowed_methods,
     reason = "here a lost driver is waited for"
@@ -22,27 +22,27 @@ use jaus::messages::mobility::{
     ReportLocalPose, local_path_segment_driver, local_vector_driver, primitive_driver,
 };
 
-/// What has become of a driver of the chain.
+/// An event of a driver of the chain.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum News {
-    /// Where the vehicle is in the local frame.
+    /// The vehicle's position in the local frame.
     Pose(Point),
-    /// It was found, or lost.
+    /// The driver was found or lost.
     Found(Link, Option<JausId>),
-    /// Its stage, and how much of what it was told is done, from 0 to 100 %.
+    /// The driver's stage, and the completed part of its command from 0 to 100 %.
     Stage(Link, LinkState, u8),
-    /// Who controls it.
+    /// The client in control of the driver.
     Controller(Link, Option<JausId>),
-    /// It has been stopped by an emergency.
+    /// The driver was stopped by an emergency.
     Emergency(Link),
-    /// It has stood down, for a reason that somebody had: it commands nobody any more.
+    /// The driver has stood down on purpose and commands no other driver.
     StoodDown(Link, String),
 }
 
-/// Between two attempts to subscribe.
+/// Interval between attempts to subscribe.
 const PAUSE: Duration = Duration::from_secs(1);
 
-/// The service that makes a component this driver, beside Stage.
+/// The service that identifies the component for this link, besides Stage.
 pub(in crate::parts) const fn service(link: Link) -> &'static str {
     match link {
         Link::Path => local_path_segment_driver::URN,
@@ -51,8 +51,7 @@ pub(in crate::parts) const fn service(link: Link) -> &'static str {
     }
 }
 
-/// Watches a driver, whoever it is, and goes on when it is another one. Ends when the component
-/// has stopped.
+/// Monitors a driver, including its replacements. Ends when the component has stopped.
 pub(super) async fn watch(component: &Component, link: Link, tell: &mpsc::Sender<News>) {
     while let Some(peer) = find(component, &[service(link), stage::URN]).await {
         tracing::info!("the {link} is {peer}");
@@ -73,7 +72,7 @@ pub(super) async fn watch(component: &Component, link: Link, tell: &mpsc::Sender
     }
 }
 
-/// Follows the pose of the vehicle. Ends when the component has stopped.
+/// Passes on the vehicle's position. Ends when the component has stopped.
 pub(super) async fn follow(
     mut poses: Sense<ReportLocalPose>,
     tell: &mpsc::Sender<News>,
@@ -88,7 +87,7 @@ pub(super) async fn follow(
     }
 }
 
-/// Watches one component until it is lost.
+/// Monitors one component until it is lost.
 async fn watch_peer(
     component: &Component,
     link: Link,
@@ -143,7 +142,7 @@ async fn ask<R: jaus::codec::Message, Q: jaus::codec::Message>(
 }
 
 fn stage_news(link: Link, report: &ReportStage) -> News {
-    // The last one of the chain commands nobody in any case.
+    // The last driver of the chain commands no other in any case.
     let commands = report.next_subsystem_id != 0 || link == Link::Primitive;
     if report.state == State::BLOCKED && !commands {
         let reason = report.reason.to_string_lossy().into_owned();
@@ -152,7 +151,7 @@ fn stage_news(link: Link, report: &ReportStage) -> News {
     News::Stage(link, state(report), report.progress)
 }
 
-/// How a driver is, as it reports.
+/// Converts a reported stage to the state of a link.
 pub(super) fn state(report: &ReportStage) -> LinkState {
     match report.state {
         State::IDLE => LinkState::Idle,
@@ -165,7 +164,7 @@ pub(super) fn state(report: &ReportStage) -> LinkState {
     }
 }
 
-/// Who is in control.
+/// The client in control.
 pub(in crate::parts) fn controller(report: &ReportControl) -> Option<JausId> {
     let id = JausId::new(report.subsystem_id, report.node_id, report.component_id);
     id.is_unicast().then_some(id)

@@ -1,5 +1,5 @@
-//! Hands a path over to the path segment driver: its list is emptied, filled with the segments, and
-//! executed. Each of these commands is acknowledged, and each change of the list confirmed.
+//! Hands a path over to the path segment driver: clears its list, fills it with the segments and
+//! executes it. Every command is acknowledged, and every change of the list is confirmed.
 #![expect(
     clippy::disallowed_methods,
     reason = "here a confirmation is waited for"
@@ -23,16 +23,16 @@ use jaus::messages::mobility::report_local_path_segment::{
 use jaus::messages::mobility::{ExecuteList, ReportLocalPathSegment};
 use jaus::service::code_of;
 
-/// Set Local Path Segment, which has the layout of its report and comes in elements only.
+/// Set Local Path Segment. It has the layout of its report and occurs only in list elements.
 const SET_LOCAL_PATH_SEGMENT: u16 = 0x0410;
-/// How many segments go in one message, so that it fits into a packet.
+/// Number of segments per message, so that it fits into a packet.
 const AT_ONCE: usize = 24;
-/// All elements of a list.
+/// Selects all elements of a list.
 const ALL: u16 = u16::MAX;
-/// How long a confirmation may take.
+/// Timeout for a confirmation.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// Hands over all segments and has them driven.
+/// Hands over all segments and starts their execution.
 pub(super) async fn hand_over(
     component: &Component,
     control: &Control,
@@ -62,7 +62,7 @@ pub(super) async fn hand_over(
     list.control.deliver(&execute).await.map_err(in_words)
 }
 
-/// The segments as elements of a list, numbered from 1.
+/// Converts the segments to list elements, numbered from 1.
 pub(super) fn elements(path: &Path, tolerance: f64) -> Result<Vec<ElementRec>, OutOfRange> {
     let numbers = 1_u16..;
     let segments = path.segments().zip(numbers);
@@ -72,7 +72,7 @@ pub(super) fn elements(path: &Path, tolerance: f64) -> Result<Vec<ElementRec>, O
             Ok(ElementRec {
                 element_uid: uid,
                 previous_uid: uid - 1,
-                // Its successor names it when it comes.
+                // Set when the successor is appended.
                 next_uid: 0,
                 element_data: FormattedBlob::new(ElementDataFormat::JAUS_MESSAGE, data),
             })
@@ -80,7 +80,7 @@ pub(super) fn elements(path: &Path, tolerance: f64) -> Result<Vec<ElementRec>, O
         .collect()
 }
 
-/// A straight segment.
+/// Encodes a straight segment.
 fn segment(from: Point, to: Point, tolerance: f64) -> Result<Bytes, OutOfRange> {
     let (x, y) = (f64::midpoint(from.0, to.0), f64::midpoint(from.1, to.1));
     let segment = ReportLocalPathSegment {
@@ -94,7 +94,7 @@ fn segment(from: Point, to: Point, tolerance: f64) -> Result<Bytes, OutOfRange> 
     };
     let mut octets = Vec::with_capacity(segment.encoded_len());
     octets.extend(SET_LOCAL_PATH_SEGMENT.to_le_bytes());
-    // All of its fields have a fixed length.
+    // All fields have a fixed length, so encoding cannot fail.
     let encoded = segment.encode().unwrap_or_default();
     octets.extend(encoded.iter().skip(2));
     Ok(octets.into())
@@ -117,7 +117,7 @@ impl List<'_> {
         .await
     }
 
-    /// Appends elements that follow each other.
+    /// Appends consecutive elements.
     async fn append(&mut self, elements: &[ElementRec]) -> Result<(), String> {
         let mut element_list = elements.to_vec();
         for index in 1..element_list.len() {
@@ -138,7 +138,7 @@ impl List<'_> {
         }
     }
 
-    /// Gives a command that changes the list, and waits until that is confirmed.
+    /// Sends a command that changes the list, and waits for its confirmation.
     async fn request(&mut self, command: &impl Message) -> Result<(), String> {
         self.control.deliver(command).await.map_err(in_words)?;
         let answer = self.answer();

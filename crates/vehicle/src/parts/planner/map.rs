@@ -1,4 +1,4 @@
-//! Fetches the map from the knowledge store, in tiles, and the pose from the pose sensor.
+//! Fetches the map from the knowledge store in tiles, and the pose from the pose sensor.
 
 use std::sync::Arc;
 
@@ -12,12 +12,12 @@ use jaus::address::JausId;
 use jaus::component::Component;
 use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
 
-/// The most cells that are asked for at once.
+/// The most cells requested at once.
 const TILE: usize = 1 << 16;
-/// How often a map is asked for that changes meanwhile.
+/// Number of attempts to fetch a map that changes during the transfer.
 const TRIES: u32 = 3;
 
-/// A map as it was at some time.
+/// A map at a certain revision.
 #[derive(Debug, Clone)]
 pub(in crate::parts) struct Map {
     store: JausId,
@@ -25,7 +25,7 @@ pub(in crate::parts) struct Map {
     pub(in crate::parts) terrain: Arc<Terrain>,
 }
 
-/// The map that is called so, or the only one; `known` if it has not changed.
+/// Fetches the map with this name, or the only one. Returns `known` if it is unchanged.
 pub(super) async fn fetch(
     component: &Component,
     name: &str,
@@ -35,7 +35,7 @@ pub(super) async fn fetch(
     fetch_from(component, store, name, known).await
 }
 
-/// The same of a store that is known.
+/// Fetches the map from a known store.
 pub(in crate::parts) async fn fetch_from(
     component: &Component,
     store: JausId,
@@ -98,7 +98,7 @@ fn choose(maps: Vec<MapRec>, name: &str, store: JausId) -> Result<MapRec, String
     }
 }
 
-/// All cells; `None` if they changed meanwhile.
+/// Fetches all cells; `None` if they change during the transfer.
 async fn fetch_cells(
     component: &Component,
     store: JausId,
@@ -130,7 +130,7 @@ async fn fetch_cells(
     Ok(Some(cells))
 }
 
-/// Where the vehicle is.
+/// Fetches the vehicle's position.
 pub(super) async fn fetch_pose(component: &Component) -> Result<Point, String> {
     let services = [local_pose_sensor::URN];
     let sensor = find_soon(component, &services, "local pose sensor").await?;

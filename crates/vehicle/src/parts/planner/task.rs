@@ -1,5 +1,5 @@
-//! The planner at work: does what the mission asks for, one thing after the other, and tells it
-//! what happens.
+//! The planner's main task: executes the actions of the mission one by one and reports their
+//! results to it.
 #![expect(
     clippy::disallowed_methods,
     reason = "here the mission gets its time, and planning a thread"
@@ -28,40 +28,40 @@ use jaus::messages::core::{
     ReportStatus,
 };
 
-/// How long the driver may take to stop and to be given back.
+/// Time limit for stopping the driver and releasing control.
 const HALT: Duration = Duration::from_secs(2);
 
 type Job = Pin<Box<dyn Future<Output = Done> + Send>>;
 
-/// What a job has come to.
+/// Result of a job.
 enum Done {
     Map(Run, Result<Map, String>),
     Planned(Run, Result<Path, NotPlanned>),
     HandedOver(Run, Result<(Control, Vec<(Link, LinkState)>), String>),
-    /// Whether the client that has lost control is alive.
+    /// Whether the client that lost control is alive.
     Checked(Run, bool),
-    /// Why control was lost; `Err` if somebody has taken it or there is an emergency.
+    /// Why control was lost; `Err` after a takeover or an emergency.
     Lost(Run, Result<String, String>),
 }
 
-/// What the planner has before it.
+/// State of the planner's task.
 pub(super) struct PlannerTask<'a> {
     settings: &'a Planner,
     component: &'a Component,
     missions: Missions,
     wake: &'a Notify,
     map: Option<Map>,
-    /// Of the path segment driver, while it drives for us.
+    /// Control of the path segment driver during a mission.
     control: Option<Control>,
     job: Option<Job>,
-    /// The drivers, by link.
+    /// The drivers, indexed by link.
     peers: [Option<JausId>; 3],
     controllers: [Option<JausId>; 3],
     told: Option<(Run, Stage)>,
 }
 
 impl<'a> PlannerTask<'a> {
-    /// News that may wait.
+    /// Capacity of the event queue.
     pub(super) const NEWS: usize = 64;
 
     pub(super) fn new(
@@ -84,7 +84,7 @@ impl<'a> PlannerTask<'a> {
         }
     }
 
-    /// Works until the component has stopped.
+    /// Runs until the component has stopped.
     pub(super) async fn work(mut self, mut news: mpsc::Receiver<News>) {
         loop {
             self.act().await;
@@ -107,7 +107,7 @@ impl<'a> PlannerTask<'a> {
         }
     }
 
-    /// Tells the mission something, and others what has changed by that.
+    /// Updates the mission, and announces the resulting changes.
     async fn tell<T>(&mut self, words: impl FnOnce(&mut Mission, Instant) -> T) -> T {
         let now = Instant::now();
         let (answer, news) = self.missions.tell(|mission| words(mission, now));
@@ -121,7 +121,7 @@ impl<'a> PlannerTask<'a> {
         answer
     }
 
-    /// Tells people when a stage begins.
+    /// Logs the start of a stage.
     fn log(&mut self) {
         let (report, _) = self.missions.tell(|mission| mission.report().clone());
         let now = Some((report.run, report.stage));
@@ -143,7 +143,8 @@ impl<'a> PlannerTask<'a> {
         );
     }
 
-    /// Begins what the mission asks for. While the vehicle is being stopped nothing else begins.
+    /// Starts the actions that the mission requests. Nothing else starts while the vehicle is being
+    /// stopped.
     async fn act(&mut self) {
         self.log();
         loop {
@@ -153,7 +154,7 @@ impl<'a> PlannerTask<'a> {
                 Some(Action::Halt) => {
                     self.job = None;
                     if let Some(control) = self.control.take() {
-                        // Not longer than that, and before anything else.
+                        // Bounded, and before anything else.
                         let _ = tokio::time::timeout(HALT, halt(control)).await;
                     }
                 }
@@ -297,7 +298,7 @@ impl<'a> PlannerTask<'a> {
         }
     }
 
-    /// Whoever is not of the chain has taken over.
+    /// Stops the mission if a client outside the chain has taken control of a driver.
     async fn check_controller(&mut self, link: Link, client: JausId) {
         let before = match link {
             Link::Path => Some(self.component.id()),
@@ -326,7 +327,7 @@ impl<'a> PlannerTask<'a> {
         self.peers[link as usize].map_or_else(String::new, |id| format!(" ({id})"))
     }
 
-    /// Control over the path segment driver is lost: asks it why.
+    /// Handles the loss of control of the path segment driver: queries it for the cause.
     fn look_why_lost(&mut self, error: &str) {
         let Some(control) = self.control.take() else {
             return;
@@ -341,7 +342,7 @@ impl<'a> PlannerTask<'a> {
     }
 }
 
-/// Why control over a driver was lost; an error if that ends the mission.
+/// Determines why control of a driver was lost. Errors end the mission.
 async fn why_lost(component: &Component, peer: JausId, error: String) -> Result<String, String> {
     let status = component.query(peer, &QueryStatus {}).await;
     if status.is_ok_and(|report: ReportStatus| report.status == Status::EMERGENCY) {
@@ -360,7 +361,7 @@ async fn why_lost(component: &Component, peer: JausId, error: String) -> Result<
     }
 }
 
-/// How the drivers are now, those that can be asked.
+/// The current states of the drivers that respond.
 async fn look(component: &Component) -> Vec<(Link, LinkState)> {
     let mut states = Vec::new();
     for link in Link::ALL {
@@ -374,7 +375,7 @@ async fn look(component: &Component) -> Vec<(Link, LinkState)> {
     states
 }
 
-/// Stops a driver and gives it back.
+/// Stops a driver and releases control.
 async fn halt(control: Control) {
     if let Err(error) = control.standby().await {
         tracing::debug!(%error, "giving it back will stop it");
@@ -390,7 +391,7 @@ async fn working(job: &mut Option<Job>) -> Done {
     }
 }
 
-/// Waits until control is lost, if there is any.
+/// Waits for the loss of control, if there is control.
 async fn lost(control: &mut Option<Control>) -> jaus::component::ControlError {
     match control {
         Some(control) => control.lost().await,

@@ -1,5 +1,5 @@
-//! A whole vehicle in one process: each of its parts on a node of its own, on loopback, so that what
-//! they say to each other passes the same transport as between boards.
+//! A whole vehicle in one process. Each part has its own node on loopback, so messages use the same
+//! transport as between boards.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -13,41 +13,41 @@ use crate::parts::{
 use jaus::component::Kind;
 use jaus::node::{Config, Node, StartError};
 
-/// The parts of a vehicle that a mission needs, running.
+/// The running parts of a vehicle that a mission needs.
 #[derive(Debug)]
 pub struct Alone {
     subsystem: u16,
-    /// Where the store keeps its file and the pose sensor its pose.
+    /// Directory for the store's file and the pose sensor's pose.
     directory: PathBuf,
     running: BTreeMap<u8, (Node, AbortHandle)>,
     tasks: JoinSet<PartError>,
 }
 
-/// Why a part does not run.
+/// Why a part does not start.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AloneError {
-    /// Its node does not start.
+    /// Its node cannot start.
     #[error(transparent)]
     Start(#[from] StartError),
-    /// Its component can not be attached.
+    /// Its component cannot be attached.
     #[error(transparent)]
     Attach(#[from] jaus::node::AttachError),
 }
 
 impl Alone {
-    /// The parts, by the numbers of their components: primitive driver, planner, local pose sensor,
-    /// velocity state sensor, vector driver, path segment driver, knowledge store.
+    /// The parts by component number: primitive driver, planner, local pose sensor, velocity state
+    /// sensor, vector driver, path segment driver, knowledge store.
     pub const PARTS: [u8; 7] = [33, 36, 41, 42, 44, 48, 61];
 
-    /// Starts all parts, each as component C on node C of a subsystem; what they keep goes into a
-    /// directory.
+    /// Starts all parts, each as component C on node C of a subsystem. They store their files in
+    /// `directory`.
     ///
     /// # Errors
-    /// If a node does not start.
+    /// If a node cannot start.
     ///
     /// # Panics
-    /// Outside of a tokio runtime.
+    /// Outside a tokio runtime.
     pub fn start(subsystem: u16, directory: impl Into<PathBuf>) -> Result<Self, AloneError> {
         let mut alone = Self {
             subsystem,
@@ -61,10 +61,10 @@ impl Alone {
         Ok(alone)
     }
 
-    /// Starts a part, for instance one that was stopped.
+    /// Starts a part, for example after [`kill`](Self::kill).
     ///
     /// # Errors
-    /// If its node does not start.
+    /// If its node cannot start.
     pub fn start_part(&mut self, number: u8) -> Result<(), AloneError> {
         let node = Node::start(Config::loopback(self.subsystem, number))?;
         let slot = Slot {
@@ -100,7 +100,7 @@ impl Alone {
         })
     }
 
-    /// Ends a part at once, as if its process were killed.
+    /// Ends a part immediately, as if its process were killed.
     pub async fn kill(&mut self, number: u8) {
         if let Some((node, task)) = self.running.remove(&number) {
             task.abort();
@@ -108,24 +108,24 @@ impl Alone {
         }
     }
 
-    /// The nodes of the parts that run.
+    /// The nodes of the running parts.
     pub fn nodes(&self) -> impl Iterator<Item = &Node> {
         self.running.values().map(|(node, _)| node)
     }
 
-    /// Waits until a part can not go on, and says why; for ever while all do.
+    /// Waits until a part fails, and returns its error. Pending forever while all parts run.
     pub async fn broken(&mut self) -> PartError {
         loop {
             match self.tasks.join_next().await {
                 Some(Ok(error)) => return error,
-                // It was killed.
+                // The part was killed.
                 Some(Err(_)) => {}
                 None => std::future::pending().await,
             }
         }
     }
 
-    /// Ends all parts, and their nodes after them.
+    /// Ends all parts, then their nodes.
     pub async fn end(mut self) {
         self.tasks.shutdown().await;
         for (node, _) in self.running.into_values() {

@@ -1,5 +1,5 @@
-//! Messages as lines, as the figures of a protocol show them: when, from whom, to whom, what, and
-//! under which number.
+//! Message log lines in the form of a protocol figure: time, source, destination, name and sequence
+//! number.
 
 use std::fmt;
 use std::time::{Duration, SystemTime};
@@ -14,26 +14,26 @@ use jaus::node::{Content, Passage};
 use jaus::service::code_of;
 use jaus::wire::{Acknowledgement, Frame};
 
-/// A message that passed.
+/// A message on the wire.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Line {
-    /// How long after the beginning.
+    /// Time since the start.
     pub time: Duration,
-    /// Who sent it.
+    /// The sender.
     pub source: JausId,
-    /// Whom it is for.
+    /// The destination.
     pub destination: JausId,
-    /// Its code.
+    /// The message code.
     pub code: u16,
-    /// What it is called; for an event the report that it carries, too.
+    /// The message name. For an event, with the name of the report it carries.
     pub name: String,
-    /// The number that its transport gave it; none between components of one node.
+    /// The transport sequence number; `None` between components of one node.
     pub sequence: Option<u16>,
-    /// Whether it acknowledges, or wants to be acknowledged.
+    /// Whether it is an acknowledgement or requests one.
     pub acknowledgement: Acknowledgement,
 }
 
-/// The messages of a passage.
+/// The messages of one passage.
 #[must_use]
 pub fn lines(passage: &Passage, begin: SystemTime) -> Vec<Line> {
     let time = passage.time.duration_since(begin).unwrap_or_default();
@@ -76,7 +76,7 @@ fn plain_name(code: u16) -> String {
 }
 
 impl Line {
-    /// Whether it is of the chatter by which components find each other and look after events.
+    /// Whether the message belongs to discovery or event maintenance.
     #[must_use]
     pub fn is_chatter(&self) -> bool {
         let subject = self.code & 0x0FFF;

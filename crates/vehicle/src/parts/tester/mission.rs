@@ -1,5 +1,5 @@
-//! A mission through the whole chain, checked step by step: planner, store, path segment driver,
-//! vector driver, primitive driver, and back.
+//! A mission test of the whole chain, step by step: planner, store, path segment driver, vector
+//! driver, primitive driver, and back.
 #![expect(
     clippy::disallowed_methods,
     reason = "here steps get their time and their patience"
@@ -26,20 +26,20 @@ use jaus::messages::mobility::{
     velocity_state_sensor,
 };
 
-/// What is to be driven.
+/// Settings of a mission test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MissionTest {
     /// The vehicle's subsystem.
     pub subsystem: u16,
-    /// Where to, in the local frame; without it some four metres away.
+    /// The destination in the local frame. `None` chooses one about four metres away.
     pub to: Option<Point>,
-    /// The greatest speed, in metres per second.
+    /// Speed limit in metres per second.
     pub speed: f32,
-    /// With which authority the planner is controlled.
+    /// The authority used to control the planner.
     pub authority: u8,
-    /// How long a step may take, but for the drive.
+    /// Timeout of each step except the drive.
     pub patience: Duration,
-    /// How long the drive may take.
+    /// Timeout of the drive.
     pub drive: Duration,
 }
 
@@ -56,7 +56,7 @@ impl Default for MissionTest {
     }
 }
 
-/// The steps, in their order.
+/// The steps in order.
 const STEPS: [&str; 17] = [
     "the knowledge store is found",
     "the local pose sensor is found",
@@ -77,7 +77,7 @@ const STEPS: [&str; 17] = [
     "control is given back, down the chain",
 ];
 
-/// A test that runs.
+/// A test in progress.
 struct Running<'a, T> {
     test: &'a MissionTest,
     component: &'a Component,
@@ -85,7 +85,7 @@ struct Running<'a, T> {
     steps: Vec<Step>,
 }
 
-/// Who takes part.
+/// The components involved.
 struct Cast {
     store: JausId,
     pose: JausId,
@@ -95,7 +95,7 @@ struct Cast {
 }
 
 impl MissionTest {
-    /// Drives the mission; each step is told as soon as it is over, and all are in the answer.
+    /// Runs the mission. `tell` receives each step when it ends; the result contains all of them.
     pub async fn run(&self, component: &Component, tell: impl FnMut(&Step)) -> Vec<Step> {
         let mut running = Running {
             test: self,
@@ -103,7 +103,7 @@ impl MissionTest {
             tell,
             steps: Vec::new(),
         };
-        // What is missing is a failed step, and the others are skipped.
+        // An absent component fails its step, and the remaining steps are skipped.
         let _ = running.all().await;
         running.skip_rest();
         running.steps
@@ -182,7 +182,7 @@ impl<T: FnMut(&Step)> Running<'_, T> {
         .await
     }
 
-    /// Carries out the next step: what comes of it, and what was seen.
+    /// Runs the next step. Returns its value and records the observation.
     async fn step<V>(
         &mut self,
         check: impl Future<Output = Result<(V, String), String>>,
@@ -219,7 +219,7 @@ impl<T: FnMut(&Step)> Running<'_, T> {
     }
 }
 
-/// The reports of the planner, as they come.
+/// The planner's reports, from events and queries.
 struct Reports<'a> {
     component: &'a Component,
     planner: JausId,
@@ -227,7 +227,7 @@ struct Reports<'a> {
     patience: Duration,
 }
 
-/// Between two looks where no events come.
+/// Polling interval without events.
 const LOOK: Duration = Duration::from_millis(250);
 
 impl<'a> Reports<'a> {
@@ -241,7 +241,7 @@ impl<'a> Reports<'a> {
         }
     }
 
-    /// The report as it is now; events that came before it are old news.
+    /// The current report. Discards queued events, which are older.
     async fn now(&mut self) -> Result<ReportMission, String> {
         let report = ask(self.component, self.planner, &QueryMission {}).await?;
         if let Some(events) = &mut self.events {
@@ -250,7 +250,7 @@ impl<'a> Reports<'a> {
         Ok(report)
     }
 
-    /// The next report that an event brings; asks if none comes.
+    /// The next report from an event, or from a query if no event arrives.
     async fn next(&mut self) -> Result<ReportMission, String> {
         let event = async {
             match &mut self.events {
@@ -268,7 +268,7 @@ impl<'a> Reports<'a> {
         }
     }
 
-    /// Reads on until the stage is reached; an end of the mission before is an error.
+    /// Collects reports until a stage is reached. An earlier end of the mission is an error.
     async fn until(&mut self, stage: Stage, limit: Duration) -> Result<Vec<ReportMission>, String> {
         let deadline = Instant::now() + limit;
         let mut seen = vec![self.now().await?];
@@ -364,7 +364,7 @@ async fn speed(component: &Component, sensor: JausId) -> Result<f64, String> {
     speed.ok_or_else(|| format!("{sensor} does not tell how fast the vehicle is"))
 }
 
-/// Asks again until the answer is good: a sensor that was just started knows nothing yet.
+/// Retries a query until it succeeds, because a sensor that has just started has no data yet.
 async fn patiently<V, F: Future<Output = Result<V, String>>>(
     test: &MissionTest,
     ask: impl Fn() -> F,
@@ -428,7 +428,7 @@ async fn set_out(
     }
 }
 
-/// A destination some metres away that can be reached.
+/// Chooses a reachable destination some metres away.
 async fn choose(component: &Component, store: JausId, from: Point) -> Result<Point, String> {
     const AWAY: f64 = 4.0;
     let map = map::fetch_from(component, store, "traversability", None).await?;
@@ -521,7 +521,7 @@ async fn arrive(
     }
 }
 
-/// How close to the destination the vehicle has to stand, in metres.
+/// Maximum distance from the destination on arrival, in metres.
 const NEAR: f64 = 0.75;
 
 async fn give_back(

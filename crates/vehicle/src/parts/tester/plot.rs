@@ -1,4 +1,4 @@
-//! A plot of figures over numbers of components, as an SVG picture that stands for itself.
+//! Plots of measurements over component counts, as self-contained SVG images.
 
 use std::fmt::{self, Display, Write};
 
@@ -7,22 +7,22 @@ use super::steps::Plain;
 /// One line of a plot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// What it shows.
+    /// Name in the legend.
     pub name: String,
-    /// Points: number, and figure above 0.
+    /// Points: component count, and measurement above 0.
     pub points: Vec<(f64, f64)>,
 }
 
 /// A plot with two logarithmic axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plot {
-    /// What stands above.
+    /// Title above the plot.
     pub title: String,
-    /// What the numbers below are.
+    /// Label of the horizontal axis.
     pub across: String,
-    /// What the figures at the left are.
+    /// Label of the vertical axis.
     pub up: String,
-    /// What is shown.
+    /// The lines to plot.
     pub lines: Vec<Line>,
 }
 
@@ -32,7 +32,7 @@ const LEFT: f64 = 80.0;
 const RIGHT: f64 = 160.0;
 const TOP: f64 = 50.0;
 const BOTTOM: f64 = 60.0;
-/// DriverStatus apart by people who see few colours, too, and by their dashes on paper.
+/// Colours for colour-blind readers, and dashes for prints without colour.
 const STYLES: [(&str, &str); 5] = [
     ("#0072b2", ""),
     ("#009e73", "8 4"),
@@ -41,17 +41,17 @@ const STYLES: [(&str, &str); 5] = [
     ("#555555", "4 4"),
 ];
 
-/// One axis: logarithmic, between two bounds.
+/// A logarithmic axis between two bounds.
 struct Axis {
     least: f64,
     most: f64,
-    /// Where the bounds are drawn.
+    /// Positions of the bounds in the image.
     from: f64,
     to: f64,
 }
 
 impl Axis {
-    /// One on which all values have their place.
+    /// An axis that covers all values.
     fn over(values: impl Iterator<Item = f64> + Clone, from: f64, to: f64) -> Self {
         let good = values.filter(|value| value.is_finite() && *value > 0.0);
         let least = good.clone().fold(f64::INFINITY, f64::min);
@@ -75,7 +75,7 @@ impl Axis {
         self.from + share * (self.to - self.from)
     }
 
-    /// The powers of ten that lie within; of a short axis also 2 and 5 times those.
+    /// The powers of ten within the bounds. For a short axis also 2 and 5 times those.
     fn marks(&self) -> Vec<f64> {
         let first = self.least.log10().floor() as i32;
         let last = self.most.log10().ceil() as i32;
@@ -127,7 +127,7 @@ impl Display for Plot {
 }
 
 impl Plot {
-    /// Lines of equal numbers and figures, and what they are.
+    /// Draws the grid and the axis labels.
     fn grid(&self, f: &mut fmt::Formatter<'_>, across: &Axis, up: &Axis) -> fmt::Result {
         let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - RIGHT);
         let mut grid = String::new();

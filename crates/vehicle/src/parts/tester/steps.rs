@@ -1,27 +1,27 @@
-//! The steps of a test: what was checked, what came of it, and how long it took.
+//! Test steps: what was checked, with which result, in what time.
 
 use std::fmt::{self, Display, Write};
 use std::time::Duration;
 
-/// What came of a step.
+/// Result of a step.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Verdict {
-    /// It is as it should be; what was seen.
+    /// The check passed, with what was observed.
     Pass(String),
-    /// It is not; what is wrong.
+    /// The check failed, with the reason.
     Fail(String),
-    /// It could not be checked because an earlier step failed.
+    /// The step was skipped because an earlier one failed.
     Skipped,
 }
 
-/// One step.
+/// One step of a test.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Step {
-    /// What was checked.
+    /// The check.
     pub name: String,
-    /// What came of it.
+    /// The result.
     pub verdict: Verdict,
-    /// How long it took.
+    /// Duration of the step.
     pub took: Duration,
 }
 
@@ -38,7 +38,7 @@ impl Display for Step {
     }
 }
 
-/// Whether all of them passed.
+/// Whether all steps passed.
 #[must_use]
 pub fn all_pass(steps: &[Step]) -> bool {
     steps
@@ -46,7 +46,7 @@ pub fn all_pass(steps: &[Step]) -> bool {
         .all(|step| matches!(step.verdict, Verdict::Pass(_)))
 }
 
-/// The steps as a JUnit report, which build servers read.
+/// Formats the steps as a JUnit report for build servers.
 #[must_use]
 pub fn junit(suite: &str, steps: &[Step]) -> String {
     let count =
@@ -78,7 +78,7 @@ pub fn junit(suite: &str, steps: &[Step]) -> String {
     text
 }
 
-/// Text without what means something in XML, and without what XML can not hold.
+/// Text escaped for XML, with control characters replaced by spaces.
 pub(super) struct Plain<'a>(pub(super) &'a str);
 
 impl Display for Plain<'_> {
