@@ -1,11 +1,11 @@
-//! The log of a node on disk: everything that passes, in files that take each other's place.
+//! The journal: a log of a node's entire traffic on disk, in rotating files.
 //!
-//! A [`Journal`] has a [tap](Node::tap) of the node, which is its bounded queue, and a thread that
-//! writes, so that a slow card holds up nobody. What the thread is too slow for is lost and counted,
-//! and the log itself says how much and where. A file is ended when it has its size or age, and the
-//! oldest go before the directory would hold more than it may. What is written is handed to the
-//! operating system within a second, in whole blocks or lines: after a crash everything up to there
-//! can be read.
+//! A [`Journal`] has a [tap](Node::tap) on the node, which is its bounded queue, and a writer
+//! thread, so a slow SD card delays nothing else. Traffic beyond the thread's speed is lost and
+//! counted, and the log itself records how much and where. A file ends when it reaches its maximum
+//! size or age, and the oldest files are deleted before the directory exceeds its limit. Data is
+//! passed to the operating system within a second, in whole blocks or lines. After a crash
+//! everything up to that point is readable.
 
 mod directory;
 mod packets;
@@ -28,42 +28,43 @@ use self::sink::Sink;
 use super::{Filter, Links};
 use jaus::node::{Node, Tap, Tapped};
 
-/// Passages that may wait to be written.
+/// Capacity of the queue in passages.
 const WAITING: usize = 8192;
-/// How often everything is handed to the operating system.
+/// Interval of flushes to the operating system.
 const FLUSH: Duration = Duration::from_secs(1);
-/// The least that a file may be given: the longest datagram and its headers fit.
+/// Minimum size limit of a file, sufficient for the longest datagram with headers.
 pub const LEAST_FILE: u64 = 128 << 10;
 
-/// What is written.
+/// Format of a journal.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum JournalFormat {
-    /// Every datagram and fragment as it passed, as pcapng: for `jaus watch`, `jaus decode` and
-    /// Wireshark. What came by TCP or a serial line, or stayed within the node, has headers around it
-    /// as if it had been a datagram.
+    /// Every datagram and fragment on the wire, as pcapng, for `jaus watch`, `jaus decode` and
+    /// Wireshark. Traffic over TCP, serial lines and within the node is wrapped in headers as if it
+    /// were a datagram.
     #[default]
     Packets,
-    /// Whole messages as JSON, one a line: for people and their scripts.
+    /// Whole messages as JSON, one per line, for reading and scripting.
     JsonLines,
 }
 
-/// Where a log is kept, and how much of it.
+/// Location, format and limits of a journal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JournalSettings {
-    /// The directory; it is made if it is not there.
+    /// The directory. It is created if it does not exist.
     pub directory: PathBuf,
-    /// What is written.
+    /// The format.
     pub format: JournalFormat,
-    /// Octets of all files of the log together.
+    /// Size limit of all files together, in octets.
     pub limit: u64,
-    /// Octets of one file, at least [`LEAST_FILE`] and at most half of the limit.
+    /// Size limit of one file in octets, at least [`LEAST_FILE`] and at most half of the total
+    /// limit.
     pub file_limit: u64,
-    /// The time that one file may span.
+    /// Maximum time span of one file.
     pub file_age: Duration,
 }
 
 impl JournalSettings {
-    /// 1 GiB in packets, in files of 64 MiB and an hour at most.
+    /// Default settings: 1 GiB of packets, in files of at most 64 MiB and one hour.
     #[must_use]
     pub fn new(directory: impl Into<PathBuf>) -> Self {
         Self {
@@ -75,7 +76,7 @@ impl JournalSettings {
         }
     }
 
-    /// Another bound for all files together, with files of a sixteenth of it at most.
+    /// Sets another total limit. Each file takes at most a sixteenth of it.
     #[must_use]
     pub fn limited_to(self, octets: u64) -> Self {
         let file_limit = self.file_limit.min(octets / 16).max(LEAST_FILE);
@@ -87,19 +88,19 @@ impl JournalSettings {
     }
 }
 
-/// Why there can be no log.
+/// Why a journal cannot be started.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum JournalError {
     /// The directory cannot be used.
     #[error("the log directory {directory} cannot be used: {source}")]
     Directory {
-        /// Which.
+        /// The directory.
         directory: String,
-        /// What the operating system says.
+        /// The cause.
         source: io::Error,
     },
-    /// Bounds that contradict each other.
+    /// The limits contradict each other.
     #[error(
         "a log of {limit} octets in files of {file_limit} cannot be: a file has at least {LEAST_FILE} \
          octets, and the log at least twice as many as a file"
@@ -110,17 +111,17 @@ pub enum JournalError {
         /// [`JournalSettings::file_limit`].
         file_limit: u64,
     },
-    /// No thread can be started.
+    /// The writer thread cannot be started.
     #[error("the log cannot be written: {0}")]
     Thread(io::Error),
 }
 
-/// What a log has done. The numbers only grow.
+/// Counters of a journal. They only increase.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct JournalCounters {
     /// Packets or lines written.
     pub written: u64,
-    /// What passed and could not be written: the disk was too slow, full or gone.
+    /// Traffic not written because the disk was slow, full or absent.
     pub lost: u64,
 }
 
@@ -128,11 +129,11 @@ pub struct JournalCounters {
 struct Numbers {
     written: AtomicU64,
     lost: AtomicU64,
-    /// Where is written to now.
+    /// The current file.
     file: RwLock<Option<PathBuf>>,
 }
 
-/// A log that is being written. Dropping it writes what waits and ends it.
+/// A journal in progress. Dropping it writes the queued data and ends it.
 #[derive(Debug)]
 pub struct Journal {
     numbers: Arc<Numbers>,
@@ -141,10 +142,10 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Begins a log of everything that passes `node` from now on.
+    /// Starts a journal of all traffic of `node` from now on.
     ///
     /// # Errors
-    /// A directory that cannot be used, or bounds that cannot be.
+    /// If the directory is unusable or the limits are invalid.
     pub fn start(node: &Node, settings: &JournalSettings) -> Result<Self, JournalError> {
         Self::of(node.tap(WAITING), Links::of(node.clone()), settings)
     }
@@ -179,7 +180,7 @@ impl Journal {
         })
     }
 
-    /// What it has done so far.
+    /// The current counters.
     #[must_use]
     pub fn counters(&self) -> JournalCounters {
         JournalCounters {
@@ -188,7 +189,7 @@ impl Journal {
         }
     }
 
-    /// The file that is being written, once something has passed.
+    /// The current file, once there has been traffic.
     #[must_use]
     pub fn file(&self) -> Option<PathBuf> {
         let file = self.numbers.file.read();
@@ -200,13 +201,13 @@ impl Drop for Journal {
     fn drop(&mut self) {
         drop(self.stop.take());
         if let Some(thread) = self.thread.take() {
-            // It has panicked, at worst; then there is nothing left to wait for.
+            // Fails only if the thread has panicked, and then there is nothing to wait for.
             let _ = thread.join();
         }
     }
 }
 
-/// The thread: writes until it is told to stop or the node has.
+/// The writer thread: runs until the journal is dropped or the node has stopped.
 async fn write(
     mut tap: Tap,
     mut sink: Sink,
@@ -252,7 +253,7 @@ async fn write(
     sink.tell(numbers);
 }
 
-/// A disk that does not do what it should: said once, and tried again every second.
+/// A failing disk: logged once, and retried every second.
 #[derive(Debug)]
 struct Trouble {
     may_try: bool,
@@ -269,7 +270,7 @@ impl Default for Trouble {
 }
 
 impl Trouble {
-    /// Whether it went well.
+    /// Records a result. Returns whether it was successful.
     fn note(&mut self, directory: &Path, result: io::Result<()>) -> bool {
         match result {
             Ok(()) => {
