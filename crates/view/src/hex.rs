@@ -1,24 +1,24 @@
-//! Octets as people write them.
+//! Hexadecimal text of octets.
 
 use std::fmt::Write as _;
 
 use super::dictionary::Unreadable;
 
-/// Lower-case hexadecimal digits, two for each octet.
+/// Formats octets as lower-case hexadecimal digits, two per octet.
 pub fn to_hex(octets: &[u8]) -> String {
     let mut text = String::with_capacity(2 * octets.len());
     for octet in octets {
-        // Writing to a String cannot fail.
+        // Writing to a `String` cannot fail.
         let _ = write!(text, "{octet:02x}");
     }
     text
 }
 
-/// Reads hexadecimal digits of either case; white space between octets does not matter.
+/// Parses hexadecimal digits of either case, ignoring white space between octets.
 ///
 /// # Errors
-/// Something that is no digit, or a digit without its second half. The offset is that of the octet
-/// in question.
+/// If a character is not a digit, or an octet has only one digit. The error's offset is that of the
+/// octet concerned.
 pub fn from_hex(text: &str) -> Result<Vec<u8>, Unreadable> {
     let mut octets = Vec::with_capacity(text.len() / 2);
     let mut half = None;

@@ -1,8 +1,9 @@
-//! Large messages in a capture: fragments put together, within bounds, in both styles seen.
+//! Reassembly of large messages from a capture, with bounded memory, in both fragmentation styles
+//! observed.
 //!
-//! AS5669A and Junior cut the message as it is, so that only the first fragment begins with the
-//! message code. JAUS++ repeats the code at the beginning of every fragment. Nothing in a fragment
-//! tells which it is; the whole message does, when it is read.
+//! AS5669A and Junior split the message unchanged, so only the first fragment starts with the
+//! message code. JAUS++ repeats the code at the start of every fragment. A single fragment does not
+//! reveal the style; decoding the whole message does.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -11,12 +12,12 @@ use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::wire::{DataControl, Frame, Version, large};
 
-/// Messages that may be incomplete at a time; then the one that began first is given up.
+/// Limit of incomplete messages. Beyond it the oldest is dropped.
 const MOST_OPEN: usize = 64;
-/// The most that one message may have; JAUS peers stop at some hundred kilobytes.
+/// Maximum size of a message. JAUS peers do not exceed some hundred kilobytes.
 const LONGEST: usize = 16 << 20;
 
-/// Fragments on their way to a whole message.
+/// Messages being reassembled.
 #[derive(Debug, Default)]
 pub(super) struct LargeMessages {
     /// Oldest first.
@@ -31,29 +32,29 @@ struct Open {
     version: Version,
     first: Option<u16>,
     last: Option<u16>,
-    /// By sequence number.
+    /// Payloads by sequence number.
     pieces: BTreeMap<u16, Bytes>,
     length: usize,
 }
 
-/// A message of which every fragment was seen.
+/// A completely received message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Whole {
     /// Sequence number of the first fragment.
     pub(super) sequence: u16,
-    /// The fragments' payloads behind one another.
+    /// The concatenated payloads.
     pub(super) plain: Bytes,
-    /// The same without the code that every fragment but the first begins with, if they all do.
+    /// The same without the code at the start of every further fragment, if all repeat it.
     pub(super) without_repeated_code: Option<Bytes>,
 }
 
 impl LargeMessages {
-    /// Messages given up, and those that still wait for fragments.
+    /// Number of dropped messages and of those still incomplete.
     pub(super) fn incomplete(&self) -> u64 {
         self.given_up + self.open.len() as u64
     }
 
-    /// Adds a fragment; the message if nothing is missing now.
+    /// Adds a fragment. Returns the message when it is complete.
     pub(super) fn insert(&mut self, frame: &Frame) -> Option<Whole> {
         let place = self.place_for(frame);
         let open = &mut self.open[place];
@@ -62,7 +63,7 @@ impl LargeMessages {
             DataControl::Last => open.last = Some(frame.sequence),
             DataControl::Middle | DataControl::Single => {}
         }
-        // One that comes again replaces itself.
+        // A duplicate replaces the original.
         let before = open.pieces.insert(frame.sequence, frame.payload.clone());
         open.length += frame.payload.len();
         open.length -= before.map_or(0, |piece| piece.len());
@@ -76,7 +77,7 @@ impl LargeMessages {
         Some(whole)
     }
 
-    /// Where the fragment's message waits. A second beginning or end is another message's.
+    /// The entry for the fragment's message. A second first or last fragment starts a new message.
     fn place_for(&mut self, frame: &Frame) -> usize {
         let known = self.open.iter().position(|open| {
             (open.source, open.destination, open.version)
@@ -113,7 +114,7 @@ impl LargeMessages {
 }
 
 impl Open {
-    /// All payloads from the first to the last, if they are here. Sequence numbers wrap around.
+    /// The message, if all fragments from first to last are present. Sequence numbers wrap around.
     fn whole(&self) -> Option<Whole> {
         let (first, last) = (self.first?, self.last?);
         let fragments = last.wrapping_sub(first);
@@ -126,7 +127,7 @@ impl Open {
         pieces.first()?.get(..large::CODE_LEN)?;
         let repeated = large::repeats_code(pieces.iter().copied());
         let join = |skip| large::join(pieces.iter().copied(), skip);
-        // The older headers hold the code, so there it stands in every payload.
+        // In the older versions the code is in the header, so every payload starts with it.
         let (plain, without_repeated_code) = match self.version {
             Version::As5669a => (join(0), repeated.then(|| join(large::CODE_LEN))),
             Version::As5669 | Version::Ra => (repeated.then(|| join(large::CODE_LEN))?, None),

@@ -1,9 +1,9 @@
-//! What people look at: captures, and JSON of any message.
+//! Human-readable views of JAUS traffic: captures, and JSON of any message.
 //!
-//! From the outside in: a [`Capture`] gives [`Frame`]s, a [`Network`] finds the UDP [`Datagram`]s
-//! in them, a [`MessageLog`] the JAUS messages in those, and a [`Dictionary`] the fields of a
-//! message. A [`Line`] is the result as one JSON object; a [`Request`] is the way back.
-//! Nothing in the stack knows that this crate exists.
+//! From the outside in: a [`Capture`] yields [`Frame`]s, a [`Network`] extracts their UDP
+//! [`Datagram`]s, a [`MessageLog`] the JAUS messages in those, and a [`Dictionary`] the fields of a
+//! message. A [`Line`] is the result as one JSON object; a [`Request`] is the reverse. The stack
+//! does not depend on this crate.
 #![forbid(unsafe_code)]
 
 mod capture;

@@ -1,4 +1,4 @@
-//! One message as one JSON object: what `jaus decode` prints, line by line.
+//! One message as one JSON object: the output format of `jaus decode`, one per line.
 
 use bytes::Bytes;
 use serde::Serialize;
@@ -12,14 +12,13 @@ use jaus::address::JausId;
 use jaus::wire::ra::RaId;
 use jaus::wire::{self, Frame, Version};
 
-/// A message, or why it cannot be read, as people and scripts see it.
+/// A message, or the reason why it is unreadable.
 ///
-/// Serializes as one object with the keys in the order in which they are described here; what is
-/// not known is left out.
+/// Serializes as one object with the keys in the order given here. Unknown values are omitted.
 #[derive(Debug, Clone)]
 pub struct Line<'d> {
     /// `time`, `source`, `destination`, `transport`, `priority`, `broadcast`, `ack`, `data`,
-    /// `sequence`: when, who to whom and how. Not there for bare messages.
+    /// `sequence`: capture time and transport header. Absent for bare messages.
     pub envelope: Option<Envelope>,
     /// `code`: four hexadecimal digits.
     pub code: Option<u16>,
@@ -27,9 +26,9 @@ pub struct Line<'d> {
     pub message: Option<&'d str>,
     /// `service`: the URN of a service that defines it.
     pub service: Option<&'d str>,
-    /// `version`: of the service, where it is not the one that would be tried first.
+    /// `version`: of the service, unless it is the one tried first.
     pub version: Option<jsidl::model::Version>,
-    /// What the message holds.
+    /// The content of the message.
     pub content: Content,
 }
 
@@ -38,65 +37,66 @@ pub struct Line<'d> {
 pub enum Content {
     /// `body`: the fields.
     Body(Body),
-    /// `length`: this many octets of a large message, which is shown once it is whole.
+    /// `length`: the size in octets of a fragment of a large message. The message follows when it
+    /// is complete.
     Fragment(usize),
-    /// `octets`: the message in hexadecimal, because no definition here describes its body.
+    /// `octets`: the message in hexadecimal, if no definition of its body is available.
     Octets(Bytes),
     /// Nothing: an acknowledgement.
     Empty,
     /// `error` and `offset`; then `octets`, the whole message, if there is one.
     Unreadable {
-        /// What is wrong.
+        /// Description of the error.
         error: String,
-        /// Where: in a message counted from its code, in a datagram or a file from its first
-        /// octet.
+        /// Offset of the error: in a message counted from its code, in a datagram or a file from
+        /// its first octet.
         offset: u64,
-        /// The message at fault.
+        /// The message concerned.
         octets: Option<Bytes>,
     },
 }
 
-/// What a capture and a transport header tell about a message.
+/// Capture time and transport header of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Envelope {
-    /// When it was captured.
+    /// Capture time.
     pub time: Option<Timestamp>,
-    /// What stands in its header; `None` if that could not be read.
+    /// The transport header; `None` if it was unreadable.
     pub header: Option<Header>,
 }
 
 /// The fields of a transport header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Header {
-    /// From whom.
+    /// The sender.
     pub source: JausId,
-    /// For whom.
+    /// The destination.
     pub destination: JausId,
-    /// Which kind of header.
+    /// Version of the header.
     pub transport: Version,
     /// Priority, broadcast, acknowledgement.
     pub flags: wire::Flags,
-    /// `single`, `first`, `middle` or `last`; `whole` for a large message put together.
+    /// `single`, `first`, `middle` or `last`; `whole` for a reassembled message.
     pub data: &'static str,
-    /// The sequence number; of a large message, the first fragment's.
+    /// The sequence number; that of the first fragment for a reassembled message.
     pub sequence: u16,
 }
 
 impl Line<'_> {
-    /// Whether it says why something cannot be read.
+    /// Whether the line reports an error.
     pub fn is_error(&self) -> bool {
         matches!(self.content, Content::Unreadable { .. })
     }
 
-    /// The object as text, without a line end.
+    /// The object as text, without a line ending.
     pub fn to_json(&self) -> String {
-        // Serializing into memory fails only for maps without text keys; there are none.
+        // Serialising to memory fails only for non-text map keys, which do not occur.
         serde_json::to_string(self).unwrap_or_default()
     }
 }
 
 impl<'d> Line<'d> {
-    /// A message that was looked up in the dictionary.
+    /// Creates the line of a decoded message.
     pub(super) fn of_reading(
         envelope: Option<Envelope>,
         reading: Reading<'d>,
@@ -120,7 +120,7 @@ impl<'d> Line<'d> {
         }
     }
 
-    /// Something that is no message at all.
+    /// Creates the line of an error outside any message.
     pub fn of_error(envelope: Option<Envelope>, error: &impl ToString, offset: u64) -> Self {
         Self {
             envelope,
@@ -155,12 +155,13 @@ impl Header {
         }
     }
 
-    /// Whether the message is one of the Reference Architecture, by its header and its source.
+    /// Whether the message belongs to the Reference Architecture, judged by header version and
+    /// source.
     pub(super) fn is_ra(&self) -> bool {
         RaId::in_header(self.transport, self.source).is_some()
     }
 
-    /// `42.1.1`; the Reference Architecture's ids have four parts.
+    /// Formats an id such as `42.1.1`. Reference Architecture ids have four parts.
     fn id(&self, id: JausId) -> String {
         if self.transport == Version::Ra || self.is_ra() {
             RaId::from(id).to_string()

@@ -1,4 +1,4 @@
-//! From the datagrams of a capture to the messages in them.
+//! Decoding of the messages in a capture's datagrams.
 
 use bytes::Bytes;
 
@@ -8,13 +8,13 @@ use super::line::{Content, Envelope, Header, Line};
 use super::{Datagram, Timestamp};
 use jaus::wire::{self, DataControl, Frame, Version, judp};
 
-/// Reads datagrams one after the other and gives a [`Line`] for every message.
+/// Decodes datagrams one by one and yields a [`Line`] for every message.
 ///
-/// Octets behind the messages of a datagram are passed over without a word, because JAUS++ leaves
-/// the end of older, longer messages there. Now and then such a rest looks like a message. What
-/// follows the first message is therefore only believed if its header could have been written on
-/// purpose ([`Frame::is_plausible`]) and its source is of the same node as the first message's:
-/// one node sends a datagram.
+/// Octets after the messages of a datagram are ignored silently, because JAUS++ leaves remains of
+/// older, longer messages there. Sometimes such remains look like a message. Therefore, data after
+/// the first message is accepted only if its header is plausible ([`Frame::is_plausible`]) and its
+/// source is on the same node as that of the first message, since a datagram comes from a single
+/// node.
 #[derive(Debug)]
 pub struct MessageLog<'d> {
     dictionary: &'d Dictionary,
@@ -23,7 +23,7 @@ pub struct MessageLog<'d> {
 }
 
 impl<'d> MessageLog<'d> {
-    /// A log that looks messages up in `dictionary`.
+    /// Creates a log that decodes with `dictionary`.
     pub fn new(dictionary: &'d Dictionary) -> Self {
         Self {
             dictionary,
@@ -32,17 +32,17 @@ impl<'d> MessageLog<'d> {
         }
     }
 
-    /// Octets behind messages that were passed over so far.
+    /// Number of octets ignored after messages so far.
     pub fn stale_octets(&self) -> u64 {
         self.stale_octets
     }
 
-    /// Large messages of which some fragments were not seen so far.
+    /// Number of large messages with missing fragments so far.
     pub fn incomplete_messages(&self) -> u64 {
         self.large.incomplete()
     }
 
-    /// The messages of a datagram, or why there is none.
+    /// The messages of a datagram, or the reason why there are none.
     pub fn read(&mut self, time: Option<Timestamp>, datagram: &Datagram<'_>) -> Vec<Line<'d>> {
         let mut lines = Vec::new();
         let octets = Bytes::copy_from_slice(&datagram.payload);
@@ -81,7 +81,7 @@ impl<'d> MessageLog<'d> {
         }
     }
 
-    /// Adds the line of a message, and that of the large message which it completes.
+    /// Adds the line of a message, and of a large message that it completes.
     fn message(&mut self, time: Option<Timestamp>, frame: &Frame, lines: &mut Vec<Line<'d>>) {
         let envelope = Envelope {
             time,
@@ -97,7 +97,7 @@ impl<'d> MessageLog<'d> {
         }
     }
 
-    /// The line of a message as soon as all of it is here; none for an acknowledgement.
+    /// The line of a complete message. `None` for acknowledgements and incomplete messages.
     pub(super) fn whole_message(
         &mut self,
         time: Option<Timestamp>,
@@ -116,7 +116,7 @@ impl<'d> MessageLog<'d> {
         Some(self.line(envelope, &frame.payload))
     }
 
-    /// A message that is here as a whole.
+    /// The line of a complete message.
     fn line(&self, envelope: Envelope, octets: &Bytes) -> Line<'d> {
         let transport = envelope.header.as_ref().map(|header| header.transport);
         let reading = self.ra(&envelope).and_then(|ra| ra.read_ra(octets));
@@ -124,13 +124,14 @@ impl<'d> MessageLog<'d> {
             (Some(reading), _) if reading.body.is_ok() => reading,
             (Some(reading), Some(Version::Ra)) => reading,
             (None, Some(Version::Ra)) => {
-                // The Reference Architecture's messages share codes and names with the services'
-                // but not layouts: reading them by the services' definitions would invent values.
+                // Messages of the Reference Architecture share codes and names with those of the
+                // services, but not layouts. Decoding them with service definitions would produce
+                // wrong values.
                 let code = octets.first_chunk().map(|&code| u16::from_le_bytes(code));
                 return self.bare(envelope, code, Content::Octets(octets.clone()));
             }
-            // Through the other older header, a message of the services may come from a subsystem
-            // that looks like one of the Reference Architecture.
+            // With the other older header, a service message may come from a subsystem number that
+            // resembles the Reference Architecture.
             (of_ra, _) => {
                 let reading = self.dictionary.read(octets);
                 of_ra.filter(|_| reading.body.is_err()).unwrap_or(reading)
@@ -139,21 +140,21 @@ impl<'d> MessageLog<'d> {
         Line::of_reading(Some(envelope), reading, octets)
     }
 
-    /// The dictionary, if the message may be one of the Reference Architecture.
+    /// The dictionary, if the message may belong to the Reference Architecture.
     fn ra(&self, envelope: &Envelope) -> Option<&'d Dictionary> {
         let is_ra = envelope.header.as_ref().is_some_and(Header::is_ra);
         is_ra.then_some(self.dictionary)
     }
 
     fn fragment(&self, envelope: Envelope, frame: &Frame) -> Line<'d> {
-        // Only the first fragment surely begins with the code; the older headers hold it.
+        // Only the first fragment reliably starts with the code. The older headers contain it.
         let has_code =
             frame.version != Version::As5669a || frame.flags.data() == DataControl::First;
         let code = frame.code().filter(|_| has_code);
         self.bare(envelope, code, Content::Fragment(frame.payload.len()))
     }
 
-    /// The large message that this fragment completes.
+    /// The line of the large message that this fragment completes.
     fn whole(&mut self, time: Option<Timestamp>, frame: &Frame) -> Option<Line<'d>> {
         let whole = self.large.insert(frame)?;
         let envelope = Envelope {
@@ -172,7 +173,7 @@ impl<'d> MessageLog<'d> {
         Some(if other.is_error() { line } else { other })
     }
 
-    /// A line without body.
+    /// A line without a body.
     fn bare(&self, envelope: Envelope, code: Option<u16>, content: Content) -> Line<'d> {
         let name = |code| {
             let ra = self.ra(&envelope);

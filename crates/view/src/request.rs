@@ -1,4 +1,4 @@
-//! A message as people ask for it: a name or a code, and a body in JSON.
+//! A message to be encoded, given as name or code with a JSON body.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use serde_json::{Map, Value as Json};
 use super::definition::{ServiceName, parse_version};
 use super::dictionary::Unreadable;
 
-/// The keys that a line may have besides those that count: what `jaus decode` and `jaus watch` add.
+/// Ignored keys, which `jaus decode` and `jaus watch` add to a line.
 const PASSED_OVER: [&str; 12] = [
     "time",
     "direction",
@@ -23,21 +23,21 @@ const PASSED_OVER: [&str; 12] = [
     "sequence",
 ];
 
-/// Which message is to be written, and what it shall hold.
+/// Specification of a message and its content.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
-    /// The message's name in its definition.
+    /// Name of the message in its definition.
     pub message: Option<String>,
-    /// The message's code. Either this or the name is there.
+    /// Code of the message. At least one of name and code is present.
     pub code: Option<u16>,
-    /// The service whose definition is meant.
+    /// The service whose definition applies.
     pub service: Option<ServiceName>,
     /// The fields; `{}` for an empty body.
     pub body: Json,
 }
 
 impl Request {
-    /// A message by name, with the fields of `body`.
+    /// Creates a request by message name, with the fields of `body`.
     pub fn new(message: impl Into<String>, body: Json) -> Self {
         Self {
             message: Some(message.into()),
@@ -47,14 +47,14 @@ impl Request {
         }
     }
 
-    /// Reads a line as `jaus decode` prints it: `message` or `code` (or both), `body`, and perhaps
-    /// `service` and `version`. What the line says about transport is passed over.
+    /// Reads a line in the output format of `jaus decode`: `message` or `code` (or both), `body`,
+    /// and optionally `service` and `version`. Transport keys are ignored.
     ///
     /// # Errors
-    /// If it is no such object.
+    /// If the line is not such an object.
     pub fn from_json(line: &str) -> Result<Self, Unreadable> {
         let mut object: Map<String, Json> = serde_json::from_str(line).map_err(|error| {
-            // serde_json ends its sentence with the place, which is told apart from it here.
+            // serde_json appends the position to its message. It is reported separately here.
             let column = error.column().saturating_sub(1);
             let sentence = error.to_string();
             let sentence = sentence.split(" at line ").next().unwrap_or(&sentence);
@@ -126,7 +126,7 @@ fn text(key: &str, value: Json) -> Result<String, Unreadable> {
     }
 }
 
-/// `"4B00"`, `"0x4B00"`, `"4B00h"`, or a number.
+/// Parses `"4B00"`, `"0x4B00"`, `"4B00h"` or a number.
 fn code(value: &Json) -> Result<u16, Unreadable> {
     let code = match value {
         Json::String(text) => {

@@ -1,4 +1,4 @@
-//! The moment at which a packet was captured, with the precision that the capture keeps.
+//! Capture time stamps, with the precision of the capture.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,7 +8,7 @@ const SECONDS_PER_DAY: i64 = 86_400;
 
 /// Time since 1970-01-01T00:00:00Z.
 ///
-/// [`Display`](fmt::Display) writes RFC 3339 in UTC, with as many decimals as the capture keeps:
+/// [`Display`](fmt::Display) writes RFC 3339 in UTC, with as many decimals as the capture has:
 /// `2015-06-07T14:03:21.068150Z`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Timestamp {
@@ -18,9 +18,10 @@ pub struct Timestamp {
 }
 
 impl Timestamp {
-    /// `seconds` and `nanos` since 1970, of which the first `decimals` (at most 9) are known.
+    /// Creates a time stamp from `seconds` and `nanos` since 1970. The first `decimals` (at most 9)
+    /// of `nanos` are significant.
     ///
-    /// Whole seconds in `nanos` are carried over.
+    /// Whole seconds in `nanos` carry over to `seconds`.
     pub fn new(seconds: i64, nanos: u32, decimals: u8) -> Self {
         Self {
             seconds: seconds.saturating_add(i64::from(nanos / NANOS_PER_SECOND)),
@@ -60,7 +61,7 @@ impl fmt::Display for Timestamp {
     }
 }
 
-/// Not a time in UTC as RFC 3339 writes it.
+/// Error: the text is not an RFC 3339 time in UTC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("write a time in UTC such as 2015-06-07T14:03:21.068150Z")]
 pub struct InvalidTime;
@@ -96,7 +97,7 @@ impl Timestamp {
     }
 }
 
-/// Three numbers with something between them.
+/// Parses three numbers with a separator.
 fn three(text: &str, between: char) -> Option<[i64; 3]> {
     let numbers: Vec<i64> = text
         .split(between)
@@ -105,7 +106,7 @@ fn three(text: &str, between: char) -> Option<[i64; 3]> {
     numbers.try_into().ok()
 }
 
-/// The way back from [`civil_date`].
+/// The inverse of [`civil_date`].
 fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
     let year = year - i64::from(month <= 2);
     let era = year.div_euclid(400);

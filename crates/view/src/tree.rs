@@ -1,4 +1,4 @@
-//! What discovery has found, for people and as JSON: the tree, and what becomes different in it.
+//! The discovery tree and its changes, as readable text and as JSON.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use jaus::component::{Change, Directory, Identification, Kind, Level, Loss, Offe
 use jaus::service::Component;
 use serde_json::{Map, Value as Json, json};
 
-/// The tree as indented lines, without `left_out`, the component that looked.
+/// Formats the tree as indented lines, without the observing component `left_out`.
 pub fn lines(directory: &Directory, left_out: Option<JausId>) -> Vec<String> {
     let mut lines = Vec::new();
     for (number, subsystem) in directory.subsystems() {
@@ -41,8 +41,8 @@ pub fn lines(directory: &Directory, left_out: Option<JausId>) -> Vec<String> {
     lines
 }
 
-/// `  vehicle "Rover"`; nothing as long as nothing was told. That a node is a node goes without
-/// saying.
+/// Formats kind and name, such as `  vehicle "Rover"`; empty while unknown. Kinds that only repeat
+/// the level are omitted.
 fn naming(identification: Option<&Identification>) -> String {
     let Some(Identification { kind, name }) = identification else {
         return String::new();
@@ -55,7 +55,7 @@ fn naming(identification: Option<&Identification>) -> String {
     }
 }
 
-/// `the vehicle "Rover"`, or `called "Camera"`.
+/// Formats an identification, such as `the vehicle "Rover"` or `called "Camera"`.
 pub fn introduction(Identification { kind, name }: &Identification) -> String {
     match kind {
         Kind::Vehicle | Kind::OperatorControlUnit => format!("the {kind} \"{name}\""),
@@ -63,7 +63,7 @@ pub fn introduction(Identification { kind, name }: &Identification) -> String {
     }
 }
 
-/// A line for each service, its versions aligned in a column.
+/// One line per service, with its versions aligned in a column.
 fn services(component: &Component) -> Vec<String> {
     let Some(offers) = &component.services else {
         return vec!["(has not told its services yet)".to_owned()];
@@ -76,7 +76,7 @@ fn services(component: &Component) -> Vec<String> {
         .collect()
 }
 
-/// The versions of every service, the newest first.
+/// The versions of every service, newest first.
 pub fn by_urn(offers: &[Offer]) -> BTreeMap<&str, Vec<String>> {
     let mut services: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for Offer { urn, major, minor } in offers.iter().rev() {
@@ -138,7 +138,7 @@ fn named_json(key: &str, id: Json, identification: Option<&Identification>) -> M
     object
 }
 
-/// A change in words; `None` if it says nothing that the next one does not say better.
+/// Describes a change as text; `None` if a following change carries more information.
 pub fn in_words(change: Change, directory: &Directory) -> Option<String> {
     Some(match change {
         Change::SubsystemFound(_) => return None,
@@ -163,7 +163,7 @@ pub fn in_words(change: Change, directory: &Directory) -> Option<String> {
     })
 }
 
-/// A change as a JSON object.
+/// Converts a change to a JSON object.
 pub fn change_json(change: Change, directory: &Directory) -> Json {
     match change {
         Change::SubsystemFound(number) => {

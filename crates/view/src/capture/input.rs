@@ -1,13 +1,13 @@
-//! A reader that knows where it is and never takes more memory than the file has octets.
+//! A reader that tracks its offset and never allocates more than the file contains.
 
 use std::io::{self, Read};
 
 use super::CaptureError;
 
-/// No link has frames near this; a length beyond it is taken for damage.
+/// Frames on real links are far shorter. A greater length counts as damage.
 pub(super) const LONGEST: u32 = 16 << 20;
 
-/// The file, the offset of the next octet in it, and the packet or block at hand.
+/// The file, the offset of its next octet, and the current packet or block.
 pub(super) struct Input<R> {
     reader: R,
     offset: u64,
@@ -28,7 +28,7 @@ impl<R: Read> Input<R> {
         self.offset
     }
 
-    /// Fills `octets` as far as the file reaches, and says how far that is.
+    /// Fills `octets` as far as the file reaches. Returns the number of octets read.
     pub(super) fn fill(&mut self, octets: &mut [u8]) -> Result<usize, CaptureError> {
         let mut held = 0;
         while held < octets.len() {
@@ -43,8 +43,8 @@ impl<R: Read> Input<R> {
         Ok(held)
     }
 
-    /// Reads `length` octets, or as many as the file still has, and says how many. The buffer
-    /// grows with what arrives, not with what was announced.
+    /// Reads up to `length` octets. Returns how many the file still had. The buffer grows with the
+    /// data read, not with the announced length.
     pub(super) fn take(&mut self, length: u32) -> Result<u32, CaptureError> {
         self.buffer.clear();
         let read = (&mut self.reader)
@@ -58,7 +58,7 @@ impl<R: Read> Input<R> {
         }
     }
 
-    /// What [`take`](Self::take) read last.
+    /// The octets of the last [`take`](Self::take).
     pub(super) fn taken(&self) -> &[u8] {
         &self.buffer
     }

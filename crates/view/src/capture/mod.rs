@@ -1,20 +1,21 @@
-//! Reading and writing capture files: pcap and pcapng, as tcpdump, Wireshark and friends have them.
+//! Reading and writing capture files: pcap and pcapng, as used by tcpdump, Wireshark and similar
+//! tools.
 //!
-//! A [`Capture`] hands out [`Frame`]s one after the other and keeps only one in memory, so that a
-//! file may be as long as it likes and may as well be a pipe. A file that was cut short, or is
-//! damaged, gives everything that can be had and then says where it ends.
+//! A [`Capture`] yields [`Frame`]s one by one and holds only one in memory, so the input may be
+//! arbitrarily long, or a pipe. A truncated or damaged file yields everything that is readable and
+//! then reports where it ends.
 //!
-//! The reader is our own because neither crate that was tried keeps this promise:
+//! The reader is this project's own because neither crate that was tried provides this:
 //!
-//! * `pcap-parser` 0.17.0 reports a pcapng packet that claims more octets than its block has as a
-//!   file cut short, and so a malformed block that nobody needs. Opening fails if the first `read`
-//!   is as short as a pipe's may be; causes of I/O errors are lost. It refuses binary `if_tsresol`,
-//!   takes `if_tsoffset` for little-endian and does not know obsolete packet blocks. Around it,
-//!   block lengths, byte order, options and obsolete packets would still have to be read here.
-//! * `pcap-file` 2.0.0 takes every pcapng time stamp for nanoseconds, refuses pcap packets that were
-//!   longer than the snap length, and repeats the error of a damaged block for ever. Its raw blocks
-//!   and packets avoid most of that, but leave their fields to be read here, and a capture cut short
-//!   gives no place. 3.0.0-rc.3 needs a newer Rust than this crate.
+//! - `pcap-parser` 0.17.0 reports a pcapng packet that claims more octets than its block holds as a
+//!   truncated file, and likewise a malformed block that is irrelevant. Opening fails if the first
+//!   `read` is short, as it may be on a pipe. The causes of I/O errors are lost. It rejects binary
+//!   `if_tsresol`, reads `if_tsoffset` as little-endian and does not know obsolete packet blocks.
+//!   Block lengths, byte order, options and obsolete packets would still have to be parsed here.
+//! - `pcap-file` 2.0.0 reads every pcapng time stamp as nanoseconds, rejects pcap packets that were
+//!   longer than the snap length, and repeats the error of a damaged block forever. Its raw blocks
+//!   and packets avoid most of that, but leave their fields to be parsed here, and a truncated
+//!   capture has no offset. 3.0.0-rc.3 needs a newer Rust than this crate.
 
 mod input;
 mod pcap;
@@ -31,7 +32,7 @@ pub use writer::{CaptureWriter, InterfaceNumber};
 
 use super::Timestamp;
 
-/// A capture that is being read.
+/// A capture opened for reading.
 ///
 /// ```no_run
 /// let file = std::fs::File::open("drive.pcapng")?;
@@ -56,63 +57,62 @@ enum Format {
 /// One captured link-layer frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// When it was captured; a pcapng Simple Packet Block does not say.
+    /// Capture time. A pcapng Simple Packet Block has none.
     pub time: Option<Timestamp>,
-    /// How the frame begins.
+    /// Type of the link header.
     pub link: LinkType,
-    /// The octets that were kept.
+    /// The captured octets.
     pub octets: &'a [u8],
-    /// How many frames were lost before this one, as far as whoever captured says (pcapng).
+    /// Number of frames lost before this one, as reported by the capturing program (pcapng).
     pub lost: u64,
-    /// How many octets the frame had on the link; more than `octets` if the capture was told to
-    /// keep only the beginning of each.
+    /// Length of the frame on the link in octets. Greater than that of `octets` if the capture was
+    /// limited to the beginning of each frame.
     pub length: u32,
 }
 
-/// What a frame begins with: a number from the registry at
-/// <https://www.tcpdump.org/linktypes.html>.
+/// Link header type: a number from the registry at <https://www.tcpdump.org/linktypes.html>.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct LinkType(pub u16);
 
 impl LinkType {
-    /// The BSDs' loopback: the address family in the capturing machine's byte order.
+    /// BSD loopback: the address family in the byte order of the capturing machine.
     pub const NULL: Self = Self(0);
     /// Ethernet.
     pub const ETHERNET: Self = Self(1);
-    /// IP without a link header, as some BSD tools number it.
+    /// IP without a link header, as numbered by some BSD tools.
     pub const RAW_BSD: Self = Self(12);
-    /// IP without a link header, as OpenBSD numbers it.
+    /// IP without a link header, as numbered by OpenBSD.
     pub const RAW_OPENBSD: Self = Self(14);
     /// IP without a link header.
     pub const RAW: Self = Self(101);
-    /// OpenBSD's loopback: the address family in network byte order.
+    /// OpenBSD loopback: the address family in network byte order.
     pub const LOOP: Self = Self(108);
-    /// Linux, captured on the interface `any`.
+    /// Linux cooked capture on the interface `any`.
     pub const LINUX_SLL: Self = Self(113);
     /// IPv4 without a link header.
     pub const IPV4: Self = Self(228);
     /// IPv6 without a link header.
     pub const IPV6: Self = Self(229);
-    /// Linux, captured on the interface `any` by newer tools.
+    /// Linux cooked capture v2, used by newer tools on the interface `any`.
     pub const LINUX_SLL2: Self = Self(276);
 }
 
-/// Why (the rest of) a capture cannot be read.
+/// Why a capture, or the rest of it, cannot be read.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CaptureError {
     /// The reader failed.
     #[error("the capture cannot be read at octet {offset}: {source}")]
     Read {
-        /// Where in the file.
+        /// Offset in the file.
         offset: u64,
-        /// What the operating system says.
+        /// The cause.
         source: io::Error,
     },
-    /// Not a capture at all.
+    /// The file is not a capture.
     #[error("this is not a pcap or pcapng file: it begins with {}{}", hex(.begin), advice(.begin))]
     NotACapture {
-        /// The first octets, at most four.
+        /// The first octets of the file, at most four.
         begin: Vec<u8>,
     },
     /// The file ends within a packet or block.
@@ -120,27 +120,27 @@ pub enum CaptureError {
         "the capture is cut short: the {what} at octet {offset} needs {wanted} octets, {held} are left"
     )]
     CutShort {
-        /// Where in the file the packet or block begins.
+        /// Offset of the packet or block in the file.
         offset: u64,
-        /// What is incomplete.
+        /// The incomplete structure.
         what: &'static str,
-        /// Octets that it claims to have.
+        /// Its stated length in octets.
         wanted: u64,
-        /// Octets that the file still holds.
+        /// Octets left in the file.
         held: u64,
     },
-    /// Something that no writer writes.
+    /// The content is invalid.
     #[error("the capture is damaged: {problem} at octet {offset}")]
     Damaged {
-        /// Where in the file the packet or block begins.
+        /// Offset of the packet or block in the file.
         offset: u64,
-        /// What is wrong with it.
+        /// Description of the damage.
         problem: String,
     },
 }
 
 impl CaptureError {
-    /// Where in the file the packet or block begins that could not be read.
+    /// Offset in the file of the unreadable packet or block.
     pub fn offset(&self) -> u64 {
         match self {
             Self::Read { offset, .. }
@@ -152,7 +152,7 @@ impl CaptureError {
 }
 
 impl<R: Read> Capture<R> {
-    /// Looks at the beginning of the file, which tells pcap from pcapng.
+    /// Opens a capture and detects whether it is pcap or pcapng.
     ///
     /// # Errors
     /// If the file is neither, ends within its header, or cannot be read.
@@ -177,11 +177,11 @@ impl<R: Read> Capture<R> {
 
     /// The next frame; `None` at the end of the file.
     ///
-    /// After an error that leaves the beginning of the next packet known, reading goes on behind
-    /// it; otherwise the error is the last thing that the capture gives.
+    /// After an error that leaves the start of the next packet known, reading can continue.
+    /// Otherwise the error is the last item.
     ///
     /// # Errors
-    /// [`CaptureError`]: the file is cut short, damaged or unreadable.
+    /// [`CaptureError`]: the file is truncated, damaged or unreadable.
     pub fn next_frame(&mut self) -> Option<Result<Frame<'_>, CaptureError>> {
         if self.finished {
             return None;
@@ -225,13 +225,13 @@ impl Packet {
     }
 }
 
-/// An error, and whether the place of the next packet is lost with it.
+/// An error, and whether it also loses the position of the next packet.
 struct Fault {
     error: CaptureError,
     last: bool,
 }
 
-/// Errors are final unless the reader of a format knows better.
+/// Errors are final unless the format's reader states otherwise.
 impl From<CaptureError> for Fault {
     fn from(error: CaptureError) -> Self {
         Self { error, last: true }

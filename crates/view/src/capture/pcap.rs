@@ -1,4 +1,5 @@
-//! The classic format: a header of 24 octets, then records of 16 octets and the frame.
+//! The pcap format: a file header of 24 octets, then record headers of 16 octets, each followed by
+//! a frame.
 
 use std::io::Read;
 
@@ -9,7 +10,7 @@ use crate::Timestamp;
 const HEADER: usize = 24;
 const RECORD: usize = 16;
 
-/// Byte order of the machine that wrote the file, and how it counts fractions of a second.
+/// Byte order of the writing machine, and resolution of fractional seconds.
 #[derive(Clone, Copy)]
 pub(super) struct Endian {
     big: bool,
@@ -17,7 +18,7 @@ pub(super) struct Endian {
 }
 
 impl Endian {
-    /// `None` if these are not the first octets of a pcap file.
+    /// Detects a pcap file by its magic number; `None` if it is another file.
     pub(super) fn of_magic(magic: &[u8]) -> Option<Self> {
         let (big, nanoseconds) = match magic {
             [0xa1, 0xb2, 0xc3, 0xd4] => (true, false),
@@ -39,19 +40,19 @@ impl Endian {
     }
 }
 
-/// What the file's header says about all of its records.
+/// File header data that applies to all records.
 pub(super) struct Header {
     endian: Endian,
     link: LinkType,
 }
 
 impl Header {
-    /// Reads what follows the magic number.
+    /// Reads the file header after the magic number.
     pub(super) fn read<R: Read>(
         endian: Endian,
         input: &mut Input<R>,
     ) -> Result<Self, CaptureError> {
-        // Version, two unused words and the snap length; then the link type.
+        // Version, two unused words and the snap length, then the link type.
         let mut rest = [0; HEADER - 4];
         let held = input.fill(&mut rest)?;
         if held < rest.len() {
@@ -62,7 +63,7 @@ impl Header {
                 held: input.offset(),
             });
         }
-        // The upper half may tell the length of the frame check sequence.
+        // The upper half may contain the length of the frame check sequence.
         let link = if endian.big {
             u16::from_be_bytes([rest[18], rest[19]])
         } else {
@@ -74,7 +75,7 @@ impl Header {
         })
     }
 
-    /// Steps to the next record; its frame is then what the input took.
+    /// Advances to the next record, whose frame is then in the input's buffer.
     pub(super) fn next_packet<R: Read>(
         &self,
         input: &mut Input<R>,
@@ -125,7 +126,8 @@ impl Header {
         if self.endian.nanoseconds {
             Timestamp::new(seconds, fraction, 9)
         } else {
-            // A fraction of a second or more is carried; no writer goes beyond a few seconds.
+            // A fraction of one second or more carries over. Real writers exceed this by a few
+            // seconds at most.
             Timestamp::new(seconds, fraction.saturating_mul(1000), 6)
         }
     }

@@ -1,7 +1,7 @@
-//! The newer format: a chain of blocks, of which the packets and the interfaces matter here.
+//! The pcapng format: a chain of blocks, of which packets and interface descriptions are evaluated.
 //!
-//! <https://www.ietf.org/archive/id/draft-ietf-opsawg-pcapng-02.html>. Every block says how long it
-//! is, so one that is unknown or wrong inside is stepped over.
+//! <https://www.ietf.org/archive/id/draft-ietf-opsawg-pcapng-02.html>. Every block states its
+//! length, so unknown or invalid blocks can be skipped.
 
 use std::io::Read;
 use std::ops::Range;
@@ -10,7 +10,7 @@ use super::input::{Input, LONGEST};
 use super::{CaptureError, Fault, LinkType, Packet};
 use crate::Timestamp;
 
-/// Type of a Section Header Block; reads the same in both byte orders.
+/// Type of a Section Header Block. Identical in both byte orders.
 pub(super) const SECTION_HEADER: [u8; 4] = [0x0a, 0x0d, 0x0d, 0x0a];
 const INTERFACE_DESCRIPTION: u32 = 1;
 const OBSOLETE_PACKET: u32 = 2;
@@ -24,16 +24,16 @@ const SHORTEST_BLOCK: u32 = 12;
 const SHORTEST_HEADER: u32 = 28;
 const TOO_SHORT: &str = "a packet block that is too short";
 
-/// A capture has a handful of interfaces; beyond this, descriptions are not kept.
+/// Limit of interface descriptions kept. A capture has only a handful of interfaces.
 const MOST_INTERFACES: usize = 4096;
 
-/// The section at hand: its byte order and the interfaces described so far.
+/// The current section: its byte order and the interfaces described so far.
 pub(super) struct Section {
     big_endian: bool,
     interfaces: Vec<Interface>,
 }
 
-/// What an Interface Description Block says.
+/// Content of an Interface Description Block.
 #[derive(Clone, Copy)]
 struct Interface {
     link: LinkType,
@@ -42,7 +42,7 @@ struct Interface {
     time_offset: i64,
 }
 
-/// `if_tsresol`: how long one unit of a time stamp is.
+/// `if_tsresol`: the unit of time stamps.
 #[derive(Clone, Copy)]
 enum Ticks {
     /// 10^-n seconds.
@@ -57,7 +57,7 @@ impl Interface {
             Ticks::Decimal(n) => (10_u64.checked_pow(n.into()), n),
             Ticks::Binary(n) => (1_u64.checked_shl(n.into()), 9),
         };
-        // A resolution finer than 64 bits can count leaves nothing but fractions.
+        // At a resolution beyond 64 bits, time stamps are fractions of a second only.
         let per_second = u128::from(per_second.unwrap_or(u64::MAX));
         let ticks = u128::from(ticks);
         let seconds = i64::try_from(ticks / per_second).unwrap_or(i64::MAX);
@@ -71,7 +71,7 @@ impl Interface {
 }
 
 impl Section {
-    /// Reads the section header that opens the file, behind its type.
+    /// Reads the section header at the start of the file, after its type.
     pub(super) fn read_first<R: Read>(input: &mut Input<R>) -> Result<Self, CaptureError> {
         let mut section = Self {
             big_endian: false,
@@ -81,7 +81,7 @@ impl Section {
         Ok(section)
     }
 
-    /// Reads a section header, whose type stands at `offset` and has been read.
+    /// Reads a section header. Its type is at `offset` and has already been read.
     fn enter<R: Read>(&mut self, input: &mut Input<R>, offset: u64) -> Result<(), CaptureError> {
         let mut begin = [0; 8];
         let held = input.fill(&mut begin)?;
@@ -106,7 +106,7 @@ impl Section {
         Ok(())
     }
 
-    /// Steps to the next block that holds a packet; the input then holds the block's body.
+    /// Advances to the next packet block, whose body is then in the input's buffer.
     pub(super) fn next_packet<R: Read>(
         &mut self,
         input: &mut Input<R>,
@@ -116,7 +116,7 @@ impl Section {
             let Some(kind) = self.next_block(input, offset)? else {
                 return Ok(None);
             };
-            // The length once more closes the block.
+            // The block ends with a copy of its length.
             let Some((body, _length)) = input.taken().split_last_chunk::<4>() else {
                 continue;
             };
@@ -131,7 +131,7 @@ impl Section {
                 Ok(None) => {}
                 Ok(packet) => return Ok(packet),
                 Err(problem) => {
-                    // Where the next block begins is known all the same.
+                    // The start of the next block is still known.
                     return Err(Fault {
                         error: damaged(offset, problem),
                         last: false,
@@ -141,8 +141,8 @@ impl Section {
         }
     }
 
-    /// Takes the body of the block that begins at `offset`, and says which kind it is. A new
-    /// section is entered at once.
+    /// Reads the body of the block at `offset` and returns its type. Enters a new section
+    /// immediately.
     fn next_block<R: Read>(
         &mut self,
         input: &mut Input<R>,
@@ -173,7 +173,7 @@ impl Section {
         Ok(Some(kind))
     }
 
-    /// Keeps what an Interface Description Block says.
+    /// Stores an Interface Description Block.
     fn describe(&mut self, body: &[u8]) -> Result<(), &'static str> {
         if self.interfaces.len() >= MOST_INTERFACES {
             return Err("one interface description too many");
@@ -220,7 +220,7 @@ impl Section {
         self.stamped_packet(interface.into(), fields)
     }
 
-    /// What the two blocks with a time stamp have in common.
+    /// Reads the common part of the two blocks with a time stamp.
     fn stamped_packet(&self, id: u32, mut fields: Fields<'_>) -> Result<Packet, &'static str> {
         let interface = self.interface(id)?;
         let (Some(high), Some(low), Some(captured), Some(length)) =
@@ -238,7 +238,7 @@ impl Section {
         })
     }
 
-    /// A Simple Packet Block: no time, no interface but the first, no length but the original one.
+    /// Reads a Simple Packet Block: no time, always the first interface, only the original length.
     fn simple_packet(&self, body: &[u8]) -> Result<Packet, &'static str> {
         let interface = self.interface(0)?;
         let mut fields = self.fields(body);
@@ -278,7 +278,7 @@ impl Section {
     }
 }
 
-/// A block's body, read from front to back.
+/// A reader for the fields of a block body.
 struct Fields<'a> {
     big_endian: bool,
     octets: &'a [u8],
@@ -325,9 +325,9 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// What the options behind a packet of so many octets say about what was lost before it.
+    /// The drop count in the options after a packet of `captured` octets.
     fn lost_before(&mut self, captured: usize) -> u64 {
-        // Everything begins at a multiple of four octets.
+        // All fields are padded to a multiple of four octets.
         let padding = captured.next_multiple_of(4) - captured;
         if self.range(padding).is_none() {
             return 0;
@@ -346,7 +346,7 @@ impl<'a> Fields<'a> {
         0
     }
 
-    /// The next option: code and value; `None` at the end or at one that does not fit.
+    /// The next option as code and value; `None` at the end or if it exceeds the block.
     fn option(&mut self) -> Option<(u16, &'a [u8])> {
         let (code, length) = (self.u16()?, self.u16()?);
         if code == 0 {

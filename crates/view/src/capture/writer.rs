@@ -1,9 +1,9 @@
-//! Writing capture files: pcapng, as Wireshark and tcpdump read it.
+//! Writing capture files in pcapng format, for Wireshark and tcpdump.
 //!
-//! A recording begins with a section header, names each interface in a block of its own, and holds
-//! one enhanced packet block a frame, with time stamps in nanoseconds. Every block is written whole,
-//! so what was flushed before a crash can be read. Layout: the pcapng draft of the IETF's opsawg
-//! working group.
+//! A recording starts with a section header, describes each interface in a separate block, and
+//! contains one enhanced packet block per frame, with time stamps in nanoseconds. Every block is
+//! written as a whole, so all data flushed before a crash is readable. The layout follows the
+//! pcapng draft of the IETF's opsawg working group.
 
 use std::io::{self, Write};
 
@@ -12,19 +12,19 @@ use super::{LinkType, Timestamp};
 const SECTION_HEADER: u32 = 0x0A0D_0D0A;
 const INTERFACE_DESCRIPTION: u32 = 1;
 const ENHANCED_PACKET: u32 = 6;
-/// Tells the reader this writer's byte order.
+/// Identifies this writer's byte order.
 const BYTE_ORDER: u32 = 0x1A2B_3C4D;
 
-/// Options of a block.
+/// Option codes of blocks.
 const END: u16 = 0;
 const COMMENT: u16 = 1;
-/// How many were lost since the packet before, 8 octets.
+/// Number of packets lost since the previous packet, 8 octets.
 pub(super) const LOST: u16 = 4;
 const PROGRAM: u16 = 4;
 const INTERFACE_NAME: u16 = 2;
 const TIME_RESOLUTION: u16 = 9;
 
-/// Writes frames into a pcapng file.
+/// Writes frames to a pcapng file.
 ///
 /// ```
 /// use jaus_view::{Capture, CaptureWriter, LinkType, Timestamp};
@@ -48,15 +48,15 @@ pub struct CaptureWriter<W> {
     block: Vec<u8>,
 }
 
-/// An interface of a capture that is being written.
+/// An interface of a capture being written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct InterfaceNumber(u32);
 
 impl<W: Write> CaptureWriter<W> {
-    /// Begins a capture; `program` is who writes it, for whoever opens it later.
+    /// Starts a capture. `program` names the writing application in the file.
     ///
     /// # Errors
-    /// What the writer says.
+    /// I/O errors of the writer.
     pub fn new(out: W, program: &str) -> io::Result<Self> {
         let mut writer = Self {
             out,
@@ -66,7 +66,7 @@ impl<W: Write> CaptureWriter<W> {
         };
         writer.begin(SECTION_HEADER);
         writer.put(&BYTE_ORDER.to_ne_bytes());
-        // Version 1.0, and a section of unknown length.
+        // Version 1.0, with unknown section length.
         writer.put(&1_u16.to_ne_bytes());
         writer.put(&0_u16.to_ne_bytes());
         writer.put(&u64::MAX.to_ne_bytes());
@@ -76,18 +76,18 @@ impl<W: Write> CaptureWriter<W> {
         Ok(writer)
     }
 
-    /// Adds an interface, whose frames all begin in the same way.
+    /// Adds an interface. All its frames have the same link type.
     ///
     /// # Errors
-    /// What the writer says.
+    /// I/O errors of the writer.
     pub fn add_interface(&mut self, name: &str, link: LinkType) -> io::Result<InterfaceNumber> {
         self.begin(INTERFACE_DESCRIPTION);
         self.put(&link.0.to_ne_bytes());
         self.put(&[0; 2]);
-        // Frames are never cut.
+        // Frames are never truncated.
         self.put(&0_u32.to_ne_bytes());
         self.option(INTERFACE_NAME, name.as_bytes());
-        // Ten to the minus ninth of a second.
+        // Resolution of 10^-9 seconds.
         self.option(TIME_RESOLUTION, &[9]);
         self.option(END, &[]);
         self.end()?;
@@ -98,13 +98,13 @@ impl<W: Write> CaptureWriter<W> {
     /// Writes a frame.
     ///
     /// # Errors
-    /// What the writer says; [`io::ErrorKind::InvalidInput`] for a frame of 4 GiB and more.
+    /// I/O errors of the writer; [`io::ErrorKind::InvalidInput`] for a frame of 4 GiB or more.
     pub fn write(&mut self, on: InterfaceNumber, time: Timestamp, frame: &[u8]) -> io::Result<()> {
         self.put_frame(on, time, frame)?;
         self.end()
     }
 
-    /// The same, with words about the frame that Wireshark shows beside it.
+    /// Writes a frame with a comment that Wireshark displays.
     ///
     /// # Errors
     /// As [`write`](Self::write).
@@ -123,7 +123,8 @@ impl<W: Write> CaptureWriter<W> {
         self.end()
     }
 
-    /// The same, and tells programs and people that so many were lost since the frame before.
+    /// Writes a frame together with the number of frames lost before it, as drop count and as
+    /// comment.
     ///
     /// # Errors
     /// As [`write`](Self::write).
@@ -143,11 +144,11 @@ impl<W: Write> CaptureWriter<W> {
         self.end()
     }
 
-    /// Begins the block of a frame; options may follow.
+    /// Starts the block of a frame. Options may follow.
     fn put_frame(&mut self, on: InterfaceNumber, time: Timestamp, frame: &[u8]) -> io::Result<()> {
         let length = u32::try_from(frame.len()).map_err(|_| io::ErrorKind::InvalidInput)?;
         let nanos = i128::from(time.seconds()) * 1_000_000_000 + i128::from(time.subsec_nanos());
-        // Before 1970 and after 2554 a capture has no way to say.
+        // pcapng cannot represent times before 1970 or after 2554.
         let nanos = u64::try_from(nanos).unwrap_or(0);
         self.begin(ENHANCED_PACKET);
         self.put(&on.0.to_ne_bytes());
@@ -164,10 +165,10 @@ impl<W: Write> CaptureWriter<W> {
         self.written
     }
 
-    /// Sees to it that everything so far is where it should be.
+    /// Flushes the writer.
     ///
     /// # Errors
-    /// What the writer says.
+    /// I/O errors of the writer.
     pub fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
@@ -175,7 +176,7 @@ impl<W: Write> CaptureWriter<W> {
     fn begin(&mut self, kind: u32) {
         self.block.clear();
         self.put(&kind.to_ne_bytes());
-        // The length, which is known at the end.
+        // Placeholder for the length, which is set at the end.
         self.put(&[0; 4]);
     }
 
@@ -183,7 +184,7 @@ impl<W: Write> CaptureWriter<W> {
         self.block.extend_from_slice(octets);
     }
 
-    /// Everything in a block begins at a multiple of four octets.
+    /// All fields are padded to a multiple of four octets.
     fn put_padded(&mut self, octets: &[u8]) {
         self.put(octets);
         self.block.resize(self.block.len().next_multiple_of(4), 0);
@@ -196,7 +197,7 @@ impl<W: Write> CaptureWriter<W> {
         self.put_padded(value);
     }
 
-    /// Writes the length at both ends, and the block.
+    /// Sets the length at both ends and writes the block.
     fn end(&mut self) -> io::Result<()> {
         let length = self.block.len() + 4;
         let length = u32::try_from(length).map_err(|_| io::ErrorKind::InvalidInput)?;

@@ -1,7 +1,7 @@
-//! The files of a log: numbered, bounded together, the oldest first to go.
+//! The numbered files of a journal, with a common size limit. The oldest files are deleted first.
 //!
-//! A small computer may have no clock when it starts. So what is older is told by the number in front
-//! of a file's name, and the time behind it is for people.
+//! A small computer may lack the time when it starts, so the number at the start of the file name
+//! determines the age. The time after it is informational.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use super::{JournalFormat, JournalSettings};
 use crate::Timestamp;
 
-/// What every file's name begins with.
+/// Prefix of all file names.
 const NAME: &str = "jaus-";
 
 #[derive(Debug)]
@@ -20,12 +20,12 @@ pub(super) struct Directory {
     extension: &'static str,
     limit: u64,
     file_limit: u64,
-    /// By number: the file and its octets.
+    /// Path and size of each file, by number.
     files: BTreeMap<u64, (PathBuf, u64)>,
 }
 
 impl Directory {
-    /// Takes over what earlier logs have left, and sees whether files can be made here.
+    /// Adopts the files of earlier runs, and checks that files can be created.
     pub(super) fn open(settings: &JournalSettings) -> io::Result<Self> {
         fs::create_dir_all(&settings.directory)?;
         let mut directory = Self {
@@ -52,7 +52,7 @@ impl Directory {
         Ok(directory)
     }
 
-    /// Begins a new file, after removing as many of the oldest as its octets need.
+    /// Starts a new file, after deleting as many of the oldest as necessary.
     pub(super) fn begin(&mut self, time: Timestamp) -> io::Result<(File, PathBuf)> {
         self.make_room()?;
         let number = self.files.last_key_value().map_or(1, |(&last, _)| last + 1);
@@ -72,7 +72,7 @@ impl Directory {
         Ok((file, path))
     }
 
-    /// Takes note of how long the newest file has become.
+    /// Updates the recorded size of the newest file.
     pub(super) fn note_length(&mut self, octets: u64) {
         if let Some(mut newest) = self.files.last_entry() {
             newest.get_mut().1 = octets;
@@ -96,7 +96,7 @@ impl Directory {
     }
 }
 
-/// The number of a file of ours, `jaus-000001-20260101T000000Z.pcapng`.
+/// The number in a journal file name such as `jaus-000001-20260101T000000Z.pcapng`.
 fn number_of(name: &str) -> Option<u64> {
     let rest = name.strip_prefix(NAME)?;
     let ours = rest.ends_with(".pcapng") || rest.ends_with(".jsonl");

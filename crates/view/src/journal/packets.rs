@@ -1,4 +1,4 @@
-//! What passed a node as IP packets, as a capture holds them.
+//! Conversion of node traffic to IP packets for a capture.
 
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -11,26 +11,26 @@ use jaus::endpoint::{LinkId, Remote, To};
 use jaus::node::{Passage, Way};
 use jaus::wire::{DataControl, Frame, judp};
 
-/// The most of a message that goes into one packet of those that were none.
+/// Maximum payload per packet for messages that were not datagrams.
 const MOST: usize = 60_000;
-/// Where everything lives that has no address: messages within the node, serial lines.
+/// Substitute address for messages within the node and on serial lines.
 const NOWHERE: SocketAddr =
     SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), crate::JAUS_PORT);
 
-/// An IP packet, and where it was.
+/// An IP packet and its interface.
 #[derive(Debug)]
 pub(super) struct Packet {
     pub(super) interface: String,
     pub(super) octets: Vec<u8>,
 }
 
-/// Makes packets of what passes.
+/// Converts passages to packets.
 #[derive(Debug, Default)]
 pub(super) struct Packets {
-    /// `None` for links of another kind.
+    /// `None` for links other than UDP.
     ends: BTreeMap<LinkId, Option<Ends>>,
     seen: Seen,
-    /// The last number of a message within the node, which has none of its own.
+    /// The last sequence number assigned to a message within the node, which has none of its own.
     number: u16,
 }
 
@@ -42,7 +42,7 @@ struct Ends {
 }
 
 impl Packets {
-    /// The packets of what passed; none for what has been recorded already.
+    /// The packets of a passage; empty if they have already been recorded.
     pub(super) fn of(&mut self, passage: &Passage, links: &mut Links) -> Vec<Packet> {
         let interface = match passage.way {
             Way::In(path) => links.name(path.link).to_owned(),
@@ -51,7 +51,7 @@ impl Packets {
         };
         let (source, destination) = self.addresses(passage.way, links);
         if matches!(passage.way, Way::In(_)) && self.is_ours(source) {
-            // Our own multicast, which comes back.
+            // Our own multicast, looped back.
             return Vec::new();
         }
         let datagrams = self.datagrams(passage);
@@ -85,7 +85,7 @@ impl Packets {
         cut.filter_map(|frame| judp::encode(&frame).ok()).collect()
     }
 
-    /// The same message in frames that fit a datagram.
+    /// Splits a local message into frames that fit into datagrams.
     fn cut(&mut self, frame: &Frame, is_local: bool) -> Vec<Frame> {
         if !is_local {
             return vec![frame.clone()];
@@ -101,7 +101,7 @@ impl Packets {
                     index if index + 1 == count => DataControl::Last,
                     _ => DataControl::Middle,
                 };
-                // Zero stands for no number.
+                // Zero means no number.
                 self.number = self.number.checked_add(1).unwrap_or(1);
                 Frame {
                     flags: frame.flags.with_data(data),

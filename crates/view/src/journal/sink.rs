@@ -1,4 +1,4 @@
-//! The file that is being written, in either format, and when the next one begins.
+//! The journal's current file in either format, and its rotation.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -14,8 +14,8 @@ use super::{JournalSettings, Numbers};
 use crate::{CaptureWriter, InterfaceNumber, LinkType, Links, MessageStream, Timestamp, timestamp};
 use jaus::node::Passage;
 
-/// Octets of a capture that a packet takes besides its own, at most: its block, an interface that
-/// it is the first of, and words about what was lost.
+/// Maximum overhead per packet in a capture, in octets: its block, a description of a new
+/// interface, and the loss comment.
 const AROUND: u64 = 512;
 
 #[derive(Debug)]
@@ -28,7 +28,7 @@ pub(super) struct Sink {
     open: Option<Open>,
     written: u64,
     lost: u64,
-    /// Of what was lost, how much the log does not say yet.
+    /// Number of lost items not yet recorded in the log.
     untold: u64,
 }
 
@@ -36,7 +36,7 @@ pub(super) struct Sink {
 struct Open {
     path: PathBuf,
     since: Timestamp,
-    /// The same file, for the disk to be told.
+    /// The same file, for syncing to disk.
     file: File,
     form: Form,
 }
@@ -68,7 +68,7 @@ impl Sink {
         }
     }
 
-    /// Takes note of what could not be taken in.
+    /// Records a loss.
     pub(super) fn lose(&mut self, count: u64) {
         self.lost += count;
         self.untold += count;
@@ -84,7 +84,7 @@ impl Sink {
         }
     }
 
-    /// Writes what passed, as it passed.
+    /// Writes the packets of a passage.
     pub(super) fn write_packets(&mut self, passage: &Passage) -> io::Result<()> {
         let time = timestamp(passage.time);
         for packet in self.packets.of(passage, &mut self.links) {
@@ -117,7 +117,7 @@ impl Sink {
         Ok(())
     }
 
-    /// Writes the messages in what passed.
+    /// Writes the messages of a passage.
     pub(super) fn write_lines(
         &mut self,
         passage: &Passage,
@@ -155,7 +155,7 @@ impl Sink {
         Ok(())
     }
 
-    /// Hands everything to the operating system.
+    /// Flushes all data to the operating system.
     pub(super) fn flush(&mut self) -> io::Result<()> {
         match &mut self.open {
             Some(open) => open.flush(),
@@ -163,7 +163,7 @@ impl Sink {
         }
     }
 
-    /// Ends the file: it is on the disk then.
+    /// Ends the file and syncs it to disk.
     pub(super) fn end(&mut self) -> io::Result<()> {
         let Some(mut open) = self.open.take() else {
             return Ok(());
@@ -173,7 +173,7 @@ impl Sink {
         open.file.sync_data()
     }
 
-    /// Lets a file go that cannot be written, and what was to be written next.
+    /// Abandons a file that cannot be written, and drops the current item.
     pub(super) fn give_up(&mut self) {
         self.lose(1);
         if let Some(open) = self.open.take() {
@@ -181,11 +181,11 @@ impl Sink {
         }
     }
 
-    /// Sees to it that a file is open that is young enough and has room for so many octets.
+    /// Ensures an open file that is young enough and has room for `octets`.
     fn make_room(&mut self, time: Timestamp, octets: u64, capture: bool) -> io::Result<()> {
         let fits = self.open.as_ref().is_some_and(|open| {
             let age = time.seconds().saturating_sub(open.since.seconds());
-            // A clock that was set back does not make a file old.
+            // A file does not become old when the clock is set back.
             let is_young = age < i64::try_from(self.file_age.as_secs()).unwrap_or(i64::MAX);
             is_young && open.octets() + octets <= self.file_limit
         });

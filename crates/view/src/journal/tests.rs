@@ -1,4 +1,4 @@
-//! Rotation, the bound, and what is read back.
+//! Rotation, size limit and readability of the journal.
 
 use std::fs;
 use std::time::SystemTime;
@@ -10,7 +10,7 @@ use jaus::endpoint::{Outgoing, Received};
 use jaus::node::{Config, Content, Passage, Way};
 use jaus::wire::{Broadcast, Priority};
 
-/// A directory of one test's own, removed at the end.
+/// A test directory, removed at the end.
 struct Scratch(PathBuf);
 
 impl Scratch {
@@ -49,7 +49,7 @@ fn settings(scratch: &Scratch, format: JournalFormat) -> JournalSettings {
     }
 }
 
-/// A code that no definition has, and a number.
+/// A message with an undefined code, followed by a number.
 fn payload(number: u32) -> Vec<u8> {
     [&[0xEE, 0xFF][..], &number.to_le_bytes(), &[7; 1000]].concat()
 }
@@ -59,7 +59,7 @@ fn number_in(entry: &Entry) -> u32 {
     u32::from_le_bytes(octets[2..6].try_into().unwrap())
 }
 
-/// All messages of a capture, and how reading it ended.
+/// All messages of a capture, and the result of reading it.
 fn read(octets: &[u8]) -> (Vec<Entry>, Option<CaptureError>) {
     let dictionary = Dictionary::new();
     let mut stream = MessageStream::new(&dictionary, Filter::default());
@@ -121,7 +121,7 @@ async fn the_oldest_files_go_before_the_directory_holds_more_than_it_may() {
         "the latest, all of them"
     );
 
-    // Another run goes on behind it, within the same bound.
+    // Another run continues after it, within the same limit.
     log_messages(&settings, 100).await;
     assert!(scratch.octets() <= settings.limit);
     assert!(scratch.files().last() > files.last());

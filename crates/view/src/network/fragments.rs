@@ -1,34 +1,34 @@
-//! Putting IP fragments together, within bounds.
+//! Reassembly of IP fragments with bounded memory.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::IpAddr;
 
-/// Datagrams that may wait for fragments at a time; then the one that waits longest is given up.
+/// Limit of incomplete packets. Beyond it the oldest is dropped.
 const MOST_WAITING: usize = 64;
-/// No IP packet is longer.
+/// Maximum length of an IP packet.
 const LONGEST: usize = 65_535;
 
-/// What the fragments of one packet have in common.
+/// Identifies the packet of a fragment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Key {
     pub(super) addresses: [IpAddr; 2],
     pub(super) identification: u32,
 }
 
-/// A piece of a packet's payload.
+/// A fragment of a packet's payload.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fragment<'a> {
     pub(super) key: Key,
-    /// Where in the payload it belongs.
+    /// Offset in the payload.
     pub(super) offset: usize,
-    /// Whether others follow it.
+    /// Whether more fragments follow.
     pub(super) more: bool,
-    /// Whether the capture left out its end.
+    /// Whether the capture truncated the fragment.
     pub(super) cut: bool,
     pub(super) octets: &'a [u8],
 }
 
-/// Packets of which something is missing, oldest first.
+/// Incomplete packets, oldest first.
 #[derive(Debug, Default)]
 pub(super) struct Fragments {
     waiting: VecDeque<Waiting>,
@@ -39,19 +39,19 @@ pub(super) struct Fragments {
 struct Waiting {
     key: Key,
     pieces: BTreeMap<usize, Vec<u8>>,
-    /// Length of the payload, once the last fragment is there.
+    /// Length of the payload, known once the last fragment has arrived.
     length: Option<usize>,
-    /// A piece cannot be had any more.
+    /// Whether a fragment is truncated, so that the packet cannot be completed.
     spoiled: bool,
 }
 
 impl Fragments {
-    /// Packets given up, and those that still wait.
+    /// Number of dropped packets and of those still incomplete.
     pub(super) fn incomplete(&self) -> u64 {
         self.given_up + self.waiting.len() as u64
     }
 
-    /// Adds a piece; the payload if nothing is missing now.
+    /// Adds a fragment. Returns the payload when it is complete.
     pub(super) fn insert(&mut self, fragment: Fragment<'_>) -> Option<Vec<u8>> {
         let place = self.place_for(&fragment)?;
         let waiting = &mut self.waiting[place];
@@ -67,8 +67,8 @@ impl Fragments {
         Some(payload)
     }
 
-    /// Where the packet of this fragment waits. One that contradicts what is there begins anew:
-    /// identifications are used again after a while.
+    /// The entry for the fragment's packet. A fragment that contradicts earlier ones starts a new
+    /// packet, because identifications are reused after a while.
     fn place_for(&mut self, fragment: &Fragment<'_>) -> Option<usize> {
         if fragment.offset + fragment.octets.len() > LONGEST {
             self.given_up += 1;
@@ -98,8 +98,8 @@ impl Fragments {
 }
 
 impl Waiting {
-    /// Whether the fragment may belong to the same packet: a sender cuts without overlap, so a
-    /// piece is new, or there already with the same octets.
+    /// Whether the fragment may belong to the same packet. Senders split without overlap, so it
+    /// must be new or an identical duplicate.
     fn accepts(&self, fragment: &Fragment<'_>) -> bool {
         let end = fragment.offset + fragment.octets.len();
         let fits = match self.length {
@@ -115,7 +115,7 @@ impl Waiting {
         }
     }
 
-    /// The whole payload, if it is here.
+    /// The payload, if it is complete.
     fn payload(&self) -> Option<Vec<u8>> {
         let length = self.length?;
         let held: usize = self.pieces.values().map(Vec::len).sum();

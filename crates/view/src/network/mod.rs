@@ -1,4 +1,4 @@
-//! From a captured frame to the UDP datagram in it: link header, IP, fragments, ports.
+//! Extraction of UDP datagrams from captured frames: link header, IP, fragments, ports.
 
 mod fragments;
 mod packet;
@@ -16,48 +16,48 @@ use super::{Frame, LinkType};
 
 pub use packet::udp_packet;
 
-/// The UDP and TCP port that IANA registered for JAUS.
+/// The UDP and TCP port registered with IANA for JAUS.
 pub const JAUS_PORT: u16 = 3794;
 
-/// Finds the datagrams of the chosen UDP ports in a capture's frames.
+/// Extracts the datagrams on selected UDP ports from the frames of a capture.
 ///
-/// Ethernet (with VLAN tags), both Linux cooked headers, raw IP and the null and loopback headers
-/// of the BSDs are understood; IPv4 and IPv6. IP fragments are kept until the datagram is whole;
-/// see [`Counts`] for those that never are.
+/// Supports Ethernet (with VLAN tags), both Linux cooked headers, raw IP, and the null and loopback
+/// headers of the BSDs, each with IPv4 and IPv6. IP fragments are kept until the datagram is
+/// complete; see [`Counts`] for those that never are.
 #[derive(Debug)]
 pub struct Network {
-    /// Those of interest; all, if there are none.
+    /// The selected ports; empty for all.
     ports: Vec<u16>,
     fragments: Fragments,
     counts: Counts,
 }
 
-/// What a [`Network`] saw and did not hand out.
+/// Traffic that a [`Network`] did not return.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
-    /// Frames whose link type is not understood.
+    /// Frames with an unsupported link type.
     pub unknown_links: u64,
-    /// TCP segments with payload on a chosen port: JTCP, which is not read yet.
+    /// TCP segments with payload on a selected port: JTCP, which is not supported yet.
     pub tcp_segments: u64,
-    /// Datagrams of which some fragments are missing, cut or contradictory.
+    /// Datagrams with missing, truncated or contradictory fragments.
     pub incomplete_datagrams: u64,
 }
 
-/// A UDP datagram on a chosen port.
+/// A UDP datagram on a selected port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Datagram<'a> {
-    /// The sender's address and port.
+    /// Address and port of the sender.
     pub source: SocketAddr,
-    /// Where it goes: a node, or a multicast group.
+    /// Address and port of the destination: a node or a multicast group.
     pub destination: SocketAddr,
-    /// What the sender gave to UDP, as far as the capture has it.
+    /// The UDP payload, as far as it was captured.
     pub payload: Cow<'a, [u8]>,
-    /// Octets at the end of the payload that the capture left out (its snap length).
+    /// Octets at the end of the payload that were not captured (snap length).
     pub missing: usize,
 }
 
 impl Network {
-    /// Looks for datagrams that come from or go to one of `ports`.
+    /// Selects datagrams from or to one of `ports`.
     pub fn new(ports: impl IntoIterator<Item = u16>) -> Self {
         Self {
             ports: ports.into_iter().collect(),
@@ -66,12 +66,12 @@ impl Network {
         }
     }
 
-    /// Looks for all UDP datagrams.
+    /// Selects all UDP datagrams.
     pub fn of_any_port() -> Self {
         Self::new([])
     }
 
-    /// What was seen and not handed out. Fragments still waiting count as incomplete.
+    /// Counts of traffic that was not returned. Incomplete fragments count as incomplete datagrams.
     pub fn counts(&self) -> Counts {
         let incomplete_datagrams = self.counts.incomplete_datagrams + self.fragments.incomplete();
         Counts {
@@ -80,7 +80,7 @@ impl Network {
         }
     }
 
-    /// The datagram that `frame` holds or completes, if it is for one of the ports.
+    /// The datagram that `frame` contains or completes, if it is on a selected port.
     pub fn handle_frame<'a>(&mut self, frame: &Frame<'a>) -> Option<Datagram<'a>> {
         let Some((kind, octets)) = payload_of_link(frame.link, frame.octets) else {
             self.counts.unknown_links += 1;
@@ -126,8 +126,8 @@ impl Network {
     }
 }
 
-/// Cuts off the link header: what follows it, and the octets. `None` if the type is unknown or the
-/// frame is too short.
+/// Strips the link header. Returns the type of the content and its octets; `None` if the type is
+/// unknown or the frame is too short.
 fn payload_of_link(link: LinkType, octets: &[u8]) -> Option<(EtherType, &[u8])> {
     match link {
         LinkType::ETHERNET => after_header(octets, 12, 14),
@@ -136,14 +136,14 @@ fn payload_of_link(link: LinkType, octets: &[u8]) -> Option<(EtherType, &[u8])> 
         LinkType::RAW | LinkType::RAW_BSD | LinkType::RAW_OPENBSD => by_ip_version(octets),
         LinkType::IPV4 => Some((ether_type::IPV4, octets)),
         LinkType::IPV6 => Some((ether_type::IPV6, octets)),
-        // The address family, in the byte order of whoever captured, and differently numbered by
-        // every system. What follows is IP, and tells its own version.
+        // The address family, in the byte order of the capturing machine and numbered differently
+        // on every system. The IP packet after it states its own version.
         LinkType::NULL | LinkType::LOOP => by_ip_version(octets.get(4..)?),
         _ => None,
     }
 }
 
-/// An Ethernet type at `at`, then the payload from `payload` on.
+/// The Ethernet type at `at`, and the octets from `payload` on.
 fn after_header(octets: &[u8], at: usize, payload: usize) -> Option<(EtherType, &[u8])> {
     let kind = *octets.get(at..)?.first_chunk()?;
     Some((EtherType(u16::from_be_bytes(kind)), octets.get(payload..)?))
@@ -178,7 +178,7 @@ fn addresses(net: &LaxNetSlice<'_>) -> Option<[IpAddr; 2]> {
     }
 }
 
-/// The piece of a UDP datagram in a packet that holds only a piece.
+/// The UDP fragment in a packet, if the packet is fragmented.
 fn fragment<'a>(addresses: [IpAddr; 2], packet: &LaxSlicedPacket<'a>) -> Option<Fragment<'a>> {
     let net = packet.net.as_ref()?;
     let payload = net.ip_payload_ref()?;

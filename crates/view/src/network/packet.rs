@@ -1,11 +1,11 @@
-//! The way back: IP and UDP headers around a datagram.
+//! Building IP and UDP headers around a datagram.
 
 use std::net::{IpAddr, SocketAddr};
 
 use etherparse::PacketBuilder;
 
-/// The IP packet of a UDP datagram with this payload. `None` if one end is of IPv4 and the other of
-/// IPv6, or the payload is too long for a packet.
+/// The IP packet of a UDP datagram with this payload. `None` if the address families differ or the
+/// payload is too long.
 pub fn udp_packet(source: SocketAddr, destination: SocketAddr, payload: &[u8]) -> Option<Vec<u8>> {
     let builder = match (source.ip(), destination.ip()) {
         (IpAddr::V4(from), IpAddr::V4(to)) => PacketBuilder::ipv4(from.octets(), to.octets(), 1),

@@ -1,4 +1,4 @@
-//! One message as people see it: a JSON object, or one readable line.
+//! One message of a stream, as a JSON object or a readable line.
 
 use std::fmt::Write as _;
 
@@ -7,21 +7,21 @@ use serde_json::{Map, Value as Json};
 use crate::Line;
 use jaus::address::JausId;
 
-/// A message, or what is wrong with it, as one JSON object.
+/// A message or an error as one JSON object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// Who sent it, if that is known.
+    /// The sender, if known.
     pub source: Option<JausId>,
-    /// For whom, if that is known.
+    /// The destination, if known.
     pub destination: Option<JausId>,
     json: Map<String, Json>,
 }
 
-/// Characters of a message's fields on a readable line.
+/// Maximum number of characters for the fields on a readable line.
 const MOST_OF_BODY: usize = 160;
 
 impl Entry {
-    /// From a line, with what is known of its way between time and source.
+    /// Creates an entry from a line. `way` is inserted after the time.
     pub(super) fn of_line(line: &Line<'_>, way: Vec<(&'static str, String)>) -> Self {
         let Ok(Json::Object(object)) = serde_json::to_value(line) else {
             return Self::of_object(Map::new());
@@ -46,7 +46,7 @@ impl Entry {
         }
     }
 
-    /// From an object that was written by [`to_json`](Self::to_json) or `jaus decode`.
+    /// Creates an entry from an object written by [`to_json`](Self::to_json) or `jaus decode`.
     #[must_use]
     pub fn of_object(json: Map<String, Json>) -> Self {
         let id = |key: &str| json.get(key)?.as_str()?.parse().ok();
@@ -63,20 +63,20 @@ impl Entry {
         &self.json
     }
 
-    /// The object as text, without a line end.
+    /// The object as text, without a line ending.
     #[must_use]
     pub fn to_json(&self) -> String {
-        // Serializing into memory fails only for maps without text keys; there are none.
+        // Serialising to memory fails only for non-text map keys, which do not occur.
         serde_json::to_string(&self.json).unwrap_or_default()
     }
 
-    /// A value that is text: `time`, `direction`, `code`, `message`, `service` …
+    /// A text value: `time`, `direction`, `code`, `message`, `service` …
     #[must_use]
     pub fn text(&self, key: &str) -> Option<&str> {
         self.json.get(key)?.as_str()
     }
 
-    /// One line for people: time, who to whom, what, and the fields.
+    /// Formats one readable line: time, source and destination, name, and the fields.
     #[must_use]
     pub fn in_words(&self, colours: bool) -> String {
         let paint = |code: &str, text: String| match colours {
@@ -123,7 +123,7 @@ fn put(json: &mut Map<String, Json>, way: Option<Vec<(&'static str, String)>>) {
     }
 }
 
-/// The fields behind one another, without the quotes and braces of JSON.
+/// The fields in sequence, without the quotes and braces of JSON.
 fn fields(value: &Json) -> String {
     let join = |parts: Vec<String>| parts.join(" ");
     match value {
@@ -146,7 +146,7 @@ fn fields(value: &Json) -> String {
                 .collect(),
         ),
         Json::String(text) => {
-            // What a peer has written must not reach the terminal as commands.
+            // Text from a peer must not reach the terminal as control sequences.
             text.chars()
                 .map(|c| if c.is_control() { '·' } else { c })
                 .collect()

@@ -1,11 +1,11 @@
-//! Comparing one field of a message with what is wanted of it.
+//! Comparison of message fields with values in a filter.
 
 use serde_json::{Map, Value as Json};
 
 /// A term such as `Pose.X>=1.5`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Field {
-    /// Names as [`plain`] makes them, from the outside in.
+    /// Names normalised by [`plain`], outermost first.
     path: Vec<String>,
     comparison: Comparison,
     wanted: String,
@@ -22,7 +22,7 @@ enum Comparison {
     Contains,
 }
 
-/// The longer ones first, of which the others are the beginnings.
+/// Longer signs first, because the shorter ones are their prefixes.
 const SIGNS: [(&str, Comparison); 7] = [
     ("!=", Comparison::Unequal),
     ("<=", Comparison::AtMost),
@@ -34,7 +34,7 @@ const SIGNS: [(&str, Comparison); 7] = [
 ];
 
 impl Comparison {
-    /// Whether a field's value and what is wanted compare so.
+    /// Whether the comparison of a field's value with `wanted` holds.
     fn holds(self, value: &Json, wanted: &str) -> bool {
         let number = wanted.parse::<f64>().ok();
         match (self, value.as_f64(), number) {
@@ -61,7 +61,7 @@ impl Comparison {
 }
 
 impl Field {
-    /// Takes a comparison apart; `None` if it is none.
+    /// Parses a comparison; `None` if the text is not one.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let at = text.find(['!', '<', '>', '=', '~'])?;
         let (name, rest) = text.split_at(at);
@@ -85,20 +85,20 @@ impl Field {
         })
     }
 
-    /// Whether it compares by size, but not with a number.
+    /// Whether it is an ordering comparison with a non-numeric value.
     pub(super) fn needs_number(&self) -> bool {
         use Comparison::{AtLeast, AtMost, Less, More};
         let by_size = matches!(self.comparison, Less | AtMost | More | AtLeast);
         by_size && self.wanted.parse::<f64>().is_err()
     }
 
-    /// Whether a message's object has such a field, in its body at any depth, or of its own.
+    /// Whether a message has a matching field, at the top level or at any depth of its body.
     pub(super) fn holds(&self, object: &Map<String, Json>) -> bool {
         object.get("body").is_some_and(|body| self.is_within(body))
             || self.is_in(object, &self.path)
     }
 
-    /// Whether the path begins here or further inside.
+    /// Whether the path starts here or further inside.
     fn is_within(&self, value: &Json) -> bool {
         match value {
             Json::Object(object) => {
@@ -109,7 +109,7 @@ impl Field {
         }
     }
 
-    /// Whether the path begins in this very object.
+    /// Whether the path starts in this object.
     fn is_in(&self, object: &Map<String, Json>, path: &[String]) -> bool {
         let Some((first, rest)) = path.split_first() else {
             return false;
@@ -118,8 +118,8 @@ impl Field {
         named.any(|(_, value)| self.leads(value, rest))
     }
 
-    /// Whether the rest of the path leads from here to what is wanted. In a list it may begin with an
-    /// element's number; without one, any element will do.
+    /// Whether the rest of the path leads to a matching value. In a list the path may continue with
+    /// an index; without one, any element may match.
     fn leads(&self, value: &Json, path: &[String]) -> bool {
         match (value, path.split_first()) {
             (Json::Array(values), Some((first, rest))) => match first.parse::<usize>() {
@@ -136,7 +136,7 @@ impl Field {
     }
 }
 
-/// A name without what people do not want to type: case, underscores, blanks.
+/// Normalises a name by removing case, underscores and spaces.
 fn plain(name: &str) -> String {
     let letters = name.chars().filter(|c| c.is_alphanumeric());
     letters.flat_map(char::to_lowercase).collect()

@@ -1,19 +1,22 @@
-//! Which messages people want to see: one grammar for the terminal, for the debug view's address
-//! and for the operator's page.
+//! Message filters: one grammar for the terminal, the URL of the debug view and the operator's
+//! page.
 //!
-//! A filter is a row of terms with blanks between them, and a message must meet them all:
+//! A filter is a sequence of terms separated by spaces. A message must match all of them:
 //!
-//! | term | holds for |
+//! | term | matches |
 //! |---|---|
-//! | `component=101.2.33`, `from=101`, `to=42.*.1` | messages from or to (only from, only to) a component, a node or a subsystem |
-//! | `service=VelocityState` | messages whose service's URN contains it |
-//! | `message=Velocity`, `message=4404`, `message=Set*,Query*` | messages whose name contains it or is like it, or that have the code |
+//! | `component=101.2.33` | messages from or to a component; `101.2` is a node, `101` a subsystem |
+//! | `from=101`, `to=42.*.1` | messages only from, or only to, such a place |
+//! | `service=VelocityState` | messages whose service URN contains it |
+//! | `message=Velocity`, `message=Set*,Query*` | messages whose name contains it or fits the pattern |
+//! | `message=4404` | messages with this code |
 //! | `direction=received` | `received`, `sent`, `local` or `passing` |
-//! | `velocity_x>1.0`, `Pose.X!=0`, `state=ready` | messages with such a field: `=`, `!=`, `<`, `<=`, `>`, `>=`, `~` (contains) |
+//! | `velocity_x>1.0`, `Pose.X!=0`, `state=ready` | messages with such a field: `=`, `!=`, `<`, … |
 //! | `text=Rover`, `Rover`, `"two words"` | messages whose JSON contains it |
 //!
-//! Neither case nor underscores matter in names. A field is found at any depth; with dots it is looked
-//! for inside of another. Several values with commas between them are alternatives.
+//! The comparisons are `=`, `!=`, `<`, `<=`, `>`, `>=` and `~` (contains). Case and underscores in
+//! names are ignored. A field is found at any depth; dots select a field inside another. Values
+//! separated by commas are alternatives.
 
 use std::fmt;
 use std::str::FromStr;
@@ -22,7 +25,7 @@ use super::Entry;
 use super::fields::Field;
 use jaus::address::JausId;
 
-/// Terms that a message must all meet. The empty filter lets everything pass.
+/// A set of terms that a message must all match. The empty filter matches everything.
 ///
 /// ```
 /// use jaus_view::Filter;
@@ -34,18 +37,18 @@ use jaus::address::JausId;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Filter(Vec<Term>);
 
-/// What is wrong with a filter, and what would be right.
+/// Error in a filter, with a correction.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct FilterError(String);
 
-/// More terms, or longer ones, are nobody's wish.
+/// Limits on the number and total length of terms, far beyond practical use.
 const MOST_TERMS: usize = 64;
 const LONGEST: usize = 4096;
 
 #[derive(Debug, Clone, PartialEq)]
 struct Term {
-    /// As it was written, without quotes.
+    /// The text of the term, without quotes.
     written: String,
     test: Test,
 }
@@ -60,7 +63,7 @@ enum Test {
     Text(String),
 }
 
-/// Which of the two ends of a message.
+/// An end of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum End {
     Either,
@@ -68,17 +71,17 @@ enum End {
     To,
 }
 
-/// A subsystem, a node or a component; `None` is any.
+/// A subsystem, node or component; `None` matches any number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Place([Option<u16>; 3]);
 
 impl Filter {
-    /// Adds what a key says, as it stands in an address: `component`, `from`, `to`, `service`,
-    /// `message`, `direction` and `text` as in the grammar, `field` for a comparison of a field, and
+    /// Adds a term given as key and value, as in a URL: `component`, `from`, `to`, `service`,
+    /// `message`, `direction` and `text` as in the grammar, `field` for a field comparison, and
     /// `filter` for terms of the grammar. An empty value adds nothing.
     ///
     /// # Errors
-    /// A key or a value that means nothing.
+    /// If the key or the value is invalid.
     pub fn add(&mut self, key: &str, value: &str) -> Result<(), FilterError> {
         if value.trim().is_empty() {
             return Ok(());
@@ -99,19 +102,19 @@ impl Filter {
         Ok(())
     }
 
-    /// Whether everything passes.
+    /// Whether the filter matches everything.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Whether a message passes.
+    /// Whether a message matches.
     #[must_use]
     pub fn passes(&self, entry: &Entry) -> bool {
         self.0.iter().all(|term| term.test.holds(entry))
     }
 
-    /// Whether a message between these two may pass, as far as can be said without reading it.
+    /// Whether a message between these ids can match, judged without decoding it.
     pub(super) fn may_pass(&self, source: JausId, destination: JausId) -> bool {
         self.0.iter().all(|term| match &term.test {
             Test::Component(end, places) => end.is_at(places, Some(source), Some(destination)),
@@ -149,7 +152,7 @@ impl fmt::Display for Filter {
     }
 }
 
-/// Splits at blanks that are not within double quotes, which are left out.
+/// Splits at spaces outside double quotes, and removes the quotes.
 fn words(text: &str) -> Result<Vec<String>, FilterError> {
     let (mut words, mut word, mut quoted) = (Vec::new(), String::new(), false);
     for character in text.chars() {
@@ -236,7 +239,7 @@ impl Term {
     }
 }
 
-/// What stands before `=` and is no field.
+/// Keys before `=` that are not field names.
 const KEYS: [&str; 7] = [
     "component",
     "from",
@@ -318,7 +321,7 @@ impl Test {
     }
 }
 
-/// Whether `text` contains `wanted`; with stars in it, whether all of it is like that.
+/// Whether `text` contains `wanted`, or matches it entirely if it contains stars.
 fn is_like(text: &str, wanted: &str) -> bool {
     let Some((first, rest)) = wanted.split_once('*') else {
         return text.contains(wanted);

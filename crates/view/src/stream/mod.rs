@@ -1,10 +1,9 @@
-//! A stream of messages for people: whole messages, each shown once, those that a [`Filter`] lets
-//! pass.
+//! A stream of messages for display: whole messages that match a [`Filter`], each one shown once.
 //!
-//! Where messages come from does not matter: a running node's [`Tap`](jaus::node::Tap), a capture,
-//! or JSON lines that were written before. Fragments are put together here, and not where the
-//! traffic is. What its sender repeats, a router passes on, or several links carry, is shown when it is
-//! seen first; acknowledgements are not shown.
+//! Messages may come from a running node's [`Tap`](jaus::node::Tap), a capture, or JSON lines
+//! written earlier. Fragments are reassembled here, away from the traffic itself. A message that is
+//! retransmitted, routed, or carried on several links is shown at its first occurrence.
+//! Acknowledgements are not shown.
 
 mod entry;
 mod fields;
@@ -26,7 +25,7 @@ pub use passage::Links;
 pub(super) use passage::timestamp;
 pub(super) use seen::Seen;
 
-/// Turns what passed into entries.
+/// Converts traffic to entries.
 #[derive(Debug)]
 pub struct MessageStream<'d> {
     messages: MessageLog<'d>,
@@ -35,7 +34,7 @@ pub struct MessageStream<'d> {
 }
 
 impl<'d> MessageStream<'d> {
-    /// A stream of what `filter` lets pass, read by the definitions of `dictionary`.
+    /// Creates a stream of messages that match `filter`, decoded with `dictionary`.
     #[must_use]
     pub fn new(dictionary: &'d Dictionary, filter: Filter) -> Self {
         Self {
@@ -45,13 +44,13 @@ impl<'d> MessageStream<'d> {
         }
     }
 
-    /// Large messages of which some fragments were not seen so far.
+    /// Number of large messages with missing fragments so far.
     #[must_use]
     pub fn incomplete_messages(&self) -> u64 {
         self.messages.incomplete_messages()
     }
 
-    /// The messages of a datagram in a capture. What is not JAUS gives none.
+    /// The messages of a datagram in a capture; empty if it is not JAUS.
     pub fn read_datagram(
         &mut self,
         time: Option<Timestamp>,
@@ -68,10 +67,11 @@ impl<'d> MessageStream<'d> {
             .collect()
     }
 
-    /// A line of JSON as this or `jaus decode` has written it; `None` if it does not pass.
+    /// Reads a line of JSON written by this type or `jaus decode`; `None` if it does not match the
+    /// filter.
     ///
     /// # Errors
-    /// What is wrong with a line that is no JSON object.
+    /// If the line is not a JSON object, with the reason.
     pub fn read_json(&self, line: &str) -> Result<Option<Entry>, String> {
         match serde_json::from_str(line) {
             Ok(Json::Object(object)) => {
@@ -83,7 +83,7 @@ impl<'d> MessageStream<'d> {
         }
     }
 
-    /// The message of a frame, or the one that it completes, if it is to be shown.
+    /// The message that a frame contains or completes, if it is to be shown.
     fn read_frame(&mut self, time: Option<Timestamp>, frame: &Frame) -> Option<Entry> {
         if time.is_some_and(|time| self.seen.is_copy(time, frame)) {
             return None;
@@ -91,7 +91,7 @@ impl<'d> MessageStream<'d> {
         self.read_whole(time, frame, Vec::new())
     }
 
-    /// The same for a frame that was not seen before.
+    /// The same for a frame without duplicate check.
     fn read_whole(
         &mut self,
         time: Option<Timestamp>,

@@ -1,4 +1,4 @@
-//! What passes a running node, as entries.
+//! Conversion of a running node's traffic to entries.
 
 use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -11,7 +11,7 @@ use jaus::endpoint::{LinkId, To};
 use jaus::node::{Node, Passage, Way};
 use jaus::wire::{Broadcast, Frame};
 
-/// The links of a node by their names. It asks the node only about those that it does not know.
+/// Cache of a node's link names. It queries the node only for unknown links.
 #[derive(Debug)]
 pub struct Links {
     node: Node,
@@ -19,7 +19,7 @@ pub struct Links {
 }
 
 impl Links {
-    /// Those of a node.
+    /// Creates an empty cache for a node.
     #[must_use]
     pub const fn of(node: Node) -> Self {
         Self {
@@ -34,7 +34,7 @@ impl Links {
         &self.node
     }
 
-    /// What a link is called.
+    /// The name of a link.
     pub fn name(&mut self, link: LinkId) -> &str {
         let node = &self.node;
         self.names
@@ -47,14 +47,14 @@ impl Links {
         (id.subsystem(), id.node()) == (config.subsystem, config.node)
     }
 
-    /// Whether something is for a component of the node.
+    /// Whether a message is addressed to a component of the node.
     fn reaches_us(&self, id: JausId) -> bool {
         let config = self.node.config();
         let subsystem = [config.subsystem, JausId::ANY_SUBSYSTEM].contains(&id.subsystem());
         subsystem && [config.node, JausId::ANY_NODE].contains(&id.node())
     }
 
-    /// `received`, `sent`, `local`, or `passing` for what is neither from nor for this node.
+    /// `received`, `sent`, `local`, or `passing` for messages neither from nor for this node.
     fn direction(&self, way: Way, frame: &Frame) -> &'static str {
         match way {
             Way::Local(_) => "local",
@@ -66,8 +66,8 @@ impl Links {
 }
 
 impl MessageStream<'_> {
-    /// The messages in what passed a node, beside `source` and the like with `direction`
-    /// (`received`, `sent`, `local`, or `passing` for what is for others), `link` and `peer`.
+    /// The messages of a passage. In addition to `source` and similar keys, they have `direction`
+    /// (`received`, `sent`, `local`, or `passing` for routed messages), `link` and `peer`.
     pub fn read_passage(&mut self, passage: &Passage, links: &mut Links) -> Vec<Entry> {
         let time = timestamp(passage.time);
         let frames = passage.frames();
@@ -83,8 +83,8 @@ impl MessageStream<'_> {
             .collect()
     }
 
-    /// Whether it was not shown before. Within the node nothing is repeated, so that a message to one
-    /// is never a copy there.
+    /// Whether the frame has not been shown before. Nothing is repeated within the node, so a local
+    /// message to a single destination is never a duplicate.
     fn is_new(&mut self, way: Way, frame: &Frame, time: Timestamp) -> bool {
         let second_way = self.seen.is_second_way(way, frame, time);
         !second_way && (matches!(way, Way::Local(_)) || !self.seen.is_copy(time, frame))
@@ -92,7 +92,8 @@ impl MessageStream<'_> {
 }
 
 impl Seen {
-    /// Whether a message to many goes by yet another way within the node: it has no number there.
+    /// Whether a multicast or broadcast takes a further path within the node, where it has no
+    /// sequence number.
     pub(crate) fn is_second_way(&mut self, way: Way, frame: &Frame, time: Timestamp) -> bool {
         let for_many =
             frame.destination.has_wildcard() || frame.flags.broadcast() != Some(Broadcast::None);
@@ -117,9 +118,9 @@ fn way_in_words(way: Way, frame: &Frame, links: &mut Links) -> Vec<(&'static str
     words
 }
 
-/// With microseconds, as captures have it.
+/// Converts a time to microsecond resolution, as in captures.
 pub(crate) fn timestamp(time: SystemTime) -> Timestamp {
-    // A clock before 1970 is nobody's.
+    // Clocks before 1970 do not occur in practice.
     let time = time.duration_since(UNIX_EPOCH).unwrap_or_default();
     Timestamp::new(time.as_secs() as i64, time.subsec_nanos(), 6)
 }

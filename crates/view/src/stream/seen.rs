@@ -1,5 +1,5 @@
-//! What was shown a moment ago: a message that is repeated, passed on, or sent by several ways is
-//! shown once.
+//! Duplicate detection: a message that is retransmitted, routed, or sent on several paths is shown
+//! once.
 
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, VecDeque};
@@ -9,14 +9,15 @@ use std::time::Duration;
 use crate::Timestamp;
 use jaus::wire::{Acknowledgement, Frame, Version};
 
-/// Messages remembered.
+/// Number of messages remembered.
 const MOST: usize = 8192;
-/// As long as peers repeat what was not acknowledged.
+/// Detection window for numbered messages: how long peers retransmit without an acknowledgement.
 const REPEATS: Duration = Duration::from_millis(3500);
-/// Copies of what has no number of its own come at once, or are another message.
+/// Detection window for unnumbered messages: copies arrive almost simultaneously, later ones are
+/// new messages.
 const COPIES: Duration = Duration::from_millis(20);
 
-/// Fingerprints of messages and when they were seen first.
+/// Fingerprints of messages with the time of their first occurrence.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
     keys: RandomState,
@@ -25,7 +26,7 @@ pub(crate) struct Seen {
 }
 
 impl Seen {
-    /// Whether this is a copy of something seen lately; remembers it, if not.
+    /// Whether this is a duplicate of a recent message. Otherwise remembers it.
     pub(super) fn is_copy(&mut self, time: Timestamp, frame: &Frame) -> bool {
         let acknowledged = frame.flags.acknowledgement() != Acknowledgement::None;
         let numbered = frame.sequence != 0 && (frame.version == Version::As5669a || acknowledged);
@@ -38,8 +39,8 @@ impl Seen {
         self.is_known(time, key, window)
     }
 
-    /// The same for a message to many that passes within a node without a number, and goes to the
-    /// links as well.
+    /// The same for a message to many destinations, which passes within the node without a sequence
+    /// number and also goes out on the links.
     pub(super) fn is_copy_for_many(&mut self, time: Timestamp, frame: &Frame) -> bool {
         let key = self.key(frame, None);
         self.is_known(time, key, COPIES)
@@ -54,7 +55,7 @@ impl Seen {
         let time = Duration::new(time.seconds().max(0) as u64, time.subsec_nanos());
         match self.times.entry(key) {
             Entry::Occupied(mut known) => {
-                // A clock that was set back makes nothing a copy for ever.
+                // After the clock is set back, old entries do not match forever.
                 let is_copy = time.abs_diff(*known.get()) < window;
                 if !is_copy {
                     known.insert(time);

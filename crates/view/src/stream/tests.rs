@@ -1,4 +1,4 @@
-//! Filters, and what is shown once.
+//! Filters and duplicate detection.
 
 use bytes::Bytes;
 use serde_json::json;
@@ -132,7 +132,7 @@ fn at(milliseconds: u32) -> Option<Timestamp> {
     Some(Timestamp::new(i64::from(seconds), rest * 1_000_000, 6))
 }
 
-/// How many lines each frame, with its time, gives.
+/// The number of lines for each frame and its time.
 fn shown(frames: &[(u32, Frame)]) -> Vec<usize> {
     let dictionary = Dictionary::new();
     let mut stream = MessageStream::new(&dictionary, Filter::default());
