@@ -85,6 +85,20 @@ pub enum Error {
         /// Its holder, as far as this host reports it.
         holder: Holder,
     },
+    /// The operating system refuses multicast.
+    #[error(
+        "multicast group {group} cannot be used on {interface}: {source}. An emulator or a sandbox \
+         may have no multicast: turn the group off and name peers by address (--group off --peer \
+         ADDRESS; in a settings file group = \"off\", peers = [\"ADDRESS\"])"
+    )]
+    GroupRefused {
+        /// The group and its port.
+        group: SocketAddr,
+        /// Where it was to be used.
+        interface: Interface,
+        /// The operating system's words.
+        source: io::Error,
+    },
     /// Another program listens at that address.
     #[error(
         "TCP port {} of {} is taken: choose another, or another address of this host, or end the \

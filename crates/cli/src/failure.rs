@@ -53,12 +53,16 @@ impl Failure {
         Self::Message(message.into())
     }
 
-    /// An error of the library, with its causes: its messages are written for users.
+    /// An error of the library, with its causes. Its messages are written for users, and many name
+    /// their cause themselves, which is not repeated then.
     pub fn of(error: impl Error) -> Self {
         let mut message = error.to_string();
         let mut source = error.source();
         while let Some(cause) = source {
-            message = format!("{message}: {cause}");
+            let words = cause.to_string();
+            if !message.contains(&words) {
+                message = format!("{message}: {words}");
+            }
             source = cause.source();
         }
         Self::Message(message)
@@ -80,3 +84,49 @@ impl fmt::Display for Failure {
 }
 
 impl Error for Failure {}
+
+#[cfg(test)]
+mod tests {
+    use jaus::link;
+    use jaus::node::StartError;
+
+    use super::*;
+
+    #[test]
+    fn a_cause_that_the_error_names_itself_is_printed_once() {
+        let refused = link::Error::GroupRefused {
+            group: ([239, 255, 0, 1], 3794).into(),
+            interface: link::Interface {
+                name: "lo".into(),
+                index: 1,
+                address: [127, 0, 0, 1].into(),
+                prefix: 8,
+                up: true,
+                multicast: true,
+                broadcast: None,
+            },
+            source: io::Error::from_raw_os_error(92),
+        };
+        let told = Failure::of(StartError::from(refused)).to_string();
+        assert_eq!(told.matches("os error 92").count(), 1, "{told}");
+        assert!(told.contains("--group off --peer"), "{told}");
+    }
+
+    #[test]
+    fn a_cause_that_the_error_does_not_name_is_added() {
+        #[derive(Debug)]
+        struct Unread(io::Error);
+        impl fmt::Display for Unread {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the map cannot be read")
+            }
+        }
+        impl Error for Unread {
+            fn source(&self) -> Option<&(dyn Error + 'static)> {
+                Some(&self.0)
+            }
+        }
+        let told = Failure::of(Unread(io::Error::other("bad sector"))).to_string();
+        assert_eq!(told, "the map cannot be read: bad sector");
+    }
+}

@@ -23,11 +23,8 @@ pub(super) fn unicast(interface: &Interface, settings: &Settings) -> Result<Open
         tracing::warn!(%wanted, "port taken, using a free one instead");
     }
     for group in settings.addresses_of_all(interface) {
-        let error = |source| Error::Io {
-            doing: format!("setting up {group} on {interface}"),
-            source,
-        };
-        prepare_sending(&socket, group.ip(), interface, settings).map_err(error)?;
+        prepare_sending(&socket, group.ip(), interface, settings)
+            .map_err(|e| refused(group, interface, e))?;
     }
     finish(socket, settings.receive_buffer)
 }
@@ -79,10 +76,7 @@ pub(super) fn group(
         },
         _ => bind_error(group, e),
     })?;
-    join(&socket, group.ip(), interface).map_err(|source| Error::Io {
-        doing: format!("joining the multicast group {} on {interface}", group.ip()),
-        source,
-    })?;
+    join(&socket, group.ip(), interface).map_err(|e| refused(group, interface, e))?;
     finish(socket, settings.receive_buffer)
 }
 
@@ -105,6 +99,21 @@ fn join(socket: &Socket, group: IpAddr, interface: &Interface) -> io::Result<()>
         }
         // A broadcast address needs no joining.
         IpAddr::V4(_) => Ok(()),
+    }
+}
+
+/// The operating system has no multicast, or no broadcast, as an emulator or a sandbox may not.
+fn refused(group: SocketAddr, interface: &Interface, source: io::Error) -> Error {
+    if group.ip().is_multicast() {
+        return Error::GroupRefused {
+            group,
+            interface: interface.clone(),
+            source,
+        };
+    }
+    Error::Io {
+        doing: format!("setting up {group} on {interface}"),
+        source,
     }
 }
 
@@ -175,5 +184,31 @@ pub(super) fn io_error(doing: &'static str) -> impl Fn(io::Error) -> Error {
     move |source| Error::Io {
         doing: doing.into(),
         source,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_group_that_cannot_be_joined_is_an_error_that_names_the_option_without_it() {
+        let interface = Interface {
+            name: "gone0".into(),
+            index: u32::MAX,
+            address: Ipv4Addr::LOCALHOST.into(),
+            prefix: 8,
+            up: true,
+            multicast: true,
+            broadcast: None,
+        };
+        let address = ([239, 255, 0, 77], 0).into();
+        let error = group(&interface, address, &Settings::default()).unwrap_err();
+        assert!(matches!(error, Error::GroupRefused { .. }), "{error}");
+        let told = error.to_string();
+        for part in ["239.255.0.77", "gone0", "--group off", "--peer ADDRESS"] {
+            assert!(told.contains(part), "no `{part}` in {told}");
+        }
     }
 }
