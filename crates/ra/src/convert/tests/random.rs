@@ -6,9 +6,9 @@ use proptest::test_runner::TestRunner;
 
 use super::*;
 use crate::messages as ra;
+use jaus::codec::MessageInfo;
 use jaus::codec::arbitrary::Unstructured;
 use jaus::codec::view::Value;
-use jaus::codec::{MessageInfo, Registry};
 use jaus::messages::registry;
 
 /// Octets to generate a message from; after the last octet, all values are zero or absent.
@@ -21,11 +21,14 @@ fn seed() -> impl Strategy<Value = Vec<u8>> {
 }
 
 /// The layout of a pair's message in a set: of several, that of the pair's version.
-fn layout(registry: Registry, code: u16, name: &str, pair: &Pair) -> &'static MessageInfo {
+fn layout(
+    infos: impl Iterator<Item = &'static MessageInfo>,
+    code: u16,
+    name: &str,
+    pair: &Pair,
+) -> &'static MessageInfo {
     let old = pair.is_meant(contexts()[1]) && !pair.is_meant(Context::default());
-    let mut same = registry
-        .iter()
-        .filter(|info| info.code == code && info.name == name);
+    let mut same = infos.filter(|info| info.code == code && info.name == name);
     let first = same.next().unwrap();
     same.find(|_| old).unwrap_or(first)
 }
@@ -78,7 +81,11 @@ fn for_every_pair(
 
 #[test]
 fn one_of_ours_comes_back_as_it_was_or_is_refused() {
-    let ours = |pair: &Pair| layout(registry(), pair.jaus, pair.jaus_name, pair);
+    let ours = |pair: &Pair| {
+        let ground = jaus_vehicle::messages::registry();
+        let infos = registry().iter().chain(ground.iter());
+        layout(infos, pair.jaus, pair.jaus_name, pair)
+    };
     for_every_pair(ours, |pair, info, payload| {
         let mut converted = false;
         for context in contexts() {
@@ -99,7 +106,7 @@ fn one_of_ours_comes_back_as_it_was_or_is_refused() {
 
 #[test]
 fn one_of_theirs_comes_back_as_it_was_or_is_refused() {
-    let theirs = |pair: &Pair| layout(ra::registry(), pair.ra, pair.ra_name, pair);
+    let theirs = |pair: &Pair| layout(ra::registry().iter(), pair.ra, pair.ra_name, pair);
     for_every_pair(theirs, |pair, info, message| {
         let mut converted = false;
         for context in contexts() {
