@@ -181,7 +181,8 @@ fn purposeful(random: &mut Random, infos: &[&'static MessageInfo]) -> Bytes {
 
 #[test]
 fn whatever_anybody_says_the_vehicle_keeps_its_limits_and_moves_only_while_it_may() {
-    let infos: Vec<&'static MessageInfo> = messages::registry().iter().collect();
+    let ours = jaus_vehicle::messages::registry();
+    let infos: Vec<&'static MessageInfo> = messages::registry().iter().chain(ours.iter()).collect();
     let mut moved = 0;
     for seed in 0..24 {
         let mut random = Random::new(seed);
