@@ -8,7 +8,7 @@
 //! | `component=101.2.33` | messages from or to a component; `101.2` is a node, `101` a subsystem |
 //! | `from=101`, `to=42.*.1` | messages only from, or only to, such a place |
 //! | `service=VelocityState` | messages whose service URN contains it |
-//! | `message=Velocity`, `message=Set*,Query*` | messages whose name contains it or fits the pattern |
+//! | `message=Velocity`, `message=Set*,Query*` | messages whose name contains or matches it |
 //! | `message=4404` | messages with this code |
 //! | `direction=received` | `received`, `sent`, `local` or `passing` |
 //! | `velocity_x>1.0`, `Pose.X!=0`, `state=ready` | messages with such a field: `=`, `!=`, `<`, … |
