@@ -8,10 +8,10 @@ use bytes::Bytes;
 
 use super::{FormattedBlob, Text};
 
-/// Random lists, blobs and strings rarely exceed the minimum length by more than this.
+/// Random lists, blobs and strings exceed the minimum length by at most this much.
 const USUAL_LENGTH: u64 = 12;
 
-/// A count within `min..=max`, usually small.
+/// A count within `min..=max`, at most [`USUAL_LENGTH`] above `min`.
 fn count(random: &mut Unstructured<'_>, min: u64, max: u64) -> Result<u64> {
     random.int_in_range(min..=max.min(min.saturating_add(USUAL_LENGTH)))
 }

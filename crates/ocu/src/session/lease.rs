@@ -18,8 +18,8 @@ use jaus::service::State;
 #[derive(Default)]
 pub(super) struct Lease {
     wanted: Wanted,
-    /// Whether held parts should act on commands, also after a restart. `None` until the operator
-    /// has decided, since the start of this station.
+    /// Whether held parts should act on commands, also after they restart. `None` from the start of
+    /// this station until the operator or the vehicle's reported state has decided it.
     ready: Option<bool>,
     /// Whether parts go to standby as soon as they are held, because their previous client is lost.
     stops: bool,
