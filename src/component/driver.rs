@@ -30,8 +30,9 @@ pub(super) enum Command {
         report: u16,
         reply: oneshot::Sender<Answer>,
     },
-    /// Create a subscription or request control.
-    Hold(Hold),
+    /// Create a subscription or request control. Boxed, because every place in the queue has room
+    /// for the largest command.
+    Hold(Box<Hold>),
     /// Add a service.
     Offer(Box<dyn Service>, oneshot::Sender<Result<(), UnsafeService>>),
     /// Withdraw a service.
@@ -155,7 +156,7 @@ impl Driver {
 
     /// Stops what the services move, ends subscriptions and control of peers, and waits a moment
     /// for the confirmations.
-    async fn leave(mut self) {
+    async fn leave(&mut self) {
         let now = Instant::now();
         self.stack.take_leave(now);
         self.settle();
@@ -197,7 +198,7 @@ impl Driver {
                     }
                 }
             }
-            Command::Hold(hold) => self.hold(hold),
+            Command::Hold(hold) => self.hold(*hold),
             Command::Offer(service, reply) => {
                 // The application may not wait for it.
                 let _ = reply.send(self.stack.offer(Instant::now(), service));

@@ -68,6 +68,9 @@ pub enum Event {
 }
 
 impl Stack {
+    /// Room for events that is kept while there are none.
+    const EVENTS_AT_REST: usize = 4;
+
     /// A component with its discovery and its other services.
     #[must_use]
     pub fn new(discovery: Discovery, services: Vec<Box<dyn Service>>) -> Self {
@@ -470,7 +473,13 @@ impl Stack {
 
     /// The next notification for the application.
     pub fn poll_event(&mut self) -> Option<Event> {
-        self.events.pop_front()
+        let event = self.events.pop_front();
+        if event.is_none() {
+            // A directory of hundreds of components brings as many events once: 40 KiB, which an
+            // idle component would hold for as long as it lives.
+            self.events.shrink_to(Self::EVENTS_AT_REST);
+        }
+        event
     }
 
     /// When to call [`handle_timeout`](Self::handle_timeout).
