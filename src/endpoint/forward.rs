@@ -12,6 +12,7 @@ use bytes::Bytes;
 use tracing::trace;
 
 use super::egress::Hop;
+use super::receive::Arrival;
 use super::{Counter, Endpoint, Path, To};
 use crate::address::JausId;
 use crate::wire::{Broadcast, DataControl, Frame, Framing, Version, ra};
@@ -29,7 +30,8 @@ impl Endpoint {
 
     /// Whether a broadcast, or a message to an unknown address, arrived on another path than the
     /// one on which its sender was heard a moment ago. It is neither forwarded nor learned from.
-    pub(super) fn is_astray(&self, now: Instant, from: Path, frame: &Frame) -> bool {
+    pub(super) fn is_astray(&self, arrival: Arrival<'_>) -> bool {
+        let (frame, now, from) = (arrival.frame, arrival.now, arrival.path);
         let for_many = frame.destination.has_wildcard()
             || frame.flags.broadcast() != Some(Broadcast::None)
             || self.route(frame.destination).is_none();
@@ -42,27 +44,21 @@ impl Endpoint {
     }
 
     /// Forwards a message towards its receivers, unless they are where it came from.
-    pub(super) fn pass_on(&mut self, now: Instant, from: Path, frame: &Frame) {
-        let (source, destination) = (frame.source, frame.destination);
-        let passed = self
-            .next_hops(now, from, frame)
-            .and_then(|(hops, version)| {
-                let frame = with_header(frame, version).ok_or(Counter::CannotForward)?;
-                self.send_to_hops(now, &hops, &frame)
-                    .map_err(|_| Counter::CannotForward)
-            });
+    pub(super) fn pass_on(&mut self, arrival: Arrival<'_>) {
+        let (source, destination) = (arrival.frame.source, arrival.frame.destination);
+        let passed = self.next_hops(arrival).and_then(|(hops, version)| {
+            let frame = with_header(arrival.frame, version).ok_or(Counter::CannotForward)?;
+            self.send_to_hops(arrival.now, &hops, &frame)
+                .map_err(|_| Counter::CannotForward)
+        });
         let outcome = passed.err().unwrap_or(Counter::MessagesForwarded);
         trace!(%source, %destination, %outcome, "passing on");
         self.counters.add(outcome);
     }
 
     /// The next hops of a message, and the header to use.
-    fn next_hops(
-        &mut self,
-        now: Instant,
-        from: Path,
-        frame: &Frame,
-    ) -> Result<(Vec<Hop>, Version), Counter> {
+    fn next_hops(&mut self, arrival: Arrival<'_>) -> Result<(Vec<Hop>, Version), Counter> {
+        let (frame, now, from) = (arrival.frame, arrival.now, arrival.path);
         let destination = frame.destination;
         if destination.is_unicast() {
             self.config.access.check_source(destination)?;

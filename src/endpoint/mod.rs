@@ -45,13 +45,13 @@ mod large;
 mod link;
 mod local;
 mod news;
-mod occupancy;
 mod peers;
 mod rate;
 mod receive;
 mod recent;
 mod send;
 mod sink;
+mod tally;
 #[cfg(test)]
 mod tests;
 mod verify;
@@ -70,7 +70,6 @@ pub use egress::{Pacing, Packing};
 pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use local::AttachError;
-pub use occupancy::Occupancy;
 pub use peers::{Peer, RouteState, Traffic};
 pub(crate) use rate::quota_address;
 pub use rate::{Buckets, Rate, Rates};
@@ -177,14 +176,14 @@ impl Endpoint {
     /// Removes a link, the routes learned through it and the datagrams queued on it, which are
     /// counted.
     pub fn remove_link(&mut self, link: LinkId) {
-        self.peers.forget_link(link);
+        self.peers.forget_paths(|path| path.link == link);
         let lost = self.egress.remove_link(link);
         self.counters.add_many(Counter::LinkGone, lost);
     }
 
     /// Reports that a connection has closed: the routes learned through it are forgotten.
     pub fn forget_path(&mut self, path: Path) {
-        self.peers.forget_path(path);
+        self.peers.forget_paths(|known| known == path);
     }
 
     /// Replaces the static peers, for instance because links were added or removed.

@@ -115,7 +115,7 @@ impl Endpoint {
             self.send_away(now, handle, &message, scope)?;
             let source = message.source;
             let message = received_locally(message, scope, destination);
-            self.deliver_to_all(&message, Some(source), sink);
+            self.deliver(&message, Some(source), sink);
         }
         self.counters.add(Counter::MessagesSent);
         self.peers.note_sent(destination, length);

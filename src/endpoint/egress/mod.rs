@@ -235,11 +235,11 @@ impl Egress {
 
     /// Records a message of ours that goes to a group.
     pub(super) fn remember_echo(&mut self, now: Instant, frame: &Frame) {
-        self.echoes.insert(now, self.echoes.fingerprint(frame));
+        self.echoes.insert_own(now, frame);
     }
 
     /// Whether that message was recently sent to a group.
-    pub(super) fn is_echo(&self, now: Instant, seen: &Fingerprint) -> bool {
+    pub(super) fn is_echo(&self, now: Instant, seen: Fingerprint) -> bool {
         self.echoes.contains(now, seen, self.echo_window)
     }
 

@@ -288,13 +288,11 @@ impl Reassembly {
     /// are counted.
     pub(in crate::endpoint) fn insert(
         &mut self,
-        Arrival {
-            now, path, held, ..
-        }: Arrival,
-        frame: &Frame,
+        arrival: Arrival<'_>,
         style: Option<LargeStyle>,
         counters: &mut Counters,
     ) -> Result<Option<Whole>, Counter> {
+        let (frame, now, path) = (arrival.frame, arrival.now, arrival.path);
         let source = frame.source;
         if !self.senders.contains_key(&source) {
             self.enlist(path.into(), now, source);
@@ -302,7 +300,7 @@ impl Reassembly {
         let new = || Sender::new(now, frame.sequence, path.into());
         let sender = self.senders.entry(source).or_insert_with(new);
         let before = sender.cost;
-        let inserted = sender.take_in(now, frame, held, self.max_message, counters);
+        let inserted = sender.take_in(arrival, self.max_message, counters);
         if inserted.is_ok() {
             sender.grown = now;
             sender.acknowledged |= frame.flags.acknowledgement() == Acknowledgement::Request;
@@ -514,12 +512,11 @@ impl Sender {
     /// Adds a fragment; returns the run if it is a complete message.
     fn take_in(
         &mut self,
-        now: Instant,
-        frame: &Frame,
-        held: usize,
+        arrival: Arrival<'_>,
         max_message: usize,
         counters: &mut Counters,
     ) -> Result<Option<Run>, Counter> {
+        let frame = arrival.frame;
         let (destination, sequence) = (frame.destination, frame.sequence);
         let data = frame.flags.data();
         self.advance(sequence);
@@ -536,7 +533,7 @@ impl Sender {
             self.take(place);
             counters.add(Counter::FragmentsForgotten);
         }
-        let piece = part_of_message(frame, held);
+        let piece = part_of_message(frame, arrival.held);
         let run = Run {
             kind: Kind {
                 version: frame.version,
@@ -547,7 +544,7 @@ impl Sender {
             ends: data == DataControl::Last,
             octets: piece.len(),
             pieces: VecDeque::from([piece]),
-            updated: now,
+            updated: arrival.now,
             position: self.position,
         };
         let place = self.insert(destination, sequence, run);

@@ -154,12 +154,14 @@ impl PeerState {
             self.latest = number;
         }
         // A frame that may not be the peer's teaches nothing about it.
-        if self
-            .challenge
-            .is_none_or(|challenge| challenge.rival.is_none())
-        {
+        if !self.has_rival() {
             self.recogniser.handle_frame(frame, 0);
         }
+    }
+
+    /// Whether its id is also heard on another path, and a challenge decides between the two.
+    pub(super) fn has_rival(&self) -> bool {
+        self.challenge.is_some_and(|it| it.rival.is_some())
     }
 
     /// Resets the evidence of a restarted or moved peer.
