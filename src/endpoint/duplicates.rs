@@ -24,15 +24,6 @@ pub(super) enum Novelty {
     Copy,
 }
 
-impl Novelty {
-    const fn repetitions(self) -> u8 {
-        match self {
-            Self::Repeated(repetitions) => repetitions,
-            Self::New | Self::Copy => 0,
-        }
-    }
-}
-
 impl Endpoint {
     /// Runs the duplicate check and records the message.
     ///
@@ -66,14 +57,17 @@ impl Endpoint {
                 }
             }
         };
-        if novelty != Novelty::Copy {
-            let sighting = Sighting {
-                time: now,
-                way,
-                repetitions: novelty.repetitions(),
-            };
-            self.heard.insert(seen, sighting, self.class(frame));
-        }
+        let repetitions = match novelty {
+            Novelty::New => 0,
+            Novelty::Repeated(repetitions) => repetitions,
+            Novelty::Copy => return novelty,
+        };
+        let sighting = Sighting {
+            time: now,
+            way,
+            repetitions,
+        };
+        self.heard.insert(seen, sighting, self.class(frame));
         novelty
     }
 

@@ -48,7 +48,8 @@ impl Endpoint {
         let (source, destination) = (arrival.frame.source, arrival.frame.destination);
         let passed = self.next_hops(arrival).and_then(|(hops, version)| {
             let frame = with_header(arrival.frame, version).ok_or(Counter::CannotForward)?;
-            self.send_to_hops(arrival.now, &hops, &frame)
+            self.egress
+                .push_to_many(arrival.now, &hops, &frame, &mut self.counters)
                 .map_err(|_| Counter::CannotForward)
         });
         let outcome = passed.err().unwrap_or(Counter::MessagesForwarded);
@@ -65,7 +66,7 @@ impl Endpoint {
             if let Some((path, version)) = self.route(destination) {
                 // Multicast has already reached every node on that network.
                 let shared = from.link == path.link
-                    && self.framing(from.link) == Framing::Judp
+                    && self.egress.framing(from.link) == Framing::Judp
                     && frame.flags.broadcast() != Some(Broadcast::None);
                 return if path == from || shared {
                     Err(Counter::NotForUs)
@@ -83,7 +84,8 @@ impl Endpoint {
         if hops.is_empty() {
             return Err(Counter::NotForUs);
         }
-        if !self.broadcasts.take(now, self.config.forwarded_broadcasts) {
+        let rate = self.config.forwarded_broadcasts;
+        if !self.broadcasts.take(now, rate, 1) {
             return Err(Counter::ForwardRate);
         }
         Ok((hops, Version::As5669a))
@@ -93,7 +95,7 @@ impl Endpoint {
     /// without a group, and static peers that groups do not reach.
     fn hops_everywhere_but(&self, from: Path, destination: JausId) -> Vec<Hop> {
         let mut singly = self.peers.broadcast_copies(destination);
-        if self.framing(from.link) == Framing::Jtcp {
+        if self.egress.framing(from.link) == Framing::Jtcp {
             singly.extend(self.peers.paths_on(from.link));
         }
         singly.sort_unstable();

@@ -69,13 +69,8 @@ pub(super) struct Bucket {
 }
 
 impl Bucket {
-    /// Takes a token, if available.
-    pub(super) fn take(&mut self, now: Instant, rate: Rate) -> bool {
-        self.take_many(now, rate, 1)
-    }
-
     /// Takes this many tokens, if available.
-    pub(super) fn take_many(&mut self, now: Instant, rate: Rate, tokens: u32) -> bool {
+    pub(super) fn take(&mut self, now: Instant, rate: Rate, tokens: u32) -> bool {
         let cost = rate.time_for(tokens);
         let is_there = self.debt(now) + cost <= rate.time_for(rate.burst.max(1));
         if is_there {
@@ -152,11 +147,11 @@ impl<K: Eq + Hash> Buckets<K> {
         if self.own.len() >= self.limit && !self.own.contains_key(&source) {
             self.sweep(now);
             if self.own.len() >= self.limit {
-                return self.shared.take_many(now, rate, tokens);
+                return self.shared.take(now, rate, tokens);
             }
         }
         let own = self.own.entry(source).or_default();
-        own.take_many(now, rate, tokens)
+        own.take(now, rate, tokens)
     }
 
     #[cfg(test)]
@@ -220,22 +215,22 @@ impl Gate {
         }
     }
 
-    /// Applies the message rate limits.
-    pub(super) fn admit_message(
+    /// Applies the limits to a message; `is_new` says whether its sender is unknown.
+    pub(super) fn admit(
         &mut self,
         now: Instant,
         from: Path,
         source: JausId,
+        is_new: bool,
     ) -> Result<(), Counter> {
-        let admitted = self.messages_by_address.take(now, from.into())
-            && self.messages_by_id.take(now, source);
-        admitted.then_some(()).ok_or(Counter::MessageRate)
-    }
-
-    /// Applies the rate limit on new ids.
-    pub(super) fn admit_new_id(&mut self, now: Instant, from: Path) -> Result<(), Counter> {
-        let admitted = self.new_ids.take(now, from.into());
-        admitted.then_some(()).ok_or(Counter::NewIdRate)
+        let origin = Origin::from(from);
+        if !self.messages_by_address.take(now, origin) || !self.messages_by_id.take(now, source) {
+            return Err(Counter::MessageRate);
+        }
+        if is_new && !self.new_ids.take(now, origin) {
+            return Err(Counter::NewIdRate);
+        }
+        Ok(())
     }
 }
 

@@ -167,7 +167,8 @@ impl Endpoint {
             Err(_) if passes => false,
             checked => checked.map(|()| true)?,
         };
-        self.admit(now, path, frame.source)?;
+        let is_new = !self.peers.knows(frame.source);
+        self.gate.admit(now, path, frame.source, is_new)?;
         // Check before acknowledging: a dropped message must not look delivered.
         if !self.peers.has_room_for(now, frame.source, path) {
             if self.warnings.is_due(now, Warning::TableFull) {
@@ -336,16 +337,6 @@ impl Endpoint {
         }
     }
 
-    /// Applies the rate limits for messages and for new ids.
-    fn admit(&mut self, now: Instant, from: Path, source: JausId) -> Result<(), Counter> {
-        self.gate.admit_message(now, from, source)?;
-        if self.peers.knows(source) {
-            Ok(())
-        } else {
-            self.gate.admit_new_id(now, from)
-        }
-    }
-
     /// Checks whether a message is for local components.
     fn check_receivers(&self, frame: &Frame, broadcast: Broadcast) -> Result<(), Counter> {
         let reaches = |broadcast| {
@@ -404,7 +395,7 @@ impl Endpoint {
     /// The path for answers to a sender: where it was heard, unless it does not read there. In that
     /// case the datagram path on which it was heard before, if any.
     pub(super) fn where_it_reads(&self, id: JausId, from: Path) -> Path {
-        let is_datagram = |path: &Path| self.framing(path.link) == Framing::Judp;
+        let is_datagram = |path: &Path| self.egress.framing(path.link) == Framing::Judp;
         if is_datagram(&from) || !self.peers.is_deaf_on_its_connections(id) {
             return from;
         }

@@ -14,9 +14,8 @@ use bytes::Bytes;
 use tracing::{debug, warn};
 
 use super::peers::{CHALLENGE, CHALLENGE_FLAGS, Challenge, Finding, Heard, Probe};
-use super::rate::{Buckets, Origin};
 use super::receive::Arrival;
-use super::{Config, Counter, Endpoint, Event, Path};
+use super::{Counter, Endpoint, Event, Path};
 use crate::address::JausId;
 use crate::wire::{Frame, Framing};
 
@@ -26,27 +25,6 @@ use crate::wire::{Frame, Framing};
 const NUMBERS_AGO: u16 = 1 << 14;
 /// The shortest interval between two warnings of a kind.
 const WARNING_INTERVAL: Duration = Duration::from_secs(10);
-
-/// The budget for traffic to unverified addresses.
-#[derive(Debug)]
-pub(super) struct Budget {
-    by_address: Buckets<Origin>,
-    total: Buckets<()>,
-}
-
-impl Budget {
-    pub(super) fn new(config: &Config) -> Self {
-        Self {
-            by_address: Buckets::new(config.unverified_address, config.max_peers),
-            total: Buckets::new(config.unverified_total, 1),
-        }
-    }
-
-    fn take(&mut self, now: Instant, to: Origin, octets: usize) -> bool {
-        let octets = u32::try_from(octets).unwrap_or(u32::MAX);
-        self.by_address.take_many(now, to, octets) && self.total.take_many(now, (), octets)
-    }
-}
 
 /// Rate-limited warnings to the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,10 +59,10 @@ impl Endpoint {
         let Arrival { frame, now, .. } = arrival;
         let (id, version) = (frame.source, frame.version);
         let path = self.where_it_reads(id, arrival.path);
-        let is_stream = self.framing(path.link) != Framing::Judp;
+        let is_stream = self.egress.framing(path.link) != Framing::Judp;
         let local = self.challenger(frame.destination);
         let arrival = Arrival { path, ..arrival };
-        match self.peers.hear(arrival, is_stream, local.is_some()) {
+        match self.peers.hear(arrival, is_stream, local.is_some())? {
             Heard::Known => {}
             Heard::New { evicted } => {
                 if let Some(forgotten) = evicted {
@@ -114,7 +92,6 @@ impl Endpoint {
                     self.begin_challenge(now, id, local, (incumbent, was_verified), rival);
                 }
             }
-            Heard::NoRoom => return Err(Counter::PeersFull),
         }
         Ok(())
     }
@@ -265,8 +242,10 @@ impl Endpoint {
         if self.is_free(to) {
             return true;
         }
-        let may = self.budget.take(now, to.into(), octets);
-        let spent = self.budget.by_address.owed(now, &to.into());
+        let octets = u32::try_from(octets).unwrap_or(u32::MAX);
+        let may = self.unverified.take_many(now, to.into(), octets)
+            && self.unverified_total.take_many(now, (), octets);
+        let spent = self.unverified.owed(now, &to.into());
         if spent >= self.config.unverified_address.burst / 4 {
             self.challenge(now, id);
         }
@@ -286,6 +265,6 @@ impl Endpoint {
 
     /// Whether traffic to a path is unlimited.
     pub(super) fn is_free(&self, to: Path) -> bool {
-        self.framing(to.link) != Framing::Judp || self.peers.is_proven(to)
+        self.egress.framing(to.link) != Framing::Judp || self.peers.is_proven(to)
     }
 }

@@ -9,7 +9,7 @@ use crate::address::JausId;
 use crate::endpoint::Path;
 use crate::endpoint::rate::Origin;
 use crate::endpoint::receive::Arrival;
-use crate::endpoint::tally::Tally;
+use crate::endpoint::share::Tally;
 use crate::peer::Recogniser;
 
 /// The most challenges in progress.

@@ -10,14 +10,14 @@ mod route;
 mod state;
 
 use std::collections::HashMap;
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::rate::Origin;
 use super::receive::Arrival;
-use super::tally::Tally;
-use super::{Config, LinkId, Path, StaticPeer};
+use super::share::Tally;
+use super::{Config, Counter, LinkId, Path, StaticPeer};
 use crate::address::JausId;
-use crate::peer::Assignment;
 use crate::wire::{Frame, Version};
 use challenges::Challenges;
 use places::{Place, Places, Standing};
@@ -44,12 +44,10 @@ pub(super) enum Heard {
         /// Whether a challenge must show on which of the two paths it is.
         contested: bool,
     },
-    /// A new peer for which there is no room.
-    NoRoom,
 }
 
 /// The table of peers.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Peers {
     states: HashMap<JausId, PeerState>,
     places: Places,
@@ -57,25 +55,24 @@ pub(super) struct Peers {
     proven: Tally<Path>,
     challenges: Challenges,
     configured: Vec<StaticPeer>,
-    assigned: Vec<Assignment>,
-    limit: usize,
+    config: Arc<Config>,
 }
 
 impl Peers {
-    pub(super) fn new(config: &Config) -> Self {
+    pub(super) fn new(config: Arc<Config>) -> Self {
         Self {
-            states: HashMap::new(),
-            places: Places::default(),
-            proven: Tally::default(),
-            challenges: Challenges::default(),
             configured: config.static_peers.clone(),
-            assigned: config.profiles.clone(),
-            limit: config.max_peers.max(1),
+            config,
+            ..Self::default()
         }
     }
 
     pub(super) fn configure(&mut self, peers: Vec<StaticPeer>) {
         self.configured = peers;
+    }
+
+    fn is_full(&self) -> bool {
+        self.states.len() >= self.config.max_peers.max(1)
     }
 
     pub(super) fn knows(&self, id: JausId) -> bool {
@@ -138,7 +135,7 @@ impl Peers {
         arrival: Arrival<'_>,
         is_stream: bool,
         can_challenge: bool,
-    ) -> Heard {
+    ) -> Result<Heard, Counter> {
         let Arrival { now, frame, .. } = arrival;
         let pin = self.pin(frame.source);
         let path = pin.unwrap_or(arrival.path);
@@ -157,25 +154,27 @@ impl Peers {
             if state.peer.route == RouteState::Stale {
                 self.set_route(frame.source, path, RouteState::Unverified);
             }
-            return Heard::Known;
+            return Ok(Heard::Known);
         }
         if let Some(challenge) = &mut state.challenge {
             challenge.incumbent_heard |= challenge.incumbent.path == path;
-            return Heard::Known;
+            return Ok(Heard::Known);
         }
         let was_verified = state.peer.route == RouteState::Verified;
-        let elsewhere = |moved, contested| Heard::Elsewhere {
-            incumbent: from,
-            was_verified,
-            moved,
-            contested,
+        let elsewhere = |moved, contested| {
+            Ok(Heard::Elsewhere {
+                incumbent: from,
+                was_verified,
+                moved,
+                contested,
+            })
         };
         if pin.is_some() {
             self.set_route(frame.source, path, RouteState::Verified);
             return elsewhere(true, false);
         }
         if state.settled_until.is_some_and(|until| now < until) {
-            return Heard::Known;
+            return Ok(Heard::Known);
         }
         let is_near = from.is_near(path);
         // A connection shows that a sender is there, not that the id belongs to it.
@@ -188,7 +187,7 @@ impl Peers {
             }
             RouteState::Stale => (RouteState::of(is_stream), false),
             RouteState::Verified if is_near && is_stream => (RouteState::Verified, false),
-            RouteState::Verified if !can_challenge => return Heard::Known,
+            RouteState::Verified if !can_challenge => return Ok(Heard::Known),
             RouteState::Verified if is_near => (RouteState::Unverified, true),
             RouteState::Unverified | RouteState::Verified => return elsewhere(false, true),
         };
@@ -203,15 +202,18 @@ impl Peers {
     }
 
     /// Adds a peer, if there is room.
-    fn take_in(&mut self, arrival: Arrival<'_>, route: RouteState, number: Option<u32>) -> Heard {
+    fn take_in(
+        &mut self,
+        arrival: Arrival<'_>,
+        route: RouteState,
+        number: Option<u32>,
+    ) -> Result<Heard, Counter> {
         let (id, now, path) = (arrival.frame.source, arrival.now, arrival.path);
         let mut evicted = None;
-        if self.states.len() >= self.limit {
-            evicted = self.next_to_go(now, path.into());
-            let Some(evicted) = evicted else {
-                return Heard::NoRoom;
-            };
-            self.forget(evicted);
+        if self.is_full() {
+            let oldest = self.next_to_go(now, path.into());
+            self.forget(oldest.ok_or(Counter::PeersFull)?);
+            evicted = oldest;
         }
         let place = Place {
             standing: Standing::Heard,
@@ -219,10 +221,10 @@ impl Peers {
             heard: now,
         };
         self.places.insert(id, place);
-        let state = PeerState::new(now, path, arrival.frame, number, place);
+        let state = PeerState::new(arrival, number, place);
         self.states.insert(id, state);
         self.set_route(id, path, route);
-        Heard::New { evicted }
+        Ok(Heard::New { evicted })
     }
 
     /// Changes the path and state of a peer's route.

@@ -6,15 +6,13 @@
 //! us stay as long as they are heard from time to time: if none can be evicted, the new peer is
 //! refused. Invented ids can therefore only replace each other.
 
-use std::collections::btree_map::Entry;
-use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
 use super::Peers;
 use crate::address::JausId;
 use crate::endpoint::Path;
 use crate::endpoint::rate::Origin;
-use crate::endpoint::tally::Tally;
+use crate::endpoint::share::{Ages, Tally};
 
 /// Our history with a peer, which determines the eviction order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -51,7 +49,7 @@ pub(super) struct Place {
 #[derive(Debug, Default)]
 pub(super) struct Places {
     /// Each peer by its network address and, under `None`, among all peers.
-    order: BTreeMap<(Option<Origin>, Standing), BTreeSet<(Instant, JausId)>>,
+    order: Ages<(Option<Origin>, Standing)>,
     /// How many peers each network address holds.
     held: Tally<Origin>,
 }
@@ -59,20 +57,14 @@ pub(super) struct Places {
 impl Places {
     pub(super) fn insert(&mut self, id: JausId, place: Place) {
         for of in [None, Some(place.origin)] {
-            let order = self.order.entry((of, place.standing)).or_default();
-            order.insert((place.heard, id));
+            self.order.insert((of, place.standing), place.heard, id);
         }
         self.held.add(place.origin, 1);
     }
 
     pub(super) fn remove(&mut self, id: JausId, place: Place) {
         for of in [None, Some(place.origin)] {
-            if let Entry::Occupied(mut order) = self.order.entry((of, place.standing)) {
-                order.get_mut().remove(&(place.heard, id));
-                if order.get().is_empty() {
-                    order.remove();
-                }
-            }
+            self.order.remove((of, place.standing), place.heard, id);
         }
         self.held.subtract(place.origin, 1);
     }
@@ -86,17 +78,16 @@ impl Peers {
         id: JausId,
         from: Path,
     ) -> bool {
-        self.knows(id)
-            || self.states.len() < self.limit
-            || self.next_to_go(now, from.into()).is_some()
+        self.knows(id) || !self.is_full() || self.next_to_go(now, from.into()).is_some()
     }
 
     /// The peer to evict for a new one from a network address. An address that holds a quarter of
     /// the table gets no more of it, and makes room for addresses that hold less.
     pub(super) fn next_to_go(&mut self, now: Instant, newcomer: Origin) -> Option<JausId> {
+        let limit = self.config.max_peers;
         let (most, holder) = self.places.held.largest()?;
         let own = self.places.held.of(newcomer);
-        let (is_excessive, own_is) = (most * 4 > self.limit, own * 4 > self.limit);
+        let (is_excessive, own_is) = (most * 4 > limit, own * 4 > limit);
         if most > own + 1 {
             let found = Standing::ALL.into_iter().find_map(|standing| {
                 let silence = if is_excessive {
@@ -127,7 +118,7 @@ impl Peers {
         silence: Duration,
     ) -> Option<JausId> {
         loop {
-            let &(heard, id) = self.places.order.get(&(of, standing))?.first()?;
+            let (heard, id) = self.places.order.oldest(&(of, standing))?;
             if self.states.get(&id)?.peer.last_heard > heard {
                 self.place_anew(id, standing);
                 continue;

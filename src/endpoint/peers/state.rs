@@ -6,6 +6,7 @@ use super::places::Place;
 use super::{Challenge, RouteState};
 use crate::address::JausId;
 use crate::endpoint::Path;
+use crate::endpoint::receive::Arrival;
 use crate::peer::{self, Recogniser};
 use crate::wire::{Frame, Version};
 
@@ -98,13 +99,8 @@ pub(super) struct PeerState {
 }
 
 impl PeerState {
-    pub(super) fn new(
-        now: Instant,
-        path: Path,
-        frame: &Frame,
-        number: Option<u32>,
-        place: Place,
-    ) -> Self {
+    pub(super) fn new(arrival: Arrival<'_>, number: Option<u32>, place: Place) -> Self {
+        let (frame, now, path) = (arrival.frame, arrival.now, arrival.path);
         let mut received = Traffic::default();
         received.add(frame.payload.len());
         let mut recogniser = Recogniser::new();

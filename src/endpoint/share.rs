@@ -1,7 +1,12 @@
-//! How much each holder has of something shared, such as the network addresses of a bounded table.
+//! The accounts of bounded tables: how much each network address holds, and what it has held for
+//! longest.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::hash::Hash;
+use std::time::Instant;
+
+use crate::address::JausId;
 
 /// The amounts of all holders, and their ranking.
 #[derive(Debug)]
@@ -38,7 +43,7 @@ impl<K: Copy + Ord + Hash> Tally<K> {
         self.set(holder, self.of(holder).saturating_sub(less));
     }
 
-    fn set(&mut self, holder: K, amount: usize) {
+    pub(super) fn set(&mut self, holder: K, amount: usize) {
         self.ranking.remove(&(self.of(holder), holder));
         if amount == 0 {
             self.amounts.remove(&holder);
@@ -46,5 +51,35 @@ impl<K: Copy + Ord + Hash> Tally<K> {
             self.amounts.insert(holder, amount);
             self.ranking.insert((amount, holder));
         }
+    }
+}
+
+/// The ids of each group by age.
+#[derive(Debug)]
+pub(super) struct Ages<G>(BTreeMap<G, BTreeSet<(Instant, JausId)>>);
+
+impl<G> Default for Ages<G> {
+    fn default() -> Self {
+        Self(BTreeMap::new())
+    }
+}
+
+impl<G: Ord> Ages<G> {
+    pub(super) fn insert(&mut self, group: G, since: Instant, id: JausId) {
+        self.0.entry(group).or_default().insert((since, id));
+    }
+
+    pub(super) fn remove(&mut self, group: G, since: Instant, id: JausId) {
+        if let Entry::Occupied(mut ids) = self.0.entry(group) {
+            ids.get_mut().remove(&(since, id));
+            if ids.get().is_empty() {
+                ids.remove();
+            }
+        }
+    }
+
+    /// The oldest of a group, and since when it is there.
+    pub(super) fn oldest(&self, group: &G) -> Option<(Instant, JausId)> {
+        self.0.get(group)?.first().copied()
     }
 }
