@@ -4,7 +4,7 @@
 //! vehicles on a shared network. They do not protect against a sender that forges an id or address.
 
 use std::fmt;
-use std::net::{IpAddr, Ipv4Addr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
@@ -138,26 +138,23 @@ impl Network {
     /// counts as the IPv4 address.
     #[must_use]
     pub fn contains(self, address: IpAddr) -> bool {
-        let address = address.to_canonical();
-        address.is_ipv4() == self.address.is_ipv4()
-            && first_bits(address, self.prefix) == self.bits()
-    }
-
-    fn bits(self) -> u128 {
-        first_bits(self.address, self.prefix)
+        first_bits(address.to_canonical(), self.prefix) == self.address
     }
 }
 
-/// The first `count` bits of an address; the others are 0.
-fn first_bits(address: IpAddr, count: u8) -> u128 {
-    let (bits, length) = match address {
-        IpAddr::V4(address) => (u128::from(address.to_bits()), Ipv4Addr::BITS),
-        IpAddr::V6(address) => (address.to_bits(), u128::BITS),
-    };
-    let others = length.saturating_sub(count.into());
-    bits.checked_shr(others)
-        .and_then(|bits| bits.checked_shl(others))
-        .unwrap_or(0)
+/// The address with all but its first `count` bits set to 0.
+fn first_bits(address: IpAddr, count: u8) -> IpAddr {
+    let others = |length: u32| length.saturating_sub(count.into());
+    match address {
+        IpAddr::V4(address) => {
+            let mask = u32::MAX.checked_shl(others(u32::BITS)).unwrap_or(0);
+            Ipv4Addr::from_bits(address.to_bits() & mask).into()
+        }
+        IpAddr::V6(address) => {
+            let mask = u128::MAX.checked_shl(others(u128::BITS)).unwrap_or(0);
+            Ipv6Addr::from_bits(address.to_bits() & mask).into()
+        }
+    }
 }
 
 impl FromStr for Network {
@@ -175,26 +172,18 @@ impl FromStr for Network {
         if prefix > longest {
             return Err(wrong());
         }
-        let bits = first_bits(address, prefix);
-        let meant = match address {
-            IpAddr::V4(_) => IpAddr::from(Ipv4Addr::from_bits(bits as u32)),
-            IpAddr::V6(_) => IpAddr::from(bits.to_be_bytes()),
-        };
-        let network = Self {
-            address: meant,
+        let meant = Self {
+            address: first_bits(address, prefix),
             prefix,
         };
-        if meant == address {
-            Ok(network)
-        } else {
-            let text = text.to_owned();
-            let meant = network;
-            Err(AccessError::HostBits {
-                text,
+        if meant.address != address {
+            return Err(AccessError::HostBits {
+                text: text.to_owned(),
                 prefix,
                 meant,
-            })
+            });
         }
+        Ok(meant)
     }
 }
 

@@ -4,7 +4,8 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use super::{Counter, Endpoint, Path};
+use super::receive::Arrival;
+use super::{Counter, Endpoint};
 use crate::address::JausId;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Kind, Version, ra};
 
@@ -46,11 +47,12 @@ impl Endpoint {
     /// Acknowledges a message that requests it, and each duplicate of it: the peer retransmits
     /// because an acknowledgement got lost. A broadcast to many is not acknowledged, or all
     /// receivers would answer at once.
-    pub(super) fn acknowledge(&mut self, now: Instant, from: Path, request: &Frame) {
+    pub(super) fn acknowledge(&mut self, arrival: Arrival<'_>) {
+        let (request, now, path) = (arrival.frame, arrival.now, arrival.path);
         if !request.destination.is_unicast() {
             return;
         }
-        self.reassembly.hear(now, from.into());
+        self.reassembly.hear(now, path.into());
         // In the older headers, acknowledgements repeat the message code.
         let code_len = match request.version {
             Version::As5669a => 0,
@@ -69,7 +71,7 @@ impl Endpoint {
             sequence: request.sequence,
             payload: request.payload.slice(..code_len.min(request.payload.len())),
         };
-        if self.send_along(now, from, &answer) == Ok(true) {
+        if self.send_along(now, path, &answer) == Ok(true) {
             self.counters.add(Counter::AcknowledgementsSent);
         }
     }

@@ -7,7 +7,6 @@ use super::Endpoint;
 use super::large::Whole;
 use super::receive::Arrival;
 use super::recent::{Class, Fingerprint, Sighting};
-use crate::address::JausId;
 use crate::peer;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Version};
 
@@ -25,22 +24,13 @@ pub(super) enum Novelty {
     Copy,
 }
 
-impl Novelty {
-    const fn repetitions(self) -> u8 {
-        match self {
-            Self::Repeated(repetitions) => repetitions,
-            Self::New | Self::Copy => 0,
-        }
-    }
-}
-
 impl Endpoint {
     /// Runs the duplicate check and records the message.
     ///
     /// Peers with the older headers leave the sequence number at 0. Their messages can be told
     /// apart only if they request an acknowledgement, and so may be retransmitted.
-    pub(super) fn recall(&mut self, arrival: Arrival, frame: &Frame, seen: Fingerprint) -> Novelty {
-        let now = arrival.now;
+    pub(super) fn recall(&mut self, arrival: Arrival<'_>, seen: Fingerprint) -> Novelty {
+        let Arrival { frame, now, .. } = arrival;
         let forwarding = self.config.forwarding;
         let repeats = frame.flags.acknowledgement() != Acknowledgement::None;
         let numbered = repeats || frame.version == Version::As5669a;
@@ -56,7 +46,7 @@ impl Endpoint {
                 let elsewhere = before.way != way;
                 if elsewhere && age < self.config.retransmission_window {
                     Novelty::Copy
-                } else if numbered && age < self.duplicate_window(arrival, frame) {
+                } else if numbered && age < self.duplicate_window(arrival) {
                     if repeats && age >= REPEAT_INTERVAL {
                         Novelty::Repeated(before.repetitions.saturating_add(1))
                     } else {
@@ -67,20 +57,26 @@ impl Endpoint {
                 }
             }
         };
-        if novelty != Novelty::Copy {
-            let sighting = Sighting {
-                time: now,
-                way,
-                repetitions: novelty.repetitions(),
-            };
-            self.heard.insert_as(seen, sighting, self.class(frame));
-        }
+        let repetitions = match novelty {
+            Novelty::New => 0,
+            Novelty::Repeated(repetitions) => repetitions,
+            Novelty::Copy => return novelty,
+        };
+        let sighting = Sighting {
+            time: now,
+            way,
+            repetitions,
+        };
+        self.heard.insert(seen, sighting, self.class(frame));
         novelty
     }
 
     /// Refreshes the record of the first fragment of a message that is now complete. It may have
     /// arrived long before `last`, and a retransmission of it must not begin the message again.
-    pub(super) fn recall_beginning(&mut self, arrival: Arrival, last: &Frame, whole: &Whole) {
+    pub(super) fn recall_beginning(&mut self, last: Arrival<'_>, whole: &Whole) {
+        let Arrival {
+            frame: last, now, ..
+        } = last;
         let first = Frame {
             sequence: whole.first.0,
             flags: last.flags.with_data(DataControl::First),
@@ -91,10 +87,10 @@ impl Endpoint {
         let seen = seen.in_round(self.peers.round(&first));
         if let Some(before) = self.heard.sighting(seen) {
             let sighting = Sighting {
-                time: arrival.now,
+                time: now,
                 ..before
             };
-            self.heard.insert_as(seen, sighting, self.class(&first));
+            self.heard.insert(seen, sighting, self.class(&first));
         }
     }
 
@@ -106,20 +102,18 @@ impl Endpoint {
     }
 
     /// How long a repetition of the message counts as a duplicate.
-    fn duplicate_window(&self, arrival: Arrival, frame: &Frame) -> Duration {
+    fn duplicate_window(&self, arrival: Arrival<'_>) -> Duration {
+        let frame = arrival.frame;
         if frame.flags.acknowledgement() == Acknowledgement::None {
             return self.config.duplicate_window;
         }
         let is_call = frame.flags.broadcast() != Some(Broadcast::None);
         let is_unmarked_call = arrival.to_all && peer::Recogniser::is_unmarked_call(frame);
-        if is_call || is_unmarked_call || self.repeats_soon(frame.source) {
+        let repeats_soon = || self.peers.profile(frame.source).repeats_soon();
+        if is_call || is_unmarked_call || repeats_soon() {
             self.config.first_contact_window
         } else {
             self.config.retransmission_window
         }
-    }
-
-    fn repeats_soon(&self, source: JausId) -> bool {
-        self.peers.profile(source).repeats_soon()
     }
 }

@@ -1,8 +1,6 @@
 //! Input and output of an endpoint besides datagrams: outgoing messages, received messages and
 //! events.
 
-use std::fmt;
-
 use bytes::Bytes;
 
 use super::Path;
@@ -132,24 +130,17 @@ pub enum Event {
 }
 
 /// Why a message was not acknowledged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, thiserror::Error)]
 #[non_exhaustive]
 pub enum Unacknowledged {
     /// The receiver refused it (NAK).
+    #[error("refused by the receiver")]
     Refused,
     /// It was retransmitted, but not acknowledged, or not in full, in time. The receiver may have
     /// it all the same.
+    #[error("not acknowledged in time")]
     TimedOut,
     /// It was never sent, because its destination did not acknowledge the messages before it.
+    #[error("not sent, as the receiver acknowledges nothing")]
     NotSent,
-}
-
-impl fmt::Display for Unacknowledged {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Refused => "refused by the receiver",
-            Self::TimedOut => "not acknowledged in time",
-            Self::NotSent => "not sent, as the receiver acknowledges nothing",
-        })
-    }
 }

@@ -12,6 +12,7 @@ use bytes::Bytes;
 use tracing::trace;
 
 use super::egress::Hop;
+use super::receive::Arrival;
 use super::{Counter, Endpoint, Path, To};
 use crate::address::JausId;
 use crate::wire::{Broadcast, DataControl, Frame, Framing, Version, ra};
@@ -29,7 +30,8 @@ impl Endpoint {
 
     /// Whether a broadcast, or a message to an unknown address, arrived on another path than the
     /// one on which its sender was heard a moment ago. It is neither forwarded nor learned from.
-    pub(super) fn is_astray(&self, now: Instant, from: Path, frame: &Frame) -> bool {
+    pub(super) fn is_astray(&self, arrival: Arrival<'_>) -> bool {
+        let (frame, now, from) = (arrival.frame, arrival.now, arrival.path);
         let for_many = frame.destination.has_wildcard()
             || frame.flags.broadcast() != Some(Broadcast::None)
             || self.route(frame.destination).is_none();
@@ -42,34 +44,29 @@ impl Endpoint {
     }
 
     /// Forwards a message towards its receivers, unless they are where it came from.
-    pub(super) fn pass_on(&mut self, now: Instant, from: Path, frame: &Frame) {
-        let (source, destination) = (frame.source, frame.destination);
-        let passed = self
-            .next_hops(now, from, frame)
-            .and_then(|(hops, version)| {
-                let frame = with_header(frame, version).ok_or(Counter::CannotForward)?;
-                self.send_to_hops(now, &hops, &frame)
-                    .map_err(|_| Counter::CannotForward)
-            });
+    pub(super) fn pass_on(&mut self, arrival: Arrival<'_>) {
+        let (source, destination) = (arrival.frame.source, arrival.frame.destination);
+        let passed = self.next_hops(arrival).and_then(|(hops, version)| {
+            let frame = with_header(arrival.frame, version).ok_or(Counter::CannotForward)?;
+            self.egress
+                .push_to_many(arrival.now, &hops, &frame, &mut self.counters)
+                .map_err(|_| Counter::CannotForward)
+        });
         let outcome = passed.err().unwrap_or(Counter::MessagesForwarded);
         trace!(%source, %destination, %outcome, "passing on");
         self.counters.add(outcome);
     }
 
     /// The next hops of a message, and the header to use.
-    fn next_hops(
-        &mut self,
-        now: Instant,
-        from: Path,
-        frame: &Frame,
-    ) -> Result<(Vec<Hop>, Version), Counter> {
+    fn next_hops(&mut self, arrival: Arrival<'_>) -> Result<(Vec<Hop>, Version), Counter> {
+        let (frame, now, from) = (arrival.frame, arrival.now, arrival.path);
         let destination = frame.destination;
         if destination.is_unicast() {
             self.config.access.check_source(destination)?;
             if let Some((path, version)) = self.route(destination) {
                 // Multicast has already reached every node on that network.
                 let shared = from.link == path.link
-                    && self.framing(from.link) == Framing::Judp
+                    && self.egress.framing(from.link) == Framing::Judp
                     && frame.flags.broadcast() != Some(Broadcast::None);
                 return if path == from || shared {
                     Err(Counter::NotForUs)
@@ -87,7 +84,8 @@ impl Endpoint {
         if hops.is_empty() {
             return Err(Counter::NotForUs);
         }
-        if !self.broadcasts.take(now, self.config.forwarded_broadcasts) {
+        let rate = self.config.forwarded_broadcasts;
+        if !self.broadcasts.take(now, rate, 1) {
             return Err(Counter::ForwardRate);
         }
         Ok((hops, Version::As5669a))
@@ -97,7 +95,7 @@ impl Endpoint {
     /// without a group, and static peers that groups do not reach.
     fn hops_everywhere_but(&self, from: Path, destination: JausId) -> Vec<Hop> {
         let mut singly = self.peers.broadcast_copies(destination);
-        if self.framing(from.link) == Framing::Jtcp {
+        if self.egress.framing(from.link) == Framing::Jtcp {
             singly.extend(self.peers.paths_on(from.link));
         }
         singly.sort_unstable();

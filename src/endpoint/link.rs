@@ -32,10 +32,8 @@ impl LinkProfile {
     #[must_use]
     pub fn judp(own: impl IntoIterator<Item = SocketAddr>) -> Self {
         Self {
-            framing: Framing::Judp,
             own: own.into_iter().collect(),
-            max_segments: 1,
-            reads_one: false,
+            ..Self::default()
         }
     }
 

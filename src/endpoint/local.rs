@@ -29,29 +29,21 @@ pub enum AttachError {
 }
 
 /// The attached components.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Components {
     ids: BTreeSet<JausId>,
-    limit: usize,
 }
 
 impl Components {
-    pub(super) fn new(limit: usize) -> Self {
-        Self {
-            ids: BTreeSet::new(),
-            limit,
-        }
-    }
-
-    pub(super) fn attach(&mut self, id: JausId) -> Result<(), AttachError> {
+    pub(super) fn attach(&mut self, id: JausId, limit: usize) -> Result<(), AttachError> {
         if !id.is_unicast() {
             return Err(AttachError::NotOneComponent(id));
         }
         if self.ids.contains(&id) {
             return Err(AttachError::AlreadyAttached(id));
         }
-        if self.ids.len() >= self.limit {
-            return Err(AttachError::TooMany { limit: self.limit });
+        if self.ids.len() >= limit {
+            return Err(AttachError::TooMany { limit });
         }
         self.ids.insert(id);
         Ok(())

@@ -45,12 +45,12 @@ mod large;
 mod link;
 mod local;
 mod news;
-mod occupancy;
 mod peers;
 mod rate;
 mod receive;
 mod recent;
 mod send;
+mod share;
 mod sink;
 #[cfg(test)]
 mod tests;
@@ -58,6 +58,7 @@ mod verify;
 
 use std::collections::BTreeMap;
 use std::hash::RandomState;
+use std::sync::Arc;
 use std::time::Instant;
 
 pub use access::{Access, AccessError, Network, Subsystems};
@@ -70,7 +71,6 @@ pub use egress::{Pacing, Packing};
 pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use local::AttachError;
-pub use occupancy::Occupancy;
 pub use peers::{Peer, RouteState, Traffic};
 pub(crate) use rate::quota_address;
 pub use rate::{Buckets, Rate, Rates};
@@ -86,20 +86,22 @@ use large::{Numbers, Reassembly};
 use local::Components;
 use news::News;
 use peers::{CHALLENGE_FLAGS, Peers};
-use rate::{Bucket, Gate};
+use rate::{Bucket, Gate, Origin};
 use recent::Recent;
-use verify::{Budget, Warnings};
+use verify::Warnings;
 
 /// The protocol core of a node. See the [module](self).
 #[derive(Debug)]
 pub struct Endpoint {
-    config: Config,
+    config: Arc<Config>,
     components: Components,
     peers: Peers,
     numbers: Numbers,
     gate: Gate,
-    /// Limits traffic to unverified addresses.
-    budget: Budget,
+    /// Limits traffic to each unverified address.
+    unverified: Buckets<Origin>,
+    /// Limits traffic to all unverified addresses.
+    unverified_total: Buckets<()>,
     warnings: Warnings,
     /// Challenges created so far.
     probes: u64,
@@ -122,24 +124,26 @@ impl Endpoint {
         config.payload_limit = config
             .payload_limit
             .clamp(*PAYLOAD_LIMITS.start(), *PAYLOAD_LIMITS.end());
+        let config = Arc::new(config);
         let keys = RandomState::new();
         let longest = config.retransmission_window;
         Self {
-            components: Components::new(config.max_components),
-            peers: Peers::new(&config),
+            components: Components::default(),
+            peers: Peers::new(config.clone()),
             numbers: Numbers::after(config.first_sequence),
             gate: Gate::new(&config.rates, config.max_peers),
-            budget: Budget::new(&config),
+            unverified: Buckets::new(config.unverified_address, config.max_peers),
+            unverified_total: Buckets::new(config.unverified_total, 1),
             warnings: Warnings::default(),
             probes: 0,
             broadcasts: Bucket::default(),
             heard: Recent::new(config.max_recent, longest, keys.clone()),
             calls: Calls::default(),
-            reassembly: Reassembly::new(&config),
-            deliveries: Deliveries::new(&config),
+            reassembly: Reassembly::new(config.clone()),
+            deliveries: Deliveries::new(config.clone()),
             conflicts: BTreeMap::new(),
-            egress: Egress::new(&config, keys),
-            news: News::new(config.queue_limit),
+            egress: Egress::new(config.clone(), keys),
+            news: News::default(),
             counters: Counters::default(),
             config,
         }
@@ -151,7 +155,7 @@ impl Endpoint {
     /// The id does not name one component, is attached already, or would exceed
     /// [`Config::max_components`].
     pub fn attach(&mut self, id: JausId) -> Result<(), AttachError> {
-        self.components.attach(id)?;
+        self.components.attach(id, self.config.max_components)?;
         self.peers.forget(id);
         Ok(())
     }
@@ -177,14 +181,14 @@ impl Endpoint {
     /// Removes a link, the routes learned through it and the datagrams queued on it, which are
     /// counted.
     pub fn remove_link(&mut self, link: LinkId) {
-        self.peers.forget_link(link);
+        self.peers.forget_paths(|path| path.link == link);
         let lost = self.egress.remove_link(link);
         self.counters.add_many(Counter::LinkGone, lost);
     }
 
     /// Reports that a connection has closed: the routes learned through it are forgotten.
     pub fn forget_path(&mut self, path: Path) {
-        self.peers.forget_path(path);
+        self.peers.forget_paths(|known| known == path);
     }
 
     /// Replaces the static peers, for instance because links were added or removed.
@@ -264,7 +268,7 @@ impl Endpoint {
 
     /// Queues an event; an overflow is counted.
     fn announce(&mut self, event: Event) {
-        if !self.news.push(event) {
+        if !self.news.push(event, self.config.queue_limit) {
             self.counters.add(Counter::NewsQueueFull);
         }
     }

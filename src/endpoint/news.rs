@@ -5,27 +5,18 @@ use std::collections::VecDeque;
 use super::Event;
 
 /// A bounded event queue.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct News {
     events: VecDeque<Event>,
     /// How many events are delivery results. There is always room for those.
     results: usize,
-    limit: usize,
 }
 
 impl News {
-    pub(super) fn new(limit: usize) -> Self {
-        Self {
-            events: VecDeque::new(),
-            results: 0,
-            limit,
-        }
-    }
-
-    /// Queues an event; returns false if the queue is full.
+    /// Queues an event; returns false if `limit` events wait already.
     #[must_use]
-    pub(super) fn push(&mut self, event: Event) -> bool {
-        let has_room = self.events.len() - self.results < self.limit;
+    pub(super) fn push(&mut self, event: Event, limit: usize) -> bool {
+        let has_room = self.events.len() - self.results < limit;
         if has_room {
             self.events.push_back(event);
         }

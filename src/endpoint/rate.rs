@@ -69,13 +69,8 @@ pub(super) struct Bucket {
 }
 
 impl Bucket {
-    /// Takes a token, if available.
-    pub(super) fn take(&mut self, now: Instant, rate: Rate) -> bool {
-        self.take_many(now, rate, 1)
-    }
-
     /// Takes this many tokens, if available.
-    pub(super) fn take_many(&mut self, now: Instant, rate: Rate, tokens: u32) -> bool {
+    pub(super) fn take(&mut self, now: Instant, rate: Rate, tokens: u32) -> bool {
         let cost = rate.time_for(tokens);
         let is_there = self.debt(now) + cost <= rate.time_for(rate.burst.max(1));
         if is_there {
@@ -110,7 +105,7 @@ impl Bucket {
 /// A bucket per source, as far as there is room.
 #[derive(Debug)]
 pub struct Buckets<K> {
-    rate: Rate,
+    rate: Option<Rate>,
     limit: usize,
     own: HashMap<K, Bucket>,
     shared: Bucket,
@@ -121,11 +116,11 @@ impl<K: Eq + Hash> Buckets<K> {
     /// The shortest interval between two sweeps for full buckets.
     const SWEEP: Duration = Duration::from_secs(1);
 
-    /// Creates buckets of this rate for at most `limit` sources.
+    /// Creates buckets of this rate for at most `limit` sources; `None` is unlimited.
     #[must_use]
-    pub fn new(rate: Rate, limit: usize) -> Self {
+    pub fn new(rate: impl Into<Option<Rate>>, limit: usize) -> Self {
         Self {
-            rate,
+            rate: rate.into(),
             limit: limit.max(1),
             own: HashMap::new(),
             shared: Bucket::default(),
@@ -138,27 +133,30 @@ impl<K: Eq + Hash> Buckets<K> {
         self.take_many(now, source, 1)
     }
 
-    /// The rate per source.
-    pub(super) const fn rate(&self) -> Rate {
-        self.rate
-    }
-
     /// How many tokens a source has spent that have not been refilled yet.
     pub(super) fn owed(&self, now: Instant, source: &K) -> u32 {
-        let bucket = self.own.get(source).copied();
-        bucket.unwrap_or(self.shared).owed(now, self.rate)
+        let bucket = self.own.get(source).copied().unwrap_or(self.shared);
+        self.rate.map_or(0, |rate| bucket.owed(now, rate))
     }
 
     /// Takes this many tokens of a source, if available.
     pub(super) fn take_many(&mut self, now: Instant, source: K, tokens: u32) -> bool {
+        let Some(rate) = self.rate else {
+            return true;
+        };
         if self.own.len() >= self.limit && !self.own.contains_key(&source) {
             self.sweep(now);
             if self.own.len() >= self.limit {
-                return self.shared.take_many(now, self.rate, tokens);
+                return self.shared.take(now, rate, tokens);
             }
         }
         let own = self.own.entry(source).or_default();
-        own.take_many(now, self.rate, tokens)
+        own.take(now, rate, tokens)
+    }
+
+    #[cfg(test)]
+    pub(super) fn len(&self) -> usize {
+        self.own.len()
     }
 
     /// Drops full buckets: a missing bucket is equivalent.
@@ -202,9 +200,9 @@ impl From<Path> for Origin {
 /// The rate limits of an endpoint.
 #[derive(Debug)]
 pub(super) struct Gate {
-    new_ids: Buckets<Origin>,
-    messages_by_address: Option<Buckets<Origin>>,
-    messages_by_id: Option<Buckets<JausId>>,
+    pub(super) new_ids: Buckets<Origin>,
+    messages_by_address: Buckets<Origin>,
+    messages_by_id: Buckets<JausId>,
 }
 
 impl Gate {
@@ -212,43 +210,27 @@ impl Gate {
     pub(super) fn new(rates: &Rates, limit: usize) -> Self {
         Self {
             new_ids: Buckets::new(rates.new_ids, limit),
-            messages_by_address: rates
-                .messages_per_address
-                .map(|rate| Buckets::new(rate, limit)),
-            messages_by_id: rates.messages_per_id.map(|rate| Buckets::new(rate, limit)),
+            messages_by_address: Buckets::new(rates.messages_per_address, limit),
+            messages_by_id: Buckets::new(rates.messages_per_id, limit),
         }
     }
 
-    /// How many sources have a bucket.
-    pub(super) fn len(&self) -> usize {
-        let by_address = self.messages_by_address.as_ref();
-        let by_id = self.messages_by_id.as_ref();
-        self.new_ids.own.len()
-            + by_address.map_or(0, |buckets| buckets.own.len())
-            + by_id.map_or(0, |buckets| buckets.own.len())
-    }
-
-    /// Applies the message rate limits.
-    pub(super) fn admit_message(
+    /// Applies the limits to a message; `is_new` says whether its sender is unknown.
+    pub(super) fn admit(
         &mut self,
         now: Instant,
         from: Path,
         source: JausId,
+        is_new: bool,
     ) -> Result<(), Counter> {
-        let in_rate = |admitted: Option<bool>| {
-            let admitted = admitted.unwrap_or(true);
-            admitted.then_some(()).ok_or(Counter::MessageRate)
-        };
-        let by_address = self.messages_by_address.as_mut();
-        in_rate(by_address.map(|buckets| buckets.take(now, from.into())))?;
-        let by_id = self.messages_by_id.as_mut();
-        in_rate(by_id.map(|buckets| buckets.take(now, source)))
-    }
-
-    /// Applies the rate limit on new ids.
-    pub(super) fn admit_new_id(&mut self, now: Instant, from: Path) -> Result<(), Counter> {
-        let admitted = self.new_ids.take(now, from.into());
-        admitted.then_some(()).ok_or(Counter::NewIdRate)
+        let origin = Origin::from(from);
+        if !self.messages_by_address.take(now, origin) || !self.messages_by_id.take(now, source) {
+            return Err(Counter::MessageRate);
+        }
+        if is_new && !self.new_ids.take(now, origin) {
+            return Err(Counter::NewIdRate);
+        }
+        Ok(())
     }
 }
 

@@ -13,11 +13,12 @@ use super::verify::Warning;
 use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
 use crate::address::JausId;
 use crate::peer;
-use crate::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, Framing, judp};
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, judp};
 
-/// How a message arrived.
+/// A received message, and how it arrived.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Arrival {
+pub(super) struct Arrival<'a> {
+    pub(super) frame: &'a Frame,
     pub(super) now: Instant,
     pub(super) path: Path,
     /// Whether it was sent to the link's group.
@@ -43,21 +44,16 @@ impl Endpoint {
         data: Bytes,
         sink: &mut dyn Sink,
     ) {
-        let Ingress { path: from, to_all } = from.into();
+        let Ingress { path, to_all } = from.into();
         self.counters.add(Counter::DatagramsReceived);
-        if let Err(reason) = self.check_path(from) {
+        if let Err(reason) = self.check_path(path) {
             return self.counters.add(reason);
         }
-        let arrival = Arrival {
-            now,
-            path: from,
-            to_all,
-            held: data.len(),
-        };
+        let held = data.len();
         let mut frames = match judp::frames(data) {
             Ok(frames) => frames,
             Err(error) => {
-                debug!(?from, %error, "not JAUS");
+                debug!(?path, %error, "not JAUS");
                 return self.counters.add(Counter::NotJaus);
             }
         };
@@ -65,22 +61,29 @@ impl Endpoint {
         for frame in &mut frames {
             match frame {
                 Ok(frame) => {
-                    self.receive(arrival, &frame, sink);
+                    let arrival = Arrival {
+                        frame: &frame,
+                        now,
+                        path,
+                        to_all,
+                        held,
+                    };
+                    self.receive(arrival, sink);
                     latest = Some(frame.source);
                 }
                 Err(error) => {
-                    debug!(?from, %error, "malformed");
+                    debug!(?path, %error, "malformed");
                     return self.counters.add(Counter::Malformed);
                 }
             }
         }
         if frames.remaining() > 0 {
-            trace!(?from, octets = frames.remaining(), "stale octets");
+            trace!(?path, octets = frames.remaining(), "stale octets");
             self.counters
                 .add_many(Counter::StaleOctets, frames.remaining() as u64);
             if let Some(source) = latest {
                 self.peers
-                    .recognise(source, from, peer::Recogniser::handle_stale_octets);
+                    .recognise(source, path, peer::Recogniser::handle_stale_octets);
             }
         }
     }
@@ -93,12 +96,13 @@ impl Endpoint {
             return self.counters.add(reason);
         }
         let arrival = Arrival {
+            frame,
             now,
             path: from,
             to_all: false,
             held: usize::MAX,
         };
-        self.receive(arrival, frame, sink);
+        self.receive(arrival, sink);
     }
 
     /// Reports that a version octet precedes the next frame of `source` in the middle of a TCP
@@ -122,15 +126,15 @@ impl Endpoint {
         Ok(())
     }
 
-    fn receive(&mut self, arrival: Arrival, frame: &Frame, sink: &mut dyn Sink) {
+    fn receive(&mut self, arrival: Arrival<'_>, sink: &mut dyn Sink) {
         self.counters.add(Counter::MessagesReceived);
-        let (source, destination) = (frame.source, frame.destination);
-        let accepted = match self.with_wildcards_for_zeros(frame) {
-            Some(meant) => self.accept(arrival, &meant, sink),
-            None => self.accept(arrival, frame, sink),
+        let Arrival { frame, path, .. } = arrival;
+        let accepted = match &self.with_wildcards_for_zeros(frame) {
+            Some(frame) => self.accept(Arrival { frame, ..arrival }, sink),
+            None => self.accept(arrival, sink),
         };
         if let Err(reason) = accepted {
-            trace!(%source, %destination, peer = %arrival.path.peer, %reason);
+            trace!(source = %frame.source, destination = %frame.destination, peer = %path.peer, %reason);
             self.counters.add(reason);
         }
     }
@@ -147,13 +151,8 @@ impl Endpoint {
     }
 
     /// Processes a message, or returns why it is dropped.
-    fn accept(
-        &mut self,
-        arrival: Arrival,
-        frame: &Frame,
-        sink: &mut dyn Sink,
-    ) -> Result<(), Counter> {
-        let Arrival { now, path, .. } = arrival;
+    fn accept(&mut self, arrival: Arrival<'_>, sink: &mut dyn Sink) -> Result<(), Counter> {
+        let (frame, now, path) = (arrival.frame, arrival.now, arrival.path);
         let broadcast = check_header(frame).inspect_err(|reason| {
             if *reason == Counter::PriorityFault {
                 self.peers
@@ -161,14 +160,15 @@ impl Endpoint {
             }
         })?;
         let seen = self.heard.fingerprint(frame);
-        self.refuse_own(now, path, frame.source, seen)?;
-        self.refuse_misplaced(now, path, frame.source)?;
+        self.refuse_own(arrival, seen)?;
+        self.refuse_misplaced(arrival)?;
         let passes = self.is_passed_on(frame);
         let is_for_us = match self.check_receivers(frame, broadcast) {
             Err(_) if passes => false,
             checked => checked.map(|()| true)?,
         };
-        self.admit(now, path, frame.source)?;
+        let is_new = !self.peers.knows(frame.source);
+        self.gate.admit(now, path, frame.source, is_new)?;
         // Check before acknowledging: a dropped message must not look delivered.
         if !self.peers.has_room_for(now, frame.source, path) {
             if self.warnings.is_due(now, Warning::TableFull) {
@@ -180,23 +180,23 @@ impl Endpoint {
             return Err(Counter::PeersFull);
         }
         if is_for_us {
-            self.check_part(now, path, frame, seen)?;
+            self.check_part(arrival, seen)?;
             match frame.flags.acknowledgement() {
                 Acknowledgement::Positive | Acknowledgement::Negative => {
-                    return self.receive_acknowledgement(now, path, frame);
+                    return self.receive_acknowledgement(arrival);
                 }
                 Acknowledgement::Request => {
                     let may_be_refused = frame.destination.is_unicast() && !is_challenge(frame);
                     if may_be_refused && !sink.has_room(frame.destination, frame.flags.priority()) {
                         return Err(Counter::ReceiverBusy);
                     }
-                    self.acknowledge(now, path, frame);
+                    self.acknowledge(arrival);
                 }
                 Acknowledgement::None => {}
             }
         }
         // Check before learning: a copy that arrived on another path must not move the peer.
-        let novelty = match self.recall(arrival, frame, seen) {
+        let novelty = match self.recall(arrival, seen) {
             Novelty::Repeated(_) if self.reassembly.awaits(frame) => Novelty::New,
             novelty => novelty,
         };
@@ -204,62 +204,59 @@ impl Endpoint {
             self.reassembly.keep(now, frame);
             self.peers.note(frame.source, |peer| peer.duplicates += 1);
             if passes && let Novelty::Repeated(1..=MOST_REPETITIONS) = novelty {
-                self.pass_on(now, path, frame);
+                self.pass_on(arrival);
             }
             return Err(Counter::Duplicate);
         }
-        if passes && self.is_astray(now, path, frame) {
+        if passes && self.is_astray(arrival) {
             self.counters.add(Counter::NotTheWayBack);
         } else {
-            self.learn(now, path, frame)?;
+            self.learn(arrival)?;
             if arrival.to_all {
                 self.peers
                     .recognise(frame.source, path, |it| it.handle_frame_to_all(frame));
             }
             if passes {
-                self.pass_on(now, path, frame);
+                self.pass_on(arrival);
             }
         }
         if !is_for_us || is_challenge(frame) {
             return Ok(());
         }
-        self.put_together(arrival, frame, broadcast, sink)
+        self.put_together(arrival, broadcast, sink)
     }
 
     /// Processes an acknowledgement. An unawaited one neither teaches nor moves a route. Sequence
     /// numbers can be guessed, so an acknowledgement from elsewhere than the peer's verified
     /// address is ignored.
-    fn receive_acknowledgement(
-        &mut self,
-        now: Instant,
-        from: Path,
-        frame: &Frame,
-    ) -> Result<(), Counter> {
+    fn receive_acknowledgement(&mut self, arrival: Arrival<'_>) -> Result<(), Counter> {
+        let (frame, now, path) = (arrival.frame, arrival.now, arrival.path);
         let (peer, local, number) = (frame.source, frame.destination, frame.sequence);
         if self.calls.take(now, peer, local, number) {
-            return self.learn(now, from, frame);
+            return self.learn(arrival);
         }
-        if self.awaits_answer(peer, local, number) && !self.peers.is_proven_elsewhere(peer, from) {
-            self.learn(now, from, frame)?;
+        if self.awaits_answer(peer, local, number) && !self.peers.is_proven_elsewhere(peer, path) {
+            self.learn(arrival)?;
             self.receive_answer(now, frame)?;
-            let from = self.where_it_reads(peer, from);
-            self.peers.verify(peer, from);
+            let path = self.where_it_reads(peer, path);
+            self.peers.verify(peer, path);
             return Ok(());
         }
-        if self.receive_challenge_answer(now, from, frame) {
-            return self.learn(now, from, frame);
+        if self.receive_challenge_answer(arrival) {
+            return self.learn(arrival);
         }
         Err(Counter::UnawaitedAcknowledgement)
     }
 
     /// Refuses senders that are denied by id or configured to be at another address.
-    fn refuse_misplaced(&mut self, now: Instant, from: Path, id: JausId) -> Result<(), Counter> {
+    fn refuse_misplaced(&mut self, arrival: Arrival<'_>) -> Result<(), Counter> {
+        let (id, path) = (arrival.frame.source, arrival.path);
         self.config.access.check_source(id)?;
-        if !self.peers.is_pinned_elsewhere(id, from) {
+        if !self.peers.is_pinned_elsewhere(id, path) {
             return Ok(());
         }
-        if self.warnings.is_due(now, Warning::PinnedElsewhere) {
-            warn!(%id, from = %from.peer, "refused: peers says that this id is at another address");
+        if self.warnings.is_due(arrival.now, Warning::PinnedElsewhere) {
+            warn!(%id, from = %path.peer, "refused: peers says that this id is at another address");
         }
         Err(Counter::PinnedElsewhere)
     }
@@ -267,24 +264,19 @@ impl Endpoint {
     /// Refuses a fragment whose sender is verified at another address, without acknowledging it: it
     /// may be forged. If the sender has in fact moved, a challenge shows it, and the fragment is
     /// retransmitted. A duplicate of a known fragment needs no challenge.
-    fn check_part(
-        &mut self,
-        now: Instant,
-        from: Path,
-        frame: &Frame,
-        seen: Fingerprint,
-    ) -> Result<(), Counter> {
+    fn check_part(&mut self, arrival: Arrival<'_>, seen: Fingerprint) -> Result<(), Counter> {
+        let Arrival { frame, path, .. } = arrival;
         let is_part = frame.flags.data() != DataControl::Single;
-        if !is_part || !self.peers.is_proven_elsewhere(frame.source, from) {
+        if !is_part || !self.peers.is_proven_elsewhere(frame.source, path) {
             return Ok(());
         }
         let seen = seen.in_round(self.peers.round(frame));
         let window = self.config.retransmission_window;
-        if self.heard.contains(now, &seen, window) {
+        if self.heard.contains(arrival.now, seen, window) {
             return Err(Counter::Duplicate);
         }
-        self.learn(now, from, frame)?;
-        if self.peers.is_proven_elsewhere(frame.source, from) {
+        self.learn(arrival)?;
+        if self.peers.is_proven_elsewhere(frame.source, path) {
             return Err(Counter::PartFromElsewhere);
         }
         Ok(())
@@ -293,55 +285,55 @@ impl Endpoint {
     /// Delivers a message to local components once it is complete.
     fn put_together(
         &mut self,
-        arrival: Arrival,
-        frame: &Frame,
+        arrival: Arrival<'_>,
         broadcast: Broadcast,
         sink: &mut dyn Sink,
     ) -> Result<(), Counter> {
-        let from = arrival.path;
-        let payload = match frame.flags.data() {
-            DataControl::Single => {
-                self.finish_large(from, frame, sink);
-                frame.payload.clone()
-            }
-            _ => {
-                let style = self.peers.large_style(frame.source);
-                let whole = self
-                    .reassembly
-                    .insert(arrival, frame, style, &mut self.counters)?;
-                let Some(whole) = whole else { return Ok(()) };
-                self.recall_beginning(arrival, frame, &whole);
-                self.peers
-                    .recognise(frame.source, from, |it| it.handle_large(whole.style));
-                whole.payload
-            }
+        let Arrival { frame, path, .. } = arrival;
+        let payload = if frame.flags.data() == DataControl::Single {
+            self.finish_large(arrival, sink);
+            frame.payload.clone()
+        } else {
+            let style = self.peers.large_style(frame.source);
+            let inserted = self.reassembly.insert(arrival, style, &mut self.counters);
+            let Some(whole) = inserted? else {
+                return Ok(());
+            };
+            self.recall_beginning(arrival, &whole);
+            self.peers
+                .recognise(frame.source, path, |it| it.handle_large(whole.style));
+            whole.payload
         };
-        self.deliver(from, frame, broadcast, &payload, sink);
+        let message = Received {
+            source: frame.source,
+            destination: frame.destination,
+            priority: frame.flags.priority(),
+            broadcast,
+            payload,
+            path: Some(path),
+            to: frame.destination,
+        };
+        self.deliver(&message, None, sink);
         Ok(())
     }
 
     /// Delivers a large message whose end is shown only by its sender's next message.
-    fn finish_large(&mut self, from: Path, next: &Frame, sink: &mut dyn Sink) {
-        let finished = self.reassembly.finish(next.source, next.sequence);
-        let Some((destination, priority, whole)) = finished else {
-            return;
-        };
-        self.peers
-            .recognise(next.source, from, |it| it.handle_large(whole.style));
-        let large = Frame {
-            flags: Flags::new(priority),
-            ..Frame::new(next.source, destination, Bytes::new())
-        };
-        self.deliver(from, &large, Broadcast::None, &whole.payload, sink);
-    }
-
-    /// Applies the rate limits for messages and for new ids.
-    fn admit(&mut self, now: Instant, from: Path, source: JausId) -> Result<(), Counter> {
-        self.gate.admit_message(now, from, source)?;
-        if self.peers.knows(source) {
-            Ok(())
-        } else {
-            self.gate.admit_new_id(now, from)
+    fn finish_large(&mut self, next: Arrival<'_>, sink: &mut dyn Sink) {
+        let (source, path) = (next.frame.source, next.path);
+        let finished = self.reassembly.finish(source, next.frame.sequence);
+        if let Some((destination, priority, whole)) = finished {
+            self.peers
+                .recognise(source, path, |it| it.handle_large(whole.style));
+            let message = Received {
+                source,
+                destination,
+                priority,
+                broadcast: Broadcast::None,
+                payload: whole.payload,
+                path: Some(path),
+                to: destination,
+            };
+            self.deliver(&message, None, sink);
         }
     }
 
@@ -366,18 +358,12 @@ impl Endpoint {
     /// Our own multicast comes back from our own address; it is recognised by its content even if
     /// the component that sent it is detached by now. Any other message with a local source id is
     /// an id conflict.
-    fn refuse_own(
-        &mut self,
-        now: Instant,
-        from: Path,
-        source: JausId,
-        seen: Fingerprint,
-    ) -> Result<(), Counter> {
-        if self.egress.is_echo(now, &seen) && self.may_be_ours(from) {
+    fn refuse_own(&mut self, arrival: Arrival<'_>, seen: Fingerprint) -> Result<(), Counter> {
+        if self.egress.is_echo(arrival.now, seen) && self.may_be_ours(arrival.path) {
             return Err(Counter::OwnEcho);
         }
-        if self.components.contains(source) {
-            self.announce_conflict(now, from, source);
+        if self.components.contains(arrival.frame.source) {
+            self.announce_conflict(arrival);
             return Err(Counter::IdConflict);
         }
         Ok(())
@@ -391,24 +377,25 @@ impl Endpoint {
     }
 
     /// Announces that another sender uses a local id, at most once per interval.
-    fn announce_conflict(&mut self, now: Instant, from: Path, id: JausId) {
-        let announced = self.conflicts.get(&id);
-        if announced
-            .is_none_or(|&at| now.saturating_duration_since(at) >= self.config.conflict_interval)
-        {
-            self.conflicts.insert(id, now);
-            debug!(%id, ?from, "id conflict");
-            if self.warnings.is_due(now, Warning::IdConflict) {
-                warn!(%id, from = %from.peer, "somebody else uses an id of this node: change one of the two");
-            }
-            self.announce(Event::IdConflict { id, path: from });
+    fn announce_conflict(&mut self, arrival: Arrival<'_>) {
+        let (now, id, path) = (arrival.now, arrival.frame.source, arrival.path);
+        let is_recent =
+            |&at: &Instant| now.saturating_duration_since(at) < self.config.conflict_interval;
+        if self.conflicts.get(&id).is_some_and(is_recent) {
+            return;
         }
+        self.conflicts.insert(id, now);
+        debug!(%id, ?path, "id conflict");
+        if self.warnings.is_due(now, Warning::IdConflict) {
+            warn!(%id, from = %path.peer, "somebody else uses an id of this node: change one of the two");
+        }
+        self.announce(Event::IdConflict { id, path });
     }
 
     /// The path for answers to a sender: where it was heard, unless it does not read there. In that
     /// case the datagram path on which it was heard before, if any.
     pub(super) fn where_it_reads(&self, id: JausId, from: Path) -> Path {
-        let is_datagram = |path: &Path| self.framing(path.link) == Framing::Judp;
+        let is_datagram = |path: &Path| self.egress.framing(path.link) == Framing::Judp;
         if is_datagram(&from) || !self.peers.is_deaf_on_its_connections(id) {
             return from;
         }
@@ -416,48 +403,17 @@ impl Endpoint {
         before.filter(is_datagram).unwrap_or(from)
     }
 
-    /// Delivers a complete message to its receivers.
-    fn deliver(
-        &mut self,
-        from: Path,
-        frame: &Frame,
-        broadcast: Broadcast,
-        payload: &Bytes,
-        sink: &mut dyn Sink,
-    ) {
-        let whole = Received {
-            source: frame.source,
-            destination: frame.destination,
-            priority: frame.flags.priority(),
-            broadcast,
-            payload: payload.clone(),
-            path: Some(from),
-            to: frame.destination,
-        };
-        self.deliver_to_all(&whole, None, sink);
-    }
-
-    /// Delivers a message to every matching component except `but`.
-    pub(super) fn deliver_to_all(
-        &mut self,
-        message: &Received,
-        but: Option<JausId>,
-        sink: &mut dyn Sink,
-    ) {
-        let Received {
-            source,
-            destination,
-            ..
-        } = *message;
+    /// Delivers a complete message to every matching component except `but`.
+    pub(super) fn deliver(&mut self, message: &Received, but: Option<JausId>, sink: &mut dyn Sink) {
+        let (source, destination) = (message.source, message.destination);
         let receivers = self
             .components
             .receivers(source, destination, message.broadcast);
         for to in receivers.filter(|&to| Some(to) != but) {
-            let message = Received {
+            sink.deliver(Received {
                 to,
                 ..message.clone()
-            };
-            sink.deliver(message);
+            });
             self.counters.add(Counter::MessagesDelivered);
         }
     }
@@ -478,16 +434,13 @@ fn check_header(frame: &Frame) -> Result<Broadcast, Counter> {
         return Err(Counter::PriorityFault);
     }
     let broadcast = frame.flags.broadcast().ok_or(Counter::ReservedBroadcast)?;
+    let begins = matches!(frame.flags.data(), DataControl::Single | DataControl::First);
     if frame.flags.acknowledgement().is_answer() {
-        let sound = frame.is_acknowledgement();
-        return if sound {
-            Ok(broadcast)
-        } else {
-            Err(Counter::AcknowledgementWithPayload)
-        };
+        if !frame.is_acknowledgement() {
+            return Err(Counter::AcknowledgementWithPayload);
+        }
+    } else if begins && frame.code().is_none() {
+        return Err(Counter::NoMessageCode);
     }
-    match (frame.flags.data(), frame.code()) {
-        (DataControl::Single | DataControl::First, None) => Err(Counter::NoMessageCode),
-        _ => Ok(broadcast),
-    }
+    Ok(broadcast)
 }

@@ -5,7 +5,7 @@
 //! out those that will be retransmitted.
 
 use std::collections::{HashMap, VecDeque};
-use std::hash::{BuildHasher, BuildHasherDefault, Hasher, RandomState};
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::{Duration, Instant};
 
 use super::Path;
@@ -25,12 +25,8 @@ impl Fingerprint {
     }
 }
 
-/// The path on which a message arrived, as a keyed hash.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct PathHash(u64);
-
 /// Whether a message is a stranger's, and whether its sender may retransmit it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Class {
     /// Whether the sender is a stranger; see [`Peers`](super::peers::Peers).
     pub(super) stranger: bool,
@@ -50,34 +46,15 @@ impl Class {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sighting {
     pub(super) time: Instant,
-    pub(super) way: PathHash,
+    /// A keyed hash of the path.
+    pub(super) way: u64,
     pub(super) repetitions: u8,
-}
-
-/// A hasher for keys that are hashes already.
-#[derive(Clone, Copy, Debug, Default)]
-struct AlreadyHashed(u64);
-
-impl Hasher for AlreadyHashed {
-    fn write(&mut self, octets: &[u8]) {
-        for &octet in octets {
-            self.0 = self.0.rotate_left(8) ^ u64::from(octet);
-        }
-    }
-
-    fn write_u64(&mut self, hash: u64) {
-        self.0 = hash;
-    }
-
-    fn finish(&self) -> u64 {
-        self.0
-    }
 }
 
 /// The recent frames.
 #[derive(Debug)]
 pub(super) struct Recent {
-    sightings: HashMap<Fingerprint, Sighting, BuildHasherDefault<AlreadyHashed>>,
+    sightings: HashMap<Fingerprint, Sighting>,
     order: [VecDeque<(Instant, Fingerprint)>; Class::COUNT],
     limit: usize,
     longest: Duration,
@@ -112,8 +89,8 @@ impl Recent {
     }
 
     /// The hash of a path; `None` if paths do not matter.
-    pub(super) fn way(&self, path: Option<Path>) -> PathHash {
-        PathHash(path.map_or(0, |path| self.keys.hash_one(path)))
+    pub(super) fn way(&self, path: Option<Path>) -> u64 {
+        path.map_or(0, |path| self.keys.hash_one(path))
     }
 
     /// The last sighting of a frame, if remembered.
@@ -122,28 +99,23 @@ impl Recent {
     }
 
     /// Whether the frame was recorded less than `window` ago.
-    pub(super) fn contains(&self, now: Instant, seen: &Fingerprint, window: Duration) -> bool {
-        self.sightings
-            .get(seen)
+    pub(super) fn contains(&self, now: Instant, seen: Fingerprint, window: Duration) -> bool {
+        self.sighting(seen)
             .is_some_and(|sighting| now.saturating_duration_since(sighting.time) < window)
     }
 
     /// Records a frame of our own.
-    pub(super) fn insert(&mut self, now: Instant, seen: Fingerprint) {
-        let class = Class {
-            stranger: false,
-            repeats: false,
-        };
+    pub(super) fn insert_own(&mut self, now: Instant, frame: &Frame) {
         let sighting = Sighting {
             time: now,
-            way: PathHash(0),
+            way: 0,
             repetitions: 0,
         };
-        self.insert_as(seen, sighting, class);
+        self.insert(self.fingerprint(frame), sighting, Class::default());
     }
 
-    /// Records a frame with its time and path.
-    pub(super) fn insert_as(&mut self, seen: Fingerprint, sighting: Sighting, class: Class) {
+    /// Records a frame.
+    pub(super) fn insert(&mut self, seen: Fingerprint, sighting: Sighting, class: Class) {
         let now = sighting.time;
         let limit = if class.stranger {
             self.limit.div_ceil(4)
@@ -166,16 +138,14 @@ impl Recent {
     fn forget_oldest(&mut self, class: usize) {
         // If the frame was recorded again since, a younger entry keeps it.
         if let Some((time, seen)) = self.order[class].pop_front()
-            && self
-                .sightings
-                .get(&seen)
-                .is_some_and(|sighting| sighting.time == time)
+            && self.sighting(seen).is_some_and(|it| it.time == time)
         {
             self.sightings.remove(&seen);
         }
     }
 
     /// How many frames are remembered.
+    #[cfg(test)]
     pub(super) fn len(&self) -> usize {
         self.sightings.len()
     }
@@ -214,16 +184,17 @@ mod tests {
         let start = Instant::now();
         let window = Duration::from_millis(500);
         let mut recent = memory(2, window);
-        let seen = [0, 1, 2].map(|sequence| recent.fingerprint(&frame(sequence, b"\x00\x2B\x02")));
-        for seen in seen {
-            recent.insert(start, seen);
+        let frames = [0, 1, 2].map(|sequence| frame(sequence, b"\x00\x2B\x02"));
+        for frame in &frames {
+            recent.insert_own(start, frame);
         }
+        let seen = frames.each_ref().map(|frame| recent.fingerprint(frame));
         assert_eq!(
-            seen.map(|seen| recent.contains(start, &seen, window)),
+            seen.map(|seen| recent.contains(start, seen, window)),
             [false, true, true]
         );
-        assert!(!recent.contains(start + window, &seen[2], window));
-        recent.insert(start + window, seen[0]);
+        assert!(!recent.contains(start + window, seen[2], window));
+        recent.insert_own(start + window, &frames[0]);
         assert_eq!((recent.len(), recent.order[0].len()), (1, 1));
     }
 
@@ -236,11 +207,11 @@ mod tests {
         let start = Instant::now();
         let window = Duration::from_millis(500);
         let mut recent = memory(8, window);
-        let seen = recent.fingerprint(&frame(7, b"\x02\x22"));
-        recent.insert(start, seen);
-        recent.insert(start + window / 2, seen);
-        recent.insert(start + window, recent.fingerprint(&frame(8, b"\x02\x22")));
-        assert!(recent.contains(start + window, &seen, window));
+        let again = frame(7, b"\x02\x22");
+        recent.insert_own(start, &again);
+        recent.insert_own(start + window / 2, &again);
+        recent.insert_own(start + window, &frame(8, b"\x02\x22"));
+        assert!(recent.contains(start + window, recent.fingerprint(&again), window));
     }
 
     #[test]
@@ -252,18 +223,18 @@ mod tests {
         let start = Instant::now();
         let window = Duration::from_millis(500);
         let mut recent = memory(4, window);
-        let known = recent.fingerprint(&frame(7, b"\x02\x22"));
-        recent.insert(start, known);
+        let known = frame(7, b"\x02\x22");
+        recent.insert_own(start, &known);
         for sequence in 100..200 {
             let seen = recent.fingerprint(&frame(sequence, b"\x02\x22"));
             let sighting = Sighting {
                 time: start,
-                way: PathHash(0),
+                way: 0,
                 repetitions: 0,
             };
-            recent.insert_as(seen, sighting, STRANGER);
+            recent.insert(seen, sighting, STRANGER);
         }
-        assert!(recent.contains(start, &known, window));
+        assert!(recent.contains(start, recent.fingerprint(&known), window));
         assert_eq!(recent.len(), 2, "a quarter for strangers");
     }
 

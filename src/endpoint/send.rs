@@ -7,10 +7,10 @@ use tracing::trace;
 
 use super::egress::{FragmentedSend, Hop, Pacing};
 use super::large::{Cut, Cutting};
-use super::{Counter, Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, Sink, To};
+use super::{Counter, Endpoint, Event, MessageHandle, Outgoing, Path, Received, Sink, To};
 use crate::address::JausId;
 use crate::wire::{
-    Acknowledgement, Broadcast, EncodeError, Flags, Frame, Framing, Priority, Version, as5669a,
+    Acknowledgement, Broadcast, EncodeError, Flags, Frame, Priority, Version, as5669a,
 };
 
 /// Why a message cannot be sent. No part of it was sent.
@@ -115,7 +115,7 @@ impl Endpoint {
             self.send_away(now, handle, &message, scope)?;
             let source = message.source;
             let message = received_locally(message, scope, destination);
-            self.deliver_to_all(&message, Some(source), sink);
+            self.deliver(&message, Some(source), sink);
         }
         self.counters.add(Counter::MessagesSent);
         self.peers.note_sent(destination, length);
@@ -189,22 +189,26 @@ impl Endpoint {
         let route = self.route(destination);
         let version = route.map_or(Version::As5669a, |(_, version)| version);
         let length = message.payload.len();
-        self.check_length(length, destination, version)?;
-        let cut = self.cutting(destination, version).cut(length);
+        let cutting = self.cutting(destination, version);
+        let limit = self.config.max_message.min(cutting.longest());
+        if length > limit {
+            return Err(SendError::TooLong { length, limit });
+        }
+        let cut = cutting.cut(length);
+        let mut frame = Frame {
+            version: if is_to_one { version } else { Version::As5669a },
+            flags: Flags::new(message.priority).with_broadcast(scope),
+            ..Frame::new(message.source, destination, message.payload.clone())
+        };
         // A large message to an unknown address is broadcast only until its first packet is
         // acknowledged. The rest goes only to that address.
         let seeks = is_to_one && self.seeks_proof(destination, length);
         if message.acknowledge || cut.count() > 1 && seeks {
-            return self.deliver_reliably(now, handle, message, scope);
+            return self.deliver_reliably(now, handle, frame, message.acknowledge);
         }
         let path = route.filter(|_| is_to_one).map(|(path, _)| path);
         let first = self.numbers.take(cut.count());
-        let frame = Frame {
-            version: if is_to_one { version } else { Version::As5669a },
-            flags: Flags::new(message.priority).with_broadcast(scope),
-            sequence: first as u16,
-            ..Frame::new(message.source, destination, message.payload.clone())
-        };
+        frame.sequence = first as u16;
         if cut.count() > 1 {
             return self.send_fragmented(now, path, &frame, cut, first);
         }
@@ -255,7 +259,13 @@ impl Endpoint {
         }
         let pacing = self.pacing(whole.destination);
         for hop in hops {
-            let message = FragmentedSend::new(whole, cut, first, pacing);
+            let message = FragmentedSend {
+                whole: whole.clone(),
+                cut,
+                first,
+                next: 0,
+                pacing,
+            };
             if let Err(reason) = self.egress.push_fragmented(now, hop, message) {
                 self.counters.add(reason);
             }
@@ -303,19 +313,9 @@ impl Endpoint {
                 .with_broadcast(Broadcast::Global)
                 .with_acknowledgement(Acknowledgement::Request);
         }
-        self.send_to_hops(now, &hops, &frame)?;
-        Ok(())
-    }
-
-    /// Sends a frame to several hops. Failures are counted.
-    pub(super) fn send_to_hops(
-        &mut self,
-        now: Instant,
-        hops: &[Hop],
-        frame: &Frame,
-    ) -> Result<(), EncodeError> {
         self.egress
-            .push_to_many(now, hops, frame, &mut self.counters)
+            .push_to_many(now, &hops, &frame, &mut self.counters)?;
+        Ok(())
     }
 
     /// How to cut messages to `destination`.
@@ -337,20 +337,6 @@ impl Endpoint {
         Some(intake.map_or(usual, |intake| usual.within(intake)))
     }
 
-    fn check_length(
-        &self,
-        length: usize,
-        destination: JausId,
-        version: Version,
-    ) -> Result<(), SendError> {
-        let longest = self.cutting(destination, version).longest();
-        let limit = self.config.max_message.min(longest);
-        if length > limit {
-            return Err(SendError::TooLong { length, limit });
-        }
-        Ok(())
-    }
-
     /// The path and header for `destination`, if its address is known and the link exists.
     pub(super) fn route(&self, destination: JausId) -> Option<(Path, Version)> {
         self.peers
@@ -363,11 +349,6 @@ impl Endpoint {
         let groups = self.egress.links().map(|(link, _)| (link, To::Group));
         let copies = self.peers.broadcast_copies(destination);
         groups.chain(copies.into_iter().map(Hop::from)).collect()
-    }
-
-    /// The framing of a link.
-    pub(super) fn framing(&self, link: LinkId) -> Framing {
-        self.egress.framing(link)
     }
 }
 

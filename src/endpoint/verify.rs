@@ -13,11 +13,9 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use tracing::{debug, warn};
 
-use super::peers::{
-    Answer, CHALLENGE, CHALLENGE_FLAGS, Challenge, Doubt, Finding, Heard, Probe, Sighting,
-};
-use super::rate::{Bucket, Buckets, Origin};
-use super::{Config, Counter, Endpoint, Event, Path, Rate};
+use super::peers::{CHALLENGE, CHALLENGE_FLAGS, Challenge, Finding, Heard, Probe};
+use super::receive::Arrival;
+use super::{Counter, Endpoint, Event, Path};
 use crate::address::JausId;
 use crate::wire::{Frame, Framing};
 
@@ -27,35 +25,6 @@ use crate::wire::{Frame, Framing};
 const NUMBERS_AGO: u16 = 1 << 14;
 /// The shortest interval between two warnings of a kind.
 const WARNING_INTERVAL: Duration = Duration::from_secs(10);
-
-/// The budget for traffic to unverified addresses.
-#[derive(Debug)]
-pub(super) struct Budget {
-    by_address: Buckets<Origin>,
-    total: Bucket,
-    total_rate: Rate,
-}
-
-impl Budget {
-    pub(super) fn new(config: &Config) -> Self {
-        Self {
-            by_address: Buckets::new(config.unverified_address, config.max_peers),
-            total: Bucket::default(),
-            total_rate: config.unverified_total,
-        }
-    }
-
-    fn take(&mut self, now: Instant, to: Origin, octets: usize) -> bool {
-        let octets = u32::try_from(octets).unwrap_or(u32::MAX);
-        self.by_address.take_many(now, to, octets)
-            && self.total.take_many(now, self.total_rate, octets)
-    }
-
-    /// Whether an address has used a quarter of its burst.
-    fn is_in_use(&self, now: Instant, to: Origin) -> bool {
-        self.by_address.owed(now, &to) >= self.by_address.rate().burst / 4
-    }
-}
 
 /// Rate-limited warnings to the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,27 +55,22 @@ impl Warnings {
 
 impl Endpoint {
     /// Learns a sender's route, if there is room for it.
-    pub(super) fn learn(&mut self, now: Instant, from: Path, frame: &Frame) -> Result<(), Counter> {
+    pub(super) fn learn(&mut self, arrival: Arrival<'_>) -> Result<(), Counter> {
+        let Arrival { frame, now, .. } = arrival;
         let (id, version) = (frame.source, frame.version);
-        let path = self.where_it_reads(id, from);
-        let is_stream = self.framing(path.link) != Framing::Judp;
+        let path = self.where_it_reads(id, arrival.path);
+        let is_stream = self.egress.framing(path.link) != Framing::Judp;
         let local = self.challenger(frame.destination);
-        let heard = self.peers.hear(Sighting {
-            now,
-            path,
-            is_stream,
-            can_challenge: local.is_some(),
-            frame,
-        });
-        match heard {
-            Heard::Known | Heard::Elsewhere => {}
+        let arrival = Arrival { path, ..arrival };
+        match self.peers.hear(arrival, is_stream, local.is_some())? {
+            Heard::Known => {}
             Heard::New { evicted } => {
-                if let Some(id) = evicted {
+                if let Some(forgotten) = evicted {
                     self.counters.add(Counter::PeersEvicted);
-                    self.announce(Event::PeerForgotten { id });
+                    self.announce(Event::PeerForgotten { id: forgotten });
                     if self.warnings.is_due(now, Warning::TableFull) {
                         warn!(
-                            forgotten = %id, newcomer = %frame.source, from = %path.peer,
+                            %forgotten, newcomer = %id, from = %path.peer,
                             "the table of peers is full: raise limits.max_peers, or see who invents ids"
                         );
                     }
@@ -114,21 +78,20 @@ impl Endpoint {
                 debug!(%id, ?path, %version, "peer learned");
                 self.announce(Event::PeerLearned { id, path, version });
             }
-            Heard::Moved {
-                from,
-                contested,
-                was_verified,
-            } => {
-                self.announce_move(now, id, from, path);
-                if contested {
-                    self.contest(now, id, local, from, was_verified, (path, is_stream));
-                }
-            }
-            Heard::Contested {
+            Heard::Elsewhere {
                 incumbent,
                 was_verified,
-            } => self.contest(now, id, local, incumbent, was_verified, (path, is_stream)),
-            Heard::NoRoom => return Err(Counter::PeersFull),
+                moved,
+                contested,
+            } => {
+                if moved {
+                    self.announce_move(now, id, incumbent, path);
+                }
+                if contested && let Some(local) = local {
+                    let rival = Some((path, is_stream));
+                    self.begin_challenge(now, id, local, (incumbent, was_verified), rival);
+                }
+            }
         }
         Ok(())
     }
@@ -149,53 +112,37 @@ impl Endpoint {
         self.components.iter().next()
     }
 
-    /// Challenges both paths on which an id is heard.
-    fn contest(
-        &mut self,
-        now: Instant,
-        id: JausId,
-        local: Option<JausId>,
-        incumbent: Path,
-        was_verified: bool,
-        (rival, rival_is_stream): (Path, bool),
-    ) {
-        if let Some(local) = local
-            && self.peers.may_challenge(now, id, rival)
-        {
-            let rival = Some(rival);
-            let doubt = Doubt {
-                local,
-                incumbent,
-                was_verified,
-                rival,
-                rival_is_stream,
-            };
-            self.begin_challenge(now, id, doubt);
-        }
-    }
-
     /// Challenges an unverified peer, unless it may not be challenged now.
     pub(super) fn challenge(&mut self, now: Instant, id: JausId) {
         if let Some(local) = self.challenger(id)
             && let Some((incumbent, _)) = self.route(id)
-            && self.peers.may_challenge(now, id, incumbent)
         {
-            let doubt = Doubt {
-                local,
-                incumbent,
-                was_verified: false,
-                rival: None,
-                rival_is_stream: false,
-            };
-            self.begin_challenge(now, id, doubt);
+            self.begin_challenge(now, id, local, (incumbent, false), None);
         }
     }
 
-    fn begin_challenge(&mut self, now: Instant, id: JausId, doubt: Doubt) {
-        let incumbent = self.probe(id, doubt.local, doubt.incumbent);
-        let rival = doubt.rival.map(|path| self.probe(id, doubt.local, path));
-        self.peers.begin_challenge(now, id, doubt, incumbent, rival);
-        self.send_probes(now, id, doubt.local, [Some(incumbent), rival]);
+    /// Challenges a peer on its path, which may be verified, and on the other path where its id is
+    /// heard, which may be a stream; unless it may not be challenged now.
+    fn begin_challenge(
+        &mut self,
+        now: Instant,
+        id: JausId,
+        local: JausId,
+        (incumbent, was_verified): (Path, bool),
+        rival: Option<(Path, bool)>,
+    ) {
+        let cause = rival.map_or(incumbent, |(path, _)| path);
+        if !self.peers.may_challenge(now, id, cause) {
+            return;
+        }
+        let incumbent = self.probe(id, local, incumbent);
+        let rival = rival.map(|(path, answered)| Probe {
+            answered,
+            ..self.probe(id, local, path)
+        });
+        let challenge = Challenge::new(now, local, incumbent, was_verified, rival);
+        self.peers.begin_challenge(now, id, challenge);
+        self.send_probes(now, id, &challenge);
     }
 
     /// A probe with an unpredictable sequence number that no message to the peer awaits.
@@ -211,36 +158,35 @@ impl Endpoint {
                 break number;
             }
         };
-        Probe { path, number }
+        Probe {
+            path,
+            number,
+            answered: false,
+        }
     }
 
-    fn send_probes(&mut self, now: Instant, id: JausId, local: JausId, probes: [Option<Probe>; 2]) {
+    fn send_probes(&mut self, now: Instant, id: JausId, challenge: &Challenge) {
         let version = self.peers.version(id);
-        for Probe { path, number } in probes.into_iter().flatten() {
+        for probe in challenge.probes() {
             let frame = Frame {
                 version,
                 flags: CHALLENGE_FLAGS,
-                sequence: number,
-                ..Frame::new(local, id, Bytes::from_static(CHALLENGE))
+                sequence: probe.number,
+                ..Frame::new(challenge.local, id, Bytes::from_static(CHALLENGE))
             };
-            if self.send_along(now, path, &frame) == Ok(true) {
+            if self.send_along(now, probe.path, &frame) == Ok(true) {
                 self.counters.add(Counter::ChallengesSent);
             }
         }
     }
 
     /// Processes an acknowledgement that no message awaits. Returns whether a challenge does.
-    pub(super) fn receive_challenge_answer(
-        &mut self,
-        now: Instant,
-        from: Path,
-        frame: &Frame,
-    ) -> bool {
-        let Some((answer, challenge)) = self.peers.answer_challenge(now, frame, from) else {
+    pub(super) fn receive_challenge_answer(&mut self, arrival: Arrival<'_>) -> bool {
+        let Some((challenge, finding)) = self.peers.answer_challenge(arrival) else {
             return false;
         };
-        if let Answer::Decides(finding) = answer {
-            self.settle_challenge(now, frame.source, &challenge, finding);
+        if let Some(finding) = finding {
+            self.settle_challenge(arrival.now, arrival.frame.source, &challenge, finding);
         }
         true
     }
@@ -250,10 +196,7 @@ impl Endpoint {
         while let Some((id, challenge, finding)) = self.peers.next_due(now) {
             match finding {
                 Some(finding) => self.settle_challenge(now, id, &challenge, finding),
-                None => {
-                    let probes = [Some(challenge.incumbent), challenge.rival];
-                    self.send_probes(now, id, challenge.doubt.local, probes);
-                }
+                None => self.send_probes(now, id, &challenge),
             }
         }
     }
@@ -299,8 +242,11 @@ impl Endpoint {
         if self.is_free(to) {
             return true;
         }
-        let may = self.budget.take(now, to.into(), octets);
-        if self.budget.is_in_use(now, to.into()) {
+        let octets = u32::try_from(octets).unwrap_or(u32::MAX);
+        let may = self.unverified.take_many(now, to.into(), octets)
+            && self.unverified_total.take_many(now, (), octets);
+        let spent = self.unverified.owed(now, &to.into());
+        if spent >= self.config.unverified_address.burst / 4 {
             self.challenge(now, id);
         }
         if !may {
@@ -319,6 +265,6 @@ impl Endpoint {
 
     /// Whether traffic to a path is unlimited.
     pub(super) fn is_free(&self, to: Path) -> bool {
-        self.framing(to.link) != Framing::Judp || self.peers.is_proven(to)
+        self.egress.framing(to.link) != Framing::Judp || self.peers.is_proven(to)
     }
 }

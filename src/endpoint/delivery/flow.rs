@@ -8,10 +8,9 @@
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::time::{Duration, Instant};
 
-use super::pending::{PendingMessage, Started};
+use super::FlowStatus;
 use super::round_trip::RoundTrip;
 use super::window::Window;
-use super::{FlowStatus, Undelivered};
 use crate::address::JausId;
 use crate::endpoint::large::{Cut, Numbers};
 use crate::endpoint::{Config, Unacknowledged};
@@ -40,6 +39,32 @@ const SILENT_PART: u32 = 6;
 /// The period of sequence numbers.
 const ROUND: u64 = 1 << 16;
 
+/// A message that is queued or unacknowledged.
+#[derive(Debug)]
+struct PendingMessage {
+    whole: Frame,
+    /// Whether the sender wants the result reported.
+    awaited: bool,
+    /// When it was queued.
+    accepted: Instant,
+    /// How it was cut, once its first packet is sent.
+    started: Option<Started>,
+    /// Octets acknowledged so far.
+    acknowledged: usize,
+}
+
+/// The state of a message whose first packet is sent.
+#[derive(Debug)]
+struct Started {
+    cut: Cut,
+    /// The serial number of the first fragment.
+    first: u64,
+    /// The first fragment not sent yet.
+    next: usize,
+    /// How many fragments are unacknowledged.
+    missing: usize,
+}
+
 /// A fragment or unfragmented message that was sent and not acknowledged yet.
 #[derive(Debug)]
 struct Packet {
@@ -55,15 +80,17 @@ struct Packet {
     lost: bool,
 }
 
-/// The effect of an acknowledgement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Progress {
-    /// No packet awaits it.
-    Unawaited,
-    /// Further fragments of the message are unacknowledged.
-    Part,
-    /// The message is fully acknowledged.
-    Whole(u64),
+/// The end of a message: it was acknowledged in full, or given up.
+#[derive(Debug)]
+pub(super) struct Outcome {
+    pub(super) message: u64,
+    /// Whether the sender wants it reported.
+    pub(super) awaited: bool,
+    /// Why it was given up.
+    pub(super) given_up: Option<Unacknowledged>,
+    /// Octets that were acknowledged.
+    pub(super) acknowledged: usize,
+    pub(super) length: usize,
 }
 
 /// All messages to one destination.
@@ -91,7 +118,7 @@ pub(super) struct Flow {
     /// When the latest acknowledgement arrived.
     heard: Option<Instant>,
     /// When a message was last queued or acknowledged.
-    active: Instant,
+    pub(super) active: Instant,
     /// Whether messages were given up because of silence, and no acknowledgement has arrived since.
     silent: bool,
     /// Whether the address is known.
@@ -104,6 +131,8 @@ pub(super) struct Flow {
     pub(super) timer: Option<Instant>,
     /// Messages with a packet that has used up its attempts.
     exhausted: Vec<u64>,
+    /// What became of messages, until it is reported.
+    pub(super) outcomes: VecDeque<Outcome>,
     /// No message in flight has a lower serial number.
     floor: u64,
     patience: Duration,
@@ -133,6 +162,7 @@ impl Flow {
             listed: Default::default(),
             timer: None,
             exhausted: Vec::new(),
+            outcomes: VecDeque::new(),
             floor: 0,
             patience: config.acknowledge_patience,
             tries: config.acknowledge_tries,
@@ -141,10 +171,6 @@ impl Flow {
 
     pub(super) fn is_idle(&self) -> bool {
         self.pending_messages.is_empty()
-    }
-
-    pub(super) fn active(&self) -> Instant {
-        self.active
     }
 
     pub(super) fn status(&self) -> FlowStatus {
@@ -156,8 +182,8 @@ impl Flow {
         }
     }
 
-    /// Queues a message.
-    pub(super) fn push(&mut self, now: Instant, message: u64, pending: PendingMessage) {
+    /// Queues a message; `awaited` says whether the sender wants its outcome reported.
+    pub(super) fn push(&mut self, now: Instant, message: u64, whole: Frame, awaited: bool) {
         if self.is_idle() {
             self.round_trip.restart();
             if now.saturating_duration_since(self.active) >= STALE {
@@ -165,7 +191,14 @@ impl Flow {
             }
         }
         self.active = now;
-        self.waiting[usize::from(pending.priority.bits())].push_back(message);
+        self.waiting[usize::from(whole.flags.priority().bits())].push_back(message);
+        let pending = PendingMessage {
+            whole,
+            awaited,
+            accepted: now,
+            started: None,
+            acknowledged: 0,
+        };
         self.pending_messages.insert(message, pending);
     }
 
@@ -187,10 +220,10 @@ impl Flow {
     pub(super) fn begins_more_than(&self, octets: usize) -> bool {
         let next = self.waiting.iter().rev().find_map(VecDeque::front);
         let pending = next.and_then(|message| self.pending_messages.get(message));
-        pending.is_some_and(|pending| pending.started.is_none() && pending.payload.len() > octets)
+        pending.is_some_and(|it| it.started.is_none() && it.whole.payload.len() > octets)
     }
 
-    /// The next packet to send, without its destination: of that priority or, if that must wait for
+    /// The next packet to send: of that priority or, if that must wait for
     /// sequence numbers, of a lower one. `begin` is called with the length of a message when its
     /// first packet is due, and returns how to cut it and which header to use.
     pub(super) fn take(
@@ -212,10 +245,11 @@ impl Flow {
             let Some(packet) = self.flight.get_mut(&sequence).filter(|packet| packet.lost) else {
                 continue;
             };
-            let frame = self
-                .pending_messages
-                .get(&packet.message)?
-                .frame(packet.index)?;
+            let pending = self.pending_messages.get(&packet.message)?;
+            let started = pending.started.as_ref()?;
+            let frame = started
+                .cut
+                .frame(&pending.whole, started.first, packet.index);
             packet.lost = false;
             packet.sent = now;
             packet.order = self.sends;
@@ -243,9 +277,9 @@ impl Flow {
             }
             self.start(message, numbers, begin)?;
             let pending = self.pending_messages.get_mut(&message)?;
-            let index = pending.started.as_ref()?.next;
-            let frame = pending.frame(index)?;
             let started = pending.started.as_mut()?;
+            let index = started.next;
+            let frame = started.cut.frame(&pending.whole, started.first, index);
             started.next += 1;
             if started.next == started.cut.count() {
                 self.waiting[level].pop_front();
@@ -253,7 +287,7 @@ impl Flow {
             let packet = Packet {
                 message,
                 index,
-                priority: pending.priority,
+                priority: frame.flags.priority(),
                 first_sent: now,
                 sent: now,
                 order: self.sends,
@@ -278,7 +312,7 @@ impl Flow {
         if pending.started.is_some() {
             return Some(());
         }
-        let (cut, version) = begin(pending.payload.len());
+        let (cut, version) = begin(pending.whole.payload.len());
         let count = cut.count();
         let end = numbers.peek(count as u64) + count as u64;
         if end - self.floor >= ROUND {
@@ -291,9 +325,10 @@ impl Flow {
                 return None;
             }
         }
-        self.pending_messages.get_mut(&message)?.started = Some(Started {
+        let pending = self.pending_messages.get_mut(&message)?;
+        pending.whole.version = version;
+        pending.started = Some(Started {
             cut,
-            version,
             first: numbers.take(count),
             next: 0,
             missing: count,
@@ -308,13 +343,29 @@ impl Flow {
         self.armed.get_or_insert(now);
     }
 
-    /// Processes the acknowledgement of a packet.
-    pub(super) fn acknowledge(&mut self, now: Instant, source: JausId, sequence: u16) -> Progress {
+    /// Processes an acknowledgement or a refusal of a packet from `source`. Returns whether the
+    /// packet awaits it.
+    pub(super) fn handle_answer(
+        &mut self,
+        now: Instant,
+        source: JausId,
+        sequence: u16,
+        is_refusal: bool,
+    ) -> bool {
         let Some(message) = self.owner_of(source, sequence) else {
-            return Progress::Unawaited;
+            return false;
         };
+        if is_refusal {
+            self.finish(message, Some(Unacknowledged::Refused));
+        } else {
+            self.acknowledge(now, sequence);
+        }
+        true
+    }
+
+    fn acknowledge(&mut self, now: Instant, sequence: u16) {
         let Some(packet) = self.flight.remove(&sequence) else {
-            return Progress::Unawaited;
+            return;
         };
         self.learn_from(now, &packet);
         if !packet.lost {
@@ -323,25 +374,23 @@ impl Flow {
         self.newest = self.newest.max(packet.order);
         self.find_lost(now);
         self.armed = (self.in_flight > 0).then_some(now);
-        let Some(pending) = self.pending_messages.get_mut(&message) else {
-            return Progress::Unawaited;
-        };
-        let Some(started) = &mut pending.started else {
-            return Progress::Unawaited;
-        };
-        pending.acknowledged += started.cut.range(packet.index).len();
-        started.missing -= 1;
-        if started.missing > 0 {
-            return Progress::Part;
+        if let Some(pending) = self.pending_messages.get_mut(&packet.message)
+            && let Some(started) = &mut pending.started
+        {
+            pending.acknowledged += started.cut.range(packet.index).len();
+            started.missing -= 1;
+            if started.missing == 0 {
+                self.finish(packet.message, None);
+            }
         }
-        Progress::Whole(message)
+        self.give_up_exhausted();
     }
 
     /// The message that a packet from `source` belongs to.
     pub(super) fn owner_of(&self, source: JausId, sequence: u16) -> Option<u64> {
         let message = self.flight.get(&sequence)?.message;
         let pending = self.pending_messages.get(&message)?;
-        (pending.source == source).then_some(message)
+        (pending.whole.source == source).then_some(message)
     }
 
     fn learn_from(&mut self, now: Instant, packet: &Packet) {
@@ -429,7 +478,7 @@ impl Flow {
 
     /// Treats all packets in flight as lost if the retransmission timeout has passed, and gives up
     /// messages that are out of time.
-    pub(super) fn handle_timeout(&mut self, now: Instant) -> Vec<(u64, Undelivered)> {
+    pub(super) fn handle_timeout(&mut self, now: Instant) {
         if self.repetition().is_some_and(|due| due <= now) {
             self.armed = None;
             self.round_trip.back_off();
@@ -442,53 +491,46 @@ impl Flow {
                 }
             }
         }
-        let mut given_up = self.take_exhausted();
+        self.give_up_exhausted();
         let mut silent = self.silent;
         while self.end_of_patience().is_some_and(|end| end <= now)
             && let Some((&message, _)) = self.pending_messages.first_key_value()
         {
             silent = true;
-            given_up.extend(self.give_up(message, Unacknowledged::TimedOut));
+            self.finish(message, Some(Unacknowledged::TimedOut));
         }
         self.silent = silent;
-        given_up
     }
 
-    /// Gives up messages with a packet that has used up its attempts.
-    pub(super) fn take_exhausted(&mut self) -> Vec<(u64, Undelivered)> {
-        std::mem::take(&mut self.exhausted)
-            .into_iter()
-            .filter_map(|message| self.give_up(message, Unacknowledged::TimedOut))
-            .collect()
+    fn give_up_exhausted(&mut self) {
+        for message in std::mem::take(&mut self.exhausted) {
+            self.finish(message, Some(Unacknowledged::TimedOut));
+        }
     }
 
-    /// Gives up a message and returns its outcome.
-    pub(super) fn give_up(
-        &mut self,
-        message: u64,
-        reason: Unacknowledged,
-    ) -> Option<(u64, Undelivered)> {
-        let pending = self.remove(message)?;
-        let reason = match (reason, &pending.started) {
+    /// Removes a message and records its outcome.
+    fn finish(&mut self, message: u64, given_up: Option<Unacknowledged>) {
+        let Some(pending) = self.remove(message) else {
+            return;
+        };
+        let given_up = given_up.map(|reason| match (reason, &pending.started) {
             (Unacknowledged::TimedOut, None) => Unacknowledged::NotSent,
             (reason, _) => reason,
-        };
-        let undelivered = Undelivered {
+        });
+        self.outcomes.push_back(Outcome {
+            message,
             awaited: pending.awaited,
-            reason,
+            given_up,
             acknowledged: pending.acknowledged,
-            length: pending.payload.len(),
-        };
-        Some((message, undelivered))
+            length: pending.whole.payload.len(),
+        });
     }
 
     /// Removes a message and its packets in flight.
-    pub(super) fn remove(&mut self, message: u64) -> Option<PendingMessage> {
+    fn remove(&mut self, message: u64) -> Option<PendingMessage> {
         let pending = self.pending_messages.remove(&message)?;
-        if let Some(started) = pending
-            .started
-            .as_ref()
-            .filter(|started| started.missing > 0)
+        if let Some(started) = &pending.started
+            && started.missing > 0
         {
             for index in 0..started.next {
                 let sequence = (started.first + index as u64) as u16;
@@ -502,13 +544,13 @@ impl Flow {
         Some(pending)
     }
 
-    /// The messages of one component.
-    pub(super) fn messages_of(&self, source: JausId) -> Vec<u64> {
-        let theirs = |(_, pending): &(&u64, &PendingMessage)| pending.source == source;
-        self.pending_messages
-            .iter()
-            .filter(theirs)
-            .map(|(&message, _)| message)
-            .collect()
+    /// Drops the messages of one component; returns their lengths.
+    pub(super) fn forget_source(&mut self, source: JausId) -> Vec<usize> {
+        let is_theirs = |pending: &PendingMessage| pending.whole.source == source;
+        let all = self.pending_messages.iter();
+        let theirs = all.filter(|(_, pending)| is_theirs(pending));
+        let theirs: Vec<_> = theirs.map(|(&message, _)| message).collect();
+        let removed = theirs.into_iter().filter_map(|it| self.remove(it));
+        removed.map(|it| it.whole.payload.len()).collect()
     }
 }

@@ -15,25 +15,21 @@
 //! 100, as configured) although it has acknowledged them, so a message must not have more. And it
 //! reads ten datagrams per millisecond from a buffer of 70000 octets, which the window finds out by
 //! loss.
-//! datagrams a millisecond from a buffer of 70000 octets, which the window finds out by loss.
 
 mod flow;
-mod pending;
 mod round_trip;
 mod window;
 
 use std::collections::{BTreeSet, HashMap, VecDeque};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tracing::debug;
 
-use super::{
-    Config, Counter, Endpoint, Event, MessageHandle, Outgoing, Path, SendError, Unacknowledged,
-};
+use super::{Config, Counter, Endpoint, Event, MessageHandle, Path, SendError};
 use crate::address::JausId;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, Priority, Version};
-use flow::{Flow, Progress};
-use pending::PendingMessage;
+use flow::{Flow, Outcome};
 
 /// Packets of one flow are sent in runs of this length, so that links can batch them in one call.
 const TURN: usize = 32;
@@ -51,17 +47,8 @@ pub struct FlowStatus {
     pub messages: usize,
 }
 
-/// The outcome of a message that was given up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Undelivered {
-    awaited: bool,
-    reason: Unacknowledged,
-    acknowledged: usize,
-    length: usize,
-}
-
 /// All flows, with their schedule.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Deliveries {
     flows: HashMap<JausId, Flow>,
     /// Flows that may have something to send, by priority; the first is next.
@@ -73,20 +60,14 @@ pub(super) struct Deliveries {
     handed_in: u64,
     messages: usize,
     octets: usize,
-    config: Config,
+    config: Arc<Config>,
 }
 
 impl Deliveries {
-    pub(super) fn new(config: &Config) -> Self {
+    pub(super) fn new(config: Arc<Config>) -> Self {
         Self {
-            flows: HashMap::new(),
-            ready: Default::default(),
-            turn: None,
-            timers: BTreeSet::new(),
-            handed_in: 0,
-            messages: 0,
-            octets: 0,
-            config: config.clone(),
+            config,
+            ..Self::default()
         }
     }
 
@@ -112,21 +93,20 @@ impl Deliveries {
     fn push(
         &mut self,
         now: Instant,
-        destination: JausId,
         handle: MessageHandle,
-        pending: PendingMessage,
+        whole: Frame,
+        awaited: bool,
     ) -> Result<(), SendError> {
+        let destination = whole.destination;
         if !self.flows.contains_key(&destination) && !self.make_room(now) {
             let limit = self.config.max_flows;
             return Err(SendError::TooManyDestinations { limit });
         }
         self.messages += 1;
-        self.octets += pending.payload.len();
-        let flow = self
-            .flows
-            .entry(destination)
-            .or_insert_with(|| Flow::new(now, &self.config));
-        flow.push(now, handle.0, pending);
+        self.octets += whole.payload.len();
+        let flow = self.flows.entry(destination);
+        let flow = flow.or_insert_with(|| Flow::new(now, &self.config));
+        flow.push(now, handle.0, whole, awaited);
         self.touch(destination);
         Ok(())
     }
@@ -137,7 +117,7 @@ impl Deliveries {
             return true;
         }
         let idle = self.flows.iter().filter(|(_, flow)| flow.is_idle());
-        let oldest = idle.min_by_key(|(_, flow)| flow.active().min(now));
+        let oldest = idle.min_by_key(|(_, flow)| flow.active.min(now));
         let Some((&destination, _)) = oldest else {
             return false;
         };
@@ -225,21 +205,22 @@ impl Deliveries {
         self.octets -= length;
     }
 
+    fn next_outcome(&mut self, destination: JausId) -> Option<Outcome> {
+        let outcome = self.flows.get_mut(&destination)?.outcomes.pop_front()?;
+        self.settle(outcome.length);
+        Some(outcome)
+    }
+
     /// Drops the messages of a detached component; returns how many.
     pub(super) fn forget_source(&mut self, source: JausId) -> u64 {
         let before = self.messages;
         let destinations: Vec<_> = self.flows.keys().copied().collect();
         for destination in destinations {
-            let Some(flow) = self.flows.get_mut(&destination) else {
-                continue;
-            };
-            let gone: Vec<_> = flow
-                .messages_of(source)
-                .into_iter()
-                .filter_map(|message| flow.remove(message))
-                .map(|pending| pending.payload.len())
-                .collect();
-            gone.into_iter().for_each(|length| self.settle(length));
+            let flow = self.flows.get_mut(&destination);
+            let gone = flow.map(|flow| flow.forget_source(source));
+            for length in gone.into_iter().flatten() {
+                self.settle(length);
+            }
             self.touch(destination);
         }
         (before - self.messages) as u64
@@ -258,14 +239,13 @@ impl Endpoint {
         &mut self,
         now: Instant,
         handle: MessageHandle,
-        message: &Outgoing,
-        scope: Broadcast,
+        mut whole: Frame,
+        awaited: bool,
     ) -> Result<(), SendError> {
         self.deliveries
-            .check_room(self.news.results(), message.payload.len())?;
-        let pending = PendingMessage::new(now, message, scope);
-        self.deliveries
-            .push(now, message.destination, handle, pending)
+            .check_room(self.news.results(), whole.payload.len())?;
+        whole.flags = whole.flags.with_acknowledgement(Acknowledgement::Request);
+        self.deliveries.push(now, handle, whole, awaited)
     }
 
     /// Sends the next packets of this priority, at most one flow's turn. Returns whether any were
@@ -292,7 +272,8 @@ impl Endpoint {
         let route = self.route(destination);
         let version = route.map_or(Version::As5669a, |(_, version)| version);
         let cutting = self.cutting(destination, version);
-        let connected = route.is_some_and(|(path, _)| self.framing(path.link) == Framing::Jtcp);
+        let connected =
+            route.is_some_and(|(path, _)| self.egress.framing(path.link) == Framing::Jtcp);
         let is_proven = route.is_some_and(|(path, _)| self.is_free(path));
         let much = self.config.unverified_address.burst as usize / 2;
         let flow = self.deliveries.flows.get(&destination)?;
@@ -308,7 +289,6 @@ impl Endpoint {
         flow.connected = connected;
         let begin = |length| (cutting.cut(length), version);
         let (mut frame, tries) = flow.take(now, priority, &mut self.numbers, begin)?;
-        frame.destination = destination;
         if tries > 1 {
             self.counters.add(Counter::Retransmissions);
             self.peers
@@ -339,7 +319,7 @@ impl Endpoint {
     /// Handles a message that was given up: if its destination was silent meanwhile, its route
     /// becomes stale, and further messages go to the group.
     fn lose(&mut self, now: Instant, destination: JausId) {
-        let is_datagram = |path: Path| self.framing(path.link) == Framing::Judp;
+        let is_datagram = |path: Path| self.egress.framing(path.link) == Framing::Judp;
         if let Some(since) = now.checked_sub(self.config.acknowledge_patience)
             && self
                 .route(destination)
@@ -352,76 +332,17 @@ impl Endpoint {
     /// Processes an acknowledgement of one of our messages.
     pub(super) fn receive_answer(&mut self, now: Instant, frame: &Frame) -> Result<(), Counter> {
         let (destination, source) = (frame.source, frame.destination);
-        let flow = self
-            .deliveries
-            .flows
-            .get_mut(&destination)
-            .ok_or(Counter::UnawaitedAcknowledgement)?;
-        flow.known = true;
-        if frame.flags.acknowledgement() == Acknowledgement::Negative {
-            let message = flow
-                .owner_of(source, frame.sequence)
-                .ok_or(Counter::UnawaitedAcknowledgement)?;
-            let refused = flow.give_up(message, Unacknowledged::Refused);
-            self.tell_undelivered(destination, refused);
-        } else {
-            match flow.acknowledge(now, source, frame.sequence) {
-                Progress::Unawaited => return Err(Counter::UnawaitedAcknowledgement),
-                Progress::Part => {}
-                Progress::Whole(message) => self.tell_delivered(destination, message),
-            }
-            let exhausted = self
-                .deliveries
-                .flows
-                .get_mut(&destination)
-                .map(Flow::take_exhausted);
-            self.tell_undelivered(destination, exhausted.into_iter().flatten());
+        let is_refusal = frame.flags.acknowledgement() == Acknowledgement::Negative;
+        let flow = self.deliveries.flows.get_mut(&destination);
+        let is_awaited = flow.is_some_and(|flow| {
+            flow.known = true;
+            flow.handle_answer(now, source, frame.sequence, is_refusal)
+        });
+        if !is_awaited {
+            return Err(Counter::UnawaitedAcknowledgement);
         }
-        self.deliveries.touch(destination);
+        self.report_outcomes(destination);
         Ok(())
-    }
-
-    fn tell_delivered(&mut self, by: JausId, message: u64) {
-        let pending = self
-            .deliveries
-            .flows
-            .get_mut(&by)
-            .and_then(|flow| flow.remove(message));
-        if let Some(pending) = pending {
-            self.deliveries.settle(pending.payload.len());
-            if pending.awaited {
-                let message = MessageHandle(message);
-                self.news.push_result(Event::Acknowledged { message, by });
-            }
-        }
-    }
-
-    fn tell_undelivered(
-        &mut self,
-        destination: JausId,
-        messages: impl IntoIterator<Item = (u64, Undelivered)>,
-    ) {
-        for (message, undelivered) in messages {
-            let Undelivered {
-                awaited,
-                reason,
-                acknowledged,
-                length,
-            } = undelivered;
-            self.deliveries.settle(length);
-            self.counters.add(Counter::MessagesGivenUp);
-            self.peers.note(destination, |peer| peer.lost += 1);
-            if !awaited {
-                continue;
-            }
-            self.news.push_result(Event::NotAcknowledged {
-                message: MessageHandle(message),
-                destination,
-                reason,
-                acknowledged,
-                length,
-            });
-        }
     }
 
     /// Retransmits unacknowledged packets whose timeout has passed, or gives their messages up.
@@ -430,12 +351,39 @@ impl Endpoint {
             let Some(flow) = self.deliveries.flows.get_mut(&destination) else {
                 continue;
             };
-            let given_up = flow.handle_timeout(now);
-            if !given_up.is_empty() {
+            flow.handle_timeout(now);
+            if !flow.outcomes.is_empty() {
                 self.lose(now, destination);
             }
-            self.tell_undelivered(destination, given_up);
-            self.deliveries.touch(destination);
+            self.report_outcomes(destination);
         }
+    }
+
+    /// Reports what became of messages to a destination, and reschedules its flow.
+    fn report_outcomes(&mut self, destination: JausId) {
+        while let Some(outcome) = self.deliveries.next_outcome(destination) {
+            if outcome.given_up.is_some() {
+                self.counters.add(Counter::MessagesGivenUp);
+                self.peers.note(destination, |peer| peer.lost += 1);
+            }
+            if !outcome.awaited {
+                continue;
+            }
+            let message = MessageHandle(outcome.message);
+            self.news.push_result(match outcome.given_up {
+                None => Event::Acknowledged {
+                    message,
+                    by: destination,
+                },
+                Some(reason) => Event::NotAcknowledged {
+                    message,
+                    destination,
+                    reason,
+                    acknowledged: outcome.acknowledged,
+                    length: outcome.length,
+                },
+            });
+        }
+        self.deliveries.touch(destination);
     }
 }

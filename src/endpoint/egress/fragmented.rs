@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use crate::endpoint::large::Cut;
 use crate::endpoint::rate::Bucket;
 use crate::peer::Intake;
-use crate::wire::{Frame, Priority, Version};
+use crate::wire::{Frame, Version};
 
 /// Headers before a datagram and kernel metadata after it.
 const ENVELOPE: usize = 384;
@@ -81,45 +81,20 @@ const fn occupied(datagram: usize) -> u64 {
 #[derive(Clone, Debug)]
 pub(in crate::endpoint) struct FragmentedSend {
     /// The whole message, without data control.
-    whole: Frame,
-    cut: Cut,
+    pub(in crate::endpoint) whole: Frame,
+    pub(in crate::endpoint) cut: Cut,
     /// The serial number of the first fragment.
-    first: u64,
+    pub(in crate::endpoint) first: u64,
     /// The next fragment.
-    next: usize,
+    pub(in crate::endpoint) next: usize,
     /// The pacing of its fragments; `None` sends as fast as the link accepts them.
-    pub(super) pacing: Option<Pacing>,
+    pub(in crate::endpoint) pacing: Option<Pacing>,
 }
 
 impl FragmentedSend {
-    pub(in crate::endpoint) fn new(
-        whole: &Frame,
-        cut: Cut,
-        first: u64,
-        pacing: Option<Pacing>,
-    ) -> Self {
-        Self {
-            whole: whole.clone(),
-            cut,
-            first,
-            next: 0,
-            pacing,
-        }
-    }
-
-    pub(super) fn priority(&self) -> Priority {
-        self.whole.flags.priority()
-    }
-
     /// The next fragment.
     pub(super) fn frame(&self) -> Frame {
-        let (data, payload) = self.cut.fragment(&self.whole.payload, self.next);
-        Frame {
-            flags: self.whole.flags.with_data(data),
-            sequence: (self.first + self.next as u64) as u16,
-            payload,
-            ..self.whole.clone()
-        }
+        self.cut.frame(&self.whole, self.first, self.next)
     }
 
     /// Marks the next fragment as sent; returns whether it was the last.

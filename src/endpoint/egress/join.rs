@@ -26,7 +26,7 @@ impl Fragments<'_> {
     fn note(&mut self, fragment: &Frame) {
         *self.octets -= fragment.payload.len();
         if let Some(echoes) = &mut self.echoes {
-            echoes.insert(self.now, echoes.fingerprint(fragment));
+            echoes.insert_own(self.now, fragment);
         }
     }
 }

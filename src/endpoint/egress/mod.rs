@@ -10,8 +10,10 @@ mod fragmented;
 mod join;
 mod queue;
 
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::hash::RandomState;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
@@ -70,17 +72,15 @@ pub(super) struct Egress {
     buffer: BytesMut,
     /// Messages sent to a group, which may come back.
     echoes: Recent,
-    echo_window: Duration,
     /// How long messages wait to be packed; `None` if they do not.
     patience: Option<Duration>,
     /// The longest datagram to pack messages into; 0 if packing is off.
     longest_packed: usize,
-    queue_limit: usize,
-    max_fragmented: usize,
+    config: Arc<Config>,
 }
 
 impl Egress {
-    pub(super) fn new(config: &Config, keys: RandomState) -> Self {
+    pub(super) fn new(config: Arc<Config>, keys: RandomState) -> Self {
         let (patience, longest_packed) = match config.packing {
             Packing::Off => (None, 0),
             Packing::Within(patience) => (
@@ -96,11 +96,9 @@ impl Egress {
             fragmented: 0,
             buffer: BytesMut::with_capacity(BUFFER),
             echoes: Recent::new(config.max_recent, config.echo_window, keys),
-            echo_window: config.echo_window,
             patience,
             longest_packed,
-            queue_limit: config.queue_limit,
-            max_fragmented: config.max_paced,
+            config,
         }
     }
 
@@ -147,12 +145,12 @@ impl Egress {
 
     /// Whether `count` more datagrams of a priority fit.
     pub(super) fn has_room(&self, priority: Priority, count: usize) -> bool {
-        self.waiting[usize::from(priority.bits())] + count <= self.queue_limit
+        self.waiting[usize::from(priority.bits())] + count <= self.config.queue_limit
     }
 
     /// Whether fragmented messages of that length fit; the first always does.
     pub(super) fn has_room_for_fragments(&self, octets: usize) -> bool {
-        self.fragmented == 0 || self.fragmented + octets <= self.max_fragmented
+        self.fragmented == 0 || self.fragmented + octets <= self.config.max_paced
     }
 
     /// Encodes a frame for a link, with the frame's own header.
@@ -198,19 +196,17 @@ impl Egress {
         frame: &Frame,
         counters: &mut Counters,
     ) -> Result<(), EncodeError> {
-        let mut encoded: Vec<(Framing, Bytes)> = Vec::new();
+        let mut encoded = HashMap::new();
         for &(link, _) in hops {
-            let framing = self.framing(link);
-            if !encoded.iter().any(|(known, _)| *known == framing) {
-                encoded.push((framing, self.encode(link, frame)?));
+            if let Entry::Vacant(entry) = encoded.entry(self.framing(link)) {
+                entry.insert(self.encode(link, frame)?);
             }
         }
         for &hop in hops {
-            let framing = self.framing(hop.0);
-            for (_, octets) in encoded.iter().filter(|(known, _)| *known == framing) {
-                if let Err(reason) = self.push(now, hop, frame.flags, octets.clone()) {
-                    counters.add(reason);
-                }
+            if let Some(octets) = encoded.get(&self.framing(hop.0))
+                && let Err(reason) = self.push(now, hop, frame.flags, octets.clone())
+            {
+                counters.add(reason);
             }
         }
         Ok(())
@@ -235,12 +231,12 @@ impl Egress {
 
     /// Records a message of ours that goes to a group.
     pub(super) fn remember_echo(&mut self, now: Instant, frame: &Frame) {
-        self.echoes.insert(now, self.echoes.fingerprint(frame));
+        self.echoes.insert_own(now, frame);
     }
 
     /// Whether that message was recently sent to a group.
-    pub(super) fn is_echo(&self, now: Instant, seen: &Fingerprint) -> bool {
-        self.echoes.contains(now, seen, self.echo_window)
+    pub(super) fn is_echo(&self, now: Instant, seen: Fingerprint) -> bool {
+        self.echoes.contains(now, seen, self.config.echo_window)
     }
 
     /// The next datagram of a level, with everything packed or batched with it.
@@ -250,9 +246,9 @@ impl Egress {
         level: Level,
         counters: &mut Counters,
     ) -> Option<Transmit> {
-        while let Some(hop) = self.turns.next(level) {
+        while let Some(hop) = self.turns.ready[level.index()].pop_front() {
             let queue = self.queues.get(now, hop);
-            queue.take_turn(level);
+            queue.listed[level.index()] = false;
             let Some(link) = self.links.get(&hop.0) else {
                 continue;
             };
@@ -296,7 +292,10 @@ impl Egress {
 
     /// Releases queues whose hold or pacing time has passed.
     pub(super) fn handle_timeout(&mut self, now: Instant) {
-        while let Some(hop) = self.turns.next_due(now) {
+        while let Some(&(due, hop)) = self.turns.timers.first()
+            && due <= now
+        {
+            self.turns.timers.pop_first();
             let queue = self.queues.get(now, hop);
             queue.handle_timeout(now);
             self.turns.list(hop, queue, self.longest_packed);
@@ -343,17 +342,6 @@ impl Turns {
             self.ready[level.index()].push_back(hop);
         }
         self.timers.extend(queue.deadlines().map(|at| (at, hop)));
-    }
-
-    fn next(&mut self, level: Level) -> Option<Hop> {
-        self.ready[level.index()].pop_front()
-    }
-
-    fn next_due(&mut self, now: Instant) -> Option<Hop> {
-        let due = self.timers.first().is_some_and(|&(at, _)| at <= now);
-        due.then(|| self.timers.pop_first())
-            .flatten()
-            .map(|(_, hop)| hop)
     }
 
     fn forget(&mut self, is_gone: impl Fn(&Hop) -> bool) {

@@ -49,7 +49,7 @@ pub(super) struct HopQueue {
     pub(super) whole: [VecDeque<Bytes>; PRIORITIES],
     fragmented: [VecDeque<FragmentedSend>; PRIORITIES],
     /// By level, whether the queue is in the list of queues with something to send.
-    listed: [bool; Level::COUNT],
+    pub(super) listed: [bool; Level::COUNT],
     /// Until when messages wait to be packed with others.
     held_until: Option<Instant>,
     /// How far its fragments fill the remote receive buffer.
@@ -69,7 +69,7 @@ impl HopQueue {
     }
 
     pub(super) fn push_fragmented(&mut self, message: FragmentedSend) {
-        let level = usize::from(message.priority().bits());
+        let level = usize::from(message.whole.flags.priority().bits());
         self.fragmented[level].push_back(message);
     }
 
@@ -97,11 +97,6 @@ impl HopQueue {
             self.listed[level.index()] |= is_new;
             is_new
         })
-    }
-
-    /// Records that the queue was taken from the list of a level.
-    pub(super) fn take_turn(&mut self, level: Level) {
-        self.listed[level.index()] = false;
     }
 
     /// The next fragment, if there is room for it, its header is the same, and it is not longer

@@ -9,7 +9,8 @@
 //! total, and in time. The oldest runs are dropped first.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::time::Instant;
 
 use bytes::Bytes;
 
@@ -17,6 +18,7 @@ use super::style;
 use crate::address::JausId;
 use crate::endpoint::rate::Origin;
 use crate::endpoint::receive::Arrival;
+use crate::endpoint::share::{Ages, Tally};
 use crate::endpoint::{Config, Counter, Counters};
 use crate::peer::LargeStyle;
 use crate::wire::{Acknowledgement, DataControl, Frame, Priority, Version, ra};
@@ -62,17 +64,11 @@ pub(in crate::endpoint) struct Whole {
     pub(in crate::endpoint) first: (u16, Bytes),
 }
 
-/// The properties that all fragments of a message share.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Kind {
-    version: Version,
-    priority: Priority,
-}
-
 /// A run of fragments with consecutive sequence numbers.
 #[derive(Debug)]
 struct Run {
-    kind: Kind,
+    version: Version,
+    priority: Priority,
     last: u16,
     /// Whether it includes the message's first fragment.
     begins: bool,
@@ -91,6 +87,11 @@ impl Run {
         sequence.wrapping_sub(first) <= self.last.wrapping_sub(first)
     }
 
+    /// Whether a run that follows belongs to the same message.
+    fn is_continued_by(&self, next: &Self) -> bool {
+        !self.ends && !next.begins && (self.version, self.priority) == (next.version, next.priority)
+    }
+
     /// Whether the frame requests an acknowledgement and repeats the first fragment of this run.
     fn is_begun_by(&self, frame: &Frame) -> bool {
         frame.flags.acknowledgement() == Acknowledgement::Request
@@ -100,7 +101,7 @@ impl Run {
 
     /// Joins a run that has both ends; `known` is the sender's style, if known.
     fn join(&self, known: Option<LargeStyle>) -> Whole {
-        let (payload, style) = style::join(self.kind.version, &self.pieces, known);
+        let (payload, style) = style::join(self.version, &self.pieces, known);
         let after_first = (self.pieces.len() as u16).wrapping_sub(1);
         let piece = self.pieces.front().cloned().unwrap_or_default();
         Whole {
@@ -172,12 +173,6 @@ impl Sender {
         }
     }
 
-    fn advance(&mut self, sequence: u16) {
-        let ahead = sequence.wrapping_sub(self.latest).cast_signed();
-        self.latest = sequence;
-        self.position += i64::from(ahead);
-    }
-
     /// The run that begins at this number, or else the nearest one before it.
     fn at_or_before(&self, destination: JausId, sequence: u16) -> Option<Place> {
         let from = (destination, 0);
@@ -206,20 +201,66 @@ impl Sender {
         self.runs.insert(place, run);
     }
 
-    fn oldest(&self) -> Option<(Instant, Place)> {
-        self.ages.first().copied()
+    /// Adds a fragment; returns the run if it is a complete message.
+    fn take_in(
+        &mut self,
+        arrival: Arrival<'_>,
+        max_message: usize,
+        counters: &mut Counters,
+    ) -> Result<Option<Run>, Counter> {
+        let frame = arrival.frame;
+        let (destination, sequence) = (frame.destination, frame.sequence);
+        let data = frame.flags.data();
+        let ahead = sequence.wrapping_sub(self.latest).cast_signed();
+        self.latest = sequence;
+        self.position += i64::from(ahead);
+        if let Some(place) = self.at_or_before(destination, sequence)
+            && let Some(known) = self.runs.get(&place)
+            && known.covers(place.1, sequence)
+        {
+            // Most retransmissions were filtered before, so this is a restarted sender; but a
+            // sender that waits for our acknowledgement may have been silent for long.
+            let begins_anew = data == DataControl::First && !known.is_begun_by(frame);
+            if !begins_anew && !self.is_stale(known) {
+                return Err(Counter::Duplicate);
+            }
+            self.take(place);
+            counters.add(Counter::FragmentsForgotten);
+        }
+        let piece = part_of_message(frame, arrival.held);
+        let run = Run {
+            version: frame.version,
+            priority: frame.flags.priority(),
+            last: sequence,
+            begins: data == DataControl::First,
+            ends: data == DataControl::Last,
+            octets: piece.len(),
+            pieces: VecDeque::from([piece]),
+            updated: arrival.now,
+            position: self.position,
+        };
+        let place = self.insert(destination, sequence, run);
+        let Some(run) = self.runs.get(&place) else {
+            return Ok(None);
+        };
+        if run.octets > max_message {
+            self.take(place);
+            return Err(Counter::MessageTooLong);
+        }
+        Ok(if run.begins && run.ends {
+            self.take(place)
+        } else {
+            None
+        })
     }
-
     /// Inserts a new fragment next to its neighbours; returns the key of the run that holds it.
     fn insert(&mut self, destination: JausId, first: u16, mut run: Run) -> Place {
-        let (mut place, kind) = ((destination, first), run.kind);
+        let mut place = (destination, first);
         let before = self.at_or_before(destination, first.wrapping_sub(1));
         if let Some(before) = before
-            && !run.begins
             && let Some(known) = self.runs.get(&before)
             && known.last.wrapping_add(1) == first
-            && !known.ends
-            && known.kind == kind
+            && known.is_continued_by(&run)
             && !self.is_stale(known)
             && let Some(mut longer) = self.take(before)
         {
@@ -228,9 +269,7 @@ impl Sender {
         }
         let after = (destination, run.last.wrapping_add(1));
         if let Some(known) = self.runs.get(&after)
-            && !run.ends
-            && !known.begins
-            && known.kind == kind
+            && run.is_continued_by(known)
             && !self.is_stale(known)
             && let Some(next) = self.take(after)
         {
@@ -242,44 +281,26 @@ impl Sender {
     }
 }
 
-/// The share of the senders at one network address.
-#[derive(Debug, Default)]
-struct Share {
-    cost: usize,
-    /// When a message that wants an acknowledgement last arrived from there.
-    heard: Option<Instant>,
-    /// As in [`Reassembly::listed`].
-    listed: BTreeSet<(Instant, JausId)>,
-}
-
 /// The reassembly buffer.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(in crate::endpoint) struct Reassembly {
     senders: HashMap<JausId, Sender>,
-    /// The senders by the time since which they are idle, or an earlier one.
-    listed: BTreeSet<(Instant, JausId)>,
+    /// The senders by the time since which they are idle, or an earlier one: those of each network
+    /// address and, under `None`, all.
+    listed: Ages<Option<Origin>>,
     cost: usize,
-    /// The share of each network address, and the addresses ranked by their share.
-    shares: HashMap<Origin, Share>,
-    ranking: BTreeSet<(usize, Origin)>,
-    max_message: usize,
-    max_sender: usize,
-    max_octets: usize,
-    timeout: Duration,
+    /// The cost of each network address.
+    shares: Tally<Origin>,
+    /// When a message that wants an acknowledgement last arrived from an address with senders.
+    heard: HashMap<Origin, Instant>,
+    config: Arc<Config>,
 }
 
 impl Reassembly {
-    pub(in crate::endpoint) fn new(config: &Config) -> Self {
+    pub(in crate::endpoint) fn new(config: Arc<Config>) -> Self {
         Self {
-            senders: HashMap::new(),
-            listed: BTreeSet::new(),
-            cost: 0,
-            shares: HashMap::new(),
-            ranking: BTreeSet::new(),
-            max_message: config.max_message,
-            max_sender: config.max_reassembly_per_sender,
-            max_octets: config.max_reassembly,
-            timeout: config.reassembly_timeout,
+            config,
+            ..Self::default()
         }
     }
 
@@ -288,41 +309,27 @@ impl Reassembly {
     /// are counted.
     pub(in crate::endpoint) fn insert(
         &mut self,
-        Arrival {
-            now, path, held, ..
-        }: Arrival,
-        frame: &Frame,
+        arrival: Arrival<'_>,
         style: Option<LargeStyle>,
         counters: &mut Counters,
     ) -> Result<Option<Whole>, Counter> {
+        let (frame, now, path) = (arrival.frame, arrival.now, arrival.path);
         let source = frame.source;
         if !self.senders.contains_key(&source) {
+            let sender = Sender::new(now, frame.sequence, path.into());
+            self.senders.insert(source, sender);
             self.enlist(path.into(), now, source);
         }
-        let new = || Sender::new(now, frame.sequence, path.into());
-        let sender = self.senders.entry(source).or_insert_with(new);
-        let before = sender.cost;
-        let inserted = sender.take_in(now, frame, held, self.max_message, counters);
-        if inserted.is_ok() {
+        let max_message = self.config.max_message;
+        let inserted = self.change(source, |sender| -> Result<_, Counter> {
+            let whole = sender.take_in(arrival, max_message, counters)?;
             sender.grown = now;
             sender.acknowledged |= frame.flags.acknowledgement() == Acknowledgement::Request;
-        }
-        let (after, runs, origin) = (sender.cost, sender.runs.len(), sender.origin);
-        self.account(origin, before, after);
-        match inserted {
-            Ok(Some(run)) => {
-                self.drop_if_empty(source);
-                Ok(Some(run.join(style)))
-            }
-            Ok(None) => {
-                self.keep_within_bounds(source, runs, counters);
-                Ok(None)
-            }
-            Err(reason) => {
-                self.drop_if_empty(source);
-                Err(reason)
-            }
-        }
+            Ok(whole)
+        });
+        self.keep_within_bounds(source, counters);
+        let whole = inserted.unwrap_or(Ok(None))?;
+        Ok(whole.map(|run| run.join(style)))
     }
 
     /// Records a repeated fragment: its sender is still active.
@@ -336,8 +343,8 @@ impl Reassembly {
 
     /// Records that a message that wants an acknowledgement arrived from that network address.
     pub(in crate::endpoint) fn hear(&mut self, now: Instant, origin: Origin) {
-        if let Some(share) = self.shares.get_mut(&origin) {
-            share.heard = Some(now);
+        if self.listed.oldest(&Some(origin)).is_some() {
+            self.heard.insert(origin, now);
         }
     }
 
@@ -345,10 +352,9 @@ impl Reassembly {
     /// pauses a large message while its node, with any component, has something more urgent for us.
     /// So acknowledged fragments count as active while such messages arrive from that address.
     fn idle_since(&self, sender: &Sender) -> Instant {
-        let share = self.shares.get(&sender.origin);
-        let heard = share.and_then(|share| share.heard);
+        let heard = self.heard.get(&sender.origin);
         let heard = heard.filter(|_| sender.acknowledged);
-        heard.map_or(sender.grown, |heard| heard.max(sender.grown))
+        heard.map_or(sender.grown, |&heard| heard.max(sender.grown))
     }
 
     /// Whether this fragment is the next one of an unfinished message. In that case it is not a
@@ -372,46 +378,52 @@ impl Reassembly {
         source: JausId,
         number: u16,
     ) -> Option<(JausId, Priority, Whole)> {
-        let sender = self.senders.get_mut(&source)?;
+        let sender = self.senders.get(&source)?;
         let from = (number, (JausId::from_u32(0), 0));
         let ending = sender.ends.range(from..).map_while(|&(last, place)| {
             let run = sender.runs.get(&place)?;
             (last == number).then_some((place, run))
         });
         let is_whole = |(_, run): &(Place, &Run)| {
-            run.begins && !run.ends && style::may_lack_the_mark(run.kind.version, &run.pieces)
+            run.begins && !run.ends && style::may_lack_the_mark(run.version, &run.pieces)
         };
         let (place, _) = ending.take(MOST_ENDING).find(is_whole)?;
-        let (before, origin) = (sender.cost, sender.origin);
-        let run = sender.take(place)?;
-        let after = sender.cost;
-        self.account(origin, before, after);
+        let run = self.change(source, |sender| sender.take(place))??;
         self.drop_if_empty(source);
         let whole = run.join(Some(LargeStyle::RepeatedCode));
-        Some((place.0, run.kind.priority, whole))
+        Some((place.0, run.priority, whole))
+    }
+
+    /// Changes a sender, and updates the accounts.
+    fn change<T>(&mut self, source: JausId, change: impl FnOnce(&mut Sender) -> T) -> Option<T> {
+        let sender = self.senders.get_mut(&source)?;
+        let before = sender.cost;
+        let changed = change(sender);
+        let (origin, after) = (sender.origin, sender.cost);
+        self.cost = self.cost + after - before;
+        self.shares
+            .set(origin, self.shares.of(origin) + after - before);
+        Some(changed)
     }
 
     fn drop_if_empty(&mut self, source: JausId) {
-        if let Some(sender) = self.senders.get(&source)
-            && sender.runs.is_empty()
-        {
-            self.strike(sender.origin, sender.listed, source);
-            self.senders.remove(&source);
+        let sender = self.senders.get(&source);
+        if sender.is_some_and(|sender| sender.runs.is_empty()) {
+            self.list(source);
         }
     }
 
     /// Drops the oldest runs, of this sender or of all, until all bounds are met.
-    fn keep_within_bounds(&mut self, source: JausId, runs: usize, counters: &mut Counters) {
-        if runs > MAX_RUNS {
-            self.forget_oldest_of(source, counters);
-        }
+    fn keep_within_bounds(&mut self, source: JausId, counters: &mut Counters) {
+        self.drop_if_empty(source);
         while let Some(sender) = self.senders.get(&source)
-            && sender.cost > self.max_sender
+            && (sender.runs.len() > MAX_RUNS || sender.cost > self.config.max_reassembly_per_sender)
         {
             self.forget_oldest_of(source, counters);
         }
-        while self.cost > self.max_octets
-            && let Some((listed, source)) = self.oldest_of_most()
+        while self.cost > self.config.max_reassembly
+            && let Some((_, origin)) = self.shares.largest()
+            && let Some((listed, source)) = self.listed.oldest(&Some(origin))
         {
             match self.senders.get(&source) {
                 Some(sender) if self.idle_since(sender) > listed => self.list(source),
@@ -420,47 +432,28 @@ impl Reassembly {
         }
     }
 
-    /// The sender idle for longest, of the network address with the largest share.
-    fn oldest_of_most(&self) -> Option<(Instant, JausId)> {
-        let (_, origin) = self.ranking.last()?;
-        self.shares.get(origin)?.listed.first().copied()
-    }
-
-    /// Updates the accounts when the cost of a sender has changed.
-    fn account(&mut self, origin: Origin, before: usize, after: usize) {
-        self.cost = self.cost + after - before;
-        let share = self.shares.entry(origin).or_default();
-        self.ranking.remove(&(share.cost, origin));
-        share.cost = share.cost + after - before;
-        self.ranking.insert((share.cost, origin));
-    }
-
     fn enlist(&mut self, origin: Origin, listed: Instant, source: JausId) {
-        self.listed.insert((listed, source));
-        let share = self.shares.entry(origin).or_default();
-        share.listed.insert((listed, source));
+        for of in [None, Some(origin)] {
+            self.listed.insert(of, listed, source);
+        }
     }
 
-    /// Removes a sender from the lists, and the share of its address if that is empty.
     fn strike(&mut self, origin: Origin, listed: Instant, source: JausId) {
-        self.listed.remove(&(listed, source));
-        if let Some(share) = self.shares.get_mut(&origin) {
-            share.listed.remove(&(listed, source));
-            if share.listed.is_empty() && share.cost == 0 {
-                self.shares.remove(&origin);
-                self.ranking.remove(&(0, origin));
-            }
+        for of in [None, Some(origin)] {
+            self.listed.remove(of, listed, source);
+        }
+        if self.listed.oldest(&Some(origin)).is_none() {
+            self.heard.remove(&origin);
         }
     }
 
     fn forget_oldest_of(&mut self, source: JausId, counters: &mut Counters) {
-        if let Some(sender) = self.senders.get_mut(&source) {
-            let (oldest, before, origin) = (sender.oldest(), sender.cost, sender.origin);
-            if oldest.and_then(|(_, place)| sender.take(place)).is_some() {
-                let after = sender.cost;
-                self.account(origin, before, after);
-                counters.add(Counter::FragmentsForgotten);
-            }
+        let forgotten = self.change(source, |sender| {
+            let &(_, place) = sender.ages.first()?;
+            sender.take(place)
+        });
+        if forgotten.flatten().is_some() {
+            counters.add(Counter::FragmentsForgotten);
         }
         self.list(source);
     }
@@ -486,11 +479,12 @@ impl Reassembly {
     /// Drops the runs of senders that are idle for too long. A single run may rest for longer,
     /// while its sender keeps retransmitting one fragment and the others are acknowledged.
     pub(in crate::endpoint) fn expire(&mut self, now: Instant, counters: &mut Counters) {
-        while let Some(&(listed, source)) = self.listed.first()
-            && listed + self.timeout <= now
+        let timeout = self.config.reassembly_timeout;
+        while let Some((listed, source)) = self.listed.oldest(&None)
+            && listed + timeout <= now
         {
             while let Some(sender) = self.senders.get(&source)
-                && self.idle_since(sender) + self.timeout <= now
+                && self.idle_since(sender) + timeout <= now
             {
                 self.forget_oldest_of(source, counters);
             }
@@ -500,69 +494,13 @@ impl Reassembly {
 
     /// When the next run may expire.
     pub(in crate::endpoint) fn next_expiry(&self) -> Option<Instant> {
-        let &(listed, _) = self.listed.first()?;
-        Some(listed + self.timeout)
+        let (listed, _) = self.listed.oldest(&None)?;
+        Some(listed + self.config.reassembly_timeout)
     }
 
     /// The octets buffered, overhead included.
     pub(in crate::endpoint) const fn cost(&self) -> usize {
         self.cost
-    }
-}
-
-impl Sender {
-    /// Adds a fragment; returns the run if it is a complete message.
-    fn take_in(
-        &mut self,
-        now: Instant,
-        frame: &Frame,
-        held: usize,
-        max_message: usize,
-        counters: &mut Counters,
-    ) -> Result<Option<Run>, Counter> {
-        let (destination, sequence) = (frame.destination, frame.sequence);
-        let data = frame.flags.data();
-        self.advance(sequence);
-        if let Some(place) = self.at_or_before(destination, sequence)
-            && let Some(known) = self.runs.get(&place)
-            && known.covers(place.1, sequence)
-        {
-            // Most retransmissions were filtered before, so this is a restarted sender; but a
-            // sender that waits for our acknowledgement may have been silent for long.
-            let begins_anew = data == DataControl::First && !known.is_begun_by(frame);
-            if !begins_anew && !self.is_stale(known) {
-                return Err(Counter::Duplicate);
-            }
-            self.take(place);
-            counters.add(Counter::FragmentsForgotten);
-        }
-        let piece = part_of_message(frame, held);
-        let run = Run {
-            kind: Kind {
-                version: frame.version,
-                priority: frame.flags.priority(),
-            },
-            last: sequence,
-            begins: data == DataControl::First,
-            ends: data == DataControl::Last,
-            octets: piece.len(),
-            pieces: VecDeque::from([piece]),
-            updated: now,
-            position: self.position,
-        };
-        let place = self.insert(destination, sequence, run);
-        let Some(run) = self.runs.get(&place) else {
-            return Ok(None);
-        };
-        if run.octets > max_message {
-            self.take(place);
-            return Err(Counter::MessageTooLong);
-        }
-        Ok(if run.begins && run.ends {
-            self.take(place)
-        } else {
-            None
-        })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use bytes::{BufMut, Bytes, BytesMut};
 
-use crate::wire::{DataControl, ra};
+use crate::wire::{DataControl, Frame, ra};
 
 /// The most fragments of a message: sequence numbers have 16 bits, and 0 is skipped.
 const MOST: usize = u16::MAX as usize;
@@ -33,7 +33,8 @@ impl Cutting {
 
     /// The longest message that can be cut by these rules.
     pub(in crate::endpoint) fn longest(self) -> usize {
-        Cut::longest(self.limit, self.repeat_code)
+        let repeated = if self.repeat_code { ra::CODE_LEN } else { 0 };
+        self.limit.saturating_sub(repeated).saturating_mul(MOST)
     }
 }
 
@@ -67,12 +68,6 @@ impl Cut {
         }
     }
 
-    /// The longest message that fits payloads of `limit` octets.
-    fn longest(limit: usize, repeat_code: bool) -> usize {
-        let repeated = if repeat_code { ra::CODE_LEN } else { 0 };
-        limit.saturating_sub(repeated).saturating_mul(MOST)
-    }
-
     /// The number of fragments; 1 for a message sent whole.
     pub(in crate::endpoint) fn count(&self) -> usize {
         1 + self
@@ -95,6 +90,17 @@ impl Cut {
     pub(in crate::endpoint) fn fragment_len(&self, index: usize) -> usize {
         let repeated = if index == 0 { 0 } else { self.repeated };
         repeated + self.range(index).len()
+    }
+
+    /// The frame of a fragment of `whole`, if the first has the serial number `first`.
+    pub(in crate::endpoint) fn frame(&self, whole: &Frame, first: u64, index: usize) -> Frame {
+        let (data, payload) = self.fragment(&whole.payload, index);
+        Frame {
+            flags: whole.flags.with_data(data),
+            sequence: (first + index as u64) as u16,
+            payload,
+            ..whole.clone()
+        }
     }
 
     /// The data control and payload of the fragment.

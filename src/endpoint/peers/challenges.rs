@@ -1,15 +1,16 @@
 //! The challenges in progress: their deadlines, their limits and their outcome.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use super::places::Standing;
-use super::{Answer, Challenge, Doubt, Finding, Peers, Probe, RouteState, route};
+use super::{Challenge, Finding, Peers, RouteState, route};
 use crate::address::JausId;
 use crate::endpoint::Path;
 use crate::endpoint::rate::Origin;
+use crate::endpoint::receive::Arrival;
+use crate::endpoint::share::Tally;
 use crate::peer::Recogniser;
-use crate::wire::Frame;
 
 /// The most challenges in progress.
 const MOST: usize = 256;
@@ -27,39 +28,13 @@ const UNANSWERED: Duration = Duration::from_secs(10);
 #[derive(Debug, Default)]
 pub(super) struct Challenges {
     due: BTreeSet<(Instant, JausId)>,
-    shares: HashMap<Origin, usize>,
+    shares: Tally<Origin>,
 }
 
 impl Challenges {
     /// Whether traffic from an address may start one more challenge.
     pub(super) fn has_room(&self, cause: Origin) -> bool {
-        let share = self.shares.get(&cause).copied().unwrap_or_default();
-        self.due.len() < MOST && share < MOST_OF_ADDRESS
-    }
-
-    pub(super) fn begin(&mut self, due: Instant, id: JausId, cause: Origin) {
-        self.due.insert((due, id));
-        *self.shares.entry(cause).or_default() += 1;
-    }
-
-    pub(super) fn postpone(&mut self, id: JausId, from: Instant, to: Instant) {
-        self.due.remove(&(from, id));
-        self.due.insert((to, id));
-    }
-
-    pub(super) fn end(&mut self, due: Instant, id: JausId, cause: Origin) {
-        self.due.remove(&(due, id));
-        if let Some(share) = self.shares.get_mut(&cause) {
-            *share -= 1;
-            if *share == 0 {
-                self.shares.remove(&cause);
-            }
-        }
-    }
-
-    /// The challenge that is due first.
-    pub(super) fn first(&self) -> Option<(Instant, JausId)> {
-        self.due.first().copied()
+        self.due.len() < MOST && self.shares.of(cause) < MOST_OF_ADDRESS
     }
 }
 
@@ -80,64 +55,58 @@ impl Peers {
         state.is_some_and(|state| state.challenge.is_some())
     }
 
-    /// Records a challenge sent with these probes: to the peer's path and, if it has a rival, to
-    /// both.
+    /// Begins a challenge of a peer.
     pub(in crate::endpoint) fn begin_challenge(
         &mut self,
         now: Instant,
         id: JausId,
-        doubt: Doubt,
-        incumbent: Probe,
-        rival: Option<Probe>,
+        challenge: Challenge,
     ) {
         let Some(state) = self.states.get_mut(&id) else {
             return;
         };
         let silence = now.saturating_duration_since(state.heard_on_route);
-        let is_near = |rival: Probe| rival.path.is_near(incumbent.path);
-        let due = now + route::TRY_INTERVAL;
+        let (incumbent, rival) = (challenge.incumbent.path, challenge.rival.map(|it| it.path));
         let challenge = Challenge {
-            doubt,
-            incumbent,
-            rival,
-            was_provisional: rival.is_some_and(|rival| rival.path == state.peer.path),
-            at_once: rival.is_some_and(is_near) || silence >= route::SILENT,
-            rival_answered: doubt.rival_is_stream,
-            incumbent_heard: false,
-            incumbent_answered: false,
-            tries: 1,
-            due,
+            was_provisional: rival == Some(state.peer.path),
+            at_once: rival.is_some_and(|rival| rival.is_near(incumbent))
+                || silence >= route::SILENT,
+            due: now + route::TRY_INTERVAL,
+            ..challenge
         };
-        self.challenges.begin(due, id, challenge.cause());
+        self.challenges.due.insert((challenge.due, id));
+        self.challenges.shares.add(challenge.cause(), 1);
         state.challenge = Some(challenge);
     }
 
-    /// Processes an acknowledgement that no message awaits: the challenge that it belongs to, if
-    /// any, and its effect.
+    /// Processes an acknowledgement that no message awaits. Returns the challenge that it belongs
+    /// to, if any, and its finding, if the acknowledgement decides it.
     pub(in crate::endpoint) fn answer_challenge(
         &mut self,
-        now: Instant,
-        frame: &Frame,
-        from: Path,
-    ) -> Option<(Answer, Challenge)> {
+        arrival: Arrival<'_>,
+    ) -> Option<(Challenge, Option<Finding>)> {
+        let (frame, now, path) = (arrival.frame, arrival.now, arrival.path);
         let state = self.states.get_mut(&frame.source)?;
         let challenge = state.challenge.as_mut()?;
-        let answer = challenge.handle_answer(frame.destination, frame.sequence, from)?;
+        if !challenge.handle_answer(frame.destination, frame.sequence, path) {
+            return None;
+        }
         let challenge = *challenge;
-        if challenge.has_proven_rival(frame.sequence) && !state.also_at.contains(&from) {
+        let incumbent = challenge.incumbent;
+        if path != incumbent.path && !state.also_at.contains(&path) {
             if state.also_at.len() == MOST_WAYS {
                 state.also_at.remove(0);
             }
-            state.also_at.push(from);
+            state.also_at.push(path);
         }
-        let is_at_home = state.peer.path == challenge.incumbent.path;
-        if let Answer::Decides(finding) = answer {
+        let finding = challenge.early_finding();
+        if let Some(finding) = finding {
             self.settle(now, frame.source, finding);
-        } else if challenge.incumbent_answered && is_at_home {
-            self.set_route(frame.source, challenge.incumbent.path, RouteState::Verified);
+        } else if incumbent.answered && state.peer.path == incumbent.path {
+            self.set_route(frame.source, incumbent.path, RouteState::Verified);
         }
         self.raise(frame.source, Standing::Answered);
-        Some((answer, challenge))
+        Some((challenge, finding))
     }
 
     /// The next challenge that is due: the peer, the challenge and its finding; `None` as finding
@@ -146,7 +115,7 @@ impl Peers {
         &mut self,
         now: Instant,
     ) -> Option<(JausId, Challenge, Option<Finding>)> {
-        let (due, id) = self.challenges.first()?;
+        let &(due, id) = self.challenges.due.first()?;
         if due > now {
             return None;
         }
@@ -155,14 +124,17 @@ impl Peers {
         let challenge = *challenge;
         match finding {
             Some(finding) => self.settle(now, id, finding),
-            None => self.challenges.postpone(id, due, challenge.due),
+            None => {
+                self.challenges.due.remove(&(due, id));
+                self.challenges.due.insert((challenge.due, id));
+            }
         }
         Some((id, challenge, finding))
     }
 
     /// When the next challenge is due.
     pub(in crate::endpoint) fn next_deadline(&self) -> Option<Instant> {
-        self.challenges.first().map(|(due, _)| due)
+        self.challenges.due.first().map(|&(due, _)| due)
     }
 
     /// Applies the finding of a challenge.
@@ -182,7 +154,7 @@ impl Peers {
                 (rival.path, RouteState::of(verified))
             }
             (Finding::Stays, _) => (before, RouteState::Verified),
-            _ => (before, RouteState::of(challenge.doubt.was_verified)),
+            _ => (before, RouteState::of(challenge.was_verified)),
         };
         // Programs that run one after the other may share an id. The next move may follow a
         // verified one at once, and an unanswered challenge must not delay a move.
@@ -198,7 +170,8 @@ impl Peers {
 
     pub(super) fn end_challenge(&mut self, id: JausId) -> Option<Challenge> {
         let challenge = self.states.get_mut(&id)?.challenge.take()?;
-        self.challenges.end(challenge.due, id, challenge.cause());
+        self.challenges.due.remove(&(challenge.due, id));
+        self.challenges.shares.subtract(challenge.cause(), 1);
         Some(challenge)
     }
 }

@@ -22,7 +22,7 @@ impl Peers {
 
     fn assigned_or(&self, id: JausId, by: fn(&Recogniser) -> peer::Peer) -> peer::Peer {
         let recognised = || self.states.get(&id).map(|state| by(&state.recogniser));
-        let assigned = Assignment::find(&self.assigned, id);
+        let assigned = Assignment::find(&self.config.profiles, id);
         assigned.or_else(recognised).unwrap_or_default()
     }
 
@@ -33,7 +33,7 @@ impl Peers {
             let state = self.states.get(&id);
             state.is_some_and(|state| state.recogniser.repeats_version())
         };
-        let assigned = Assignment::find(&self.assigned, id);
+        let assigned = Assignment::find(&self.config.profiles, id);
         self.profile(id).is_deaf_on_its_connections() || assigned.is_none() && is_by_habit()
     }
 
@@ -41,7 +41,7 @@ impl Peers {
     /// standard says.
     pub(in crate::endpoint) fn large_style(&self, id: JausId) -> Option<LargeStyle> {
         let style = self.profile(id).large_style();
-        let assigned = || Assignment::find(&self.assigned, id);
+        let assigned = || Assignment::find(&self.config.profiles, id);
         style.or_else(|| assigned().map(|_| LargeStyle::Standard))
     }
 
@@ -58,7 +58,7 @@ impl Peers {
 
     fn trusts_evidence(&self, id: JausId) -> bool {
         let is_verified = |state: &PeerState| state.peer.route == RouteState::Verified;
-        Assignment::find(&self.assigned, id).is_some()
+        Assignment::find(&self.config.profiles, id).is_some()
             || self.states.get(&id).is_some_and(is_verified)
     }
 

@@ -10,35 +10,22 @@ mod route;
 mod state;
 
 use std::collections::HashMap;
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::rate::Origin;
-use super::{Config, LinkId, Path, StaticPeer};
+use super::receive::Arrival;
+use super::share::Tally;
+use super::{Config, Counter, LinkId, Path, StaticPeer};
 use crate::address::JausId;
-use crate::peer::Assignment;
 use crate::wire::{Frame, Version};
 use challenges::Challenges;
-use places::{Places, Standing};
+use places::{Place, Places, Standing};
 pub use route::RouteState;
 use route::has_own_number;
-pub(super) use route::{
-    Answer, CHALLENGE, CHALLENGE_FLAGS, Challenge, Doubt, Finding, Probe, is_challenge,
-};
+pub(super) use route::{CHALLENGE, CHALLENGE_FLAGS, Challenge, Finding, Probe, is_challenge};
 use state::PeerState;
 pub use state::{Peer, Traffic};
-
-/// A received frame and its path, from which the table learns.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sighting<'a> {
-    pub(super) now: Instant,
-    pub(super) path: Path,
-    /// Whether the path is a connection or line, on which both ends have shown that they are
-    /// present.
-    pub(super) is_stream: bool,
-    /// Whether a local component could challenge the sender.
-    pub(super) can_challenge: bool,
-    pub(super) frame: &'a Frame,
-}
 
 /// The result of [`Peers::hear`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,43 +34,36 @@ pub(super) enum Heard {
     Known,
     /// A new peer, for which another may have been evicted.
     New { evicted: Option<JausId> },
-    /// A peer whose route has changed. If `contested`, it may still be on the old path.
-    Moved {
-        from: Path,
-        contested: bool,
+    /// A peer heard on another path than before.
+    Elsewhere {
+        /// Its path so far.
+        incumbent: Path,
         was_verified: bool,
+        /// Whether its route has changed.
+        moved: bool,
+        /// Whether a challenge must show on which of the two paths it is.
+        contested: bool,
     },
-    /// A peer heard on another path; its route changes only if a challenge shows that it has moved.
-    Contested { incumbent: Path, was_verified: bool },
-    /// A peer heard on another path, while a challenge is running or was just decided.
-    Elsewhere,
-    /// A new peer for which there is no room.
-    NoRoom,
 }
 
 /// The table of peers.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Peers {
     states: HashMap<JausId, PeerState>,
     places: Places,
     /// The number of verified peers on each path.
-    proven: HashMap<Path, usize>,
+    proven: Tally<Path>,
     challenges: Challenges,
     configured: Vec<StaticPeer>,
-    assigned: Vec<Assignment>,
-    limit: usize,
+    config: Arc<Config>,
 }
 
 impl Peers {
-    pub(super) fn new(config: &Config) -> Self {
+    pub(super) fn new(config: Arc<Config>) -> Self {
         Self {
-            states: HashMap::new(),
-            places: Places::default(),
-            proven: HashMap::new(),
-            challenges: Challenges::default(),
             configured: config.static_peers.clone(),
-            assigned: config.profiles.clone(),
-            limit: config.max_peers.max(1),
+            config,
+            ..Self::default()
         }
     }
 
@@ -91,8 +71,8 @@ impl Peers {
         self.configured = peers;
     }
 
-    pub(super) fn len(&self) -> usize {
-        self.states.len()
+    fn is_full(&self) -> bool {
+        self.states.len() >= self.config.max_peers.max(1)
     }
 
     pub(super) fn knows(&self, id: JausId) -> bool {
@@ -144,18 +124,26 @@ impl Peers {
 
     /// Whether a peer on a path is verified or configured.
     pub(super) fn is_proven(&self, path: Path) -> bool {
-        self.proven.contains_key(&path) || self.configured.iter().any(|pin| pin.path == path)
+        self.proven.of(path) > 0 || self.configured.iter().any(|pin| pin.path == path)
     }
 
-    /// Records where a message came from, and learns about its sender.
-    pub(super) fn hear(&mut self, seen: Sighting<'_>) -> Heard {
-        let Sighting { now, frame, .. } = seen;
+    /// Records where a message came from, and learns about its sender. `is_stream` says whether the
+    /// path is a connection or line, on which both ends have shown that they are present;
+    /// `can_challenge` whether a local component could challenge the sender.
+    pub(super) fn hear(
+        &mut self,
+        arrival: Arrival<'_>,
+        is_stream: bool,
+        can_challenge: bool,
+    ) -> Result<Heard, Counter> {
+        let Arrival { now, frame, .. } = arrival;
         let pin = self.pin(frame.source);
-        let path = pin.unwrap_or(seen.path);
+        let path = pin.unwrap_or(arrival.path);
         let number = self.counted_on(frame);
-        let can_challenge = seen.can_challenge && self.challenges.has_room(seen.path.into());
+        let can_challenge = can_challenge && self.challenges.has_room(arrival.path.into());
         let Some(state) = self.states.get_mut(&frame.source) else {
-            return self.take_in(seen, path, number, pin.is_some());
+            let route = RouteState::of(is_stream || pin.is_some());
+            return self.take_in(Arrival { path, ..arrival }, route, number);
         };
         let silence = now.saturating_duration_since(state.peer.last_heard);
         state.peer.received.add(frame.payload.len());
@@ -166,44 +154,42 @@ impl Peers {
             if state.peer.route == RouteState::Stale {
                 self.set_route(frame.source, path, RouteState::Unverified);
             }
-            return Heard::Known;
+            return Ok(Heard::Known);
         }
         if let Some(challenge) = &mut state.challenge {
             challenge.incumbent_heard |= challenge.incumbent.path == path;
-            return Heard::Elsewhere;
+            return Ok(Heard::Known);
         }
+        let was_verified = state.peer.route == RouteState::Verified;
+        let elsewhere = |moved, contested| {
+            Ok(Heard::Elsewhere {
+                incumbent: from,
+                was_verified,
+                moved,
+                contested,
+            })
+        };
         if pin.is_some() {
             self.set_route(frame.source, path, RouteState::Verified);
-            return Heard::Moved {
-                from,
-                contested: false,
-                was_verified: true,
-            };
+            return elsewhere(true, false);
         }
         if state.settled_until.is_some_and(|until| now < until) {
-            return Heard::Elsewhere;
+            return Ok(Heard::Known);
         }
         let is_near = from.is_near(path);
-        let was_verified = state.peer.route == RouteState::Verified;
         // A connection shows that a sender is there, not that the id belongs to it.
         let is_free =
             is_near || now.saturating_duration_since(state.heard_on_route) >= route::SILENT;
         let (route, contested) = match state.peer.route {
-            RouteState::Unverified if seen.is_stream && is_free => (RouteState::Verified, false),
+            RouteState::Unverified if is_stream && is_free => (RouteState::Verified, false),
             RouteState::Unverified if is_free || !can_challenge => {
                 (RouteState::Unverified, can_challenge)
             }
-            RouteState::Stale => (RouteState::of(seen.is_stream), false),
-            RouteState::Verified if is_near && seen.is_stream => (RouteState::Verified, false),
-            RouteState::Verified if !can_challenge => return Heard::Elsewhere,
+            RouteState::Stale => (RouteState::of(is_stream), false),
+            RouteState::Verified if is_near && is_stream => (RouteState::Verified, false),
+            RouteState::Verified if !can_challenge => return Ok(Heard::Known),
             RouteState::Verified if is_near => (RouteState::Unverified, true),
-            RouteState::Unverified | RouteState::Verified => {
-                let incumbent = from;
-                return Heard::Contested {
-                    incumbent,
-                    was_verified,
-                };
-            }
+            RouteState::Unverified | RouteState::Verified => return elsewhere(false, true),
         };
         state.peer.version = frame.version;
         if is_near {
@@ -212,36 +198,33 @@ impl Peers {
             state.begin_anew(frame, number);
         }
         self.set_route(frame.source, path, route);
-        Heard::Moved {
-            from,
-            contested,
-            was_verified,
-        }
+        elsewhere(true, contested)
     }
 
+    /// Adds a peer, if there is room.
     fn take_in(
         &mut self,
-        seen: Sighting<'_>,
-        path: Path,
+        arrival: Arrival<'_>,
+        route: RouteState,
         number: Option<u32>,
-        pinned: bool,
-    ) -> Heard {
-        let Sighting { now, frame, .. } = seen;
-        let evicted = if self.states.len() >= self.limit {
-            let Some(evicted) = self.next_to_go(now, path.into()) else {
-                return Heard::NoRoom;
-            };
-            self.forget(evicted);
-            Some(evicted)
-        } else {
-            None
+    ) -> Result<Heard, Counter> {
+        let (id, now, path) = (arrival.frame.source, arrival.now, arrival.path);
+        let mut evicted = None;
+        if self.is_full() {
+            let oldest = self.next_to_go(now, path.into());
+            self.forget(oldest.ok_or(Counter::PeersFull)?);
+            evicted = oldest;
+        }
+        let place = Place {
+            standing: Standing::Heard,
+            origin: path.into(),
+            heard: now,
         };
-        let id = frame.source;
-        let place = self.places.insert(id, path.into(), Standing::Heard, now);
-        let state = PeerState::new(now, path, frame, number, place);
+        self.places.insert(id, place);
+        let state = PeerState::new(arrival, number, place);
         self.states.insert(id, state);
-        self.set_route(id, path, RouteState::of(seen.is_stream || pinned));
-        Heard::New { evicted }
+        self.set_route(id, path, route);
+        Ok(Heard::New { evicted })
     }
 
     /// Changes the path and state of a peer's route.
@@ -249,31 +232,18 @@ impl Peers {
         let Some(state) = self.states.get_mut(&id) else {
             return;
         };
-        let before = (state.peer.path, state.peer.route);
-        (state.peer.path, state.peer.route) = (path, route);
-        let origin = Origin::from(path);
-        if state.place.origin != origin {
-            self.places.remove(id, state.place);
-            let (standing, heard) = (state.place.standing, state.peer.last_heard);
-            state.place = self.places.insert(id, origin, standing, heard);
-        }
-        if before.1 == RouteState::Verified {
-            self.count_proof(before.0, false);
+        if state.peer.route == RouteState::Verified {
+            self.proven.subtract(state.peer.path, 1);
         }
         if route == RouteState::Verified {
-            self.count_proof(path, true);
+            self.proven.add(path, 1);
         }
-    }
-
-    fn count_proof(&mut self, path: Path, more: bool) {
-        let count = self.proven.entry(path).or_default();
-        *count = if more {
-            *count + 1
-        } else {
-            count.saturating_sub(1)
-        };
-        if *count == 0 {
-            self.proven.remove(&path);
+        (state.peer.path, state.peer.route) = (path, route);
+        let Place {
+            standing, origin, ..
+        } = state.place;
+        if origin != Origin::from(path) {
+            self.place_anew(id, standing);
         }
     }
 
@@ -283,9 +253,7 @@ impl Peers {
         self.raise(id, Standing::Answered);
         if let Some(state) = self.states.get(&id)
             && state.peer.path == from
-            && state
-                .challenge
-                .is_none_or(|challenge| challenge.rival.is_none())
+            && !state.has_rival()
             && state.peer.route != RouteState::Verified
         {
             self.set_route(id, from, RouteState::Verified);
@@ -368,29 +336,19 @@ impl Peers {
         if let Some(state) = self.states.remove(&id) {
             self.places.remove(id, state.place);
             if state.peer.route == RouteState::Verified {
-                self.count_proof(state.peer.path, false);
+                self.proven.subtract(state.peer.path, 1);
             }
         }
     }
 
-    pub(super) fn forget_link(&mut self, link: LinkId) {
-        self.forget_where(|path| path.link == link);
-    }
-
-    pub(super) fn forget_path(&mut self, path: Path) {
-        self.forget_where(|known| known == path);
-    }
-
-    fn forget_where(&mut self, gone: impl Fn(Path) -> bool) {
+    /// Forgets the routes on paths that are gone.
+    pub(super) fn forget_paths(&mut self, gone: impl Fn(Path) -> bool) {
         let ids: Vec<_> = self.states.keys().copied().collect();
         for id in ids {
             let Some(state) = self.states.get(&id) else {
                 continue;
             };
-            let challenge = state.challenge.iter();
-            let mut probes = challenge
-                .flat_map(|it| [Some(it.incumbent), it.rival])
-                .flatten();
+            let mut probes = state.challenge.iter().flat_map(Challenge::probes);
             if gone(state.peer.path) {
                 self.forget(id);
             } else if probes.any(|probe| gone(probe.path)) {
@@ -413,10 +371,13 @@ impl Peers {
 
 /// Whether two ids, each possibly with wildcards, overlap.
 fn overlap(one: JausId, other: JausId) -> bool {
-    let subsystem = one.subsystem() == other.subsystem()
-        || [one.subsystem(), other.subsystem()].contains(&JausId::ANY_SUBSYSTEM);
-    let node = one.node() == other.node() || [one.node(), other.node()].contains(&JausId::ANY_NODE);
-    let component = one.component() == other.component()
-        || [one.component(), other.component()].contains(&JausId::ANY_COMPONENT);
-    subsystem && node && component
+    let fits = |a: u16, b: u16, any: u16| a == b || a == any || b == any;
+    let (any_node, any_component) = (JausId::ANY_NODE.into(), JausId::ANY_COMPONENT.into());
+    fits(one.subsystem(), other.subsystem(), JausId::ANY_SUBSYSTEM)
+        && fits(one.node().into(), other.node().into(), any_node)
+        && fits(
+            one.component().into(),
+            other.component().into(),
+            any_component,
+        )
 }

@@ -6,13 +6,13 @@
 //! us stay as long as they are heard from time to time: if none can be evicted, the new peer is
 //! refused. Invented ids can therefore only replace each other.
 
-use std::collections::{BTreeSet, HashMap};
 use std::time::{Duration, Instant};
 
 use super::Peers;
 use crate::address::JausId;
 use crate::endpoint::Path;
 use crate::endpoint::rate::Origin;
+use crate::endpoint::share::{Ages, Tally};
 
 /// Our history with a peer, which determines the eviction order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -40,96 +40,33 @@ impl Standing {
 pub(super) struct Place {
     pub(super) standing: Standing,
     pub(super) origin: Origin,
-    number: u64,
     /// When the peer was last heard before it got this position.
     pub(super) heard: Instant,
 }
 
-/// The eviction order, overall and per network address. It catches up with the times at which peers
-/// were heard only during a search, so that receiving a message costs nothing.
+/// The eviction order. It catches up with the times at which peers were heard only during a search,
+/// so that receiving a message costs nothing.
 #[derive(Debug, Default)]
 pub(super) struct Places {
-    latest: u64,
-    overall: BTreeSet<(Standing, u64, JausId)>,
-    by_origin: BTreeSet<(Origin, Standing, u64, JausId)>,
-    held: HashMap<Origin, usize>,
-    ranking: BTreeSet<(usize, Origin)>,
+    /// Each peer by its network address and, under `None`, among all peers.
+    order: Ages<(Option<Origin>, Standing)>,
+    /// How many peers each network address holds.
+    held: Tally<Origin>,
 }
 
 impl Places {
-    /// Appends a peer to those of its standing.
-    pub(super) fn insert(
-        &mut self,
-        id: JausId,
-        origin: Origin,
-        standing: Standing,
-        heard: Instant,
-    ) -> Place {
-        self.latest += 1;
-        let number = self.latest;
-        self.overall.insert((standing, number, id));
-        self.by_origin.insert((origin, standing, number, id));
-        self.count(origin, |held| held + 1);
-        Place {
-            standing,
-            origin,
-            number,
-            heard,
+    pub(super) fn insert(&mut self, id: JausId, place: Place) {
+        for of in [None, Some(place.origin)] {
+            self.order.insert((of, place.standing), place.heard, id);
         }
+        self.held.add(place.origin, 1);
     }
 
     pub(super) fn remove(&mut self, id: JausId, place: Place) {
-        let Place {
-            standing,
-            origin,
-            number,
-            ..
-        } = place;
-        self.overall.remove(&(standing, number, id));
-        if self.by_origin.remove(&(origin, standing, number, id)) {
-            self.count(origin, |held| held.saturating_sub(1));
+        for of in [None, Some(place.origin)] {
+            self.order.remove((of, place.standing), place.heard, id);
         }
-    }
-
-    fn count(&mut self, origin: Origin, change: impl Fn(usize) -> usize) {
-        let before = self.held(origin);
-        self.ranking.remove(&(before, origin));
-        match change(before) {
-            0 => {
-                self.held.remove(&origin);
-            }
-            held => {
-                self.held.insert(origin, held);
-                self.ranking.insert((held, origin));
-            }
-        }
-    }
-
-    /// How many peers a network address holds.
-    pub(super) fn held(&self, origin: Origin) -> usize {
-        self.held.get(&origin).copied().unwrap_or(0)
-    }
-
-    /// The network address that holds the most peers, and how many.
-    pub(super) fn most(&self) -> Option<(usize, Origin)> {
-        self.ranking.last().copied()
-    }
-
-    /// The first peer of a standing, of one network address or overall.
-    pub(super) fn first(&self, standing: Standing, of: Option<Origin>) -> Option<JausId> {
-        match of {
-            Some(origin) => {
-                let from = (origin, standing, 0, JausId::from_u32(0));
-                let next = self.by_origin.range(from..).next();
-                let next = next.filter(|(at, is, ..)| (*at, *is) == (origin, standing));
-                next.map(|&(.., id)| id)
-            }
-            None => {
-                let from = (standing, 0, JausId::from_u32(0));
-                let next = self.overall.range(from..).next();
-                next.filter(|(is, ..)| *is == standing).map(|&(.., id)| id)
-            }
-        }
+        self.held.subtract(place.origin, 1);
     }
 }
 
@@ -141,17 +78,16 @@ impl Peers {
         id: JausId,
         from: Path,
     ) -> bool {
-        self.knows(id)
-            || self.states.len() < self.limit
-            || self.next_to_go(now, from.into()).is_some()
+        self.knows(id) || !self.is_full() || self.next_to_go(now, from.into()).is_some()
     }
 
     /// The peer to evict for a new one from a network address. An address that holds a quarter of
     /// the table gets no more of it, and makes room for addresses that hold less.
     pub(super) fn next_to_go(&mut self, now: Instant, newcomer: Origin) -> Option<JausId> {
-        let (most, holder) = self.places.most()?;
-        let own = self.places.held(newcomer);
-        let (is_excessive, own_is) = (most * 4 > self.limit, own * 4 > self.limit);
+        let limit = self.config.max_peers;
+        let (most, holder) = self.places.held.largest()?;
+        let own = self.places.held.of(newcomer);
+        let (is_excessive, own_is) = (most * 4 > limit, own * 4 > limit);
         if most > own + 1 {
             let found = Standing::ALL.into_iter().find_map(|standing| {
                 let silence = if is_excessive {
@@ -182,10 +118,8 @@ impl Peers {
         silence: Duration,
     ) -> Option<JausId> {
         loop {
-            let id = self.places.first(standing, of)?;
-            let state = self.states.get(&id)?;
-            let heard = state.peer.last_heard;
-            if heard > state.place.heard {
+            let (heard, id) = self.places.order.oldest(&(of, standing))?;
+            if self.states.get(&id)?.peer.last_heard > heard {
                 self.place_anew(id, standing);
                 continue;
             }
@@ -193,11 +127,16 @@ impl Peers {
         }
     }
 
-    fn place_anew(&mut self, id: JausId, standing: Standing) {
+    /// Updates a peer's position.
+    pub(super) fn place_anew(&mut self, id: JausId, standing: Standing) {
         if let Some(state) = self.states.get_mut(&id) {
             self.places.remove(id, state.place);
-            let (origin, heard) = (state.place.origin, state.peer.last_heard);
-            state.place = self.places.insert(id, origin, standing, heard);
+            state.place = Place {
+                standing,
+                origin: state.peer.path.into(),
+                heard: state.peer.last_heard,
+            };
+            self.places.insert(id, state.place);
         }
     }
 

@@ -5,6 +5,7 @@
 //! two paths, both are challenged, with a query that requests an acknowledgement and has an
 //! unpredictable sequence number, which no other host can acknowledge.
 
+use std::iter;
 use std::time::{Duration, Instant};
 
 use crate::address::JausId;
@@ -40,39 +41,31 @@ pub enum RouteState {
     Stale,
 }
 
-/// A query on one path, and the number that its acknowledgement must have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A query on one path.
+#[derive(Clone, Copy, Debug)]
 pub(in crate::endpoint) struct Probe {
     pub(in crate::endpoint) path: Path,
+    /// The number that its acknowledgement must have.
     pub(in crate::endpoint) number: u16,
-}
-
-/// Why a peer is challenged, and by which component.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::endpoint) struct Doubt {
-    /// The local component that sends the challenge.
-    pub(in crate::endpoint) local: JausId,
-    /// The peer's known path.
-    pub(in crate::endpoint) incumbent: Path,
-    pub(in crate::endpoint) was_verified: bool,
-    /// The other path on which its id is heard; `None` if the only path is to be verified.
-    pub(in crate::endpoint) rival: Option<Path>,
-    pub(in crate::endpoint) rival_is_stream: bool,
+    /// Whether the peer has shown that it is there.
+    pub(in crate::endpoint) answered: bool,
 }
 
 /// A challenge in progress.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::endpoint) struct Challenge {
-    pub(in crate::endpoint) doubt: Doubt,
+    /// The local component that sends it.
+    pub(in crate::endpoint) local: JausId,
+    /// On the peer's known path.
     pub(in crate::endpoint) incumbent: Probe,
+    pub(super) was_verified: bool,
+    /// On the other path where its id is heard; `None` if the only path is to be verified.
     pub(in crate::endpoint) rival: Option<Probe>,
     /// Whether messages go to the rival in the meantime.
     pub(in crate::endpoint) was_provisional: bool,
     /// Whether an answer from the rival decides without waiting for the incumbent.
     pub(super) at_once: bool,
-    pub(super) rival_answered: bool,
     pub(super) incumbent_heard: bool,
-    pub(super) incumbent_answered: bool,
     pub(super) tries: u32,
     pub(super) due: Instant,
 }
@@ -89,44 +82,62 @@ pub(in crate::endpoint) enum Finding {
 }
 
 impl Challenge {
+    /// A challenge of a peer whose route on the incumbent's path `was_verified`.
+    pub(in crate::endpoint) const fn new(
+        now: Instant,
+        local: JausId,
+        incumbent: Probe,
+        was_verified: bool,
+        rival: Option<Probe>,
+    ) -> Self {
+        Self {
+            local,
+            incumbent,
+            was_verified,
+            rival,
+            was_provisional: false,
+            at_once: false,
+            incumbent_heard: false,
+            tries: 1,
+            due: now,
+        }
+    }
+
     /// The network address that caused it.
     pub(super) fn cause(&self) -> Origin {
         self.rival.unwrap_or(self.incumbent).path.into()
     }
 
-    /// Processes an acknowledgement with this number that arrived on `path`. `None` if the
-    /// challenge does not await it.
-    pub(super) fn handle_answer(
-        &mut self,
-        local: JausId,
-        number: u16,
-        path: Path,
-    ) -> Option<Answer> {
-        let probe = Probe { path, number };
-        if local != self.doubt.local {
-            return None;
-        }
-        if probe == self.incumbent {
-            self.incumbent_answered = true;
-        } else if Some(probe) == self.rival {
-            self.rival_answered = true;
-        } else {
-            return None;
-        }
-        // If nothing is at stake, both have time to answer: a peer may be reachable on two paths.
-        Some(match (self.incumbent_answered, self.rival_answered) {
-            (true, true) => Answer::Decides(Finding::Stays),
-            (true, false) if self.at_once || self.rival.is_none() => {
-                Answer::Decides(Finding::Stays)
-            }
-            (false, true) if self.at_once => Answer::Decides(Finding::Moves { verified: true }),
-            _ => Answer::Counts,
-        })
+    /// The queries: one or two.
+    pub(in crate::endpoint) fn probes(&self) -> impl Iterator<Item = Probe> + use<> {
+        [Some(self.incumbent), self.rival].into_iter().flatten()
     }
 
-    /// Whether an answer with that number is the rival's.
-    pub(super) fn has_proven_rival(&self, number: u16) -> bool {
-        self.rival.is_some_and(|rival| rival.number == number)
+    /// Processes an acknowledgement with this number that arrived on `path`. Returns whether the
+    /// challenge awaits it.
+    pub(super) fn handle_answer(&mut self, local: JausId, number: u16, path: Path) -> bool {
+        let mut probes = iter::once(&mut self.incumbent).chain(&mut self.rival);
+        let probe = probes.find(|probe| (probe.path, probe.number) == (path, number));
+        let Some(probe) = probe.filter(|_| local == self.local) else {
+            return false;
+        };
+        probe.answered = true;
+        true
+    }
+
+    fn rival_answered(&self) -> bool {
+        self.rival.is_some_and(|rival| rival.answered)
+    }
+
+    /// The finding after an answer, unless the other path still has time to answer.
+    pub(super) fn early_finding(&self) -> Option<Finding> {
+        // If nothing is at stake, both have time to answer: a peer may be reachable on two paths.
+        match (self.incumbent.answered, self.rival_answered()) {
+            (true, true) => Some(Finding::Stays),
+            (true, false) if self.at_once || self.rival.is_none() => Some(Finding::Stays),
+            (false, true) if self.at_once => Some(Finding::Moves { verified: true }),
+            _ => None,
+        }
     }
 
     /// Handles the end of a try: `None` if the challenge must be sent again.
@@ -137,21 +148,13 @@ impl Challenge {
             return None;
         }
         Some(match self.rival {
-            _ if self.incumbent_answered => Finding::Stays,
+            _ if self.incumbent.answered => Finding::Stays,
             Some(_) if self.incumbent_heard => Finding::Unanswered,
-            Some(_) if self.rival_answered => Finding::Moves { verified: true },
-            Some(_) if !self.doubt.was_verified => Finding::Moves { verified: false },
+            Some(rival) if rival.answered => Finding::Moves { verified: true },
+            Some(_) if !self.was_verified => Finding::Moves { verified: false },
             _ => Finding::Unanswered,
         })
     }
-}
-
-/// The effect of an acknowledgement on a challenge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::endpoint) enum Answer {
-    /// It was awaited, but the other path still has time to answer.
-    Counts,
-    Decides(Finding),
 }
 
 /// Whether a message is a challenge, which is not delivered to the component that it is addressed

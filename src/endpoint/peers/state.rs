@@ -6,6 +6,7 @@ use super::places::Place;
 use super::{Challenge, RouteState};
 use crate::address::JausId;
 use crate::endpoint::Path;
+use crate::endpoint::receive::Arrival;
 use crate::peer::{self, Recogniser};
 use crate::wire::{Frame, Version};
 
@@ -98,13 +99,8 @@ pub(super) struct PeerState {
 }
 
 impl PeerState {
-    pub(super) fn new(
-        now: Instant,
-        path: Path,
-        frame: &Frame,
-        number: Option<u32>,
-        place: Place,
-    ) -> Self {
+    pub(super) fn new(arrival: Arrival<'_>, number: Option<u32>, place: Place) -> Self {
+        let (frame, now, path) = (arrival.frame, arrival.now, arrival.path);
         let mut received = Traffic::default();
         received.add(frame.payload.len());
         let mut recogniser = Recogniser::new();
@@ -154,12 +150,14 @@ impl PeerState {
             self.latest = number;
         }
         // A frame that may not be the peer's teaches nothing about it.
-        if self
-            .challenge
-            .is_none_or(|challenge| challenge.rival.is_none())
-        {
+        if !self.has_rival() {
             self.recogniser.handle_frame(frame, 0);
         }
+    }
+
+    /// Whether its id is also heard on another path, and a challenge decides between the two.
+    pub(super) fn has_rival(&self) -> bool {
+        self.challenge.is_some_and(|it| it.rival.is_some())
     }
 
     /// Resets the evidence of a restarted or moved peer.
