@@ -224,19 +224,17 @@ impl Record {
     /// # Errors
     /// [`RecordError::Malformed`] if its kind is unknown or its fields are invalid.
     pub fn decode(mut octets: Bytes) -> Result<Self, RecordError> {
-        let (head, payload) = Head::split_off(&octets)?;
-        octets.advance(octets.len() - payload.len());
+        let mut rest = &octets[..];
+        let head = Head::decode(&mut rest).ok_or_else(|| RecordError::Malformed {
+            kind: octets.first().copied().unwrap_or(0),
+            length: octets.len(),
+        })?;
+        let head_length = octets.len() - rest.len();
+        octets.advance(head_length);
         Ok(Self {
             head,
             payload: octets,
         })
-    }
-
-    /// Like [`decode`](Self::decode), with a copy of the payload.
-    pub(super) fn copy(octets: &[u8]) -> Result<Self, RecordError> {
-        let (head, payload) = Head::split_off(octets)?;
-        let payload = Bytes::copy_from_slice(payload);
-        Ok(Self { head, payload })
     }
 }
 
@@ -293,16 +291,6 @@ impl Head {
                 outcome.encode(out);
             }
         }
-    }
-
-    /// Splits a record into head and payload.
-    fn split_off(octets: &[u8]) -> Result<(Self, &[u8]), RecordError> {
-        let mut rest = octets;
-        let head = Self::decode(&mut rest).ok_or_else(|| RecordError::Malformed {
-            kind: octets.first().copied().unwrap_or(0),
-            length: octets.len(),
-        })?;
-        Ok((head, rest))
     }
 
     fn decode(octets: &mut &[u8]) -> Option<Self> {
