@@ -38,6 +38,8 @@ pub mod local;
 #[cfg(feature = "serial")]
 pub mod serial;
 mod slab;
+#[cfg(unix)]
+mod socket_file;
 mod socket_table;
 pub mod tcp;
 pub mod udp;
