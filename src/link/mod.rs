@@ -35,6 +35,7 @@ pub mod interface;
 #[cfg(unix)]
 pub mod junior;
 pub mod local;
+mod redial;
 #[cfg(feature = "serial")]
 pub mod serial;
 mod slab;

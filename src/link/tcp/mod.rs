@@ -41,7 +41,6 @@ use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use socket2::{Domain, Protocol, Socket, Type};
 use tokio::net::{TcpListener, TcpStream};
 
 pub use connection::Closed;
@@ -155,6 +154,7 @@ impl TcpLink {
     /// # Errors
     /// [`Error::ListenerTaken`], [`Error::Permission`], [`Error::AddressGone`] or [`Error::Io`].
     pub fn open(settings: &Settings) -> Result<Self, Error> {
+        let listen = |address| listen(address).map_err(|error| listen_error(address, error));
         let listener = settings.listen.map(listen).transpose()?;
         let local = listener.as_ref().and_then(|l| l.local_addr().ok());
         let mut dials: Vec<Dial> = Vec::new();
@@ -214,7 +214,7 @@ impl TcpLink {
     /// When to call [`receive`](Self::receive) even if nothing arrives.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let dials = self.dials.iter().filter_map(Dial::deadline);
+        let dials = self.dials.iter().filter_map(|dial| dial.redial.deadline());
         let stuck = self.connections.values().filter_map(Connection::stuck_at);
         dials.chain(stuck).chain(self.accept_after).min()
     }
@@ -250,7 +250,7 @@ impl TcpLink {
         for connection in self.connections.values_mut() {
             self.counters.count(connection.send(priority, payload));
         }
-        for dial in self.dials.iter_mut().filter(|dial| !dial.is_connected()) {
+        for dial in self.dials.iter_mut().filter(|dial| !dial.redial.is_up()) {
             self.counters.count_kept(dial.keep(priority, payload));
         }
         self.bound_waiting();
@@ -354,7 +354,7 @@ impl TcpLink {
         self.counters.send_overflows += connection.overflows;
         let dialed = connection.dialed;
         if dialed && let Some(dial) = self.dial(remote) {
-            dial.lost(now, connection.received > 0);
+            dial.redial.lost(now, connection.received > 0);
         }
         dialed
     }
@@ -476,7 +476,7 @@ impl TcpLink {
             Err(error) => {
                 tracing::warn!(%remote, %error, "a connection cannot be set up");
                 if dialed && let Some(dial) = self.dial(remote) {
-                    dial.lost(now, false);
+                    dial.redial.lost(now, false);
                 }
             }
         }
@@ -511,33 +511,16 @@ fn is_of_the_peer(error: &io::Error) -> bool {
     )
 }
 
-fn listen(address: SocketAddr) -> Result<TcpListener, Error> {
-    let open = || {
-        let socket = Socket::new(
-            Domain::for_address(address),
-            Type::STREAM,
-            Some(Protocol::TCP),
-        )?;
-        // A restarted node finds connections of its predecessor in TIME_WAIT. (On Windows this
-        // option would allow sharing the port.)
-        #[cfg(not(windows))]
-        socket.set_reuse_address(true)?;
-        socket.bind(&address.into())?;
-        socket.listen(128)?;
-        socket.set_nonblocking(true)?;
-        TcpListener::from_std(socket.into())
-    };
-    open().map_err(|source: io::Error| match source.kind() {
+/// Listens at an address. On Unix, connections of a predecessor in TIME_WAIT are no obstacle.
+pub(in crate::link) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
+    let listener = std::net::TcpListener::bind(address)?;
+    listener.set_nonblocking(true)?;
+    TcpListener::from_std(listener)
+}
+
+fn listen_error(address: SocketAddr, source: io::Error) -> Error {
+    match source.kind() {
         io::ErrorKind::AddrInUse => Error::ListenerTaken { address },
-        io::ErrorKind::AddrNotAvailable => Error::AddressGone(address.ip()),
-        io::ErrorKind::PermissionDenied => Error::Permission {
-            doing: format!("listening on TCP {address}"),
-            port: address.port(),
-            source,
-        },
-        _ => Error::Io {
-            doing: format!("listening on TCP {address}"),
-            source,
-        },
-    })
+        _ => Error::socket(format!("listening on TCP {address}"), address, source),
+    }
 }
