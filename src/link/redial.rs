@@ -3,6 +3,7 @@
 use std::fmt;
 use std::hash::{BuildHasher, RandomState};
 use std::io;
+use std::ops::RangeInclusive;
 use std::pin::Pin;
 use std::task::{Context, Poll, ready};
 use std::time::{Duration, Instant};
@@ -10,22 +11,15 @@ use std::time::{Duration, Instant};
 /// An attempt to open a connection or device.
 pub(super) type Attempt<T> = Pin<Box<dyn Future<Output = io::Result<T>> + Send>>;
 
-/// The times of attempts.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Pace {
-    /// The timeout of an attempt; [`Duration::MAX`] for none.
-    pub(super) timeout: Duration,
-    /// The pause after the first failure. It doubles with each further one.
-    pub(super) first: Duration,
-    /// The longest pause. Each is changed by ± 25 % at random, so that many nodes do not return to
-    /// a restarted peer at the same time.
-    pub(super) longest: Duration,
-}
-
 /// When to open one connection or device, and the attempt to do so.
 #[derive(Debug)]
 pub(super) struct Redial<T> {
-    pace: Pace,
+    /// The timeout of an attempt; [`Duration::MAX`] for none.
+    timeout: Duration,
+    /// The pause after the first failure, which doubles with each further one, to the longest. Each
+    /// is changed by ± 25 % at random, so that many nodes do not return to a restarted peer at the
+    /// same time.
+    pauses: RangeInclusive<Duration>,
     state: State<T>,
     failures: u32,
 }
@@ -53,20 +47,20 @@ impl<T> fmt::Debug for State<T> {
 
 impl<T> Redial<T> {
     /// Of what is still to be opened.
-    pub(super) const fn new(pace: Pace) -> Self {
+    pub(super) const fn new(timeout: Duration, pauses: RangeInclusive<Duration>) -> Self {
         Self {
-            pace,
+            timeout,
+            pauses,
             state: State::Pausing(None),
             failures: 0,
         }
     }
 
     /// Of what is open.
-    pub(super) const fn up(pace: Pace) -> Self {
+    pub(super) fn up(timeout: Duration, pauses: RangeInclusive<Duration>) -> Self {
         Self {
-            pace,
             state: State::Up,
-            failures: 0,
+            ..Self::new(timeout, pauses)
         }
     }
 
@@ -99,7 +93,7 @@ impl<T> Redial<T> {
         {
             self.state = State::Attempting {
                 attempt: attempt(),
-                until: now.checked_add(self.pace.timeout),
+                until: now.checked_add(self.timeout),
             };
         }
         let State::Attempting { attempt, until } = &mut self.state else {
@@ -133,9 +127,12 @@ impl<T> Redial<T> {
     }
 
     fn next_pause(&self, chance: u64) -> Duration {
-        let doubled = self.pace.first.saturating_mul(1 << self.failures.min(16));
+        let doubled = self
+            .pauses
+            .start()
+            .saturating_mul(1 << self.failures.min(16));
         let permille = 750 + (chance % 501) as u32;
-        doubled.min(self.pace.longest) * permille / 1000
+        doubled.min(*self.pauses.end()) * permille / 1000
     }
 }
 
@@ -145,23 +142,19 @@ mod tests {
 
     #[test]
     fn pauses_grow_to_a_bound_and_differ() {
-        let pace = Pace {
-            timeout: Duration::MAX,
-            first: Duration::from_millis(250),
-            longest: Duration::from_secs(15),
-        };
+        let (first, longest) = (Duration::from_millis(250), Duration::from_secs(15));
         let pause = |failures, chance| {
             let redial = Redial::<()> {
                 failures,
-                ..Redial::new(pace)
+                ..Redial::new(Duration::MAX, first..=longest)
             };
             redial.next_pause(chance)
         };
-        assert_eq!(pause(0, 0), pace.first * 3 / 4);
-        assert_eq!(pause(0, 500), pace.first * 5 / 4);
-        assert_eq!(pause(3, 0), pace.first * 6);
+        assert_eq!(pause(0, 0), first * 3 / 4);
+        assert_eq!(pause(0, 500), first * 5 / 4);
+        assert_eq!(pause(3, 0), first * 6);
         for failures in [10, 100, u32::MAX] {
-            assert_eq!(pause(failures, 500), pace.longest * 5 / 4);
+            assert_eq!(pause(failures, 500), longest * 5 / 4);
         }
     }
 }

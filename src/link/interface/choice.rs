@@ -95,31 +95,27 @@ impl Interfaces {
     /// The selected ones of the available interfaces that are up. May be empty.
     #[must_use]
     pub fn present(&self, available: &[Interface], ip: Ip) -> Vec<Interface> {
-        let mut chosen: Vec<Interface> = Vec::new();
+        let up = available.iter().filter(|i| i.up);
         match self {
             Self::All => {
-                let up: Vec<_> = available.iter().filter(|i| i.up).collect();
-                chosen.extend(usual(up.into_iter().filter(|i| !i.is_loopback()), ip));
+                let chosen = usual(up.filter(|i| !i.is_loopback()), ip);
                 if chosen.is_empty() {
                     return Self::Loopback.present(available, ip);
                 }
+                chosen
             }
-            Self::Loopback => {
-                let loopback = available.iter().filter(|i| i.up && i.is_loopback());
-                chosen.extend(usual(loopback, ip));
-            }
+            Self::Loopback => usual(up.filter(|i| i.is_loopback()), ip),
             Self::Only(wanted) => {
-                let found = wanted
-                    .iter()
-                    .filter_map(|name| named(name, available, ip).ok());
+                let mut chosen: Vec<Interface> = Vec::new();
+                let found = wanted.iter().flat_map(|name| named(name, available, ip));
                 for interface in found.flatten() {
                     if !chosen.iter().any(|c| c.at(0) == interface.at(0)) {
                         chosen.push(interface);
                     }
                 }
+                chosen
             }
         }
-        chosen
     }
 }
 

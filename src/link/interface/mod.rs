@@ -100,14 +100,11 @@ pub struct Available(pub Vec<Interface>);
 
 impl fmt::Display for Available {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.is_empty() {
-            return f.write_str("none with an address");
+        let all: Vec<_> = self.0.iter().map(ToString::to_string).collect();
+        match all.as_slice() {
+            [] => f.write_str("none with an address"),
+            all => f.write_str(&all.join(", ")),
         }
-        for (i, interface) in self.0.iter().enumerate() {
-            let comma = if i == 0 { "" } else { ", " };
-            write!(f, "{comma}{interface}")?;
-        }
-        Ok(())
     }
 }
 

@@ -27,7 +27,7 @@ pub use error::SerialError;
 pub use settings::{FlowControl, Parity, Settings};
 
 use super::backlog::{Backlog, Bounds};
-use super::redial::{Pace, Redial};
+use super::redial::Redial;
 use crate::endpoint::Transmit;
 use crate::wire::Frame;
 use crate::wire::jserial::{self, Decoder};
@@ -36,13 +36,6 @@ use crate::wire::jserial::{self, Decoder};
 pub const FIRST_PAUSE: Duration = Duration::from_millis(250);
 /// The longest pause between attempts to reopen a port.
 pub const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-
-const PACE: Pace = Pace {
-    // A driver may take its time.
-    timeout: Duration::MAX,
-    first: FIRST_PAUSE,
-    longest: LONGEST_PAUSE,
-};
 
 /// Limits of the queue to the line. The octets leave room for one message of the default maximum
 /// length.
@@ -111,7 +104,8 @@ impl SerialLink {
         Ok(Self {
             settings: settings.clone(),
             port: Some(port),
-            redial: Redial::up(PACE),
+            // A driver may take its time.
+            redial: Redial::up(Duration::MAX, FIRST_PAUSE..=LONGEST_PAUSE),
             decoder: Decoder::new(),
             outbox: Backlog::new(OUTBOX),
             leaving: Bytes::new(),

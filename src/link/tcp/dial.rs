@@ -10,14 +10,8 @@ use tokio::net::TcpStream;
 
 use super::settings::{BACKLOG, CONNECT_TIMEOUT, FIRST_PAUSE, LONGEST_PAUSE};
 use crate::link::backlog::Backlog;
-use crate::link::redial::{Pace, Redial};
+use crate::link::redial::Redial;
 use crate::wire::Priority;
-
-const PACE: Pace = Pace {
-    timeout: CONNECT_TIMEOUT,
-    first: FIRST_PAUSE,
-    longest: LONGEST_PAUSE,
-};
 
 /// A peer to connect to.
 #[derive(Debug)]
@@ -32,7 +26,7 @@ impl Dial {
     pub(super) fn new(address: SocketAddr) -> Self {
         Self {
             address,
-            redial: Redial::new(PACE),
+            redial: Redial::new(CONNECT_TIMEOUT, FIRST_PAUSE..=LONGEST_PAUSE),
             waiting: Backlog::new(BACKLOG),
         }
     }

@@ -47,9 +47,9 @@ pub use connection::Closed;
 pub use settings::{CONNECT_TIMEOUT, FIRST_PAUSE, HANDSHAKE, LONGEST_PAUSE, STUCK, Settings};
 
 use super::Error;
-use crate::endpoint::{Access, Remote, To, Transmit};
+use crate::endpoint::{Remote, To, Transmit};
 use crate::wire::{Frame, Priority};
-use admission::{Admission, Place, Quota};
+use admission::{Admission, Place};
 use connection::Connection;
 use dial::Dial;
 use settings::MAX_WAITING;
@@ -137,8 +137,7 @@ pub enum Arrival {
 pub struct TcpLink {
     listener: Option<TcpListener>,
     local: Option<SocketAddr>,
-    quota: Quota,
-    access: Access,
+    settings: Settings,
     /// When the last warning about scarce places was logged.
     warned: Option<Instant>,
     accept_after: Option<Instant>,
@@ -167,11 +166,7 @@ impl TcpLink {
         Ok(Self {
             listener,
             local,
-            quota: Quota {
-                total: settings.max_accepted,
-                per_address: settings.max_per_address,
-            },
-            access: settings.access.clone(),
+            settings: settings.clone(),
             warned: None,
             accept_after: None,
             dials,
@@ -206,7 +201,7 @@ impl TcpLink {
                 local: connection.local,
                 dialed: connection.dialed,
                 received: connection.received,
-                waiting: connection.waiting(),
+                waiting: connection.backlog.len(),
                 overflows: connection.overflows,
             })
     }
@@ -234,7 +229,7 @@ impl TcpLink {
         let (priority, payload) = (transmit.priority, &transmit.payload);
         if let Some(connection) = self.connections.get_mut(&peer) {
             self.counters.count(connection.send(priority, payload));
-            if connection.waiting_octets() > SMALL {
+            if connection.backlog.octets() > SMALL {
                 self.bound_waiting();
             }
         } else if let Some(dial) = self.dial(peer) {
@@ -258,7 +253,7 @@ impl TcpLink {
 
     /// Keeps the backlogs of all connections within [`MAX_WAITING`].
     fn bound_waiting(&mut self) {
-        let octets = |connection: &Connection| connection.waiting_octets();
+        let octets = |connection: &Connection| connection.backlog.octets();
         while self.connections.values().map(octets).sum::<usize>() > MAX_WAITING
             && let Some(most) = self.connections.values_mut().max_by_key(|c| octets(c))
         {
@@ -313,26 +308,24 @@ impl TcpLink {
                 self.closed.push_back((remote, Closed::Stuck));
                 continue;
             }
-            let mut batch = 0;
-            while let Poll::Ready(result) = connection.poll_recv(cx, now) {
-                match result {
-                    Ok(frame) => arrived(Arrival::Frame {
-                        remote,
-                        frame,
-                        version_again: connection.repeats_version(),
-                    }),
-                    Err(closed) => {
+            for taken in 1..=BATCH {
+                match connection.poll_recv(cx, now) {
+                    Poll::Pending => break,
+                    Poll::Ready(Ok(frame)) => {
+                        self.counters.received += 1;
+                        arrived(Arrival::Frame {
+                            remote,
+                            frame,
+                            version_again: connection.repeats_version(),
+                        });
+                    }
+                    Poll::Ready(Err(closed)) => {
                         self.closed.push_back((remote, closed));
                         break;
                     }
                 }
-                batch += 1;
-                if batch == BATCH {
-                    more = true;
-                    break;
-                }
+                more |= taken == BATCH;
             }
-            self.counters.received += batch as u64;
         }
         while let Some((remote, why)) = self.closed.pop_front() {
             more |= self.close(now, remote, &why);
@@ -385,7 +378,7 @@ impl TcpLink {
 
     /// Admits or refuses an incoming connection.
     fn admit(&mut self, stream: TcpStream, remote: SocketAddr, now: Instant) {
-        if !self.access.allows_address(remote.ip()) {
+        if !self.settings.access.allows_address(remote.ip()) {
             self.counters.denied += 1;
             tracing::debug!(%remote, "connection denied");
             return;
@@ -401,7 +394,7 @@ impl TcpLink {
                 heard: connection.heard,
             })
             .collect();
-        match self.quota.admit(remote, &places, now) {
+        match self.settings.admit(remote, &places, now) {
             Admission::Admit => {}
             Admission::ReplaceSilent(other) => self.displace(other, Closed::Silent, now),
             Admission::ReplaceIdle(other) => self.displace(other, Closed::Idle, now),
@@ -425,7 +418,7 @@ impl TcpLink {
 
     /// Warns once per [`WARNING_PAUSE`], so that incoming connections cannot fill the log.
     fn warn_of_scarcity(&mut self, now: Instant, what: &str, remote: SocketAddr) {
-        let limit = self.quota.total;
+        let limit = self.settings.max_accepted;
         let is_due = |warned: Instant| now.saturating_duration_since(warned) >= WARNING_PAUSE;
         if self.warned.is_none_or(is_due) {
             self.warned = Some(now);
