@@ -21,37 +21,13 @@ pub(crate) struct Bounds {
 #[derive(Debug)]
 pub(crate) struct Backlog<T> {
     bounds: Bounds,
-    /// By priority, low first.
-    levels: [Level<T>; Priority::ALL.len()],
+    /// By priority, low first: the items, each with its octets.
+    levels: [VecDeque<(usize, T)>; LEVELS],
+    /// Octets of the items of each level.
+    octets: [usize; LEVELS],
 }
 
-/// The queue of one priority.
-#[derive(Debug)]
-struct Level<T> {
-    /// The items, each with its octets.
-    items: VecDeque<(usize, T)>,
-    octets: usize,
-}
-
-impl<T> Default for Level<T> {
-    fn default() -> Self {
-        Self {
-            items: VecDeque::new(),
-            octets: 0,
-        }
-    }
-}
-
-impl<T> Level<T> {
-    fn pop(&mut self) -> Option<T> {
-        let (octets, item) = self.items.pop_front()?;
-        self.octets -= octets;
-        if self.items.is_empty() && self.items.capacity() > 2 * KEPT {
-            self.items.shrink_to(KEPT);
-        }
-        Some(item)
-    }
-}
+const LEVELS: usize = Priority::ALL.len();
 
 /// The memory, in items, that an empty level keeps. A burst may need more, but a node has many
 /// components whose only burst is the discovery at the start.
@@ -62,15 +38,16 @@ impl<T> Backlog<T> {
         Self {
             bounds,
             levels: Default::default(),
+            octets: [0; LEVELS],
         }
     }
 
     pub(crate) fn len(&self) -> usize {
-        self.levels.iter().map(|level| level.items.len()).sum()
+        self.levels.iter().map(VecDeque::len).sum()
     }
 
     pub(crate) fn octets(&self) -> usize {
-        self.levels.iter().map(|level| level.octets).sum()
+        self.octets.iter().sum()
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -85,18 +62,18 @@ impl<T> Backlog<T> {
     /// Whether items of this or a higher priority take less than half of the room. If so, a new
     /// item of this priority is never dropped in favour of less urgent ones.
     pub(crate) fn has_reserve(&self, priority: Priority) -> bool {
-        let as_urgent = &self.levels[usize::from(priority.bits())..];
-        let items: usize = as_urgent.iter().map(|level| level.items.len()).sum();
-        let octets: usize = as_urgent.iter().map(|level| level.octets).sum();
+        let level = usize::from(priority.bits());
+        let items: usize = self.levels[level..].iter().map(VecDeque::len).sum();
+        let octets: usize = self.octets[level..].iter().sum();
         items < self.bounds.items.div_ceil(2) && octets <= self.bounds.octets / 2
     }
 
     /// Adds an item; returns how many items were dropped for it.
     #[must_use]
     pub(crate) fn push(&mut self, priority: Priority, octets: usize, item: T) -> u64 {
-        let level = &mut self.levels[usize::from(priority.bits())];
-        level.items.push_back((octets, item));
-        level.octets += octets;
+        let level = usize::from(priority.bits());
+        self.levels[level].push_back((octets, item));
+        self.octets[level] += octets;
         let mut dropped = 0;
         while self.is_overfull() && self.drop_least() {
             dropped += 1;
@@ -106,17 +83,27 @@ impl<T> Backlog<T> {
 
     /// Removes the oldest item of the highest priority.
     pub(crate) fn pop(&mut self) -> Option<T> {
-        self.levels.iter_mut().rev().find_map(Level::pop)
+        (0..LEVELS).rev().find_map(|level| self.pop_from(level))
+    }
+
+    /// Drops the oldest item of the lowest priority; returns whether there was one.
+    pub(crate) fn drop_least(&mut self) -> bool {
+        (0..LEVELS).any(|level| self.pop_from(level).is_some())
+    }
+
+    fn pop_from(&mut self, level: usize) -> Option<T> {
+        let items = &mut self.levels[level];
+        let (octets, item) = items.pop_front()?;
+        self.octets[level] -= octets;
+        if items.is_empty() && items.capacity() > 2 * KEPT {
+            items.shrink_to(KEPT);
+        }
+        Some(item)
     }
 
     fn is_overfull(&self) -> bool {
         let items = self.len();
         items > 1 && (items > self.bounds.items || self.octets() > self.bounds.octets)
-    }
-
-    /// Drops the oldest item of the lowest priority; returns whether there was one.
-    pub(crate) fn drop_least(&mut self) -> bool {
-        self.levels.iter_mut().find_map(Level::pop).is_some()
     }
 }
 

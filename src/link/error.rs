@@ -132,6 +132,30 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// Maps an error of the operating system.
+    pub(super) fn io(doing: impl Into<String>) -> impl FnOnce(io::Error) -> Self {
+        |source| Self::Io {
+            doing: doing.into(),
+            source,
+        }
+    }
+
+    /// Maps an error of opening a socket for an address.
+    pub(super) fn socket(doing: impl Into<String>, address: SocketAddr, source: io::Error) -> Self {
+        let doing = doing.into();
+        match source.kind() {
+            io::ErrorKind::AddrNotAvailable => Self::AddressGone(address.ip()),
+            io::ErrorKind::PermissionDenied => Self::Permission {
+                doing,
+                port: address.port(),
+                source,
+            },
+            _ => Self::Io { doing, source },
+        }
+    }
+}
+
 fn holder_hint(holder: &Holder, address: SocketAddr) -> String {
     match holder {
         _ if cfg!(unix) && holder.is_junior() => {

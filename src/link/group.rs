@@ -58,29 +58,16 @@ pub trait GroupAddress: Copy + Into<SocketAddr> + FromStr + fmt::Display {
     const RANGE: &'static str;
     /// The default group.
     const USUAL: Self;
-
-    /// Parses an address without a port; the port is then 3794.
-    fn of_ip(text: &str) -> Option<Self>;
 }
 
 impl GroupAddress for SocketAddrV4 {
     const RANGE: &'static str = "224.0.0.0 to 239.255.255.255";
     const USUAL: Self = STANDARD_GROUP;
-
-    fn of_ip(text: &str) -> Option<Self> {
-        let ip = text.parse().ok()?;
-        Some(Self::new(ip, STANDARD_PORT))
-    }
 }
 
 impl GroupAddress for SocketAddrV6 {
     const RANGE: &'static str = "ff00:: to ffff:…";
     const USUAL: Self = STANDARD_GROUP6;
-
-    fn of_ip(text: &str) -> Option<Self> {
-        let ip = text.parse().ok()?;
-        Some(Self::new(ip, STANDARD_PORT, 0, 0))
-    }
 }
 
 impl<A: GroupAddress> Group<A> {
@@ -128,8 +115,14 @@ impl<A: GroupAddress> FromStr for Group<A> {
         if text == "off" {
             return Ok(Self::Off);
         }
-        let group = text.parse().ok().or_else(|| A::of_ip(text)).map(Self::At);
+        let with_port = [
+            text.to_owned(),
+            format!("{text}:{STANDARD_PORT}"),
+            format!("[{text}]:{STANDARD_PORT}"),
+        ];
+        let group = with_port.iter().find_map(|text| text.parse().ok());
         group
+            .map(Self::At)
             .filter(|group| group.validate().is_ok())
             .ok_or_else(|| Self::invalid(text))
     }

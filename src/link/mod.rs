@@ -35,9 +35,12 @@ pub mod interface;
 #[cfg(unix)]
 pub mod junior;
 pub mod local;
+mod redial;
 #[cfg(feature = "serial")]
 pub mod serial;
 mod slab;
+#[cfg(unix)]
+mod socket_file;
 mod socket_table;
 pub mod tcp;
 pub mod udp;

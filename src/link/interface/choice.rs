@@ -1,7 +1,5 @@
 //! Selects the host's interfaces and addresses that a node uses.
 
-#[cfg(feature = "serde")]
-use std::fmt;
 use std::net::{IpAddr, SocketAddr};
 
 use super::{Available, Interface, Place, list};
@@ -49,6 +47,14 @@ impl Ip {
 /// neighbours find each other without any configuration, or else the first one. To use another
 /// address, name it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(
+        rename_all = "lowercase",
+        expecting = "\"all\", \"loopback\" or a list of names or addresses such as [\"eth0\"]"
+    )
+)]
 pub enum Interfaces {
     /// Every interface that is up and has an address, except loopback. Nodes of one host reach each
     /// other there too. A host without any other interface uses loopback.
@@ -59,6 +65,7 @@ pub enum Interfaces {
     /// The listed interfaces, each by name (`eth0`) or by an address of this host, such as
     /// `10.0.3.2`, `fd00::2` or `fe80::1%eth0`. Any address in 127.0.0.0/8 means the loopback
     /// interface with that address.
+    #[cfg_attr(feature = "serde", serde(untagged))]
     Only(Vec<String>),
 }
 
@@ -88,31 +95,27 @@ impl Interfaces {
     /// The selected ones of the available interfaces that are up. May be empty.
     #[must_use]
     pub fn present(&self, available: &[Interface], ip: Ip) -> Vec<Interface> {
-        let mut chosen: Vec<Interface> = Vec::new();
+        let up = available.iter().filter(|i| i.up);
         match self {
             Self::All => {
-                let up: Vec<_> = available.iter().filter(|i| i.up).collect();
-                chosen.extend(usual(up.into_iter().filter(|i| !i.is_loopback()), ip));
+                let chosen = usual(up.filter(|i| !i.is_loopback()), ip);
                 if chosen.is_empty() {
                     return Self::Loopback.present(available, ip);
                 }
+                chosen
             }
-            Self::Loopback => {
-                let loopback = available.iter().filter(|i| i.up && i.is_loopback());
-                chosen.extend(usual(loopback, ip));
-            }
+            Self::Loopback => usual(up.filter(|i| i.is_loopback()), ip),
             Self::Only(wanted) => {
-                let found = wanted
-                    .iter()
-                    .filter_map(|name| named(name, available, ip).ok());
+                let mut chosen: Vec<Interface> = Vec::new();
+                let found = wanted.iter().flat_map(|name| named(name, available, ip));
                 for interface in found.flatten() {
                     if !chosen.iter().any(|c| c.at(0) == interface.at(0)) {
                         chosen.push(interface);
                     }
                 }
+                chosen
             }
         }
-        chosen
     }
 }
 
@@ -136,36 +139,37 @@ fn usual<'a>(addresses: impl Iterator<Item = &'a Interface>, ip: Ip) -> Vec<Inte
 
 /// The addresses of a requested interface, which must be up.
 fn named(wanted: &str, available: &[Interface], ip: Ip) -> Result<Vec<Interface>, Error> {
-    let all = || Available(available.to_vec());
-    let of_name = |i: &&Interface| i.name == wanted;
-    let found = match wanted.parse::<Place>() {
-        Ok(place) => by_address(place, available).into_iter().collect(),
-        Err(_) => usual(available.iter().filter(of_name).filter(|i| i.up), ip),
+    let place = wanted.parse::<Place>().ok();
+    let found: Vec<Interface> = match place {
+        Some(place) => by_address(place, available).into_iter().collect(),
+        None => available
+            .iter()
+            .filter(|i| i.name == wanted)
+            .cloned()
+            .collect(),
     };
-    if let Some(down) = found.iter().find(|i| !i.up) {
+    let (wanted, available) = (wanted.to_owned(), Available(available.to_vec()));
+    let Some(interface) = found.first().cloned() else {
+        return Err(Error::NoSuchInterface { wanted, available });
+    };
+    if !found.iter().any(|i| i.up) {
         return Err(Error::InterfaceDown {
-            interface: down.clone(),
-            available: all(),
+            interface,
+            available,
         });
     }
-    if !found.is_empty() {
-        return Ok(found);
-    }
-    Err(match available.iter().find(of_name) {
-        None => Error::NoSuchInterface {
-            wanted: wanted.to_owned(),
-            available: all(),
-        },
-        Some(down) if !down.up => Error::InterfaceDown {
-            interface: down.clone(),
-            available: all(),
-        },
-        Some(_) => Error::NoAddress {
-            wanted: wanted.to_owned(),
+    let chosen = match place {
+        Some(_) => found,
+        None => usual(found.iter().filter(|i| i.up), ip),
+    };
+    if chosen.is_empty() {
+        return Err(Error::NoAddress {
+            wanted,
             ip,
-            available: all(),
-        },
-    })
+            available,
+        });
+    }
+    Ok(chosen)
 }
 
 fn by_address(place: Place, available: &[Interface]) -> Option<Interface> {
@@ -189,52 +193,6 @@ fn by_address(place: Place, available: &[Interface]) -> Option<Interface> {
         address: address.ip(),
         ..found.clone()
     })
-}
-
-#[cfg(feature = "serde")]
-impl serde::Serialize for Interfaces {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::All => serializer.serialize_str("all"),
-            Self::Loopback => serializer.serialize_str("loopback"),
-            Self::Only(names) => names.serialize(serializer),
-        }
-    }
-}
-
-#[cfg(feature = "serde")]
-impl<'de> serde::Deserialize<'de> for Interfaces {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(WordOrNames)
-    }
-}
-
-#[cfg(feature = "serde")]
-struct WordOrNames;
-
-#[cfg(feature = "serde")]
-impl<'de> serde::de::Visitor<'de> for WordOrNames {
-    type Value = Interfaces;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("\"all\", \"loopback\" or a list of names or addresses such as [\"eth0\"]")
-    }
-
-    fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<Interfaces, E> {
-        match word {
-            "all" => Ok(Interfaces::All),
-            "loopback" => Ok(Interfaces::Loopback),
-            _ => Err(E::invalid_value(serde::de::Unexpected::Str(word), &self)),
-        }
-    }
-
-    fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut seq: A) -> Result<Interfaces, A::Error> {
-        let mut names = Vec::new();
-        while let Some(name) = seq.next_element()? {
-            names.push(name);
-        }
-        Ok(Interfaces::Only(names))
-    }
 }
 
 #[cfg(test)]

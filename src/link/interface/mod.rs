@@ -55,22 +55,19 @@ impl Interface {
     /// Whether `peer` is on the network attached to this interface.
     #[must_use]
     pub fn reaches(&self, peer: SocketAddr) -> bool {
-        let (own, other, length) = match (self.address, peer) {
-            (IpAddr::V4(own), SocketAddr::V4(peer)) => {
-                let bits = |ip: Ipv4Addr| u128::from(u32::from(ip)) << 96;
-                (bits(own), bits(*peer.ip()), self.prefix)
-            }
-            (IpAddr::V6(own), SocketAddr::V6(peer)) => {
-                if own.is_unicast_link_local() && peer.scope_id() != self.index {
-                    return false;
-                }
-                (u128::from(own), u128::from(*peer.ip()), self.prefix)
-            }
+        let scope = match peer {
+            SocketAddr::V4(_) => 0,
+            SocketAddr::V6(peer) => peer.scope_id(),
+        };
+        if self.is_link_local() && scope != self.index {
+            return false;
+        }
+        let common = match (self.address, peer.ip()) {
+            (IpAddr::V4(own), IpAddr::V4(peer)) => (own.to_bits() ^ peer.to_bits()).leading_zeros(),
+            (IpAddr::V6(own), IpAddr::V6(peer)) => (own.to_bits() ^ peer.to_bits()).leading_zeros(),
             _ => return false,
         };
-        let shift = 128 - u32::from(length.min(128));
-        let network = |bits: u128| bits.checked_shr(shift).unwrap_or(0);
-        network(own) == network(other)
+        common >= self.prefix.into()
     }
 
     /// A socket address on this interface; a link-local address includes the interface index as its
@@ -103,14 +100,11 @@ pub struct Available(pub Vec<Interface>);
 
 impl fmt::Display for Available {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.is_empty() {
-            return f.write_str("none with an address");
+        let all: Vec<_> = self.0.iter().map(ToString::to_string).collect();
+        match all.as_slice() {
+            [] => f.write_str("none with an address"),
+            all => f.write_str(&all.join(", ")),
         }
-        for (i, interface) in self.0.iter().enumerate() {
-            let comma = if i == 0 { "" } else { ", " };
-            write!(f, "{comma}{interface}")?;
-        }
-        Ok(())
     }
 }
 
@@ -119,10 +113,7 @@ impl fmt::Display for Available {
 /// # Errors
 /// [`Error::Io`] if the operating system does not list them.
 pub fn list() -> Result<Vec<Interface>, Error> {
-    let found = if_addrs::get_if_addrs().map_err(|source| Error::Io {
-        doing: "listing the network interfaces".into(),
-        source,
-    })?;
+    let found = if_addrs::get_if_addrs().map_err(Error::io("listing the network interfaces"))?;
     let tentative = tentative_addresses();
     let usable = |mut interface: Interface| {
         interface.up &= !tentative.contains(&(interface.address, interface.index));

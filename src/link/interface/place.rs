@@ -81,13 +81,11 @@ impl FromStr for Place {
     fn from_str(text: &str) -> Result<Self, NoPlace> {
         let named = || {
             let (ip, zone, port) = split(text)?;
-            let number = zone.parse().ok();
-            let address = SocketAddrV6::new(ip, port, 0, number.unwrap_or(0)).into();
-            let zone = if number.is_none() {
-                Some(Zone::new(zone)?)
-            } else {
-                None
+            let (scope, zone) = match zone.parse() {
+                Ok(scope) => (scope, None),
+                Err(_) => (0, Some(Zone::new(zone)?)),
             };
+            let address = SocketAddrV6::new(ip, port, 0, scope).into();
             ip.is_unicast_link_local().then_some(Self { address, zone })
         };
         let standard = |ip: IpAddr| SocketAddr::new(ip, STANDARD_PORT);

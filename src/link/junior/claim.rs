@@ -1,16 +1,16 @@
 //! The sockets in the folder of Junior's node manager: its own, and one per client.
 
-use std::fs::{self, Permissions};
 use std::io::{self, ErrorKind};
-use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 use std::path::{Path, PathBuf};
 use std::task::{Context, Poll};
 
+use socket2::Type;
 use tokio::io::ReadBuf;
 use tokio::net;
 
 use crate::address::JausId;
+use crate::link::socket_file::{Obstacle, SocketFile};
 
 /// The folder that Junior uses unless fkie's `SockPath` names another.
 pub const DEFAULT_FOLDER: &str = "/tmp";
@@ -113,9 +113,7 @@ pub(super) fn connect(folder: &Path) -> io::Result<UnixDatagram> {
 #[derive(Debug)]
 pub(crate) struct Claim {
     id: JausId,
-    path: PathBuf,
-    /// Device and inode of the file: another client may have replaced it.
-    file: (u64, u64),
+    _file: SocketFile,
     /// The socket until the runtime watches it, because components may be attached outside a
     /// runtime.
     idle: Option<UnixDatagram>,
@@ -126,34 +124,18 @@ impl Claim {
     /// Creates the socket of an id. Replaces the socket of a dead client, but not of a living one.
     pub(crate) fn new(folder: &Path, id: JausId) -> Result<Self, Error> {
         let path = client_in(folder, id);
-        let failed = |source| {
-            let path = client_in(folder, id);
-            Error::Socket { id, path, source }
-        };
-        let socket = match UnixDatagram::bind(&path) {
-            Err(error) if error.kind() == ErrorKind::AddrInUse => {
-                if !is_dead(&path) {
-                    return Err(Error::Taken { id, path });
-                }
-                fs::remove_file(&path).map_err(failed)?;
-                tracing::info!(%id, "replaced the socket of a client of Junior that is gone");
-                UnixDatagram::bind(&path)
-            }
-            bound => bound,
-        };
-        let socket = socket.map_err(failed)?;
-        socket.set_nonblocking(true).map_err(failed)?;
-        let claim = Self {
-            id,
-            file: file_at(&path).map_err(failed)?,
-            path,
-            idle: Some(socket),
-            watched: None,
-        };
         // The node manager may belong to another user, and must be able to write here.
-        let rights = Permissions::from_mode(0o666);
-        fs::set_permissions(&claim.path, rights).map_err(failed)?;
-        Ok(claim)
+        let (socket, file) = match SocketFile::bind(&path, Type::DGRAM, 0o666) {
+            Ok(bound) => bound,
+            Err(Obstacle::Io(source)) => return Err(Error::Socket { id, path, source }),
+            Err(_) => return Err(Error::Taken { id, path }),
+        };
+        Ok(Self {
+            id,
+            _file: file,
+            idle: Some(socket.into()),
+            watched: None,
+        })
     }
 
     pub(super) const fn id(&self) -> JausId {
@@ -176,29 +158,10 @@ impl Claim {
     }
 }
 
-impl Drop for Claim {
-    fn drop(&mut self) {
-        if file_at(&self.path).is_ok_and(|file| file == self.file) {
-            // The next client recognises a remaining file as stale.
-            let _ = fs::remove_file(&self.path);
-        }
-    }
-}
-
-fn file_at(path: &Path) -> io::Result<(u64, u64)> {
-    let file = fs::symlink_metadata(path)?;
-    Ok((file.dev(), file.ino()))
-}
-
-/// Whether a path is a socket without a reader.
-fn is_dead(path: &Path) -> bool {
-    let is_socket = fs::symlink_metadata(path).is_ok_and(|file| file.file_type().is_socket());
-    let answer = UnixDatagram::unbound().and_then(|socket| socket.connect(path));
-    is_socket && answer.is_err_and(|error| error.kind() == ErrorKind::ConnectionRefused)
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     const ID: JausId = JausId::new(101, 1, 33);

@@ -259,7 +259,8 @@ impl JuniorLink {
                 tracing::info!(%folder, "connected to Junior's node manager");
                 self.manager = Some(manager);
                 self.last_error = None;
-                self.registration.handle_connected();
+                let ids = self.clients.keys().copied();
+                self.registration.handle_connected(ids);
             }
             Err(source) => {
                 let is_news = self.last_error.replace(source.kind()) != Some(source.kind());

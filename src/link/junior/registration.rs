@@ -4,7 +4,7 @@
 //! probes on the connected socket. They fail if the process that bound it is gone, however quickly
 //! another took its place.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use crate::address::JausId;
@@ -23,10 +23,9 @@ pub(super) enum Step {
     Probe,
 }
 
-/// The ids to register, and their state at the node manager.
+/// The state of the ids at the node manager.
 #[derive(Debug, Default)]
 pub(super) struct Registration {
-    ids: BTreeSet<JausId>,
     is_connected: bool,
     /// When to connect or to probe; `None` means at the next opportunity.
     next: Option<Instant>,
@@ -40,19 +39,17 @@ impl Registration {
     }
 
     pub(super) fn add(&mut self, id: JausId) {
-        self.ids.insert(id);
         self.pending.insert(id, None);
     }
 
     pub(super) fn remove(&mut self, id: JausId) {
-        self.ids.remove(&id);
         self.pending.remove(&id);
     }
 
-    /// Notes that the node manager is present and has no registrations.
-    pub(super) fn handle_connected(&mut self) {
+    /// Notes that the node manager is present and has none of the ids.
+    pub(super) fn handle_connected(&mut self, ids: impl IntoIterator<Item = JausId>) {
         self.is_connected = true;
-        self.pending = self.ids.iter().map(|&id| (id, None)).collect();
+        self.pending = ids.into_iter().map(|id| (id, None)).collect();
     }
 
     /// Notes that the node manager is gone.
@@ -114,7 +111,7 @@ mod tests {
         registration.add(ONE);
         registration.add(TWO);
         assert_eq!(steps(&mut registration, now), [Step::Connect]);
-        registration.handle_connected();
+        registration.handle_connected([ONE, TWO]);
         let both = [Step::Register(ONE), Step::Register(TWO)];
         assert_eq!(steps(&mut registration, now), both);
         assert!(registration.handle_accept(ONE));
@@ -154,7 +151,7 @@ mod tests {
         registration.handle_lost();
         assert!(!registration.is_complete());
         assert_eq!(steps(&mut registration, now), [Step::Connect]);
-        registration.handle_connected();
+        registration.handle_connected([ONE, TWO]);
         let both = [Step::Register(ONE), Step::Register(TWO)];
         assert_eq!(steps(&mut registration, now), both);
     }

@@ -7,6 +7,11 @@ use std::str::FromStr;
 
 use crate::as_text::serde_as_text;
 
+/// The default address on systems without Unix sockets.
+#[cfg(not(unix))]
+pub(super) const DEFAULT_PORT: SocketAddr =
+    SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 37940);
+
 /// Where a node serves the component processes of its host: `default`, the path of a socket, or a
 /// port of loopback such as `127.0.0.1:3795`.
 ///

@@ -104,8 +104,9 @@ impl Assembler {
             return Err(RecordError::TooLong { length, limit });
         }
         if let Some(octets) = octets.get(..length) {
+            let record = Bytes::copy_from_slice(octets);
             self.taken += LENGTH + length;
-            return Record::copy(octets).map(Some);
+            return Record::decode(record).map(Some);
         }
         if length > COPIED {
             let new = || Vec::with_capacity(length.min(GROWTH.max(2 * octets.len())));

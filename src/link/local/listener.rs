@@ -5,12 +5,13 @@ use std::net::SocketAddr;
 
 use tokio::net::TcpListener;
 
+#[cfg(not(unix))]
+use super::address::DEFAULT_PORT;
 use super::stream::{Stream, tcp_stream};
 #[cfg(unix)]
 use super::unix_socket::{self, UnixSocket};
-#[cfg(not(unix))]
-use super::usual_place::PORT;
 use super::{Address, Error};
+use crate::link::tcp::listen;
 
 /// The node's side of a local link.
 #[derive(Debug)]
@@ -28,7 +29,7 @@ impl Listener {
             #[cfg(unix)]
             Address::Path(path) => UnixSocket::open(path).map(Self::Unix),
             #[cfg(not(unix))]
-            Address::Default => Self::open_tcp(PORT),
+            Address::Default => Self::open_tcp(DEFAULT_PORT),
             #[cfg(not(unix))]
             Address::Path(_) => Err(Error::NoUnixSockets),
             Address::Tcp(port) => Self::open_tcp(*port),
@@ -40,15 +41,8 @@ impl Listener {
             io::ErrorKind::AddrInUse => Error::PortTaken(port),
             _ => Error::io(format!("listening on {port}"))(source),
         };
-        let listen = || {
-            // On Unix this sets SO_REUSEADDR, as usual for listeners. It still fails if another
-            // listener is alive.
-            let listener = std::net::TcpListener::bind(port)?;
-            listener.set_nonblocking(true)?;
-            TcpListener::from_std(listener)
-        };
         tracing::warn!(%port, "every program on this host may attach components through a TCP port");
-        listen().map(Self::Tcp).map_err(failed)
+        listen(port).map(Self::Tcp).map_err(failed)
     }
 
     /// Waits for the next component. An error concerns only that component.

@@ -18,8 +18,8 @@
 //! | `assembler` | extracts records from a stream, without I/O |
 //! | `connection` | the two halves of a connection, the same on both sides |
 //! | `stream` | the two kinds of stream, and the process at the other end |
-//! | `address`, `usual_place` | the address at which the node listens |
-//! | `listener`, `unix_socket` | the node's side: directory and socket with their permissions, stale sockets |
+//! | `address` | the address at which the node listens |
+//! | `listener`, `unix_socket` | the node's side: its default directory, directory and socket with their permissions |
 //!
 //! [`node`](crate::node) reads and answers the records.
 
@@ -32,7 +32,6 @@ pub mod record;
 mod stream;
 #[cfg(unix)]
 mod unix_socket;
-mod usual_place;
 
 pub use address::{Address, InvalidAddress, Local};
 pub use assembler::Assembler;

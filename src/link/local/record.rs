@@ -172,29 +172,30 @@ impl Record {
     #[must_use]
     pub fn hello(id: JausId, name: &str) -> Self {
         let version = VERSION;
-        Self {
-            head: Head::Hello { version, id },
-            payload: text(name),
-        }
+        Self::with_text(Head::Hello { version, id }, name)
     }
 
     /// The refusal of a component.
     #[must_use]
     pub fn refused(reason: Reason, why: &str) -> Self {
-        Self {
-            head: Head::Refused(reason),
-            payload: text(why),
-        }
+        Self::with_text(Head::Refused(reason), why)
     }
 
     /// The rejection of a message.
     #[must_use]
     pub fn rejected(handle: u64, why: &str) -> Self {
         let outcome = Outcome::Rejected;
-        Self {
-            head: Head::Outcome { handle, outcome },
-            payload: text(why),
+        Self::with_text(Head::Outcome { handle, outcome }, why)
+    }
+
+    /// With a name or an explanation, truncated at a character boundary.
+    fn with_text(head: Head, text: &str) -> Self {
+        let mut end = text.len().min(LONGEST_TEXT);
+        while !text.is_char_boundary(end) {
+            end -= 1;
         }
+        let payload = Bytes::copy_from_slice(&text.as_bytes()[..end]);
+        Self { head, payload }
     }
 
     /// The payload as text that is safe for a terminal, at most 255 octets of it.
@@ -224,19 +225,17 @@ impl Record {
     /// # Errors
     /// [`RecordError::Malformed`] if its kind is unknown or its fields are invalid.
     pub fn decode(mut octets: Bytes) -> Result<Self, RecordError> {
-        let (head, payload) = Head::split_off(&octets)?;
-        octets.advance(octets.len() - payload.len());
+        let mut rest = &octets[..];
+        let head = Head::decode(&mut rest).ok_or_else(|| RecordError::Malformed {
+            kind: octets.first().copied().unwrap_or(0),
+            length: octets.len(),
+        })?;
+        let head_length = octets.len() - rest.len();
+        octets.advance(head_length);
         Ok(Self {
             head,
             payload: octets,
         })
-    }
-
-    /// Like [`decode`](Self::decode), with a copy of the payload.
-    pub(super) fn copy(octets: &[u8]) -> Result<Self, RecordError> {
-        let (head, payload) = Head::split_off(octets)?;
-        let payload = Bytes::copy_from_slice(payload);
-        Ok(Self { head, payload })
     }
 }
 
@@ -293,16 +292,6 @@ impl Head {
                 outcome.encode(out);
             }
         }
-    }
-
-    /// Splits a record into head and payload.
-    fn split_off(octets: &[u8]) -> Result<(Self, &[u8]), RecordError> {
-        let mut rest = octets;
-        let head = Self::decode(&mut rest).ok_or_else(|| RecordError::Malformed {
-            kind: octets.first().copied().unwrap_or(0),
-            length: octets.len(),
-        })?;
-        Ok((head, rest))
     }
 
     fn decode(octets: &mut &[u8]) -> Option<Self> {
@@ -457,13 +446,4 @@ fn id(octets: &mut &[u8]) -> Option<JausId> {
 fn flags(octets: &mut &[u8]) -> Option<Flags> {
     let flags = Flags(octets.try_get_u8().ok()?);
     flags.broadcast().map(|_| flags)
-}
-
-/// A name or an explanation, truncated at a character boundary.
-fn text(text: &str) -> Bytes {
-    let mut end = text.len().min(LONGEST_TEXT);
-    while !text.is_char_boundary(end) {
-        end -= 1;
-    }
-    Bytes::copy_from_slice(&text.as_bytes()[..end])
 }

@@ -12,7 +12,11 @@ use tokio::net::{UnixStream, unix::UCred};
 pub(crate) use self::elsewhere::{ReadHalf, WriteHalf};
 #[cfg(unix)]
 pub(crate) use self::on_unix::{ReadHalf, WriteHalf};
-use super::{Address, Assembler, Error, usual_place};
+#[cfg(not(unix))]
+use super::address::DEFAULT_PORT;
+#[cfg(unix)]
+use super::unix_socket::{default_path, own_uid};
+use super::{Address, Assembler, Error};
 
 /// The process at the other end.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
@@ -226,11 +230,11 @@ pub(super) fn pid_of(credentials: &UCred) -> Option<u32> {
 pub(crate) async fn connect(address: &Address) -> Result<Stream, Error> {
     match address {
         #[cfg(unix)]
-        Address::Default => connect_unix(&usual_place::path()).await,
+        Address::Default => connect_unix(&default_path()).await,
         #[cfg(unix)]
         Address::Path(path) => connect_unix(path).await,
         #[cfg(not(unix))]
-        Address::Default => connect_tcp(usual_place::PORT).await,
+        Address::Default => connect_tcp(DEFAULT_PORT).await,
         #[cfg(not(unix))]
         Address::Path(_) => Err(Error::NoUnixSockets),
         Address::Tcp(port) => connect_tcp(*port).await,
@@ -242,7 +246,7 @@ async fn connect_unix(path: &std::path::Path) -> Result<Stream, Error> {
     let place = path.display().to_string();
     let stream = UnixStream::connect(path).await.and_then(unix_stream);
     let (stream, uid) = stream.map_err(|error| unreachable(&place, error))?;
-    let own = usual_place::own_uid();
+    let own = own_uid();
     // Root may trust any user.
     if uid != own && uid != 0 && own != 0 {
         return Err(Error::Foreign { place, uid, own });

@@ -1,28 +1,25 @@
-//! A node's Unix socket: directory and socket with their permissions, and stale sockets.
+//! A node's Unix socket: its default directory, and directory and socket with their permissions.
 //!
 //! The socket is in a directory that only its owner can write to, and is accessible to the owner
-//! alone. In addition the operating system reports the user of each connecting process. A
-//! connection attempt distinguishes the socket of a living node from one that a crashed node has
-//! left behind.
+//! alone. In addition the operating system reports the user of each connecting process.
 
-use std::fs::{self, DirBuilder, Metadata, Permissions};
-use std::io::{self, ErrorKind};
-use std::os::unix::fs::{DirBuilderExt, FileTypeExt, MetadataExt, PermissionsExt};
+use std::fs::{self, DirBuilder};
+use std::io::ErrorKind;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
+use socket2::{Socket, Type};
 use tokio::net::{UnixListener, UnixStream};
 
 use super::Error;
 use super::stream::{Stream, pid_of, unix_stream};
-use super::usual_place::{directory, own_uid, path};
+use crate::link::socket_file::{Obstacle, SocketFile};
 
 /// A Unix socket that is removed when the node ends.
 #[derive(Debug)]
 pub(crate) struct UnixSocket {
+    file: SocketFile,
     listener: UnixListener,
-    path: PathBuf,
-    /// Device and inode of the socket's file: another one may have replaced it.
-    file: (u64, u64),
     owner: u32,
 }
 
@@ -30,21 +27,25 @@ impl UnixSocket {
     pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let owner = own_uid();
         check_directory(parent(path), owner, 0o022)?;
-        let listener = bind(path)?;
-        let doing = || format!("setting the rights of {}", path.display());
-        let rights = Permissions::from_mode(0o600);
-        fs::set_permissions(path, rights).map_err(Error::io(doing()))?;
-        let metadata = fs::symlink_metadata(path).map_err(Error::io(doing()))?;
+        let failed = |source| Error::io(format!("listening at {}", path.display()))(source);
+        let bound = SocketFile::bind(path, Type::STREAM, 0o600);
+        let (socket, file) = bound.map_err(|obstacle| match obstacle {
+            Obstacle::Alive(other) => Error::Served {
+                path: path.to_owned(),
+                pid: other.and_then(server_of),
+            },
+            Obstacle::NoSocket => Error::NoSocket(path.to_owned()),
+            Obstacle::Io(source) => failed(source),
+        })?;
         Ok(Self {
-            listener,
-            path: path.to_owned(),
-            file: (metadata.dev(), metadata.ino()),
+            file,
+            listener: UnixListener::from_std(socket.into()).map_err(failed)?,
             owner,
         })
     }
 
     pub(super) fn path(&self) -> &Path {
-        &self.path
+        self.file.path()
     }
 
     pub(super) async fn accept(&self) -> Result<Stream, Error> {
@@ -53,7 +54,7 @@ impl UnixSocket {
         let (stream, uid) = stream.map_err(Error::io("accepting a component"))?;
         if !may_attach(uid, self.owner) {
             return Err(Error::Foreign {
-                place: self.path.display().to_string(),
+                place: self.path().display().to_string(),
                 uid,
                 own: self.owner,
             });
@@ -62,14 +63,10 @@ impl UnixSocket {
     }
 }
 
-impl Drop for UnixSocket {
-    fn drop(&mut self) {
-        let is_ours = |file: Metadata| (file.dev(), file.ino()) == self.file;
-        if fs::symlink_metadata(&self.path).is_ok_and(is_ours) {
-            // The next node recognises a remaining file as stale.
-            let _ = fs::remove_file(&self.path);
-        }
-    }
+/// The process id of the node that serves a connected socket.
+fn server_of(socket: Socket) -> Option<u32> {
+    let stream = UnixStream::from_std(socket.into()).ok()?;
+    pid_of(&stream.peer_cred().ok()?)
 }
 
 /// Accepts components of the owner and of root.
@@ -77,16 +74,40 @@ const fn may_attach(uid: u32, owner: u32) -> bool {
     uid == owner || uid == 0
 }
 
+/// The default path of the socket, whether or not it exists.
+pub(super) fn default_path() -> PathBuf {
+    default_directory().join("node.sock")
+}
+
+/// The default directory: in the user's runtime directory, if there is one.
+fn default_directory() -> PathBuf {
+    let given = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
+    if let Some(directory) = given.filter(|directory| directory.is_absolute()) {
+        return directory.join("jaus");
+    }
+    let uid = own_uid();
+    let of_user = PathBuf::from(format!("/run/user/{uid}"));
+    if of_user.is_dir() {
+        return of_user.join("jaus");
+    }
+    PathBuf::from(format!("/tmp/jaus-{uid}"))
+}
+
+/// The effective user id of this process.
+pub(super) fn own_uid() -> u32 {
+    rustix::process::geteuid().as_raw()
+}
+
 /// The default path, in a directory that exists and is accessible to the owner alone.
 pub(super) fn make_default() -> Result<PathBuf, Error> {
-    let directory = directory();
+    let directory = default_directory();
     match DirBuilder::new().mode(0o700).create(&directory) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => {
             return Err(Error::io(format!("making {}", directory.display()))(error));
         }
         _ => check_directory(&directory, own_uid(), 0o077)?,
     }
-    Ok(path())
+    Ok(default_path())
 }
 
 fn parent(path: &Path) -> &Path {
@@ -137,82 +158,6 @@ fn check_directory(directory: &Path, own: u32, forbidden: u32) -> Result<(), Err
         return unsafe_because(why, remedy);
     }
     Ok(())
-}
-
-/// Listens on the socket, after replacing that of a dead node if necessary.
-fn bind(path: &Path) -> Result<UnixListener, Error> {
-    let failed = |source| Error::io(format!("listening at {}", path.display()))(source);
-    match UnixListener::bind(path) {
-        Err(error) if error.kind() == ErrorKind::AddrInUse => {}
-        bound => return bound.map_err(failed),
-    }
-    let served = |pid| {
-        let path = path.to_owned();
-        Err(Error::Served { path, pid })
-    };
-    match look(path)? {
-        Found::Nothing => {}
-        Found::Other => return Err(Error::NoSocket(path.to_owned())),
-        Found::Alive(pid) => return served(pid),
-        // Renamed first: between the check and the removal, another node may have started.
-        Found::Dead => {
-            let aside = path.with_extension(format!("dead-{}", std::process::id()));
-            match fs::rename(path, &aside) {
-                Err(error) if error.kind() == ErrorKind::NotFound => {}
-                moved => moved.map_err(failed)?,
-            }
-            if let Found::Alive(pid) = look(&aside)? {
-                let _ = fs::rename(&aside, path);
-                return served(pid);
-            }
-            let _ = fs::remove_file(&aside);
-            tracing::info!(path = %path.display(), "replaced the socket of a node that is gone");
-        }
-    }
-    match UnixListener::bind(path) {
-        Err(error) if error.kind() == ErrorKind::AddrInUse => served(None),
-        bound => bound.map_err(failed),
-    }
-}
-
-/// What exists at the socket's path.
-enum Found {
-    Nothing,
-    Alive(Option<u32>),
-    Dead,
-    Other,
-}
-
-fn look(path: &Path) -> Result<Found, Error> {
-    let doing = || format!("looking at {}", path.display());
-    let metadata = match fs::symlink_metadata(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::Nothing),
-        other => other.map_err(Error::io(doing()))?,
-    };
-    if !metadata.file_type().is_socket() {
-        return Ok(Found::Other);
-    }
-    match try_connect(path) {
-        Ok(stream) => {
-            let pid = stream.peer_cred().ok().and_then(|peer| pid_of(&peer));
-            Ok(Found::Alive(pid))
-        }
-        Err(error) if error.kind() == ErrorKind::ConnectionRefused => Ok(Found::Dead),
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(Found::Nothing),
-        // A listener with a full queue.
-        Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(Found::Alive(None)),
-        Err(error) => Err(Error::io(doing())(error)),
-    }
-}
-
-/// Connects without waiting.
-fn try_connect(path: &Path) -> io::Result<UnixStream> {
-    use socket2::{Domain, SockAddr, Socket, Type};
-    let socket = Socket::new(Domain::UNIX, Type::STREAM, None)?;
-    socket.set_nonblocking(true)?;
-    socket.connect(&SockAddr::unix(path)?)?;
-    let stream = std::os::unix::net::UnixStream::from(std::os::fd::OwnedFd::from(socket));
-    UnixStream::from_std(stream)
 }
 
 #[cfg(test)]

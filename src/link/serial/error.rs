@@ -1,6 +1,5 @@
 //! Errors of a serial port, with their remedies.
 
-use std::fmt;
 use std::io;
 
 use serial2_tokio::SerialPort;
@@ -8,51 +7,39 @@ use serial2_tokio::SerialPort;
 /// A serial port that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "the serial port `{device}` cannot be used ({source}): {}; {ports}",
-    remedy(source)
+    "the serial port `{device}` cannot be used ({source}): {}; {}",
+    remedy(source),
+    choice(ports)
 )]
 pub struct SerialError {
     /// The port as given.
     pub device: String,
-    /// The existing ports.
-    pub ports: Ports,
+    /// The existing ports, to choose from.
+    pub ports: Vec<String>,
     /// The error of the operating system.
     pub source: io::Error,
 }
 
 impl SerialError {
     pub(super) fn new(device: &str, source: io::Error) -> Self {
+        let ports = SerialPort::available_ports().unwrap_or_default();
+        let mut ports: Vec<_> = ports
+            .iter()
+            .map(|port| port.display().to_string())
+            .collect();
+        ports.sort_unstable();
         Self {
             device: device.to_owned(),
-            ports: Ports::available(),
+            ports,
             source,
         }
     }
 }
 
-/// The serial ports of this host, for people to choose from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Ports(Vec<String>);
-
-impl Ports {
-    fn available() -> Self {
-        let found = SerialPort::available_ports().unwrap_or_default();
-        let mut names: Vec<_> = found
-            .iter()
-            .map(|port| port.display().to_string())
-            .collect();
-        names.sort_unstable();
-        Self(names)
-    }
-}
-
-impl fmt::Display for Ports {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.is_empty() {
-            f.write_str("no serial port is found on this host")
-        } else {
-            write!(f, "there are: {}", self.0.join(", "))
-        }
+fn choice(ports: &[String]) -> String {
+    match ports {
+        [] => "no serial port is found on this host".to_owned(),
+        ports => format!("there are: {}", ports.join(", ")),
     }
 }
 

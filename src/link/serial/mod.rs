@@ -5,7 +5,7 @@
 //! first. When the queue is full, the oldest packet of the lowest priority is dropped.
 //!
 //! The port must be usable when the link is opened. If it disappears later, as USB ports do, it is
-//! reopened, with pauses from [`FIRST_PAUSE`] to [`LONGEST_PAUSE`]. Packets sent meanwhile are
+//! reopened, with pauses from [`FIRST_PAUSE`] to [`LONGEST_PAUSE`], ± 25 % at random. Packets sent meanwhile are
 //! dropped and counted, because old commands are useless when the line is back.
 //!
 //! The port is driven through `serial2-tokio`, which needs no C library such as libudev.
@@ -21,12 +21,13 @@ use std::time::{Duration, Instant};
 use bytes::{Buf, Bytes};
 use serial2_tokio::SerialPort;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::task::{JoinHandle, spawn_blocking};
+use tokio::task::spawn_blocking;
 
-pub use error::{Ports, SerialError};
+pub use error::SerialError;
 pub use settings::{FlowControl, Parity, Settings};
 
 use super::backlog::{Backlog, Bounds};
+use super::redial::Redial;
 use crate::endpoint::Transmit;
 use crate::wire::Frame;
 use crate::wire::jserial::{self, Decoder};
@@ -77,24 +78,14 @@ pub enum Arrival {
 #[derive(Debug)]
 pub struct SerialLink {
     settings: Settings,
-    port: Result<SerialPort, Away>,
+    /// `None` while it is gone.
+    port: Option<SerialPort>,
+    redial: Redial<SerialPort>,
     decoder: Decoder,
     outbox: Backlog<Bytes>,
     /// The packet that is being written.
     leaving: Bytes,
     counters: Counters,
-}
-
-/// A port that is gone.
-#[derive(Debug)]
-struct Away {
-    /// When to reopen it; `None` until the time is known, and during an attempt.
-    retry_at: Option<Instant>,
-    /// The attempt to open it, on its own thread, because a driver may take time.
-    opening: Option<JoinHandle<io::Result<SerialPort>>>,
-    pause: Duration,
-    /// Whether [`Arrival::Lost`] was reported.
-    told: bool,
 }
 
 impl SerialLink {
@@ -112,7 +103,9 @@ impl SerialLink {
         );
         Ok(Self {
             settings: settings.clone(),
-            port: Ok(port),
+            port: Some(port),
+            // A driver may take its time.
+            redial: Redial::up(Duration::MAX, FIRST_PAUSE..=LONGEST_PAUSE),
             decoder: Decoder::new(),
             outbox: Backlog::new(OUTBOX),
             leaving: Bytes::new(),
@@ -129,7 +122,7 @@ impl SerialLink {
     /// Whether the port is open at present.
     #[must_use]
     pub const fn is_open(&self) -> bool {
-        self.port.is_ok()
+        self.port.is_some()
     }
 
     /// Its counters so far.
@@ -143,7 +136,7 @@ impl SerialLink {
 
     /// Queues a packet from the endpoint, for [`poll_flush`](Self::poll_flush).
     pub fn transmit(&mut self, transmit: &Transmit) {
-        if self.port.is_err() {
+        if self.port.is_none() {
             self.counters.port_away += 1;
             return;
         }
@@ -154,7 +147,7 @@ impl SerialLink {
 
     /// Writes queued packets, as fast as the line takes them; ready when none is left.
     pub fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<()> {
-        while let Ok(port) = &mut self.port {
+        while let Some(port) = &mut self.port {
             if self.leaving.is_empty() {
                 // One packet at a time, so that an urgent one does not wait behind many.
                 let Some(packet) = self.outbox.pop() else {
@@ -168,7 +161,7 @@ impl SerialLink {
                 Ok(octets) => self.leaving.advance(octets),
                 Err(error) => self.lose(&error),
             }
-            if self.port.is_err() {
+            if self.port.is_none() {
                 // For the next `receive`, which reports the loss and reopens the port.
                 cx.waker().wake_by_ref();
             }
@@ -178,8 +171,8 @@ impl SerialLink {
 
     /// When to call [`receive`](Self::receive) even if nothing arrives.
     #[must_use]
-    pub fn poll_timeout(&self) -> Option<Instant> {
-        self.port.as_ref().err().and_then(|away| away.retry_at)
+    pub const fn poll_timeout(&self) -> Option<Instant> {
+        self.redial.deadline()
     }
 
     /// Receives data, and reopens a lost port. Returns whether there was more than the line's
@@ -201,20 +194,16 @@ impl SerialLink {
                 arrived(Arrival::Frame(frame));
             }
         }
-        if let Err(away) = &mut self.port {
-            if away.opening.is_none() {
-                away.retry_at.get_or_insert(now + away.pause);
-            }
-            if !std::mem::replace(&mut away.told, true) {
-                arrived(Arrival::Lost);
-            }
+        if self.port.is_none() && self.redial.is_up() {
+            self.redial.lost(now, true);
+            arrived(Arrival::Lost);
         }
         more
     }
 
     /// Ready when there are new octets.
     fn poll_read(&mut self, cx: &mut Context<'_>) -> Poll<()> {
-        let Ok(port) = &mut self.port else {
+        let Some(port) = &mut self.port else {
             return Poll::Pending;
         };
         let mut chunk = [0; CHUNK];
@@ -242,45 +231,26 @@ impl SerialLink {
         self.counters.port_away += self.outbox.len() as u64 + u64::from(!self.leaving.is_empty());
         self.outbox = Backlog::new(OUTBOX);
         self.leaving = Bytes::new();
-        let away = Err(Away {
-            retry_at: None,
-            opening: None,
-            pause: FIRST_PAUSE,
-            told: false,
-        });
-        let port = std::mem::replace(&mut self.port, away);
+        let port = self.port.take();
         // Closing blocks until the driver has written its buffer.
         spawn_blocking(move || drop(port));
     }
 
     fn open_again(&mut self, cx: &mut Context<'_>, now: Instant) {
-        let Err(away) = &mut self.port else {
-            return;
-        };
-        if away.retry_at.is_some_and(|at| at <= now) {
-            away.retry_at = None;
+        let device = &self.settings.device;
+        let attempt = || {
             let settings = self.settings.clone();
-            away.opening = Some(spawn_blocking(move || settings.open()));
-        }
-        let opened = away
-            .opening
-            .as_mut()
-            .map(|opening| Pin::new(opening).poll(cx));
-        let Some(Poll::Ready(opened)) = opened else {
-            return;
+            let opened = spawn_blocking(move || settings.open());
+            // An attempt that the runtime has cancelled counts as failed.
+            Box::pin(async { opened.await.map_err(io::Error::from).flatten() }) as _
         };
-        away.opening = None;
-        // An attempt that the runtime has cancelled counts as failed.
-        match opened.map_err(io::Error::from).flatten() {
-            Ok(port) => {
-                tracing::info!(device = self.settings.device, "serial port is back");
-                self.port = Ok(port);
+        match self.redial.poll(cx, now, attempt) {
+            Poll::Pending => {}
+            Poll::Ready(Ok(port)) => {
+                tracing::info!(device, "serial port is back");
+                self.port = Some(port);
             }
-            Err(error) => {
-                tracing::debug!(device = self.settings.device, %error, "still no serial port");
-                away.pause = (away.pause * 2).min(LONGEST_PAUSE);
-                away.retry_at = Some(now + away.pause);
-            }
+            Poll::Ready(Err(error)) => tracing::debug!(device, %error, "still no serial port"),
         }
     }
 }

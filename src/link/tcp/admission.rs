@@ -11,17 +11,8 @@ use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
 use std::time::Instant;
 
-use super::settings::HANDSHAKE;
+use super::settings::{HANDSHAKE, Settings};
 use crate::endpoint::quota_address;
-
-/// Limits of accepted connections.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Quota {
-    /// Of all addresses together.
-    pub(super) total: usize,
-    /// Of one network address.
-    pub(super) per_address: usize,
-}
 
 /// An accepted connection.
 #[derive(Clone, Copy, Debug)]
@@ -47,9 +38,9 @@ pub(super) enum Admission {
     Refuse,
 }
 
-impl Quota {
+impl Settings {
     /// Decides about a new connection from `remote`, given the accepted connections.
-    pub(super) fn admit(self, remote: SocketAddr, places: &[Place], now: Instant) -> Admission {
+    pub(super) fn admit(&self, remote: SocketAddr, places: &[Place], now: Instant) -> Admission {
         let newcomer = quota_address(remote.ip());
         let mut held = BTreeMap::<IpAddr, usize>::new();
         for place in places {
@@ -57,26 +48,20 @@ impl Quota {
         }
         let held_by = |source| held.get(&source).copied().unwrap_or_default();
         let own = held_by(newcomer);
-        if own >= self.per_address {
+        if own >= self.max_per_address {
             let own = places.iter().filter(|place| place.source() == newcomer);
             return longest_silent(own, now).unwrap_or(Admission::Refuse);
         }
-        if places.len() < self.total {
+        if places.len() < self.max_accepted {
             return Admission::Admit;
         }
         let idle = || {
-            let others = places
-                .iter()
-                .filter(|place| held_by(place.source()) > own + 1);
-            // An address with one place gives it up for an address with none; the longest idle one
-            // goes.
-            let any = places.iter().filter(|_| own == 0);
+            // An address with one place gives it up for an address with none.
+            let gives = |place: &&Place| own == 0 || held_by(place.source()) > own + 1;
             let key =
                 |place: &&Place| (Reverse(held_by(place.source())), place.heard, place.opened);
-            others
-                .chain(any)
-                .min_by_key(key)
-                .map(|place| Admission::ReplaceIdle(place.remote))
+            let longest = places.iter().filter(gives).min_by_key(key)?;
+            Some(Admission::ReplaceIdle(longest.remote))
         };
         longest_silent(places.iter(), now)
             .or_else(idle)
@@ -107,11 +92,6 @@ mod tests {
 
     use super::*;
 
-    const QUOTA: Quota = Quota {
-        total: 4,
-        per_address: 3,
-    };
-
     fn remote(text: &str) -> SocketAddr {
         text.parse().unwrap()
     }
@@ -131,11 +111,13 @@ mod tests {
             .iter()
             .map(|(text, heard)| place(start, text, *heard))
             .collect();
-        QUOTA.admit(
-            remote(newcomer),
-            &places,
-            start + Duration::from_secs(after),
-        )
+        let settings = Settings {
+            max_accepted: 4,
+            max_per_address: 3,
+            ..Settings::default()
+        };
+        let now = start + Duration::from_secs(after);
+        settings.admit(remote(newcomer), &places, now)
     }
 
     #[test]

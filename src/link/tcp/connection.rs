@@ -65,7 +65,8 @@ pub(super) struct Connection {
     pub(super) heard: Option<Instant>,
     /// The version octet with which our direction began.
     spoken: Option<Version>,
-    backlog: Backlog<Bytes>,
+    /// The messages that wait for the other side.
+    pub(super) backlog: Backlog<Bytes>,
     /// Octets being passed to the kernel; nothing overtakes them.
     leaving: BytesMut,
     /// The backlog is written at once when it reaches this many octets.
@@ -104,16 +105,6 @@ impl Connection {
             failed: None,
             hung_up: false,
         })
-    }
-
-    /// Messages that wait for the other side.
-    pub(super) fn waiting(&self) -> usize {
-        self.backlog.len()
-    }
-
-    /// Octets of the waiting messages.
-    pub(super) fn waiting_octets(&self) -> usize {
-        self.backlog.octets()
     }
 
     /// Drops the oldest waiting message of the lowest priority.

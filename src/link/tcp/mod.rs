@@ -41,16 +41,15 @@ use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use socket2::{Domain, Protocol, Socket, Type};
 use tokio::net::{TcpListener, TcpStream};
 
 pub use connection::Closed;
 pub use settings::{CONNECT_TIMEOUT, FIRST_PAUSE, HANDSHAKE, LONGEST_PAUSE, STUCK, Settings};
 
 use super::Error;
-use crate::endpoint::{Access, Remote, To, Transmit};
+use crate::endpoint::{Remote, To, Transmit};
 use crate::wire::{Frame, Priority};
-use admission::{Admission, Place, Quota};
+use admission::{Admission, Place};
 use connection::Connection;
 use dial::Dial;
 use settings::MAX_WAITING;
@@ -138,8 +137,7 @@ pub enum Arrival {
 pub struct TcpLink {
     listener: Option<TcpListener>,
     local: Option<SocketAddr>,
-    quota: Quota,
-    access: Access,
+    settings: Settings,
     /// When the last warning about scarce places was logged.
     warned: Option<Instant>,
     accept_after: Option<Instant>,
@@ -155,6 +153,7 @@ impl TcpLink {
     /// # Errors
     /// [`Error::ListenerTaken`], [`Error::Permission`], [`Error::AddressGone`] or [`Error::Io`].
     pub fn open(settings: &Settings) -> Result<Self, Error> {
+        let listen = |address| listen(address).map_err(|error| listen_error(address, error));
         let listener = settings.listen.map(listen).transpose()?;
         let local = listener.as_ref().and_then(|l| l.local_addr().ok());
         let mut dials: Vec<Dial> = Vec::new();
@@ -167,11 +166,7 @@ impl TcpLink {
         Ok(Self {
             listener,
             local,
-            quota: Quota {
-                total: settings.max_accepted,
-                per_address: settings.max_per_address,
-            },
-            access: settings.access.clone(),
+            settings: settings.clone(),
             warned: None,
             accept_after: None,
             dials,
@@ -206,7 +201,7 @@ impl TcpLink {
                 local: connection.local,
                 dialed: connection.dialed,
                 received: connection.received,
-                waiting: connection.waiting(),
+                waiting: connection.backlog.len(),
                 overflows: connection.overflows,
             })
     }
@@ -214,7 +209,7 @@ impl TcpLink {
     /// When to call [`receive`](Self::receive) even if nothing arrives.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let dials = self.dials.iter().filter_map(Dial::deadline);
+        let dials = self.dials.iter().filter_map(|dial| dial.redial.deadline());
         let stuck = self.connections.values().filter_map(Connection::stuck_at);
         dials.chain(stuck).chain(self.accept_after).min()
     }
@@ -234,7 +229,7 @@ impl TcpLink {
         let (priority, payload) = (transmit.priority, &transmit.payload);
         if let Some(connection) = self.connections.get_mut(&peer) {
             self.counters.count(connection.send(priority, payload));
-            if connection.waiting_octets() > SMALL {
+            if connection.backlog.octets() > SMALL {
                 self.bound_waiting();
             }
         } else if let Some(dial) = self.dial(peer) {
@@ -250,7 +245,7 @@ impl TcpLink {
         for connection in self.connections.values_mut() {
             self.counters.count(connection.send(priority, payload));
         }
-        for dial in self.dials.iter_mut().filter(|dial| !dial.is_connected()) {
+        for dial in self.dials.iter_mut().filter(|dial| !dial.redial.is_up()) {
             self.counters.count_kept(dial.keep(priority, payload));
         }
         self.bound_waiting();
@@ -258,7 +253,7 @@ impl TcpLink {
 
     /// Keeps the backlogs of all connections within [`MAX_WAITING`].
     fn bound_waiting(&mut self) {
-        let octets = |connection: &Connection| connection.waiting_octets();
+        let octets = |connection: &Connection| connection.backlog.octets();
         while self.connections.values().map(octets).sum::<usize>() > MAX_WAITING
             && let Some(most) = self.connections.values_mut().max_by_key(|c| octets(c))
         {
@@ -313,26 +308,24 @@ impl TcpLink {
                 self.closed.push_back((remote, Closed::Stuck));
                 continue;
             }
-            let mut batch = 0;
-            while let Poll::Ready(result) = connection.poll_recv(cx, now) {
-                match result {
-                    Ok(frame) => arrived(Arrival::Frame {
-                        remote,
-                        frame,
-                        version_again: connection.repeats_version(),
-                    }),
-                    Err(closed) => {
+            for taken in 1..=BATCH {
+                match connection.poll_recv(cx, now) {
+                    Poll::Pending => break,
+                    Poll::Ready(Ok(frame)) => {
+                        self.counters.received += 1;
+                        arrived(Arrival::Frame {
+                            remote,
+                            frame,
+                            version_again: connection.repeats_version(),
+                        });
+                    }
+                    Poll::Ready(Err(closed)) => {
                         self.closed.push_back((remote, closed));
                         break;
                     }
                 }
-                batch += 1;
-                if batch == BATCH {
-                    more = true;
-                    break;
-                }
+                more |= taken == BATCH;
             }
-            self.counters.received += batch as u64;
         }
         while let Some((remote, why)) = self.closed.pop_front() {
             more |= self.close(now, remote, &why);
@@ -354,7 +347,7 @@ impl TcpLink {
         self.counters.send_overflows += connection.overflows;
         let dialed = connection.dialed;
         if dialed && let Some(dial) = self.dial(remote) {
-            dial.lost(now, connection.received > 0);
+            dial.redial.lost(now, connection.received > 0);
         }
         dialed
     }
@@ -385,7 +378,7 @@ impl TcpLink {
 
     /// Admits or refuses an incoming connection.
     fn admit(&mut self, stream: TcpStream, remote: SocketAddr, now: Instant) {
-        if !self.access.allows_address(remote.ip()) {
+        if !self.settings.access.allows_address(remote.ip()) {
             self.counters.denied += 1;
             tracing::debug!(%remote, "connection denied");
             return;
@@ -401,7 +394,7 @@ impl TcpLink {
                 heard: connection.heard,
             })
             .collect();
-        match self.quota.admit(remote, &places, now) {
+        match self.settings.admit(remote, &places, now) {
             Admission::Admit => {}
             Admission::ReplaceSilent(other) => self.displace(other, Closed::Silent, now),
             Admission::ReplaceIdle(other) => self.displace(other, Closed::Idle, now),
@@ -425,7 +418,7 @@ impl TcpLink {
 
     /// Warns once per [`WARNING_PAUSE`], so that incoming connections cannot fill the log.
     fn warn_of_scarcity(&mut self, now: Instant, what: &str, remote: SocketAddr) {
-        let limit = self.quota.total;
+        let limit = self.settings.max_accepted;
         let is_due = |warned: Instant| now.saturating_duration_since(warned) >= WARNING_PAUSE;
         if self.warned.is_none_or(is_due) {
             self.warned = Some(now);
@@ -476,7 +469,7 @@ impl TcpLink {
             Err(error) => {
                 tracing::warn!(%remote, %error, "a connection cannot be set up");
                 if dialed && let Some(dial) = self.dial(remote) {
-                    dial.lost(now, false);
+                    dial.redial.lost(now, false);
                 }
             }
         }
@@ -511,33 +504,16 @@ fn is_of_the_peer(error: &io::Error) -> bool {
     )
 }
 
-fn listen(address: SocketAddr) -> Result<TcpListener, Error> {
-    let open = || {
-        let socket = Socket::new(
-            Domain::for_address(address),
-            Type::STREAM,
-            Some(Protocol::TCP),
-        )?;
-        // A restarted node finds connections of its predecessor in TIME_WAIT. (On Windows this
-        // option would allow sharing the port.)
-        #[cfg(not(windows))]
-        socket.set_reuse_address(true)?;
-        socket.bind(&address.into())?;
-        socket.listen(128)?;
-        socket.set_nonblocking(true)?;
-        TcpListener::from_std(socket.into())
-    };
-    open().map_err(|source: io::Error| match source.kind() {
+/// Listens at an address. On Unix, connections of a predecessor in TIME_WAIT are no obstacle.
+pub(in crate::link) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
+    let listener = std::net::TcpListener::bind(address)?;
+    listener.set_nonblocking(true)?;
+    TcpListener::from_std(listener)
+}
+
+fn listen_error(address: SocketAddr, source: io::Error) -> Error {
+    match source.kind() {
         io::ErrorKind::AddrInUse => Error::ListenerTaken { address },
-        io::ErrorKind::AddrNotAvailable => Error::AddressGone(address.ip()),
-        io::ErrorKind::PermissionDenied => Error::Permission {
-            doing: format!("listening on TCP {address}"),
-            port: address.port(),
-            source,
-        },
-        _ => Error::Io {
-            doing: format!("listening on TCP {address}"),
-            source,
-        },
-    })
+        _ => Error::socket(format!("listening on TCP {address}"), address, source),
+    }
 }

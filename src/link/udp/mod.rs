@@ -7,7 +7,6 @@
 
 #[cfg(target_os = "linux")]
 mod batch;
-mod gso_batch;
 mod open;
 mod receive;
 mod send;
@@ -20,7 +19,7 @@ use std::net::SocketAddr;
 
 use bytes::Bytes;
 
-use gso_batch::GsoBatch;
+use send::GsoBatch;
 use socket::Socket;
 
 pub use settings::{Broadcasts, PortTaken, Settings};
@@ -108,7 +107,7 @@ impl UdpLink {
         let local = unicast
             .get()
             .local_addr()
-            .map_err(open::io_error("reading the local address"))?;
+            .map_err(Error::io("reading the local address"))?;
         let groups = settings.addresses_of_all(interface);
         let mut sockets = vec![unicast];
         for &group in &groups {

@@ -62,7 +62,7 @@ pub(super) fn group(
     let socket = new_socket(group)?;
     socket
         .set_reuse_address(true)
-        .map_err(io_error("sharing the multicast port"))?;
+        .map_err(Error::io("sharing the multicast port"))?;
     // Bound to the group itself, the socket leaves unicast to this port to the unicast socket.
     let local = match group {
         _ if !cfg!(windows) => group,
@@ -111,31 +111,18 @@ fn refused(group: SocketAddr, interface: &Interface, source: io::Error) -> Error
             source,
         };
     }
-    Error::Io {
-        doing: format!("setting up {group} on {interface}"),
-        source,
-    }
+    Error::io(format!("setting up {group} on {interface}"))(source)
 }
 
 fn new_socket(address: SocketAddr) -> Result<Socket, Error> {
-    let socket = Socket::new(
-        Domain::for_address(address),
-        Type::DGRAM,
-        Some(Protocol::UDP),
-    )
-    .map_err(|e| match e.kind() {
-        io::ErrorKind::PermissionDenied => Error::Permission {
-            doing: "opening a UDP socket".into(),
-            port: 0,
-            source: e,
-        },
-        _ => io_error("opening a UDP socket")(e),
-    })?;
+    let domain = Domain::for_address(address);
+    let socket = Socket::new(domain, Type::DGRAM, Some(Protocol::UDP))
+        .map_err(|e| Error::socket("opening a UDP socket", (address.ip(), 0).into(), e))?;
     if address.is_ipv6() {
         // The links of IPv4 have sockets of their own.
         socket
             .set_only_v6(true)
-            .map_err(io_error("keeping IPv4 out of an IPv6 socket"))?;
+            .map_err(Error::io("keeping IPv4 out of an IPv6 socket"))?;
     }
     Ok(socket)
 }
@@ -145,7 +132,7 @@ fn finish(socket: Socket, receive_buffer: usize) -> Result<Opened, Error> {
     let granted = socket
         .set_recv_buffer_size(receive_buffer)
         .and_then(|()| socket.recv_buffer_size())
-        .map_err(io_error("setting the receive buffer size"))?;
+        .map_err(Error::io("setting the receive buffer size"))?;
     if granted < receive_buffer {
         tracing::info!(
             wanted = receive_buffer,
@@ -158,7 +145,7 @@ fn finish(socket: Socket, receive_buffer: usize) -> Result<Opened, Error> {
     socket
         .set_nonblocking(true)
         .and_then(|()| Opened::new(socket.into()))
-        .map_err(io_error("handing the socket to the runtime"))
+        .map_err(Error::io("handing the socket to the runtime"))
 }
 
 fn bind_error(address: SocketAddr, source: io::Error) -> Error {
@@ -167,23 +154,7 @@ fn bind_error(address: SocketAddr, source: io::Error) -> Error {
             address,
             holder: Holder::of(address),
         },
-        io::ErrorKind::PermissionDenied => Error::Permission {
-            doing: format!("binding to UDP {address}"),
-            port: address.port(),
-            source,
-        },
-        io::ErrorKind::AddrNotAvailable => Error::AddressGone(address.ip()),
-        _ => Error::Io {
-            doing: format!("binding to UDP {address}"),
-            source,
-        },
-    }
-}
-
-pub(super) fn io_error(doing: &'static str) -> impl Fn(io::Error) -> Error {
-    move |source| Error::Io {
-        doing: doing.into(),
-        source,
+        _ => Error::socket(format!("binding to UDP {address}"), address, source),
     }
 }
 

@@ -11,14 +11,34 @@ use std::task::{Context, Poll, ready};
 use bytes::{Buf, Bytes};
 use socket2::SockRef;
 
-use super::UdpLink;
-use super::gso_batch::GsoBatch;
 use super::socket::Socket;
-use crate::endpoint::{Remote, To, Transmit};
+use super::{MAX_SEGMENTS, UdpLink};
+use crate::endpoint::{MOST_OCTETS, Remote, To, Transmit};
 use crate::wire::Priority;
 
 /// So many messages leave at once, and with one call if they are datagrams to different peers.
 const BURST: usize = 64;
+
+/// Datagrams to one peer, of `segment` octets each, of which the last may be shorter.
+#[derive(Clone, Debug)]
+pub(super) struct GsoBatch {
+    pub(super) peer: SocketAddr,
+    pub(super) octets: Bytes,
+    pub(super) segment: usize,
+}
+
+impl GsoBatch {
+    /// What leaves with one call, if datagrams of up to `limit` octets may leave together.
+    pub(super) fn part(&self, limit: usize) -> &[u8] {
+        let datagrams = if self.segment <= limit {
+            (MOST_OCTETS / self.segment).clamp(1, MAX_SEGMENTS)
+        } else {
+            1
+        };
+        let octets = self.octets.len().min(datagrams * self.segment);
+        &self.octets[..octets]
+    }
+}
 
 impl UdpLink {
     /// Queues what the endpoint gives out, for [`flush`](Self::flush).
@@ -104,30 +124,27 @@ impl UdpLink {
 
     /// Gives the kernel what it takes with one call.
     fn send_once(&mut self) {
-        let single = |batch: &&GsoBatch| batch.octets.len() <= batch.segment;
-        let singles = self.leaving.iter().take_while(single).count();
         self.counters.send_calls += 1;
-        if self.batch && singles > 1 {
-            match self.send_many(singles) {
-                Ok(sent) => (0..sent).for_each(|_| self.complete_first(1)),
-                Err(error) => self.handle_refusal(1, &error),
-            }
-        } else if let Some(first) = self.leaving.front() {
-            let part = first.part(self.gso_limit);
-            let datagrams = part.len().div_ceil(first.segment).max(1);
-            match send(&self.sockets[0], first.peer, part, first.segment) {
-                Ok(_) => self.complete_first(datagrams),
-                Err(error) => self.handle_refusal(datagrams, &error),
+        #[cfg(target_os = "linux")]
+        if self.batch {
+            let is_single = |batch: &&GsoBatch| batch.octets.len() <= batch.segment;
+            let singles = self.leaving.iter().take_while(is_single);
+            if singles.clone().nth(1).is_some() {
+                return match super::batch::send_many(self.sockets[0].get(), singles) {
+                    Ok(sent) => (0..sent).for_each(|_| self.complete_first(1)),
+                    Err(error) => self.handle_refusal(1, &error),
+                };
             }
         }
-    }
-
-    /// Sends the first `count` batches, of one datagram each; how many the kernel has taken.
-    fn send_many(&self, count: usize) -> io::Result<usize> {
-        #[cfg(target_os = "linux")]
-        return super::batch::send_many(self.sockets[0].get(), self.leaving.range(..count));
-        #[cfg(not(target_os = "linux"))]
-        Ok(count)
+        let Some(first) = self.leaving.front() else {
+            return;
+        };
+        let part = first.part(self.gso_limit);
+        let datagrams = part.len().div_ceil(first.segment).max(1);
+        match send(&self.sockets[0], first.peer, part, first.segment) {
+            Ok(_) => self.complete_first(datagrams),
+            Err(error) => self.handle_refusal(datagrams, &error),
+        }
     }
 
     /// The kernel has taken so many datagrams of the first batch.
@@ -143,18 +160,24 @@ impl UdpLink {
         let Some(first) = self.leaving.front() else {
             return;
         };
-        let (peer, segment) = (first.peer, first.segment);
+        let peer = first.peer;
         match error.kind() {
             io::ErrorKind::WouldBlock => self.full = true,
             io::ErrorKind::Interrupted => {}
-            _ => match limit_after(error, segment).filter(|_| datagrams > 1) {
-                Some(limit) => self.lower_gso_limit(limit, error),
-                None => {
-                    self.counters.send_errors += datagrams as u64;
-                    self.report("sending", Some(peer), error);
-                    self.drop_first(datagrams);
+            _ => {
+                #[cfg(target_os = "linux")]
+                if datagrams > 1
+                    && let Some(limit) = super::batch::limit_after(error, first.segment)
+                {
+                    self.gso_limit = limit;
+                    let interface = &self.interface.name;
+                    tracing::info!(interface, limit, %error, "datagrams above the limit leave one by one");
+                    return;
                 }
-            },
+                self.counters.send_errors += datagrams as u64;
+                self.report("sending", Some(peer), error);
+                self.drop_first(datagrams);
+            }
         }
     }
 
@@ -169,25 +192,6 @@ impl UdpLink {
             self.leaving.pop_front();
         }
         octets
-    }
-
-    /// Longer datagrams leave one by one from now on.
-    fn lower_gso_limit(&mut self, limit: usize, error: &io::Error) {
-        self.gso_limit = limit;
-        let interface = &self.interface.name;
-        tracing::info!(interface, limit, %error, "datagrams above the limit leave one by one");
-    }
-}
-
-/// If the error means that batches of such datagrams cannot be sent: the most octets of those that
-/// can, perhaps.
-fn limit_after(error: &io::Error, segment: usize) -> Option<usize> {
-    #[cfg(target_os = "linux")]
-    return super::batch::limit_after(error, segment);
-    #[cfg(not(target_os = "linux"))]
-    {
-        let _ = (error, segment);
-        None
     }
 }
 
