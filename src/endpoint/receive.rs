@@ -12,7 +12,7 @@ use super::recent::Fingerprint;
 use super::verify::Warning;
 use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
 use crate::address::JausId;
-use crate::peer;
+use crate::peer::{self, Sign};
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, Framing, judp};
 
 /// How a message arrived.
@@ -80,7 +80,7 @@ impl Endpoint {
                 .add_many(Counter::StaleOctets, frames.remaining() as u64);
             if let Some(source) = latest {
                 self.peers
-                    .recognise(source, from, peer::Recogniser::handle_stale_octets);
+                    .recognise(source, from, |it| it.note(Sign::StaleOctets));
             }
         }
     }
@@ -106,7 +106,7 @@ impl Endpoint {
     pub fn handle_repeated_version(&mut self, source: JausId) {
         if let Some((path, _)) = self.peers.last_heard(source) {
             self.peers
-                .recognise(source, path, peer::Recogniser::handle_repeated_version);
+                .recognise(source, path, |it| it.note(Sign::RepeatedVersion));
         }
     }
 
