@@ -58,10 +58,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 pub use self::attendance::{ComponentEvent, Departure};
-pub use self::config::{
-    Config, ConfigError, Delivery, InvalidDelivery, InvalidListen, Limits, Listen, Peer, Routing,
-    Tcp, units,
-};
+pub use self::config::{Config, ConfigError, Delivery, Limits, Listen, Peer, Routing, Tcp, units};
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::events::EventStream;
 pub use self::host::{Host, HostEvent, HostEvents};

@@ -32,27 +32,29 @@
 //! [[serial]]                           # one for each serial line (feature `serial`)
 //! device = "/dev/ttyUSB0"
 //! baud = 115200                        # the default
+//! parity = "none"                      # the default; or "odd", "even"
+//! stop_bits = 1                        # the default; or 2
+//! flow_control = "none"                # the default; or "hardware"
 //! ```
 //!
-//! Each section has its own file here.
+//! The larger sections have their own files here.
 
 mod delivery;
 mod error;
 mod limits;
 mod peer;
-#[cfg(feature = "serial")]
-mod serial;
 mod tcp;
 pub mod units;
 
 #[cfg(unix)]
 use std::path::PathBuf;
 
-pub use self::delivery::{Delivery, InvalidDelivery};
+pub use self::delivery::Delivery;
 pub use self::error::ConfigError;
+use self::error::{in_range, not_zero};
 pub use self::limits::{Limits, Routing};
 pub use self::peer::Peer;
-pub use self::tcp::{InvalidListen, Listen, Tcp};
+pub use self::tcp::{Listen, Tcp};
 use super::mailbox::MailboxLimits;
 use crate::address::JausId;
 use crate::endpoint::{self, Access, PAYLOAD_LIMITS};
@@ -201,13 +203,6 @@ impl Config {
         self
     }
 
-    /// Uses these IP versions on the interfaces.
-    #[must_use]
-    pub const fn ip(mut self, ip: Ip) -> Self {
-        self.ip = ip;
-        self
-    }
-
     /// Uses this UDP port; 0 selects any free one.
     #[must_use]
     pub const fn port(mut self, port: u16) -> Self {
@@ -284,39 +279,26 @@ impl Config {
     /// # Errors
     /// The first setting that is out of range, and the range.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        if !(1..JausId::ANY_SUBSYSTEM).contains(&self.subsystem) {
-            return Err(ConfigError::Subsystem(self.subsystem));
-        }
-        if !(1..JausId::ANY_NODE).contains(&self.node) {
-            return Err(ConfigError::Node(self.node));
-        }
-        if !PAYLOAD_LIMITS.contains(&self.payload_limit) {
-            return Err(ConfigError::PayloadLimit(self.payload_limit));
-        }
+        in_range("subsystem", self.subsystem, 1..=JausId::ANY_SUBSYSTEM - 1)?;
+        in_range("node", self.node, 1..=JausId::ANY_NODE - 1)?;
+        in_range("payload_limit", self.payload_limit, PAYLOAD_LIMITS)?;
         let longest = LONGEST_MESSAGE.min(self.payload_limit * MOST_FRAGMENTS);
-        if !(self.payload_limit..=longest).contains(&self.max_message) {
-            return Err(ConfigError::MaxMessage {
-                message: self.max_message,
-                payload: self.payload_limit,
-                longest,
-            });
-        }
-        let most = self.tcp.max_accepted.min(self.tcp.max_per_address);
-        if self.tcp.listen.is_some() && most == 0 {
-            return Err(ConfigError::MaxAccepted);
-        }
+        in_range(
+            "max_message",
+            self.max_message,
+            self.payload_limit..=longest,
+        )?;
+        not_zero("mailbox.messages", self.mailbox.messages)?;
         #[cfg(unix)]
         if self.junior.is_some() && self.routing.forward {
             return Err(ConfigError::JuniorForward);
         }
         #[cfg(feature = "serial")]
-        serial::validate(&self.serial)?;
+        validate_serial(&self.serial)?;
+        self.tcp.validate()?;
         limits::validate(&self.routing, &self.limits)?;
-        if self.mailbox.messages == 0 {
-            return Err(ConfigError::Mailbox);
-        }
-        self.delivery.validate().map_err(ConfigError::Delivery)?;
-        self.udp().validate().map_err(ConfigError::Group)
+        self.delivery.validate()?;
+        Ok(self.udp().validate()?)
     }
 
     /// The endpoint's settings. Its limits leave room for two of the longest messages.
@@ -371,6 +353,24 @@ impl Config {
     }
 }
 
+/// Checks the settings of the serial lines, without opening them.
+#[cfg(feature = "serial")]
+fn validate_serial(lines: &[SerialLine]) -> Result<(), ConfigError> {
+    for (index, line) in lines.iter().enumerate() {
+        let device = &line.device;
+        not_zero(format_args!("serial line {device}: baud"), line.baud)?;
+        in_range(
+            format_args!("serial line {device}: stop_bits"),
+            line.stop_bits,
+            1..=2,
+        )?;
+        if lines[..index].iter().any(|other| other.device == *device) {
+            return Err(ConfigError::SerialTwice(device.clone()));
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -380,7 +380,7 @@ mod tests {
         for (subsystem, node) in [(0, 1), (65535, 1), (1, 0), (1, 255)] {
             let error = Config::new(subsystem, node).validate().unwrap_err();
             assert!(
-                error.to_string().contains("choose a number from 1 to"),
+                error.to_string().contains("cannot be: choose from 1 to"),
                 "{error}"
             );
         }
@@ -405,8 +405,30 @@ mod tests {
         assert!(with(64, 4_194_240).is_ok());
         assert_eq!(
             with(64, 4_194_241).unwrap_err(),
-            "max_message 4194241 cannot be: choose from 64 (payload_limit) to 4194240"
+            "max_message 4194241 cannot be: choose from 64 to 4194240"
         );
+    }
+
+    #[cfg(feature = "serial")]
+    #[test]
+    fn what_no_line_can_have_is_refused_with_the_port() {
+        let line = || SerialLine::new("/dev/ttyUSB0");
+        let error = |lines: &[SerialLine]| validate_serial(lines).unwrap_err().to_string();
+        assert_eq!(
+            validate_serial(&[line(), SerialLine::new("/dev/ttyUSB1")]),
+            Ok(())
+        );
+        assert!(
+            error(&[SerialLine { baud: 0, ..line() }]).contains("serial line /dev/ttyUSB0: baud 0")
+        );
+        assert!(
+            error(&[SerialLine {
+                stop_bits: 3,
+                ..line()
+            }])
+            .contains("choose from 1 to 2")
+        );
+        assert!(error(&[line(), line()]).contains("/dev/ttyUSB0 is named twice"));
     }
 }
 
@@ -434,7 +456,7 @@ mod toml_tests {
         assert!(local.uses_udp() && !local.without_udp().uses_udp());
         assert_eq!((tcp.validate(), serial.validate()), (Ok(()), Ok(())));
         let closed = read("tcp = { listen = \"0.0.0.0\", max_accepted = 0 }").validate();
-        assert_eq!(closed, Err(ConfigError::MaxAccepted));
+        assert!(closed.unwrap_err().to_string().contains("choose 1 or more"));
     }
 
     #[test]
@@ -484,15 +506,13 @@ mod toml_tests {
     #[test]
     fn a_file_says_what_peers_are_that_cannot_be_recognised() {
         let text = "[[profile]]\nid = \"7.255.255\"\nprofile = \"jaus++\"\n\
-                    [[profile]]\nid = \"8.1.1\"\nprofile = \"iop\"\n\
-                    [delivery]\nrepeat_code_to = [\"9.255.255\"]";
+                    [[profile]]\nid = \"8.1.1\"\nprofile = \"iop\"";
         let config: Config = toml::from_str(text).unwrap();
         let endpoint = config.endpoint(0);
         let found = |id: &str| Assignment::find(&endpoint.profiles, id.parse().unwrap());
         assert_eq!(found("7.1.33"), Some(crate::peer::Peer::JausPlusPlus));
         assert_eq!(found("8.1.1"), Some(crate::peer::Peer::Iop));
         assert_eq!(found("8.1.2"), None);
-        assert_eq!(found("9.1.1"), Some(crate::peer::Peer::JausPlusPlus));
         let wrong = error("[[profile]]\nid = \"7.1.1\"\nprofile = \"jauspp\"");
         assert!(
             wrong.contains("line 3") && wrong.contains("\"jaus++\""),
@@ -538,5 +558,23 @@ mod toml_tests {
             .group(Group::Off);
         let text = serde_json::to_string(&config).unwrap();
         assert_eq!(serde_json::from_str::<Config>(&text).unwrap(), config);
+    }
+
+    #[cfg(feature = "serial")]
+    #[test]
+    fn a_line_needs_no_more_than_its_device() {
+        let read =
+            |text: &str| toml::from_str::<SerialLine>(text).map_err(|error| error.to_string());
+        assert_eq!(read("device = \"COM3\"").unwrap(), SerialLine::new("COM3"));
+        assert!(
+            read("baud = 9600")
+                .unwrap_err()
+                .contains("missing field `device`")
+        );
+        let unknown = read("device = \"COM3\"\nparity = \"mark\"").unwrap_err();
+        assert!(
+            unknown.contains("expected one of `none`, `odd`, `even`"),
+            "{unknown}"
+        );
     }
 }

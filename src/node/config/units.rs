@@ -97,89 +97,48 @@ fn split(text: &str) -> (&str, &str) {
     (number, unit.trim_start())
 }
 
-/// Deserializes a setting that is a size: an integer is a number of octets, a string may have a
-/// unit.
-///
-/// # Errors
-/// Those of [`size`], and values that are neither integer nor string.
+/// A setting that may have a unit, as a settings file has it.
 #[cfg(feature = "serde")]
-pub fn read_size<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
-    deserializer.deserialize_any(SizeVisitor)
+#[derive(serde::Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected a number, or a text with a unit such as \"4MiB\" or \"5ms\""
+)]
+enum Raw {
+    Integer(i64),
+    Float(f64),
+    Text(String),
 }
 
-/// Deserializes a setting that is a time, as a string with a unit.
-///
-/// # Errors
-/// Those of [`duration`], and values that are not strings.
+/// Deserializes a setting as text, whether it is one or a number.
 #[cfg(feature = "serde")]
-pub fn read_duration<'de, D: serde::Deserializer<'de>>(
-    deserializer: D,
-) -> Result<Duration, D::Error> {
-    deserializer.deserialize_any(DurationVisitor)
+pub(super) fn read_text<'de, D: serde::Deserializer<'de>>(d: D) -> Result<String, D::Error> {
+    Ok(match serde::Deserialize::deserialize(d)? {
+        Raw::Integer(number) => number.to_string(),
+        Raw::Float(number) => number.to_string(),
+        Raw::Text(text) => text,
+    })
+}
+
+/// Deserializes a setting that is a size.
+#[cfg(feature = "serde")]
+pub(crate) fn read_size<'de, D: serde::Deserializer<'de>>(d: D) -> Result<usize, D::Error> {
+    size(&read_text(d)?).map_err(serde::de::Error::custom)
+}
+
+/// Deserializes a setting that is a time.
+#[cfg(feature = "serde")]
+pub(super) fn read_duration<'de, D: serde::Deserializer<'de>>(d: D) -> Result<Duration, D::Error> {
+    duration(&read_text(d)?).map_err(serde::de::Error::custom)
 }
 
 /// The reverse of [`read_duration`].
-///
-/// # Errors
-/// Those of the serializer.
 #[cfg(feature = "serde")]
-pub fn write_duration<S: serde::Serializer>(
+pub(super) fn write_duration<S: serde::Serializer>(
     duration: &Duration,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
     serializer.collect_str(&format_args!("{}s", duration.as_secs_f64()))
-}
-
-#[cfg(feature = "serde")]
-struct SizeVisitor;
-
-#[cfg(feature = "serde")]
-impl serde::de::Visitor<'_> for SizeVisitor {
-    type Value = usize;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("a number of octets, or a text with a unit such as \"4MiB\"")
-    }
-
-    fn visit_u64<E: serde::de::Error>(self, octets: u64) -> Result<usize, E> {
-        usize::try_from(octets).map_err(|_| E::custom(InvalidUnit::Size(octets.to_string())))
-    }
-
-    fn visit_i64<E: serde::de::Error>(self, octets: i64) -> Result<usize, E> {
-        usize::try_from(octets).map_err(|_| E::custom(InvalidUnit::Size(octets.to_string())))
-    }
-
-    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<usize, E> {
-        size(text).map_err(E::custom)
-    }
-}
-
-#[cfg(feature = "serde")]
-struct DurationVisitor;
-
-#[cfg(feature = "serde")]
-impl serde::de::Visitor<'_> for DurationVisitor {
-    type Value = Duration;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("a text with a unit such as \"5ms\", \"1.5s\" or \"2 min\"")
-    }
-
-    fn visit_i64<E: serde::de::Error>(self, number: i64) -> Result<Duration, E> {
-        Err(E::custom(InvalidUnit::Duration(number.to_string())))
-    }
-
-    fn visit_u64<E: serde::de::Error>(self, number: u64) -> Result<Duration, E> {
-        Err(E::custom(InvalidUnit::Duration(number.to_string())))
-    }
-
-    fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<Duration, E> {
-        Err(E::custom(InvalidUnit::Duration(number.to_string())))
-    }
-
-    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Duration, E> {
-        duration(text).map_err(E::custom)
-    }
 }
 
 #[cfg(test)]
