@@ -90,21 +90,6 @@ impl Delivery {
             _ => Ok(()),
         }
     }
-
-    /// Applies these settings to those of the endpoint.
-    pub(super) fn apply(&self, to: endpoint::Config) -> endpoint::Config {
-        endpoint::Config {
-            acknowledge_patience: self.patience,
-            max_window: self.window,
-            max_unacknowledged_octets: self.waiting,
-            packing: self.packing,
-            pacing: (self.pace_rate > 0).then_some(Pacing {
-                burst: self.pace_burst,
-                rate: self.pace_rate as u64,
-            }),
-            ..to
-        }
-    }
 }
 
 #[cfg(feature = "serde")]
@@ -131,6 +116,15 @@ fn write_packing<S: serde::Serializer>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::node::Config;
+
+    fn endpoint(delivery: Delivery) -> endpoint::Config {
+        let config = Config {
+            delivery,
+            ..Config::new(1, 1)
+        };
+        config.endpoint(0)
+    }
 
     #[test]
     fn what_is_out_of_range_is_refused_with_the_range() {
@@ -161,7 +155,7 @@ mod tests {
             ..short
         };
         assert_eq!(unpaced.validate(), Ok(()));
-        assert_eq!(unpaced.apply(endpoint::Config::default()).pacing, None);
+        assert_eq!(endpoint(unpaced).pacing, None);
     }
 
     #[test]
@@ -171,7 +165,7 @@ mod tests {
             patience: Duration::from_secs(60),
             ..Delivery::default()
         };
-        let window = patient.apply(usual.clone()).retransmission_window;
+        let window = endpoint(patient).retransmission_window;
         assert_eq!(window, usual.retransmission_window);
     }
 
@@ -181,7 +175,7 @@ mod tests {
         let read = |text: &str| toml::from_str::<Delivery>(text).map_err(|error| error.to_string());
         let text =
             "patience = \"1.5s\"\npacking = \"2ms\"\npace_rate = \"1MB\"\nwaiting = \"1MiB\"";
-        let endpoint = read(text).unwrap().apply(endpoint::Config::default());
+        let endpoint = endpoint(read(text).unwrap());
         assert_eq!(endpoint.acknowledge_patience, Duration::from_millis(1500));
         assert_eq!(endpoint.packing, Packing::Within(Duration::from_millis(2)));
         assert_eq!(endpoint.pacing.unwrap().rate, 1_000_000);

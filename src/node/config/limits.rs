@@ -20,7 +20,7 @@
 
 use super::ConfigError;
 use super::error::{in_range, not_zero};
-use crate::endpoint::{self, Rate, Rates};
+use crate::endpoint::{self, Rate};
 
 /// The largest valid `max_peers`.
 const MOST_PEERS: usize = 65_536;
@@ -76,16 +76,6 @@ impl Default for Limits {
     }
 }
 
-impl Limits {
-    pub(super) const fn rates(&self) -> Rates {
-        Rates {
-            new_ids: self.new_ids_per_address,
-            messages_per_address: self.messages_per_address,
-            messages_per_id: self.messages_per_id,
-        }
-    }
-}
-
 /// Rejects limits that would block everything, or are too large.
 pub(super) fn validate(routing: &Routing, limits: &Limits) -> Result<(), ConfigError> {
     in_range("limits.max_peers", limits.max_peers, 1..=MOST_PEERS)?;
@@ -111,6 +101,8 @@ pub(super) fn validate(routing: &Routing, limits: &Limits) -> Result<(), ConfigE
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(feature = "serde")]
+    use crate::endpoint::Rates;
     use crate::node::Config;
 
     #[test]
