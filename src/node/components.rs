@@ -182,11 +182,11 @@ impl Components {
     pub(super) fn end(&mut self) -> impl Iterator<Item = JausId> {
         self.taps.end();
         self.events.end();
-        let attached = std::mem::take(&mut self.attached).into_iter();
-        attached.map(|(id, attached)| {
+        let attached = std::mem::take(&mut self.attached);
+        for attached in attached.values() {
             attached.mailbox.close();
-            id
-        })
+        }
+        attached.into_keys()
     }
 }
 
