@@ -117,9 +117,7 @@ impl Node {
             Local::At(address) => Some(Listener::open(address)?),
         };
         let follows = links.follows();
-        let local_place = listener
-            .as_ref()
-            .map(|listener| listener.place().to_owned());
+        let local_place = listener.as_ref().map(Listener::place);
         let shared = Arc::new(Shared::new(config, links, local_place));
         runtime.spawn(Driver(shared.clone()).run());
         if follows {
