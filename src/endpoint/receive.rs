@@ -12,7 +12,7 @@ use super::recent::Fingerprint;
 use super::verify::Warning;
 use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
 use crate::address::JausId;
-use crate::peer;
+use crate::peer::{self, Sign};
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, judp};
 
 /// A received message, and how it arrived.
@@ -83,7 +83,7 @@ impl Endpoint {
                 .add_many(Counter::StaleOctets, frames.remaining() as u64);
             if let Some(source) = latest {
                 self.peers
-                    .recognise(source, path, peer::Recogniser::handle_stale_octets);
+                    .recognise(source, path, |it| it.note(Sign::StaleOctets));
             }
         }
     }
@@ -110,7 +110,7 @@ impl Endpoint {
     pub fn handle_repeated_version(&mut self, source: JausId) {
         if let Some((path, _)) = self.peers.last_heard(source) {
             self.peers
-                .recognise(source, path, peer::Recogniser::handle_repeated_version);
+                .recognise(source, path, |it| it.note(Sign::RepeatedVersion));
         }
     }
 

@@ -5,14 +5,10 @@ use std::sync::Arc;
 
 use tokio::sync::oneshot;
 
-use super::answers::Answers;
 use super::error::Undelivered;
+use super::local::Answers;
 use crate::address::JausId;
 use crate::endpoint::{Event, MessageHandle};
-
-/// Limit of messages. The endpoint eventually gives up each message, so this is only reached if it
-/// fails to report that.
-const MOST: usize = 65_536;
 
 /// A waiting sender.
 #[derive(Debug)]
@@ -24,22 +20,38 @@ pub(super) enum Waiter {
 }
 
 /// All waiting senders.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Awaiting {
+    limit: usize,
     waiters: HashMap<MessageHandle, (JausId, Waiter)>,
 }
 
 impl Awaiting {
-    pub(super) fn insert(&mut self, message: MessageHandle, source: JausId, waiter: Waiter) {
-        if self.waiters.len() >= MOST {
-            self.waiters.retain(|_, (_, waiter)| waiter.waits());
-        }
-        if self.waiters.len() < MOST {
-            self.waiters.insert(message, (source, waiter));
-        }
+    /// At most `limit` senders can wait.
+    pub(super) fn new(limit: usize) -> Self {
+        let waiters = HashMap::new();
+        Self { limit, waiters }
     }
 
-    /// Notifies the waiting sender of an outcome.
+    /// Adds a waiting sender; returns whether there was room.
+    #[must_use]
+    pub(super) fn insert(
+        &mut self,
+        message: MessageHandle,
+        source: JausId,
+        waiter: Waiter,
+    ) -> bool {
+        if self.waiters.len() >= self.limit {
+            self.waiters.retain(|_, (_, waiter)| waiter.waits());
+        }
+        let has_room = self.waiters.len() < self.limit;
+        if has_room {
+            self.waiters.insert(message, (source, waiter));
+        }
+        has_room
+    }
+
+    /// Notifies the waiting sender of an outcome at the endpoint.
     pub(super) fn handle_event(&mut self, event: &Event) {
         let (message, outcome) = match *event {
             Event::Acknowledged { message, .. } => (message, Ok(())),
@@ -60,14 +72,13 @@ impl Awaiting {
             }
             _ => return,
         };
-        match self.waiters.remove(&message) {
-            Some((_, Waiter::Here(sender))) => {
-                // An error means that the sender no longer waits.
-                let _ = sender.send(outcome);
-            }
-            Some((_, Waiter::There { answers, handle })) => answers.send(handle, outcome),
-            None => {}
+        if let Some(waiter) = self.remove(message) {
+            waiter.notify(outcome);
         }
+    }
+
+    pub(super) fn remove(&mut self, message: MessageHandle) -> Option<Waiter> {
+        self.waiters.remove(&message).map(|(_, waiter)| waiter)
     }
 
     /// Drops the waiters of a component that is gone.
@@ -82,6 +93,14 @@ impl Awaiting {
 }
 
 impl Waiter {
+    pub(super) fn notify(self, outcome: Result<(), Undelivered>) {
+        match self {
+            // An error means that the sender no longer waits.
+            Self::Here(sender) => drop(sender.send(outcome)),
+            Self::There { answers, handle } => answers.send(handle, outcome),
+        }
+    }
+
     fn waits(&self) -> bool {
         match self {
             Self::Here(sender) => !sender.is_closed(),

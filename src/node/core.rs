@@ -5,10 +5,7 @@
 //! between. The [driver](super::driver) receives and waits.
 
 use std::any::Any;
-use std::collections::BTreeMap;
 use std::hash::{BuildHasher, RandomState};
-#[cfg(unix)]
-use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant, SystemTime};
@@ -16,15 +13,14 @@ use std::time::{Duration, Instant, SystemTime};
 use tokio::sync::watch;
 
 use super::Config;
-use super::attendance::{Attendance, Departure};
 use super::awaiting::{Awaiting, Waiter};
+use super::components::{Components, Departure};
 use super::error::SendError;
 use super::events::EventSender;
+use super::link::Link;
 use super::links::{Links, Survey};
-use super::mailbox::{Mailbox, MailboxLimits};
-use super::receivers::Receivers;
+use super::mailbox::Mailbox;
 use super::resident::Residents;
-use super::tap::Taps;
 use crate::address::JausId;
 use crate::endpoint::{
     self, AttachError, Endpoint, Event, MessageHandle, Outgoing, first_sequence_at,
@@ -38,6 +34,9 @@ use crate::wire::Priority;
 
 /// Limit of messages in a burst that leave together.
 const BURST: usize = 64;
+/// Limit of messages whose senders wait for an acknowledgement. The endpoint's own is lower, and it
+/// eventually gives up each message.
+const MAX_AWAITED: usize = 65_536;
 /// How long a node that shuts down tries to send queued messages.
 pub(super) const LAST_WORDS: Duration = Duration::from_millis(250);
 
@@ -54,34 +53,41 @@ pub(super) fn now() -> Instant {
 /// The state that handles, ports and the driver share.
 #[derive(Debug)]
 pub(super) struct Shared {
+    pub(super) config: Arc<Config>,
     core: Mutex<Core>,
-    /// The folder of Junior's sockets if components are clients of its node manager.
-    #[cfg(unix)]
-    junior: Option<PathBuf>,
+    /// Whether the node has stopped. Set by the driver.
     pub(super) stopped: watch::Sender<bool>,
-    /// Whether component processes can no longer attach, or never could.
-    pub(super) closed: watch::Sender<bool>,
-    pub(super) residents: Arc<Residents>,
+    pub(super) residents: Residents,
+    /// Where component processes may attach, if anywhere.
+    pub(super) local_place: Option<String>,
+    /// The listener for component processes has a receiver as long as it is open.
+    pub(super) listening: watch::Sender<()>,
     commons: Mutex<Vec<Arc<dyn Any + Send + Sync>>>,
 }
 
 impl Shared {
-    pub(super) fn new(config: &Config, links: Links) -> Self {
+    pub(super) fn new(config: Arc<Config>, links: Links, local_place: Option<String>) -> Self {
         let endpoint = Endpoint::new(endpoint::Config {
             // The keys of `RandomState` come from the operating system.
             challenge_key: RandomState::new().hash_one(0),
             ..config.endpoint(first_sequence())
         });
-        let core = Core::new(endpoint, links, config.mailbox);
         Self {
-            core: Mutex::new(core),
-            #[cfg(unix)]
-            junior: config.junior.clone(),
+            config,
+            core: Mutex::new(Core::new(endpoint, links)),
             stopped: watch::Sender::new(false),
-            closed: watch::Sender::new(true),
-            residents: Arc::default(),
+            residents: Residents::new(),
+            local_place,
+            listening: watch::Sender::new(()),
             commons: Mutex::default(),
         }
+    }
+
+    /// Waits until the node has stopped.
+    pub(super) async fn stopped(&self) {
+        let mut stopped = self.stopped.subscribe();
+        // This cannot fail: `self` holds the sender.
+        let _ = stopped.wait_for(|stopped| *stopped).await;
     }
 
     /// Data that the components of this process share on the node: one value of each type.
@@ -102,9 +108,10 @@ impl Shared {
         id: JausId,
         process: Option<Process>,
     ) -> Result<Arc<Mailbox>, AttachError> {
-        let mailbox = self.lock().attach(id, process)?;
+        let mailbox = Arc::new(Mailbox::new(self.config.mailbox));
+        self.lock().attach(id, mailbox.clone(), process)?;
         #[cfg(unix)]
-        if let Some(folder) = &self.junior {
+        if let Some(folder) = &self.config.junior {
             let claim = Claim::new(folder, id);
             let mut core = self.lock();
             match claim {
@@ -139,13 +146,10 @@ fn first_sequence() -> u16 {
 pub(super) struct Core {
     pub(super) endpoint: Endpoint,
     pub(super) links: Links,
-    pub(super) mailboxes: BTreeMap<JausId, Arc<Mailbox>>,
-    pub(super) attendance: Attendance,
+    pub(super) components: Components,
     awaiting: Awaiting,
-    limits: MailboxLimits,
     pub(super) events: EventSender<Event>,
     slab: Slab,
-    pub(super) taps: Taps,
     /// Messages sent since the last [`pump`](Self::pump).
     gathered: usize,
     driver: Option<Waker>,
@@ -154,17 +158,14 @@ pub(super) struct Core {
 }
 
 impl Core {
-    fn new(endpoint: Endpoint, links: Links, limits: MailboxLimits) -> Self {
+    fn new(endpoint: Endpoint, links: Links) -> Self {
         let mut core = Self {
             endpoint,
             links,
-            mailboxes: BTreeMap::new(),
-            attendance: Attendance::new(),
-            awaiting: Awaiting::default(),
-            limits,
+            components: Components::new(),
+            awaiting: Awaiting::new(MAX_AWAITED),
             events: EventSender::new(),
             slab: Slab::new(),
-            taps: Taps::default(),
             gathered: 0,
             driver: None,
             stop_at: None,
@@ -177,7 +178,7 @@ impl Core {
     /// Registers the links at the endpoint. A node's own multicast may return on any link, so each
     /// gets the addresses of all.
     fn announce_links(&mut self) {
-        for (id, link) in self.links.iter() {
+        for (&id, link) in &self.links.open {
             let own = self.links.udp().map(|(_, link)| link.local());
             self.endpoint.add_link(id, link.profile(own));
         }
@@ -210,27 +211,24 @@ impl Core {
     fn attach(
         &mut self,
         id: JausId,
+        mailbox: Arc<Mailbox>,
         process: Option<Process>,
-    ) -> Result<Arc<Mailbox>, AttachError> {
+    ) -> Result<(), AttachError> {
         self.endpoint.attach(id)?;
-        let mailbox = Arc::new(Mailbox::new(self.limits));
         if self.stopped {
             mailbox.close();
         }
-        self.mailboxes.insert(id, mailbox.clone());
-        self.attendance.arrive(id, process);
-        Ok(mailbox)
+        self.components.add(id, mailbox, process);
+        Ok(())
     }
 
     /// Detaches a component, unless its id belongs to another mailbox by now.
     pub(super) fn detach(&mut self, id: JausId, mailbox: &Arc<Mailbox>, why: Departure) {
-        let is_it = |there: &Arc<Mailbox>| Arc::ptr_eq(there, mailbox);
-        if self.mailboxes.get(&id).is_some_and(is_it) {
+        if self.components.has(id, mailbox) {
             self.endpoint.detach(id);
-            self.mailboxes.remove(&id);
             self.awaiting.forget_source(id);
             self.links.release(id);
-            self.attendance.depart(id, why);
+            self.components.remove(id, why);
         }
     }
 
@@ -247,14 +245,17 @@ impl Core {
         let (source, deadline) = (message.source, self.deadline());
         let urgent = message.priority > Priority::Standard;
         let now = now();
-        let mut result = self.hand_in(now, message.clone());
+        let mut result = self
+            .endpoint
+            .send(now, message.clone(), &mut self.components);
         if let Err(endpoint::SendError::QueueFull { .. }) = result {
             // Perhaps only the gathered messages fill the queue.
             self.pump(now);
-            result = self.hand_in(now, message);
+            result = self.endpoint.send(now, message, &mut self.components);
         }
         if let (Ok(handle), Some(waiter)) = (&result, waiter) {
-            self.awaiting.insert(*handle, source, waiter);
+            // The endpoint's own limit is lower.
+            let _ = self.awaiting.insert(*handle, source, waiter);
         }
         // The first message of a burst leaves at once, and so do urgent ones. The others leave
         // together in the driver's next turn, for which the first one woke it.
@@ -267,16 +268,6 @@ impl Core {
             self.wake_driver();
         }
         Ok(result?)
-    }
-
-    fn hand_in(
-        &mut self,
-        now: Instant,
-        message: Outgoing,
-    ) -> Result<MessageHandle, endpoint::SendError> {
-        let (mailboxes, taps) = (&self.mailboxes, &mut self.taps);
-        let mut receivers = Receivers { mailboxes, taps };
-        self.endpoint.send(now, message, &mut receivers)
     }
 
     /// Starts to shut down; the driver completes it.
@@ -330,43 +321,28 @@ impl Core {
         let mut transmitted = false;
         self.gathered = 0;
         while let Some(transmit) = self.endpoint.poll_transmit(now) {
-            if let Some(link) = self.links.get_mut(transmit.link) {
-                self.taps.transmit(link.framing(), &transmit);
+            if let Some(link) = self.links.open.get_mut(&transmit.link) {
+                self.components.taps.transmit(link.framing(), &transmit);
                 link.transmit(&transmit);
             }
             transmitted = true;
         }
         if transmitted {
-            self.links
-                .iter_mut()
-                .for_each(|(_, link)| link.send_waiting());
+            self.links.open.values_mut().for_each(Link::send_waiting);
         }
-        self.announce();
+        announce(&mut self.endpoint, &mut self.awaiting, &self.events);
         transmitted
-    }
-
-    /// Publishes the endpoint's events.
-    fn announce(&mut self) {
-        while let Some(event) = self.endpoint.poll_event() {
-            self.awaiting.handle_event(&event);
-            self.events.send(event);
-        }
     }
 
     /// Receives datagrams; returns whether a link had more than its share.
     fn receive(&mut self, now: Instant, cx: &mut Context<'_>) -> bool {
         let mut more = false;
-        let links: Vec<_> = self.links.iter().map(|(id, _)| id).collect();
-        for id in links {
-            if let Some(link) = self.links.get_mut(id) {
-                let (mailboxes, taps) = (&self.mailboxes, &mut self.taps);
-                let mut receivers = Receivers { mailboxes, taps };
-                let into = (&mut self.endpoint, &mut receivers);
-                more |= link.receive(cx, now, id, &mut self.slab, into);
-            }
+        for (&id, link) in &mut self.links.open {
+            let into = (&mut self.endpoint, &mut self.components);
+            more |= link.receive(cx, now, id, &mut self.slab, into);
             // Before the next link: all links together may produce more events than the queue
             // holds.
-            self.announce();
+            announce(&mut self.endpoint, &mut self.awaiting, &self.events);
         }
         more
     }
@@ -374,7 +350,7 @@ impl Core {
     /// Sends what waits for the network; returns whether nothing is left.
     fn flush(&mut self, cx: &mut Context<'_>, now: Instant) -> bool {
         let mut flushed = true;
-        for (_, link) in self.links.iter_mut() {
+        for link in self.links.open.values_mut() {
             flushed &= link.poll_flush(cx, now).is_ready();
         }
         flushed
@@ -383,7 +359,7 @@ impl Core {
     /// Closes connections properly; returns whether the peers have done so too.
     fn hang_up(&mut self) -> bool {
         let mut hung_up = true;
-        for (_, link) in self.links.iter_mut() {
+        for link in self.links.open.values_mut() {
             hung_up &= link.hang_up().is_ready();
         }
         hung_up
@@ -392,17 +368,13 @@ impl Core {
     /// Closes everything. Idempotent.
     pub(super) fn finish(&mut self) {
         self.stopped = true;
-        for (id, mailbox) in std::mem::take(&mut self.mailboxes) {
+        for id in self.components.end() {
             self.endpoint.detach(id);
-            mailbox.close();
         }
         self.awaiting.clear();
-        self.attendance.end();
-        for (id, _) in self.links.iter() {
+        for (id, _) in std::mem::take(&mut self.links.open) {
             self.endpoint.remove_link(id);
         }
-        self.links.close();
-        self.taps.end();
         self.events.end();
     }
 
@@ -410,5 +382,13 @@ impl Core {
         if let Some(driver) = self.driver.take() {
             driver.wake();
         }
+    }
+}
+
+/// Publishes the endpoint's events.
+fn announce(endpoint: &mut Endpoint, awaiting: &mut Awaiting, events: &EventSender<Event>) {
+    while let Some(event) = endpoint.poll_event() {
+        awaiting.handle_event(&event);
+        events.send(event);
     }
 }

@@ -5,16 +5,16 @@
 //! System calls run on a blocking thread and without the node's lock.
 
 use std::collections::BTreeSet;
-use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::Config;
+use tokio::task::spawn_blocking;
+
 use super::core::Shared;
 use super::links::Survey;
 use crate::link::interface::Changes;
 use crate::link::udp::UdpLink;
-use crate::link::{Interface, udp};
+use crate::link::{Error, Interface};
 
 /// Poll interval where the operating system does not report changes, or where an interface could
 /// not be used yet.
@@ -24,98 +24,56 @@ const FALLBACK: Duration = Duration::from_secs(60);
 /// How long changes are collected before a poll: an interface that comes up causes several.
 const SETTLE: Duration = Duration::from_millis(50);
 
-/// The task that follows the interfaces.
-#[derive(Debug)]
-pub(super) struct Follower {
-    shared: Arc<Shared>,
-    config: Arc<Config>,
-    changes: Changes,
-    /// Addresses where a link could not be opened. The warning is logged once.
-    refused: BTreeSet<SocketAddr>,
-}
-
-impl Follower {
-    pub(super) fn new(shared: Arc<Shared>, config: &Config) -> Self {
-        Self {
-            shared,
-            config: Arc::new(config.clone()),
-            changes: Changes::open(),
-            refused: BTreeSet::new(),
+/// Follows the interfaces until the node has stopped.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "it looks at interfaces, and decides nothing by time"
+)]
+pub(super) async fn follow(shared: Arc<Shared>, mut changes: Changes) {
+    // Addresses where a link could not be opened.
+    let mut refused = BTreeSet::new();
+    loop {
+        let polls = !changes.are_announced() || !refused.is_empty();
+        let longest = if polls { POLL } else { FALLBACK };
+        tokio::select! {
+            () = shared.stopped() => return,
+            _ = tokio::time::timeout(longest, changes.next()) => {}
         }
-    }
-
-    #[expect(
-        clippy::disallowed_methods,
-        reason = "it looks at interfaces, and decides nothing by time"
-    )]
-    pub(super) async fn run(mut self) {
-        let mut stopped = self.shared.stopped.subscribe();
-        loop {
-            let polls = !self.changes.are_announced() || !self.refused.is_empty();
-            let longest = if polls { POLL } else { FALLBACK };
-            tokio::select! {
-                _ = stopped.wait_for(|stopped| *stopped) => return,
-                _ = tokio::time::timeout(longest, self.changes.next()) => {}
-            }
-            tokio::time::sleep(SETTLE).await;
-            self.changes.forget();
-            self.look().await;
-        }
-    }
-
-    async fn look(&mut self) {
-        let config = self.config.clone();
-        let Some(survey) = blocking(move || Survey::make(&config)).await.flatten() else {
-            return;
+        tokio::time::sleep(SETTLE).await;
+        changes.forget();
+        let node = shared.clone();
+        let Ok(Some(failures)) = spawn_blocking(move || update(&node)).await else {
+            continue;
         };
-        let (gone, came) = self.shared.lock().retire_links(&survey);
-        if gone.is_empty() && came.is_empty() {
-            self.refused.clear();
-            return;
-        }
-        let settings = self.config.udp();
-        let is_change = !gone.is_empty();
-        let Some(opened) = blocking(move || open(gone, came, &settings)).await else {
-            return;
-        };
-        let links = self.sort_out(opened);
-        if is_change || !links.is_empty() {
-            self.shared.lock().adopt_links(links, survey);
-        }
-    }
-
-    /// The links that could be opened. Warns about the others.
-    fn sort_out(&mut self, opened: Vec<Opened>) -> Vec<UdpLink> {
-        let mut links = Vec::new();
-        let before = std::mem::take(&mut self.refused);
-        for (interface, result) in opened {
-            match result {
-                Ok(link) => links.push(link),
-                Err(error) => {
-                    if !before.contains(&interface.at(0)) {
-                        tracing::warn!(%interface, %error, "no link on an interface that came up");
-                    }
-                    self.refused.insert(interface.at(0));
-                }
+        let addresses = failures.iter().map(|(interface, _)| interface.at(0));
+        let before = std::mem::replace(&mut refused, addresses.collect());
+        for (interface, error) in failures {
+            if !before.contains(&interface.at(0)) {
+                tracing::warn!(%interface, %error, "no link on an interface that came up");
             }
         }
-        links
     }
 }
 
-type Opened = (Interface, Result<UdpLink, crate::link::Error>);
-
-/// Closes links and opens others, which may need the same addresses.
-fn open(gone: Vec<UdpLink>, came: Vec<Interface>, settings: &udp::Settings) -> Vec<Opened> {
+/// Opens and closes links as the host's interfaces require. Returns the interfaces where that
+/// failed; `None` if the host does not list its interfaces.
+fn update(shared: &Shared) -> Option<Vec<(Interface, Error)>> {
+    let survey = Survey::make(&shared.config)?;
+    let (gone, came) = shared.lock().retire_links(&survey);
+    let mut is_change = !gone.is_empty();
+    // The new links may need the same addresses.
     drop(gone);
-    let open = |interface: Interface| {
-        let link = UdpLink::open(&interface, settings);
-        (interface, link)
-    };
-    came.into_iter().map(open).collect()
-}
-
-/// The result of blocking work; `None` if the runtime is shutting down.
-async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Option<T> {
-    tokio::task::spawn_blocking(work).await.ok()
+    let settings = shared.config.udp();
+    let (mut links, mut failures) = (Vec::new(), Vec::new());
+    for interface in came {
+        match UdpLink::open(&interface, &settings) {
+            Ok(link) => links.push(link),
+            Err(error) => failures.push((interface, error)),
+        }
+    }
+    is_change |= !links.is_empty();
+    if is_change {
+        shared.lock().adopt_links(links, survey);
+    }
+    Some(failures)
 }

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::task::{Context, Poll};
 use std::time::Instant;
 
-use super::receivers::Receivers;
+use super::components::Components;
 use crate::address::JausId;
 use crate::endpoint::{Endpoint, Ingress, LinkId, LinkProfile, Path, Remote, Transmit};
 use crate::link::Slab;
@@ -30,36 +30,6 @@ pub(super) enum Link {
 }
 
 impl Link {
-    pub(super) const fn udp(&self) -> Option<&UdpLink> {
-        match self {
-            Self::Udp(link) => Some(link),
-            _ => None,
-        }
-    }
-
-    pub(super) const fn tcp(&self) -> Option<&TcpLink> {
-        match self {
-            Self::Tcp(link) => Some(link),
-            _ => None,
-        }
-    }
-
-    #[cfg(unix)]
-    pub(super) const fn junior(&self) -> Option<&JuniorLink> {
-        match self {
-            Self::Junior(link) => Some(link),
-            _ => None,
-        }
-    }
-
-    #[cfg(feature = "serial")]
-    pub(super) const fn serial(&self) -> Option<&SerialLink> {
-        match self {
-            Self::Serial(link) => Some(link),
-            _ => None,
-        }
-    }
-
     /// The profile for the endpoint; `own` are the source addresses of all UDP links.
     pub(super) fn profile(&self, own: impl IntoIterator<Item = SocketAddr>) -> LinkProfile {
         match self {
@@ -72,12 +42,7 @@ impl Link {
                 reads_one: true,
                 ..LinkProfile::judp([])
             },
-            Self::Tcp(_) => LinkProfile {
-                framing: self.framing(),
-                ..LinkProfile::default()
-            },
-            #[cfg(feature = "serial")]
-            Self::Serial(_) => LinkProfile {
+            _ => LinkProfile {
                 framing: self.framing(),
                 ..LinkProfile::default()
             },
@@ -179,7 +144,7 @@ impl Link {
         now: Instant,
         id: LinkId,
         slab: &mut Slab,
-        (endpoint, receivers): (&mut Endpoint, &mut Receivers<'_>),
+        (endpoint, components): (&mut Endpoint, &mut Components),
     ) -> bool {
         let from = |peer| Path { link: id, peer };
         match self {
@@ -189,21 +154,21 @@ impl Link {
                         return false;
                     };
                     let path = from(Remote::Socket(peer));
-                    receivers.taps.datagram(path, &datagram);
+                    components.taps.datagram(path, &datagram);
                     let to_all = link.went_to_all();
-                    endpoint.handle_datagram(now, Ingress { path, to_all }, datagram, receivers);
+                    endpoint.handle_datagram(now, Ingress { path, to_all }, datagram, components);
                 }
                 true
             }
             #[cfg(unix)]
             Self::Junior(link) => link.receive(cx, now, slab, |datagram| {
                 let path = from(Remote::Line);
-                receivers.taps.datagram(path, &datagram);
+                components.taps.datagram(path, &datagram);
                 let ingress = Ingress {
                     path,
                     to_all: false,
                 };
-                endpoint.handle_datagram(now, ingress, datagram, receivers);
+                endpoint.handle_datagram(now, ingress, datagram, components);
             }),
             Self::Tcp(link) => link.receive(cx, now, |arrival| match arrival {
                 Arrival::Frame {
@@ -212,20 +177,20 @@ impl Link {
                     version_again,
                 } => {
                     let path = from(Remote::Socket(remote));
-                    receivers.taps.frame(path, &frame);
+                    components.taps.frame(path, &frame);
                     // First, because it decides how this frame is answered.
                     if version_again {
                         endpoint.handle_repeated_version(frame.source);
                     }
-                    endpoint.handle_frame(now, path, &frame, receivers);
+                    endpoint.handle_frame(now, path, &frame, components);
                 }
                 Arrival::Closed(peer, _) => endpoint.forget_path(from(Remote::Socket(peer))),
             }),
             #[cfg(feature = "serial")]
             Self::Serial(link) => link.receive(cx, now, |arrival| match arrival {
                 serial::Arrival::Frame(frame) => {
-                    receivers.taps.frame(from(Remote::Line), &frame);
-                    endpoint.handle_frame(now, from(Remote::Line), &frame, receivers);
+                    components.taps.frame(from(Remote::Line), &frame);
+                    endpoint.handle_frame(now, from(Remote::Line), &frame, components);
                 }
                 serial::Arrival::Lost => endpoint.forget_path(from(Remote::Line)),
             }),

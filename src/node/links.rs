@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::link::Link;
@@ -24,8 +25,8 @@ use crate::link::{Available, Error, Interface, Interfaces, interface};
 /// The open links of a node.
 #[derive(Debug)]
 pub(super) struct Links {
-    config: Config,
-    open: BTreeMap<LinkId, Link>,
+    config: Arc<Config>,
+    pub(super) open: BTreeMap<LinkId, Link>,
     next: LinkId,
     routes: Routes,
 }
@@ -46,11 +47,9 @@ impl Survey {
     pub(super) fn make(config: &Config) -> Option<Self> {
         let available = interface::list().ok()?;
         let mut wanted = config.interfaces.present(&available, config.ip);
-        for &peer in &config.peers {
-            // Unreachable at present. It was reachable when the node started.
-            let _ = lead_to(peer, &config.interfaces, &mut wanted);
-        }
-        let routes = routes(config, &wanted);
+        // An error means that a peer is unreachable at present. It was not when the node started.
+        let route = |&peer| route_to(peer, &config.interfaces, &mut wanted).ok()?;
+        let routes = config.peers.iter().filter_map(route).collect();
         Some(Self { wanted, routes })
     }
 }
@@ -58,7 +57,7 @@ impl Survey {
 impl Links {
     /// Opens a link on every selected interface, and the links for streams. If one fails, none
     /// stays open.
-    pub(super) fn open(config: &Config) -> Result<Self, StartError> {
+    pub(super) fn open(config: &Arc<Config>) -> Result<Self, StartError> {
         let mut links = Self {
             config: config.clone(),
             open: BTreeMap::new(),
@@ -88,7 +87,8 @@ impl Links {
         let config = self.config.clone();
         let mut chosen = config.interfaces.choose(config.ip)?;
         for &peer in &config.peers {
-            lead_to(peer, &config.interfaces, &mut chosen)?;
+            self.routes
+                .extend(route_to(peer, &config.interfaces, &mut chosen)?);
         }
         let udp = config.udp();
         let deaf = chosen.iter().all(|interface| udp.is_deaf_on(interface));
@@ -101,31 +101,15 @@ impl Links {
         for interface in &chosen {
             self.insert(Link::Udp(UdpLink::open(interface, &udp)?));
         }
-        self.routes = routes(&config, &chosen);
         self.distribute_peers();
         Ok(())
     }
 
-    pub(super) fn get_mut(&mut self, link: LinkId) -> Option<&mut Link> {
-        self.open.get_mut(&link)
-    }
-
-    pub(super) fn iter(&self) -> impl Iterator<Item = (LinkId, &Link)> {
-        self.open.iter().map(|(&id, link)| (id, link))
-    }
-
     pub(super) fn udp(&self) -> impl Iterator<Item = (LinkId, &UdpLink)> {
-        self.iter().filter_map(|(id, link)| Some((id, link.udp()?)))
-    }
-
-    pub(super) fn tcp(&self) -> Option<(LinkId, &TcpLink)> {
-        self.iter().find_map(|(id, link)| Some((id, link.tcp()?)))
-    }
-
-    #[cfg(unix)]
-    pub(super) fn junior(&self) -> Option<(LinkId, &JuniorLink)> {
-        self.iter()
-            .find_map(|(id, link)| Some((id, link.junior()?)))
+        self.open.iter().filter_map(|(&id, link)| match link {
+            Link::Udp(link) => Some((id, link)),
+            _ => None,
+        })
     }
 
     /// Registers a component with Junior's node manager.
@@ -145,23 +129,9 @@ impl Links {
         }
     }
 
-    #[cfg(feature = "serial")]
-    pub(super) fn serial(&self) -> impl Iterator<Item = (LinkId, &SerialLink)> {
-        self.iter()
-            .filter_map(|(id, link)| Some((id, link.serial()?)))
-    }
-
     /// When a link needs a turn if nothing arrives before.
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
         self.open.values().filter_map(Link::poll_timeout).min()
-    }
-
-    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = (LinkId, &mut Link)> {
-        self.open.iter_mut().map(|(&id, link)| (id, link))
-    }
-
-    pub(super) fn close(&mut self) {
-        self.open.clear();
     }
 
     /// Whether changes of interfaces matter to this node.
@@ -214,7 +184,7 @@ impl Links {
         };
         let behind_connection = |&peer: &Peer| {
             let path = Path {
-                link: self.tcp()?.0,
+                link: self.tcp()?,
                 peer: peer.address().into(),
             };
             // Broadcasts go to all connections anyway.
@@ -228,6 +198,11 @@ impl Links {
         let by_udp = config.peers.iter().filter_map(named);
         let by_tcp = config.tcp.connect.iter().filter_map(behind_connection);
         by_udp.chain(by_tcp).collect()
+    }
+
+    fn tcp(&self) -> Option<LinkId> {
+        let mut links = self.open.iter();
+        links.find_map(|(&id, link)| matches!(link, Link::Tcp(_)).then_some(id))
     }
 
     fn insert(&mut self, link: Link) {
@@ -270,50 +245,36 @@ impl Links {
     }
 }
 
-/// The local address on the route to each configured peer.
-fn routes(config: &Config, interfaces: &[Interface]) -> Routes {
-    let route = |peer: &Peer| {
-        let address = peer.address();
-        Some((address, way_to(address, interfaces.iter())?))
-    };
-    config.peers.iter().filter_map(route).collect()
-}
-
-/// The local address on the route to a peer: that of the interface on its network, or else the one
-/// that the operating system selects.
-fn way_to<'a>(
-    peer: SocketAddr,
-    mut interfaces: impl Iterator<Item = &'a Interface>,
-) -> Option<IpAddr> {
-    let near = |i: &&Interface| i.reaches(peer);
-    let near = interfaces.find(near).map(|interface| interface.address);
-    near.or_else(|| interface::local_address_for(peer))
-}
-
-/// Ensures that an interface on the route to the peer is selected.
-fn lead_to(peer: Peer, wanted: &Interfaces, chosen: &mut Vec<Interface>) -> Result<(), StartError> {
-    let Some(local) = way_to(peer.address(), chosen.iter()) else {
-        tracing::debug!(%peer, "no way there just now");
-        return Ok(());
-    };
-    if chosen.iter().any(|interface| interface.address == local) {
-        return Ok(());
+/// A configured peer's address, and the local address on the route to it, if there is one at
+/// present. Ensures that its interface is selected.
+fn route_to(
+    peer: Peer,
+    wanted: &Interfaces,
+    chosen: &mut Vec<Interface>,
+) -> Result<Option<(SocketAddr, IpAddr)>, StartError> {
+    let address = peer.address();
+    if let Some(near) = chosen.iter().find(|interface| interface.reaches(address)) {
+        return Ok(Some((address, near.address)));
     }
-    let through = interface::list()?
-        .into_iter()
-        .find(|interface| interface.address == local);
-    match through {
-        Some(interface) if *wanted == Interfaces::All => chosen.push(interface),
-        _ => {
-            let chosen = Available(chosen.clone());
-            return Err(StartError::PeerOutOfReach {
-                peer,
-                local,
-                chosen,
-            });
+    let Some(local) = interface::local_address_for(address) else {
+        tracing::debug!(%peer, "no way there just now");
+        return Ok(None);
+    };
+    if !chosen.iter().any(|interface| interface.address == local) {
+        let mut all = interface::list()?.into_iter();
+        match all.find(|interface| interface.address == local) {
+            Some(interface) if *wanted == Interfaces::All => chosen.push(interface),
+            _ => {
+                let chosen = Available(chosen.clone());
+                return Err(StartError::PeerOutOfReach {
+                    peer,
+                    local,
+                    chosen,
+                });
+            }
         }
     }
-    Ok(())
+    Ok(Some((address, local)))
 }
 
 #[cfg(test)]
@@ -342,18 +303,15 @@ mod tests {
             interface("eth0", [10, 0, 0, 5]),
             interface("lo", [127, 0, 0, 1]),
         ];
-        lead_to(peer(), &Interfaces::Loopback, &mut chosen).unwrap();
+        let route = route_to(peer(), &Interfaces::Loopback, &mut chosen).unwrap();
         assert_eq!(chosen.len(), 2);
-        assert_eq!(
-            way_to(peer().address(), chosen.iter()),
-            Some([127, 0, 0, 1].into())
-        );
+        assert_eq!(route, Some((peer().address(), [127, 0, 0, 1].into())));
     }
 
     #[test]
     fn the_interface_that_leads_to_a_peer_is_added_when_all_are_wanted() {
         let mut chosen = vec![interface("eth0", [10, 0, 0, 5])];
-        lead_to(peer(), &Interfaces::All, &mut chosen).unwrap();
+        route_to(peer(), &Interfaces::All, &mut chosen).unwrap();
         assert_eq!(chosen[1].address, IpAddr::from([127, 0, 0, 1]));
     }
 
@@ -361,7 +319,9 @@ mod tests {
     fn a_peer_behind_an_interface_that_was_not_chosen_is_an_error_that_names_it() {
         let mut chosen = vec![interface("eth0", [10, 0, 0, 5])];
         let only = Interfaces::Only(vec!["eth0".into()]);
-        let error = lead_to(peer(), &only, &mut chosen).unwrap_err().to_string();
+        let error = route_to(peer(), &only, &mut chosen)
+            .unwrap_err()
+            .to_string();
         assert!(
             error.contains("add `127.0.0.1`") && error.contains("eth0 10.0.0.5"),
             "{error}"

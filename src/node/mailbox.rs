@@ -1,4 +1,4 @@
-//! The mailbox of a component: a bounded queue of unread messages, most urgent first.
+//! The mailbox of a component or tap: a bounded queue of unread messages, most urgent first.
 //!
 //! A component that does not read must not block the node, so a full mailbox drops messages. **It
 //! drops the oldest message of the lowest priority present**. If all waiting messages are more
@@ -7,14 +7,16 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 
+use tokio::sync::Notify;
+
 #[cfg(feature = "serde")]
 use super::config::units;
 use crate::endpoint::Received;
 use crate::link::backlog::{Backlog, Bounds};
 use crate::wire::Priority;
 
-/// A writer that waits for room is woken when the number of messages is a multiple of this.
-const WAKE_WRITER: usize = 128;
+/// Progress of the reader is signalled when the number of messages is a multiple of this.
+const SIGNAL_READ: usize = 128;
 
 /// The limits of a mailbox.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,29 +51,60 @@ pub struct MailboxCounters {
     pub waiting: usize,
 }
 
-/// A queue with one writer (the node) and one reader (the component's port).
+/// A queue with one writer (the node) and one reader (the component's port, or a tap).
 #[derive(Debug)]
-pub(super) struct Mailbox {
-    inner: Mutex<Inner>,
+pub(super) struct Mailbox<T = Received> {
+    inner: Mutex<Inner<T>>,
+    /// Signals progress of the reader.
+    pub(super) read: Notify,
 }
 
 #[derive(Debug)]
-struct Inner {
-    messages: Backlog<Received>,
+struct Inner<T> {
+    messages: Backlog<T>,
     delivered: u64,
     dropped: u64,
     closed: bool,
     reader: Option<Waker>,
-    /// The writer's waker while it waits for room.
-    writer: Option<Waker>,
 }
 
 impl Mailbox {
     pub(super) fn new(limits: MailboxLimits) -> Self {
-        let bounds = Bounds {
+        Self::bounded(Bounds {
             items: limits.messages,
             octets: limits.octets,
-        };
+        })
+    }
+
+    /// Queues a message.
+    pub(super) fn deliver(&self, message: Received) {
+        self.push(message.priority, message.payload.len(), message);
+    }
+
+    /// Whether `messages` more fit, or the mailbox is empty.
+    pub(super) fn has_room(&self, messages: usize) -> bool {
+        let inner = self.lock();
+        inner.messages.is_empty() || inner.messages.has_room(messages)
+    }
+
+    /// Whether a message that is acknowledged now is sure to stay until it is read: the other half
+    /// of the room is for messages that cannot be refused.
+    pub(super) fn has_reserve(&self, priority: Priority) -> bool {
+        self.lock().messages.has_reserve(priority)
+    }
+
+    pub(super) fn counters(&self) -> MailboxCounters {
+        let inner = self.lock();
+        MailboxCounters {
+            delivered: inner.delivered,
+            dropped: inner.dropped,
+            waiting: inner.messages.len(),
+        }
+    }
+}
+
+impl<T> Mailbox<T> {
+    pub(super) fn bounded(bounds: Bounds) -> Self {
         Self {
             inner: Mutex::new(Inner {
                 messages: Backlog::new(bounds),
@@ -79,82 +112,51 @@ impl Mailbox {
                 dropped: 0,
                 closed: false,
                 reader: None,
-                writer: None,
             }),
+            read: Notify::new(),
         }
     }
 
-    /// Queues a message.
-    pub(super) fn push(&self, message: Received) {
+    pub(super) fn push(&self, priority: Priority, octets: usize, message: T) {
         let mut inner = self.lock();
         inner.delivered += 1;
-        inner.dropped += inner
-            .messages
-            .push(message.priority, message.payload.len(), message);
+        inner.dropped += inner.messages.push(priority, octets, message);
         inner.wake();
     }
 
     /// The oldest message of the highest priority; `None` when the mailbox is closed and empty.
-    pub(super) fn poll_pop(&self, cx: &mut Context<'_>) -> Poll<Option<Received>> {
+    pub(super) fn poll_pop(&self, cx: &Context<'_>) -> Poll<Option<T>> {
         let mut inner = self.lock();
-        if let Some(message) = inner.pop() {
+        if let Some(message) = self.take(&mut inner) {
             return Poll::Ready(Some(message));
         }
-        if inner.closed {
-            return Poll::Ready(None);
-        }
-        inner.await_more(cx);
-        Poll::Pending
+        inner.poll_closed(cx).map(|()| None)
     }
 
-    pub(super) fn pop(&self) -> Option<Received> {
-        self.lock().pop()
+    pub(super) fn pop(&self) -> Option<T> {
+        self.take(&mut self.lock())
+    }
+
+    fn take(&self, inner: &mut Inner<T>) -> Option<T> {
+        let message = inner.messages.pop()?;
+        if inner.messages.len().is_multiple_of(SIGNAL_READ) {
+            self.read.notify_waiters();
+        }
+        Some(message)
     }
 
     /// Passes messages to `each` while it returns `true`, in the order of [`poll_pop`]. Ready when
     /// the mailbox is closed and empty.
     ///
     /// [`poll_pop`]: Self::poll_pop
-    pub(super) fn poll_drain(
-        &self,
-        cx: &mut Context<'_>,
-        mut each: impl FnMut(Received) -> bool,
-    ) -> Poll<()> {
+    pub(super) fn poll_drain(&self, cx: &Context<'_>, mut each: impl FnMut(T) -> bool) -> Poll<()> {
         let mut inner = self.lock();
-        while let Some(message) = inner.pop() {
+        while let Some(message) = self.take(&mut inner) {
             if !each(message) {
                 return Poll::Pending;
             }
         }
-        if inner.closed {
-            return Poll::Ready(());
-        }
-        inner.await_more(cx);
-        Poll::Pending
-    }
-
-    /// Waits until `messages` more fit, or the mailbox is empty.
-    pub(super) fn poll_room(&self, cx: &mut Context<'_>, messages: usize) -> Poll<()> {
-        let mut inner = self.lock();
-        if inner.has_room(messages) {
-            return Poll::Ready(());
-        }
-        match &inner.writer {
-            Some(waker) if waker.will_wake(cx.waker()) => {}
-            _ => inner.writer = Some(cx.waker().clone()),
-        }
-        Poll::Pending
-    }
-
-    /// Whether `messages` more fit, or the mailbox is empty.
-    pub(super) fn has_room(&self, messages: usize) -> bool {
-        self.lock().has_room(messages)
-    }
-
-    /// Whether a message that is acknowledged now is sure to stay until it is read: the other half
-    /// of the room is for messages that cannot be refused.
-    pub(super) fn has_reserve(&self, priority: Priority) -> bool {
-        self.lock().messages.has_reserve(priority)
+        inner.poll_closed(cx)
     }
 
     /// The number of messages read so far.
@@ -170,41 +172,19 @@ impl Mailbox {
         inner.wake();
     }
 
-    pub(super) fn counters(&self) -> MailboxCounters {
-        let inner = self.lock();
-        MailboxCounters {
-            delivered: inner.delivered,
-            dropped: inner.dropped,
-            waiting: inner.messages.len(),
-        }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Inner> {
+    fn lock(&self) -> MutexGuard<'_, Inner<T>> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Inner {
-    fn has_room(&self, messages: usize) -> bool {
-        self.messages.is_empty() || self.messages.has_room(messages)
-    }
-
-    fn pop(&mut self) -> Option<Received> {
-        let message = self.messages.pop();
-        if let Some(writer) = self
-            .writer
-            .take_if(|_| self.messages.len().is_multiple_of(WAKE_WRITER))
-        {
-            writer.wake();
+impl<T> Inner<T> {
+    /// Ready when the mailbox is closed; otherwise its reader is woken by the next message.
+    fn poll_closed(&mut self, cx: &Context<'_>) -> Poll<()> {
+        if self.closed {
+            return Poll::Ready(());
         }
-        message
-    }
-
-    fn await_more(&mut self, cx: &Context<'_>) {
-        match &self.reader {
-            Some(waker) if waker.will_wake(cx.waker()) => {}
-            _ => self.reader = Some(cx.waker().clone()),
-        }
+        self.reader = Some(cx.waker().clone());
+        Poll::Pending
     }
 
     fn wake(&mut self) {
@@ -242,10 +222,10 @@ mod tests {
         });
         let mut acknowledged = 0;
         while mailbox.has_reserve(Priority::Standard) {
-            mailbox.push(message(Priority::Standard));
+            mailbox.deliver(message(Priority::Standard));
             acknowledged += 1;
         }
-        (0..4).for_each(|_| mailbox.push(message(Priority::Standard)));
+        (0..4).for_each(|_| mailbox.deliver(message(Priority::Standard)));
         assert_eq!((acknowledged, mailbox.counters().dropped), (4, 0));
         assert!(
             mailbox.has_reserve(Priority::SafetyCritical),
@@ -265,7 +245,7 @@ mod tests {
             Priority::Low,
             Priority::High,
         ] {
-            mailbox.push(message(priority));
+            mailbox.deliver(message(priority));
         }
         let expected = MailboxCounters {
             delivered: 4,
@@ -280,11 +260,11 @@ mod tests {
     #[test]
     fn a_closed_mailbox_can_be_read_to_its_end() {
         let mailbox = Mailbox::new(MailboxLimits::default());
-        let mut cx = Context::from_waker(Waker::noop());
-        assert!(mailbox.poll_pop(&mut cx).is_pending());
-        mailbox.push(message(Priority::Standard));
+        let cx = Context::from_waker(Waker::noop());
+        assert!(mailbox.poll_pop(&cx).is_pending());
+        mailbox.deliver(message(Priority::Standard));
         mailbox.close();
-        assert!(matches!(mailbox.poll_pop(&mut cx), Poll::Ready(Some(_))));
-        assert!(matches!(mailbox.poll_pop(&mut cx), Poll::Ready(None)));
+        assert!(matches!(mailbox.poll_pop(&cx), Poll::Ready(Some(_))));
+        assert!(matches!(mailbox.poll_pop(&cx), Poll::Ready(None)));
     }
 }

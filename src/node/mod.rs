@@ -33,9 +33,8 @@
 //! # }
 //! ```
 
-mod answers;
-mod attendance;
 mod awaiting;
+mod components;
 mod config;
 mod core;
 mod driver;
@@ -48,7 +47,6 @@ mod links;
 mod local;
 mod mailbox;
 mod port;
-mod receivers;
 mod resident;
 mod tap;
 
@@ -57,11 +55,8 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-pub use self::attendance::{ComponentEvent, Departure};
-pub use self::config::{
-    Config, ConfigError, Delivery, InvalidDelivery, InvalidListen, Limits, Listen, Peer, Routing,
-    Tcp, units,
-};
+pub use self::components::{ComponentEvent, Departure};
+pub use self::config::{Config, ConfigError, Delivery, Limits, Listen, Peer, Routing, Tcp, units};
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::events::EventStream;
 pub use self::host::{Host, HostEvent, HostEvents};
@@ -74,12 +69,13 @@ pub use crate::link::local::{Address, Local, Process};
 
 use self::core::Shared;
 use self::driver::Driver;
-use self::follower::Follower;
+use self::follower::follow;
+use self::link::Link;
 use self::links::Links;
 use self::local::Server;
-use self::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::{self, Event, LinkId};
+use crate::link::interface::Changes;
 #[cfg(unix)]
 use crate::link::junior;
 use crate::link::local::Listener;
@@ -93,8 +89,6 @@ use crate::link::{Interface, tcp, udp};
 /// [`Port`] are dropped.
 #[derive(Clone, Debug)]
 pub struct Node {
-    config: Arc<Config>,
-    local_place: Option<Arc<str>>,
     guard: Arc<Guard>,
 }
 
@@ -116,42 +110,38 @@ impl Node {
     pub fn start(config: Config) -> Result<Self, StartError> {
         config.validate()?;
         let runtime = tokio::runtime::Handle::try_current().map_err(|_| StartError::NoRuntime)?;
+        let config = Arc::new(config);
         let links = Links::open(&config)?;
         let listener = match &config.local {
             Local::Off => None,
             Local::At(address) => Some(Listener::open(address)?),
         };
         let follows = links.follows();
-        let shared = Arc::new(Shared::new(&config, links));
-        runtime.spawn(Driver::new(shared.clone()));
+        let local_place = listener.as_ref().map(Listener::place);
+        let shared = Arc::new(Shared::new(config, links, local_place));
+        runtime.spawn(Driver(shared.clone()).run());
         if follows {
-            runtime.spawn(Follower::new(shared.clone(), &config).run());
+            runtime.spawn(follow(shared.clone(), Changes::open()));
         }
-        let local_place = listener.as_ref().map(|listener| listener.place().into());
         if let Some(listener) = listener {
-            tracing::info!(
-                place = listener.place(),
-                "components of this host may attach"
-            );
-            runtime.spawn(Server::new(listener, shared.clone(), &config).run());
+            let place = listener.place();
+            tracing::info!(place, "components of this host may attach");
+            runtime.spawn(Server::new(listener, shared.clone()).run());
         }
-        Ok(Self {
-            config: Arc::new(config),
-            local_place,
-            guard: Arc::new(Guard(shared)),
-        })
+        let guard = Arc::new(Guard(shared));
+        Ok(Self { guard })
     }
 
     /// The configuration that it was started with.
     #[must_use]
     pub fn config(&self) -> &Config {
-        &self.config
+        &self.shared().config
     }
 
     /// The local address where component processes of this host may attach, if enabled.
     #[must_use]
     pub fn local_place(&self) -> Option<&str> {
-        self.local_place.as_deref()
+        self.shared().local_place.as_deref()
     }
 
     /// Attaches a component, by its number within the node, 1 to 254.
@@ -159,8 +149,8 @@ impl Node {
     /// # Errors
     /// If the number does not name a single component, or is already attached.
     pub fn attach(&self, component: u8) -> Result<Port, AttachError> {
-        let id = JausId::new(self.config.subsystem, self.config.node, component);
-        self.attach_as(id)
+        let config = self.config();
+        self.attach_as(JausId::new(config.subsystem, config.node, component))
     }
 
     /// Attaches a component under any id, including one of another subsystem or node: for gateways,
@@ -205,12 +195,14 @@ impl Node {
     #[must_use]
     pub fn tcp(&self) -> Option<TcpReport> {
         let core = self.shared().lock();
-        let (link, tcp) = core.links.tcp()?;
-        Some(TcpReport {
-            link,
-            listening: tcp.local(),
-            connections: tcp.connections().collect(),
-            counters: tcp.counters(),
+        core.links.open.iter().find_map(|(&id, link)| match link {
+            Link::Tcp(link) => Some(TcpReport {
+                link: id,
+                listening: link.local(),
+                connections: link.connections().collect(),
+                counters: link.counters(),
+            }),
+            _ => None,
         })
     }
 
@@ -219,12 +211,14 @@ impl Node {
     #[must_use]
     pub fn junior(&self) -> Option<JuniorReport> {
         let core = self.shared().lock();
-        let (link, junior) = core.links.junior()?;
-        Some(JuniorReport {
-            link,
-            folder: junior.folder().to_owned(),
-            is_registered: junior.is_registered(),
-            counters: junior.counters(),
+        core.links.open.iter().find_map(|(&id, link)| match link {
+            Link::Junior(link) => Some(JuniorReport {
+                link: id,
+                folder: link.folder().to_owned(),
+                is_registered: link.is_registered(),
+                counters: link.counters(),
+            }),
+            _ => None,
         })
     }
 
@@ -233,13 +227,16 @@ impl Node {
     #[must_use]
     pub fn serial_lines(&self) -> Vec<SerialReport> {
         let core = self.shared().lock();
-        let report = |(id, line): (LinkId, &serial::SerialLink)| SerialReport {
-            link: id,
-            settings: line.settings().clone(),
-            is_open: line.is_open(),
-            counters: line.counters(),
+        let report = |(&id, link): (&LinkId, &Link)| match link {
+            Link::Serial(line) => Some(SerialReport {
+                link: id,
+                settings: line.settings().clone(),
+                is_open: line.is_open(),
+                counters: line.counters(),
+            }),
+            _ => None,
         };
-        core.links.serial().map(report).collect()
+        core.links.open.iter().filter_map(report).collect()
     }
 
     /// The peers whose addresses are known, in order of their ids.
@@ -257,26 +254,20 @@ impl Node {
     /// The attached components, in order of their ids.
     #[must_use]
     pub fn components(&self) -> Vec<ComponentReport> {
-        let core = self.shared().lock();
-        let report = |(&id, mailbox): (&JausId, &Arc<Mailbox>)| ComponentReport {
-            id,
-            process: core.attendance.process(id).cloned(),
-            mailbox: mailbox.counters(),
-        };
-        core.mailboxes.iter().map(report).collect()
+        self.shared().lock().components.reports()
     }
 
     /// Events from now on about components that attach, leave, or stop reading.
     #[must_use]
     pub fn component_events(&self) -> ComponentEvents {
-        self.shared().lock().attendance.events.subscribe()
+        self.shared().lock().components.events.subscribe()
     }
 
     /// A tap on all traffic of the node from now on. It holds up to `limit` unread passages (at
     /// least 1, and at most 16 MiB). Beyond that the oldest are dropped and counted.
     #[must_use]
     pub fn tap(&self, limit: usize) -> Tap {
-        self.shared().lock().taps.open(limit)
+        self.shared().lock().components.taps.open(limit)
     }
 
     /// The name of a link: its interface, its serial device, or `tcp` for the connections. `None`
@@ -284,9 +275,7 @@ impl Node {
     #[must_use]
     pub fn link_name(&self, link: LinkId) -> Option<String> {
         let core = self.shared().lock();
-        core.links
-            .iter()
-            .find_map(|(id, open)| (id == link).then(|| open.name()))
+        core.links.open.get(&link).map(Link::name)
     }
 
     /// Events from now on: peers learned and moved, id conflicts, acknowledgements.
@@ -300,14 +289,11 @@ impl Node {
     /// properly (0.25 s at most for both), and closes the links. Every [`Port::recv`] ends once its
     /// mailbox is read.
     pub async fn shutdown(self) {
-        self.shared().residents.close().await;
-        let mut stopped = self.shared().stopped.subscribe();
-        self.shared().lock().stop();
-        // An error would mean that the node is gone, which is what this waits for.
-        let _ = stopped.wait_for(|stopped| *stopped).await;
-        let mut closed = self.shared().closed.subscribe();
-        // As above.
-        let _ = closed.wait_for(|closed| *closed).await;
+        let shared = self.shared();
+        shared.residents.close().await;
+        shared.lock().stop();
+        shared.stopped().await;
+        shared.listening.closed().await;
     }
 
     fn shared(&self) -> &Shared {

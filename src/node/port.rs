@@ -7,8 +7,8 @@ use std::task::{Context, Poll};
 
 use tokio::sync::oneshot;
 
-use super::attendance::Departure;
 use super::awaiting::Waiter;
+use super::components::Departure;
 use super::core::Shared;
 use super::events::EventSender;
 use super::host::{Client, HostEvents};
@@ -41,7 +41,7 @@ impl Port {
     }
 
     pub(super) fn to_host(client: Arc<Client>) -> Self {
-        let (id, mailbox) = (client.id(), client.mailbox().clone());
+        let (id, mailbox) = (client.id, client.mailbox.clone());
         let way = Attachment::Host(client);
         Self {
             sender: Sender { id, way },
@@ -101,7 +101,7 @@ impl Port {
     #[must_use]
     pub fn reside(&self) -> Resident {
         match &self.sender.way {
-            Attachment::Here(shared) => Resident::of(&shared.residents),
+            Attachment::Here(shared) => shared.residents.admit(),
             Attachment::Host(_) => Resident::elsewhere(),
         }
     }
@@ -133,7 +133,7 @@ impl Port {
     pub fn host_events(&self) -> HostEvents {
         match &self.sender.way {
             Attachment::Here(_) => EventSender::new().subscribe(),
-            Attachment::Host(client) => client.events(),
+            Attachment::Host(client) => client.events.subscribe(),
         }
     }
 }
@@ -183,11 +183,7 @@ impl Sender {
     /// has stopped. [`SendError::NotConnected`] while the host's node is gone: nothing is queued,
     /// because late commands do harm.
     pub fn send(&self, message: Outgoing) -> Result<MessageHandle, SendError> {
-        self.check_source(&message)?;
-        match &self.way {
-            Attachment::Here(shared) => shared.lock().send(message, None),
-            Attachment::Host(client) => client.send(message, None),
-        }
+        self.transmit(message, None)
     }
 
     /// Sends a message with acknowledgement, and waits for it. Dropping the future cancels the
@@ -196,13 +192,9 @@ impl Sender {
     /// # Errors
     /// [`Undelivered`] tells what was not acknowledged, and why.
     pub async fn deliver(&self, mut message: Outgoing) -> Result<(), Undelivered> {
-        self.check_source(&message)?;
         message.acknowledge = true;
         let (tell, told) = oneshot::channel();
-        match &self.way {
-            Attachment::Here(shared) => shared.lock().send(message, Some(Waiter::Here(tell))),
-            Attachment::Host(client) => client.send(message, Some(tell)),
-        }?;
+        self.transmit(message, Some(Waiter::Here(tell)))?;
         told.await.unwrap_or(Err(Undelivered::Lost))
     }
 
@@ -228,19 +220,22 @@ impl Sender {
     /// component is detached and its last records to the host's node are written.
     pub async fn disconnected(&self) {
         match &self.way {
-            Attachment::Here(shared) => {
-                let mut stopped = shared.stopped.subscribe();
-                // This cannot fail: `shared` holds the sender.
-                let _ = stopped.wait_for(|stopped| *stopped).await;
-            }
+            Attachment::Here(shared) => shared.stopped().await,
             Attachment::Host(client) => client.disconnected().await,
         }
     }
 
-    fn check_source(&self, message: &Outgoing) -> Result<(), SendError> {
-        if message.source == self.id {
-            return Ok(());
+    fn transmit(
+        &self,
+        message: Outgoing,
+        waiter: Option<Waiter>,
+    ) -> Result<MessageHandle, SendError> {
+        if message.source != self.id {
+            return Err(endpoint::SendError::UnknownSource(message.source).into());
         }
-        Err(endpoint::SendError::UnknownSource(message.source).into())
+        match &self.way {
+            Attachment::Here(shared) => shared.lock().send(message, waiter),
+            Attachment::Host(client) => client.send(message, waiter),
+        }
     }
 }

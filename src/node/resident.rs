@@ -1,54 +1,43 @@
 //! The orderly shutdown of a node: components of its own process stop and release what they hold
 //! before it closes its links.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::watch;
 
 /// How long a stopping node waits for its residents.
-pub(super) const LIMIT: Duration = Duration::from_secs(1);
+const LIMIT: Duration = Duration::from_secs(1);
 
-/// The number of residents of a node, and whether it is about to stop.
+/// Tells the residents of a node whether it is about to stop. Each has a receiver.
 #[derive(Debug)]
-pub(super) struct Residents {
-    closing: watch::Sender<bool>,
-    count: watch::Sender<usize>,
-}
-
-impl Default for Residents {
-    fn default() -> Self {
-        Self {
-            closing: watch::Sender::new(false),
-            count: watch::Sender::new(0),
-        }
-    }
-}
+pub(super) struct Residents(watch::Sender<bool>);
 
 impl Residents {
+    pub(super) fn new() -> Self {
+        Self(watch::Sender::new(false))
+    }
+
+    pub(super) fn admit(&self) -> Resident {
+        Resident(Some(self.0.subscribe()))
+    }
+
     /// Asks the residents to leave, and waits until all have, or for [`LIMIT`].
     #[expect(
         clippy::disallowed_methods,
         reason = "a node that stops waits in real time"
     )]
     pub(super) async fn close(&self) {
-        self.closing.send_replace(true);
-        let mut count = self.count.subscribe();
+        self.0.send_replace(true);
         // On timeout the peers' own timeouts release what the residents held.
-        let _ = tokio::time::timeout(LIMIT, count.wait_for(|count| *count == 0)).await;
+        let _ = tokio::time::timeout(LIMIT, self.0.closed()).await;
     }
 }
 
 /// Keeps a stopping node running for a moment, until this is dropped.
 #[derive(Debug)]
-pub struct Resident(Option<Arc<Residents>>);
+pub struct Resident(Option<watch::Receiver<bool>>);
 
 impl Resident {
-    pub(super) fn of(residents: &Arc<Residents>) -> Self {
-        residents.count.send_modify(|count| *count += 1);
-        Self(Some(Arc::clone(residents)))
-    }
-
     /// For the node of another process, which does not wait.
     pub(super) const fn elsewhere() -> Self {
         Self(None)
@@ -56,21 +45,12 @@ impl Resident {
 
     /// Waits until the node is about to stop.
     pub async fn closing(&self) {
-        match &self.0 {
-            Some(residents) => {
-                let mut closing = residents.closing.subscribe();
-                // This cannot fail: `residents` holds the sender.
+        match self.0.clone() {
+            Some(mut closing) => {
+                // An error means that the node is gone.
                 let _ = closing.wait_for(|closing| *closing).await;
             }
             None => std::future::pending().await,
-        }
-    }
-}
-
-impl Drop for Resident {
-    fn drop(&mut self) {
-        if let Some(residents) = &self.0 {
-            residents.count.send_modify(|count| *count -= 1);
         }
     }
 }

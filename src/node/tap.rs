@@ -9,18 +9,16 @@
 //! octets. A full queue drops the oldest, and counts it. Without taps the cost is one test of an
 //! empty list.
 
-use std::collections::VecDeque;
-use std::fmt;
 use std::future::poll_fn;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
-use std::task::{Context, Poll, Waker};
+use std::sync::{Arc, Weak};
 use std::time::SystemTime;
 
 use bytes::Bytes;
 
+use super::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::{LinkId, Path, Received, To, Transmit};
-use crate::link::backlog::{Backlog, Bounds};
+use crate::link::backlog::Bounds;
 use crate::wire::{Flags, Frame, Framing, Priority, jserial, jtcp, judp};
 
 /// Limit of octets that wait for one tap, whatever the number of messages.
@@ -61,10 +59,9 @@ pub enum Content {
         /// If set, they are several datagrams of this many octets each; the last may be shorter.
         segment: Option<usize>,
     },
-    /// A message from a link that decodes the framing itself: TCP, serial lines.
+    /// A message between components of the node, or from a link that decodes the framing itself:
+    /// TCP, serial lines.
     Frame(Frame),
-    /// A message between components of the node.
-    Message(Received),
 }
 
 /// An item of a [`Tap`].
@@ -82,36 +79,25 @@ impl Passage {
     pub fn frames(&self) -> Vec<Frame> {
         match &self.content {
             Content::Frame(frame) => vec![frame.clone()],
-            Content::Message(message) => vec![Frame {
-                flags: Flags::new(message.priority).with_broadcast(message.broadcast),
-                ..Frame::new(message.source, message.destination, message.payload.clone())
-            }],
             Content::Octets {
-                framing: Framing::Jtcp,
-                octets,
-                ..
-            } => {
-                let mut decoder = jtcp::Decoder::new();
-                decoder.input().extend_from_slice(octets);
-                std::iter::from_fn(|| decoder.next_frame().ok().flatten()).collect()
-            }
-            Content::Octets {
-                framing: Framing::Jserial,
-                octets,
-                ..
-            } => {
-                let mut decoder = jserial::Decoder::new();
-                decoder.push(octets);
-                std::iter::from_fn(|| decoder.next_frame()).collect()
-            }
-            Content::Octets {
-                framing: Framing::Judp,
-                ..
-            } => {
-                let datagrams = self.datagrams();
-                let frames = datagrams.into_iter().filter_map(|d| judp::frames(d).ok());
-                frames.flatten().map_while(Result::ok).collect()
-            }
+                framing, octets, ..
+            } => match framing {
+                Framing::Jtcp => {
+                    let mut decoder = jtcp::Decoder::new();
+                    decoder.input().extend_from_slice(octets);
+                    std::iter::from_fn(|| decoder.next_frame().ok().flatten()).collect()
+                }
+                Framing::Jserial => {
+                    let mut decoder = jserial::Decoder::new();
+                    decoder.push(octets);
+                    std::iter::from_fn(|| decoder.next_frame()).collect()
+                }
+                Framing::Judp => {
+                    let datagrams = self.datagrams();
+                    let frames = datagrams.into_iter().filter_map(|d| judp::frames(d).ok());
+                    frames.flatten().map_while(Result::ok).collect()
+                }
+            },
         }
     }
 
@@ -138,7 +124,6 @@ impl Passage {
         match &self.content {
             Content::Octets { octets, .. } => octets.len(),
             Content::Frame(frame) => frame.payload.len(),
-            Content::Message(message) => message.payload.len(),
         }
     }
 }
@@ -147,109 +132,71 @@ impl Passage {
 /// between components of the node, before the endpoint processes it.
 ///
 /// Dropping it ends it.
-pub struct Tap(Arc<Queue>);
-
-impl fmt::Debug for Tap {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let waiting = self.0.lock().waiting.len();
-        f.debug_struct("Tap").field("waiting", &waiting).finish()
-    }
+#[derive(Debug)]
+pub struct Tap {
+    queue: Arc<Queue>,
+    /// The number of the next passage if none is lost.
+    next: u64,
+    /// The passage after the lost ones, which are reported first.
+    held: Option<Passage>,
 }
+
+/// The queue of one tap: passages, with their numbers.
+type Queue = Mailbox<(u64, Passage)>;
 
 impl Tap {
     /// Waits for the next passage; `None` when the node has stopped and the queue is empty.
     pub async fn next(&mut self) -> Option<Tapped> {
-        poll_fn(|cx| self.0.poll_pop(cx)).await
+        if let Some(tapped) = self.try_next() {
+            return Some(tapped);
+        }
+        let passage = poll_fn(|cx| self.queue.poll_pop(cx)).await?;
+        Some(self.take(passage))
     }
 
     /// The next unread passage, if any.
     pub fn try_next(&mut self) -> Option<Tapped> {
-        self.0.lock().pop()
-    }
-}
-
-/// The queue of one tap.
-#[derive(Debug)]
-struct Queue(Mutex<Inner>);
-
-#[derive(Debug)]
-struct Inner {
-    waiting: Backlog<Passage>,
-    lost: u64,
-    ended: bool,
-    reader: Option<Waker>,
-}
-
-impl Inner {
-    fn pop(&mut self) -> Option<Tapped> {
-        // The oldest are dropped, so the lost ones came before all that wait.
-        match std::mem::take(&mut self.lost) {
-            0 => self.waiting.pop().map(Tapped::Passage),
-            lost => Some(Tapped::Lost(lost)),
-        }
-    }
-}
-
-impl Queue {
-    fn push(&self, passage: Passage) {
-        let mut inner = self.lock();
-        let length = passage.len();
-        // Same priority for all, so that a tap sees the passages in their order.
-        inner.lost += inner.waiting.push(Priority::Standard, length, passage);
-        if let Some(reader) = inner.reader.take() {
-            reader.wake();
-        }
+        let held = self.held.take().map(Tapped::Passage);
+        held.or_else(|| self.queue.pop().map(|passage| self.take(passage)))
     }
 
-    fn poll_pop(&self, cx: &Context<'_>) -> Poll<Option<Tapped>> {
-        let mut inner = self.lock();
-        if let Some(tapped) = inner.pop() {
-            return Poll::Ready(Some(tapped));
+    fn take(&mut self, (number, passage): (u64, Passage)) -> Tapped {
+        match number - std::mem::replace(&mut self.next, number + 1) {
+            0 => Tapped::Passage(passage),
+            lost => {
+                self.held = Some(passage);
+                Tapped::Lost(lost)
+            }
         }
-        if inner.ended {
-            return Poll::Ready(None);
-        }
-        inner.reader = Some(cx.waker().clone());
-        Poll::Pending
-    }
-
-    fn end(&self) {
-        let mut inner = self.lock();
-        inner.ended = true;
-        if let Some(reader) = inner.reader.take() {
-            reader.wake();
-        }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Inner> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// The taps of a node.
 #[derive(Debug, Default)]
 pub(super) struct Taps {
-    queues: VecDeque<Weak<Queue>>,
+    queues: Vec<Weak<Queue>>,
+    /// The number of the next passage.
+    next: u64,
     ended: bool,
 }
 
 impl Taps {
     /// Opens a tap that holds up to `limit` passages.
     pub(super) fn open(&mut self, limit: usize) -> Tap {
-        let bounds = Bounds {
+        let queue = Arc::new(Queue::bounded(Bounds {
             items: limit.max(1),
             octets: OCTETS,
-        };
-        let queue = Arc::new(Queue(Mutex::new(Inner {
-            waiting: Backlog::new(bounds),
-            lost: 0,
-            ended: self.ended,
-            reader: None,
-        })));
-        if !self.ended {
-            self.queues.push_back(Arc::downgrade(&queue));
+        }));
+        if self.ended {
+            queue.close();
+        } else {
+            self.queues.push(Arc::downgrade(&queue));
         }
-        Tap(queue)
+        Tap {
+            queue,
+            next: self.next,
+            held: None,
+        }
     }
 
     /// Records a received datagram.
@@ -278,7 +225,12 @@ impl Taps {
     /// Records a message from one component of this node to another.
     pub(super) fn message(&mut self, message: &Received) {
         if message.path.is_none() {
-            self.tell(Way::Local(message.to), || Content::Message(message.clone()));
+            self.tell(Way::Local(message.to), || {
+                Content::Frame(Frame {
+                    flags: Flags::new(message.priority).with_broadcast(message.broadcast),
+                    ..Frame::new(message.source, message.destination, message.payload.clone())
+                })
+            });
         }
     }
 
@@ -286,7 +238,7 @@ impl Taps {
     pub(super) fn end(&mut self) {
         self.ended = true;
         for queue in self.queues.drain(..).filter_map(|queue| queue.upgrade()) {
-            queue.end();
+            queue.close();
         }
     }
 
@@ -309,10 +261,13 @@ impl Taps {
             way,
             content,
         };
+        let (octets, number) = (passage.len(), self.next);
+        self.next += 1;
         self.queues.retain(|queue| {
             let queue = queue.upgrade();
             if let Some(queue) = &queue {
-                queue.push(passage.clone());
+                // Same priority for all, so that a tap sees the passages in their order.
+                queue.push(Priority::Standard, octets, (number, passage.clone()));
             }
             queue.is_some()
         });
@@ -374,9 +329,9 @@ mod tests {
             peer: std::net::SocketAddr::from(([127, 0, 0, 1], 1)).into(),
         };
         (0..1000).for_each(|_| taps.datagram(path, &octets));
-        let held = tap.0.lock().waiting.octets();
-        assert!(held <= OCTETS, "{held}");
         assert!(matches!(tap.try_next(), Some(Tapped::Lost(lost)) if lost > 700));
+        let held = std::iter::from_fn(|| tap.try_next()).count() * octets.len();
+        assert!(held <= OCTETS, "{held}");
     }
 
     #[test]

@@ -1,11 +1,10 @@
 //! Profiles of known peers: where each departs from the standard, how that is recognised, and what
 //! this implementation does about it.
 //!
-//! Every departure that this implementation handles has a name, a [`Departure`]. Its
-//! [entry](Departure::entry) says which peers it applies to, how it is known, how it is recognised
-//! or that it must be [configured](Assignment), how it is handled, where in the code, and which
-//! test covers it. The table of all departures is [below](#the-table), and available as text from
-//! [`table`].
+//! Every [`Departure`] that this implementation handles has a name. It says which peers it applies
+//! to, how it is known, how it is recognised or that it must be [configured](Assignment), how it is
+//! handled, where in the code, and which test covers it. The table of all of them is
+//! [below](#the-table), for programs in [`DEPARTURES`].
 //!
 //! Most handling suits every peer and applies to all: tolerance for lenient peers never degrades
 //! what strict peers get. Handling that would not suit every peer depends on the [`Peer`] that was
@@ -37,9 +36,7 @@
 //!
 #![doc = include_str!("departures.md")]
 
-mod assignment;
 mod departure;
-mod entries;
 mod habits;
 mod numbers;
 mod recogniser;
@@ -50,11 +47,10 @@ mod tests;
 use std::fmt;
 use std::str::FromStr;
 
+use crate::address::JausId;
 use crate::as_text::serde_as_text;
 
-pub use assignment::Assignment;
-pub use departure::{Entry, Recognition, Source, table};
-pub use entries::Departure;
+pub use departure::{DEPARTURES, Departure, Recognition, Source};
 pub(crate) use habits::JAUSPP_FRAGMENT;
 pub use habits::{Intake, LargeStyle};
 pub(crate) use recogniser::is_priority_fault;
@@ -132,9 +128,9 @@ impl Peer {
     }
 
     /// Its departures from the standard.
-    pub fn departures(self) -> impl Iterator<Item = Departure> {
-        let all = Departure::ALL.iter().copied();
-        all.filter(move |departure| departure.entry().peers.contains(&self))
+    pub fn departures(self) -> impl Iterator<Item = &'static Departure> {
+        let of_it = move |departure: &&Departure| departure.peers.contains(&self);
+        DEPARTURES.iter().filter(of_it)
     }
 }
 
@@ -162,3 +158,29 @@ impl FromStr for Peer {
 }
 
 serde_as_text!(Peer);
+
+/// Assigns a profile to an id, whatever is observed of the peer.
+///
+/// ```toml
+/// [[profile]]
+/// id = "7.255.255"        # every component of subsystem 7
+/// profile = "jaus++"
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Assignment {
+    /// The id, which may hold the wildcards 65535 and 255.
+    pub id: JausId,
+    /// The profile. [`Peer::Standard`] prevents the peer from being recognised as anything else.
+    pub profile: Peer,
+}
+
+impl Assignment {
+    /// The profile of an id: the first entry that matches.
+    #[must_use]
+    pub fn find(all: &[Self], id: JausId) -> Option<Peer> {
+        let fits = |assignment: &&Self| assignment.id.matches(id);
+        all.iter().find(fits).map(|assignment| assignment.profile)
+    }
+}

@@ -102,7 +102,7 @@ impl Recogniser {
     /// Pass invalid frames too: they are good evidence.
     pub fn handle_frame(&mut self, frame: &Frame, trailing: usize) {
         if trailing > 0 {
-            self.handle_stale_octets();
+            self.note(Sign::StaleOctets);
         }
         if is_priority_fault(frame) {
             self.note(Sign::PriorityFault);
@@ -122,9 +122,13 @@ impl Recogniser {
         }
     }
 
-    /// Records stale octets after the last message of a datagram.
-    pub fn handle_stale_octets(&mut self) {
-        self.note(Sign::StaleOctets);
+    /// Records a sign that frames do not show by themselves.
+    pub fn note(&mut self, sign: Sign) {
+        if self.signs.insert(sign)
+            && let (peer, Certainty::Certain) = self.best()
+        {
+            self.certain = peer;
+        }
     }
 
     /// Processes a frame that was sent to all, in addition to [`handle_frame`](Self::handle_frame).
@@ -151,9 +155,13 @@ impl Recogniser {
     }
 
     /// Processes the services that the peer reports: name, major and minor version.
-    pub fn handle_services<'a>(&mut self, services: impl IntoIterator<Item = (&'a str, u8, u8)>) {
+    pub fn handle_services<S: AsRef<str>>(
+        &mut self,
+        services: impl IntoIterator<Item = (S, u8, u8)>,
+    ) {
         let (mut core, mut newer) = (0, 0);
         for (urn, major, minor) in services {
+            let urn = urn.as_ref();
             if urn.starts_with(JAUSPP_SERVICES) {
                 self.note(Sign::JausPlusPlusService);
             } else if urn.starts_with(IOP_SERVICES) {
@@ -166,22 +174,6 @@ impl Recogniser {
         if core > 0 && newer == 0 {
             self.note(Sign::OnlyFirstVersions);
         }
-    }
-
-    /// Records a repeated version octet before a message in the middle of a TCP stream.
-    pub fn handle_repeated_version(&mut self) {
-        self.note(Sign::RepeatedVersion);
-    }
-
-    /// Records that the peer acknowledged reserved message types, except those with either of the
-    /// two lowest bits set.
-    pub fn handle_misread_type(&mut self) {
-        self.note(Sign::MisreadType);
-    }
-
-    /// Records that the peer acknowledged a message for an id with a 0.
-    pub fn handle_answer_for_zero(&mut self) {
-        self.note(Sign::AnswersForZero);
     }
 
     /// Whether it repeats version octets in the middle of a TCP stream.
@@ -241,14 +233,6 @@ impl Recogniser {
         (best.0, certainty)
     }
 
-    fn note(&mut self, sign: Sign) {
-        if self.signs.insert(sign)
-            && let (peer, Certainty::Certain) = self.best()
-        {
-            self.certain = peer;
-        }
-    }
-
     fn handle_number(&mut self, frame: &Frame) {
         match frame.sequence {
             0 => self.note(Sign::NumberZero),
@@ -290,16 +274,11 @@ impl Recogniser {
         if ![frame.source.subsystem(), JausId::ANY_SUBSYSTEM].contains(&subsystem) {
             self.note(Sign::RegistersAcrossSubsystems);
         }
-        let services: Vec<_> = registration
-            .service_list
-            .iter()
-            .map(|it| {
-                let urn = it.uri.to_string_lossy().into_owned();
-                (urn, it.major_version_number, it.minor_version_number)
-            })
-            .collect();
-        let services = services.iter();
-        self.handle_services(services.map(|(urn, major, minor)| (urn.as_str(), *major, *minor)));
+        let offers = registration.service_list.iter();
+        self.handle_services(offers.map(|it| {
+            let urn = it.uri.to_string_lossy();
+            (urn, it.major_version_number, it.minor_version_number)
+        }));
     }
 
     /// JAUS++ is recognised by the length of its fragments except the last, and by the code in all

@@ -4,148 +4,86 @@ use std::fmt;
 
 use super::Peer;
 
-/// An observed behaviour that points to a peer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[non_exhaustive]
-pub enum Sign {
+/// Defines the signs. Each has the peer that it points to, its weight, and its description.
+macro_rules! signs {
+    ($($(#[doc = $doc:literal])+ $sign:ident = $peer:ident, $weight:literal: $words:literal;)+) => {
+        /// An observed behaviour that points to a peer.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[non_exhaustive]
+        pub enum Sign {
+            $($(#[doc = $doc])+ $sign,)+
+        }
+
+        impl Sign {
+            /// All signs.
+            pub const ALL: &[Self] = &[$(Self::$sign,)+];
+
+            /// The peer that it points to.
+            #[must_use]
+            pub const fn peer(self) -> Peer {
+                match self {
+                    $(Self::$sign => Peer::$peer,)+
+                }
+            }
+
+            /// The weight: 4 is sufficient alone, 2 needs another 2, and 1 alone is a guess.
+            const fn weight(self) -> u8 {
+                match self {
+                    $(Self::$sign => $weight,)+
+                }
+            }
+        }
+
+        impl fmt::Display for Sign {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(match self {
+                    $(Self::$sign => $words,)+
+                })
+            }
+        }
+    };
+}
+
+signs! {
     /// A fragment of JAUS++'s length that begins with the code of its message.
-    RepeatedCode,
+    RepeatedCode = JausPlusPlus, 4:
+        "the fragments of its large messages each begin with the message code, and have 1573 \
+         octets";
     /// Stale octets after the messages of a datagram.
-    StaleOctets,
+    StaleOctets = JausPlusPlus, 2: "octets of older datagrams stand behind its messages";
     /// Register Services sent to another subsystem.
-    RegistersAcrossSubsystems,
+    RegistersAcrossSubsystems = JausPlusPlus, 2: "it sends Register Services to other subsystems";
     /// A private service of JAUS++.
-    JausPlusPlusService,
+    JausPlusPlusService = JausPlusPlus, 4: "it offers a service of urn:jaus:jss:jpp:extras";
     /// All services of the core set have version 1.0.
-    OnlyFirstVersions,
+    OnlyFirstVersions = JausPlusPlus, 1: "all its core services have version 1.0";
     /// The version octet before each message of a TCP stream.
-    RepeatedVersion,
+    RepeatedVersion = JausPlusPlus, 2: "it writes the version octet before each message over TCP";
     /// Sequence number 0, which peers that begin with 1 skip.
-    NumberZero,
+    NumberZero = JausPlusPlus, 1: "a message of it has the sequence number 0";
     /// All flags set on a message other than an acknowledgement.
-    PriorityFault,
+    PriorityFault = Junior, 4: "a message of it has all flags set, as with priority 0";
     /// A fragment of Junior's length.
-    LongFragments,
+    LongFragments = Junior, 2: "the fragments of its large messages have 4079 octets";
     /// A message for one component that was broadcast and requests an acknowledgement.
-    CallsUnknownIds,
+    CallsUnknownIds = Junior, 1:
+        "a message for one component went to everybody and wants an acknowledgement";
     /// The first message heard has the number 1.
-    BeginsWithOne,
+    BeginsWithOne = Junior, 1: "the first message that was heard of it has the number 1";
     /// Acknowledgements of reserved message types, except those that look like header compression
     /// if the bits are read from the wrong end. It must be provoked.
-    MisreadType,
+    MisreadType = Junior, 4: "it takes bits of the message type for header compression";
     /// An acknowledgement of a message for an id with a 0. It must be provoked.
-    AnswersForZero,
+    AnswersForZero = Jts, 2: "it answers for an id with a 0 in it";
     /// Sequence numbers counted per destination.
-    NumbersByDestination,
+    NumbersByDestination = OpenJausSdk, 2: "its sequence numbers count for each destination";
     /// Queries to all components of one node, as global broadcasts.
-    AsksWholeNodes,
+    AsksWholeNodes = OpenJausSdk, 2:
+        "it asks all components of a node, in global broadcasts, what others ask one";
     /// A destination that contains a 0.
-    ZeroInDestination,
+    ZeroInDestination = Iop, 2: "it writes 0 into destinations, for \"all\"";
     /// A service of the interoperability profiles.
-    IopService,
-}
-
-impl Sign {
-    /// All signs.
-    pub const ALL: [Self; 17] = [
-        Self::RepeatedCode,
-        Self::StaleOctets,
-        Self::RegistersAcrossSubsystems,
-        Self::JausPlusPlusService,
-        Self::OnlyFirstVersions,
-        Self::RepeatedVersion,
-        Self::NumberZero,
-        Self::PriorityFault,
-        Self::LongFragments,
-        Self::CallsUnknownIds,
-        Self::BeginsWithOne,
-        Self::MisreadType,
-        Self::AnswersForZero,
-        Self::NumbersByDestination,
-        Self::AsksWholeNodes,
-        Self::ZeroInDestination,
-        Self::IopService,
-    ];
-
-    /// The peer that it points to.
-    #[must_use]
-    pub const fn peer(self) -> Peer {
-        match self {
-            Self::RepeatedCode
-            | Self::StaleOctets
-            | Self::RegistersAcrossSubsystems
-            | Self::JausPlusPlusService
-            | Self::OnlyFirstVersions
-            | Self::RepeatedVersion
-            | Self::NumberZero => Peer::JausPlusPlus,
-            Self::PriorityFault
-            | Self::LongFragments
-            | Self::CallsUnknownIds
-            | Self::BeginsWithOne
-            | Self::MisreadType => Peer::Junior,
-            Self::AnswersForZero => Peer::Jts,
-            Self::NumbersByDestination | Self::AsksWholeNodes => Peer::OpenJausSdk,
-            Self::ZeroInDestination | Self::IopService => Peer::Iop,
-        }
-    }
-
-    /// The weight: 4 is sufficient alone, 2 needs another 2, and 1 alone is a guess.
-    pub(super) const fn weight(self) -> u8 {
-        match self {
-            Self::RepeatedCode
-            | Self::JausPlusPlusService
-            | Self::PriorityFault
-            | Self::MisreadType
-            | Self::IopService => 4,
-            Self::StaleOctets
-            | Self::RegistersAcrossSubsystems
-            | Self::RepeatedVersion
-            | Self::LongFragments
-            | Self::AnswersForZero
-            | Self::NumbersByDestination
-            | Self::AsksWholeNodes
-            | Self::ZeroInDestination => 2,
-            Self::OnlyFirstVersions
-            | Self::NumberZero
-            | Self::CallsUnknownIds
-            | Self::BeginsWithOne => 1,
-        }
-    }
-
-    const fn bit(self) -> u32 {
-        1 << self as u32
-    }
-}
-
-impl fmt::Display for Sign {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::RepeatedCode => {
-                "the fragments of its large messages each begin with the message code, and have \
-                 1573 octets"
-            }
-            Self::StaleOctets => "octets of older datagrams stand behind its messages",
-            Self::RegistersAcrossSubsystems => "it sends Register Services to other subsystems",
-            Self::JausPlusPlusService => "it offers a service of urn:jaus:jss:jpp:extras",
-            Self::OnlyFirstVersions => "all its core services have version 1.0",
-            Self::RepeatedVersion => "it writes the version octet before each message over TCP",
-            Self::NumberZero => "a message of it has the sequence number 0",
-            Self::PriorityFault => "a message of it has all flags set, as with priority 0",
-            Self::LongFragments => "the fragments of its large messages have 4079 octets",
-            Self::CallsUnknownIds => {
-                "a message for one component went to everybody and wants an acknowledgement"
-            }
-            Self::BeginsWithOne => "the first message that was heard of it has the number 1",
-            Self::MisreadType => "it takes bits of the message type for header compression",
-            Self::AnswersForZero => "it answers for an id with a 0 in it",
-            Self::NumbersByDestination => "its sequence numbers count for each destination",
-            Self::AsksWholeNodes => {
-                "it asks all components of a node, in global broadcasts, what others ask one"
-            }
-            Self::ZeroInDestination => "it writes 0 into destinations, for \"all\"",
-            Self::IopService => "it offers a service of the interoperability profiles",
-        })
-    }
+    IopService = Iop, 4: "it offers a service of the interoperability profiles";
 }
 
 /// A set of signs.
@@ -155,17 +93,20 @@ pub(super) struct Signs(u32);
 impl Signs {
     /// Adds a sign; returns whether it is new.
     pub(super) fn insert(&mut self, sign: Sign) -> bool {
-        let new = self.0 & sign.bit() == 0;
-        self.0 |= sign.bit();
+        let new = !self.has(sign);
+        self.0 |= 1 << sign as u32;
         new
     }
 
     pub(super) const fn has(self, sign: Sign) -> bool {
-        self.0 & sign.bit() != 0
+        self.0 & (1 << sign as u32) != 0
     }
 
     pub(super) fn iter(self) -> impl Iterator<Item = Sign> {
-        Sign::ALL.into_iter().filter(move |sign| self.has(*sign))
+        Sign::ALL
+            .iter()
+            .copied()
+            .filter(move |&sign| self.has(sign))
     }
 
     /// The total weight for a peer. Signs of Junior also count for a fork of it, if at least one

@@ -372,7 +372,7 @@ impl Reassembly {
     /// Finishes the large message whose end is shown by `number`, the sequence number of the next
     /// whole message; returns it with its receiver and priority. JAUS++ does not mark the end of a
     /// message that fills its fragments, and reuses the number of the last fragment for the next
-    /// message. See [`NoLastFragment`](crate::peer::Departure::NoLastFragment).
+    /// message. See "no last fragment" in [`peer`](crate::peer#the-table).
     pub(in crate::endpoint) fn finish(
         &mut self,
         source: JausId,

@@ -1,15 +1,12 @@
 //! The `[delivery]` section: acknowledged messages, packing and pacing.
 
-#[cfg(feature = "serde")]
-use std::fmt;
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
 #[cfg(feature = "serde")]
 use super::units;
-use crate::address::JausId;
+use super::{ConfigError, error::in_range};
 use crate::endpoint::{self, Pacing, Packing};
-use crate::peer::{self, Assignment};
 
 const PATIENCES: RangeInclusive<Duration> = Duration::from_millis(100)..=Duration::from_secs(600);
 const WINDOWS: RangeInclusive<usize> = 2..=16_384;
@@ -26,7 +23,6 @@ const LONGEST_PACKING: Duration = Duration::from_secs(1);
 /// packing = "off"          # or for how long small messages wait for others: "2ms"
 /// pace_burst = "192kB"     # of a receive buffer that a large message may fill at once
 /// pace_rate = "200MB"      # of it that is emptied each second; 0: no pacing
-/// repeat_code_to = ["7.255.255"]   # JAUS++ nodes, whose large messages are cut otherwise
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -62,10 +58,6 @@ pub struct Delivery {
     /// pacing.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub pace_rate: usize,
-    /// Peers that repeat the message code in each fragment of a large message, by id, which may
-    /// have wildcards: the same as a `[[profile]]` with `profile = "jaus++"` for each. A node also
-    /// learns this from a peer's own large messages.
-    pub repeat_code_to: Vec<JausId>,
 }
 
 impl Default for Delivery {
@@ -78,96 +70,36 @@ impl Default for Delivery {
             packing: usual.packing,
             pace_burst: pacing.burst,
             pace_rate: pacing.rate as usize,
-            repeat_code_to: Vec::new(),
         }
     }
 }
 
 impl Delivery {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// The first setting that is out of range, and the range.
-    pub(super) fn validate(&self) -> Result<(), InvalidDelivery> {
-        if !PATIENCES.contains(&self.patience) {
-            return Err(InvalidDelivery::Patience(self.patience));
+    /// Checks that the settings are in their ranges.
+    pub(super) fn validate(&self) -> Result<(), ConfigError> {
+        in_range("delivery.patience", self.patience, PATIENCES)?;
+        in_range("delivery.window", self.window, WINDOWS)?;
+        if self.pace_rate > 0 {
+            in_range("delivery.pace_burst", self.pace_burst, BURSTS)?;
         }
-        if !WINDOWS.contains(&self.window) {
-            return Err(InvalidDelivery::Window(self.window));
-        }
-        if matches!(self.packing, Packing::Within(time) if time > LONGEST_PACKING) {
-            return Err(InvalidDelivery::Packing);
-        }
-        if self.pace_rate > 0 && !BURSTS.contains(&self.pace_burst) {
-            return Err(InvalidDelivery::Burst(self.pace_burst));
-        }
-        Ok(())
-    }
-
-    /// Applies these settings to those of the endpoint.
-    pub(super) fn apply(&self, to: endpoint::Config) -> endpoint::Config {
-        let repeat = |&id: &JausId| Assignment {
-            id,
-            profile: peer::Peer::JausPlusPlus,
-        };
-        let repeating = self.repeat_code_to.iter().map(repeat);
-        let profiles = to.profiles.into_iter().chain(repeating).collect();
-        endpoint::Config {
-            acknowledge_patience: self.patience,
-            max_window: self.window,
-            max_unacknowledged_octets: self.waiting,
-            packing: self.packing,
-            pacing: (self.pace_rate > 0).then_some(Pacing {
-                burst: self.pace_burst,
-                rate: self.pace_rate as u64,
-            }),
-            profiles,
-            ..to
+        match self.packing {
+            Packing::Within(time) if time > LONGEST_PACKING => {
+                let range = "\"off\" or a time up to 1s";
+                Err(ConfigError::out_of_range("delivery.packing", time, range))
+            }
+            _ => Ok(()),
         }
     }
-}
-
-/// An invalid setting of the section.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum InvalidDelivery {
-    /// Too short for a round trip, or longer than is useful.
-    #[error("delivery.patience {0:?} cannot be: choose from 0.1s to 10min")]
-    Patience(Duration),
-    /// A window without room, or larger than the sequence numbers allow.
-    #[error("delivery.window {0} cannot be: choose from 2 to 16384 packets")]
-    Window(usize),
-    /// Messages would be stale.
-    #[error("delivery.packing cannot be so long: choose \"off\" or a time up to 1s")]
-    Packing,
-    /// Less than one packet occupies.
-    #[error(
-        "delivery.pace_burst {0} cannot be: choose from 8192 octets to 1GiB, or turn pacing off \
-         with pace_rate = 0"
-    )]
-    Burst(usize),
 }
 
 #[cfg(feature = "serde")]
 fn read_packing<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Packing, D::Error> {
-    struct Visitor;
-    impl serde::de::Visitor<'_> for Visitor {
-        type Value = Packing;
-
-        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("\"off\" or a time such as \"2ms\"")
-        }
-
-        fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Packing, E> {
-            match text {
-                "off" => Ok(Packing::Off),
-                time => units::duration(time)
-                    .map(Packing::Within)
-                    .map_err(E::custom),
-            }
-        }
+    match units::read_text(deserializer)?.as_str() {
+        "off" => Ok(Packing::Off),
+        time => units::duration(time)
+            .map(Packing::Within)
+            .map_err(|error| serde::de::Error::custom(format_args!("{error}, or \"off\""))),
     }
-    deserializer.deserialize_str(Visitor)
 }
 
 #[cfg(feature = "serde")]
@@ -184,6 +116,15 @@ fn write_packing<S: serde::Serializer>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::node::Config;
+
+    fn endpoint(delivery: Delivery) -> endpoint::Config {
+        let config = Config {
+            delivery,
+            ..Config::new(1, 1)
+        };
+        config.endpoint(0)
+    }
 
     #[test]
     fn what_is_out_of_range_is_refused_with_the_range() {
@@ -195,14 +136,14 @@ mod tests {
                 patience: Duration::from_millis(5),
                 ..usual()
             }),
-            "delivery.patience 5ms cannot be: choose from 0.1s to 10min"
+            "delivery.patience 5ms cannot be: choose from 100ms to 600s"
         );
         assert_eq!(
             refused(Delivery {
                 window: 1,
                 ..usual()
             }),
-            "delivery.window 1 cannot be: choose from 2 to 16384 packets"
+            "delivery.window 1 cannot be: choose from 2 to 16384"
         );
         let short = Delivery {
             pace_burst: 100,
@@ -214,7 +155,7 @@ mod tests {
             ..short
         };
         assert_eq!(unpaced.validate(), Ok(()));
-        assert_eq!(unpaced.apply(endpoint::Config::default()).pacing, None);
+        assert_eq!(endpoint(unpaced).pacing, None);
     }
 
     #[test]
@@ -224,7 +165,7 @@ mod tests {
             patience: Duration::from_secs(60),
             ..Delivery::default()
         };
-        let window = patient.apply(usual.clone()).retransmission_window;
+        let window = endpoint(patient).retransmission_window;
         assert_eq!(window, usual.retransmission_window);
     }
 
@@ -232,21 +173,15 @@ mod tests {
     #[test]
     fn a_file_says_times_and_sizes_with_their_units() {
         let read = |text: &str| toml::from_str::<Delivery>(text).map_err(|error| error.to_string());
-        let text = "patience = \"1.5s\"\npacking = \"2ms\"\npace_rate = \"1MB\"\nwaiting = \"1MiB\"\n\
-                    repeat_code_to = [\"7.255.255\"]";
-        let endpoint = read(text).unwrap().apply(endpoint::Config::default());
+        let text =
+            "patience = \"1.5s\"\npacking = \"2ms\"\npace_rate = \"1MB\"\nwaiting = \"1MiB\"";
+        let endpoint = endpoint(read(text).unwrap());
         assert_eq!(endpoint.acknowledge_patience, Duration::from_millis(1500));
         assert_eq!(endpoint.packing, Packing::Within(Duration::from_millis(2)));
         assert_eq!(endpoint.pacing.unwrap().rate, 1_000_000);
         assert_eq!(endpoint.max_unacknowledged_octets, 1 << 20);
-        assert_eq!(endpoint.profiles[0].id, JausId::new(7, 255, 255));
-        assert_eq!(endpoint.profiles[0].profile, peer::Peer::JausPlusPlus);
         assert_eq!(read("packing = \"off\"").unwrap(), Delivery::default());
-        assert!(
-            read("packing = 5")
-                .unwrap_err()
-                .contains("\"off\" or a time")
-        );
+        assert!(read("packing = 5").unwrap_err().contains("or \"off\""));
         assert!(read("patience = 3").unwrap_err().contains("time"));
         assert!(read("windwo = 3").unwrap_err().contains("windwo"));
     }

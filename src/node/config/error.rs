@@ -1,6 +1,8 @@
 //! Invalid settings of a node.
 
-use super::InvalidDelivery;
+use std::fmt::{Debug, Display};
+use std::ops::RangeInclusive;
+
 use crate::address::ParseIdError;
 use crate::link::InvalidGroup;
 
@@ -8,82 +10,28 @@ use crate::link::InvalidGroup;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// 0 is no subsystem, 65535 is the wildcard.
-    #[error("subsystem {0} cannot be: choose a number from 1 to 65534")]
-    Subsystem(u16),
-    /// 0 is no node, 255 is the wildcard.
-    #[error("node {0} cannot be: choose a number from 1 to 254")]
-    Node(u8),
-    /// Too small for a packet, or more than one holds.
-    #[error("payload_limit {0} cannot be: choose from 64 to 4079 octets of payload in a packet")]
-    PayloadLimit(usize),
-    /// Less than a packet, more than there are fragments for, or too much memory for a small board.
-    #[error("max_message {message} cannot be: choose from {payload} (payload_limit) to {longest}")]
-    MaxMessage {
-        /// The configured length in octets.
-        message: usize,
-        /// [`Config::payload_limit`](super::Config::payload_limit).
-        payload: usize,
-        /// The limit in octets: 16 MiB, and no more fragments than there are sequence numbers.
-        longest: usize,
+    /// A setting is out of its range.
+    #[error("{setting} {value} cannot be: choose {range}")]
+    OutOfRange {
+        /// Its section and key.
+        setting: String,
+        /// The configured value.
+        value: String,
+        /// What can be.
+        range: String,
     },
-    /// A table without room, or too large.
-    #[error("max_peers {0} cannot be: choose from 1 to 65536")]
-    MaxPeers(usize),
-    /// A rate of zero.
-    #[error(
-        "{key} = {{ per_second = {per_second}, burst = {burst} }} cannot be: choose at least 1 for each"
-    )]
-    Rate {
-        /// Section and key.
-        key: &'static str,
-        /// The rate per second.
-        per_second: u32,
-        /// The burst.
-        burst: u32,
-    },
-    /// A listener that accepts no connection.
-    #[error(
-        "tcp.max_accepted or tcp.max_per_address 0 lets nobody connect: choose 1 or more, or leave \
-             tcp.listen out"
-    )]
-    MaxAccepted,
     /// Junior delivers only to its own clients.
     #[error(
         "routing.forward and junior exclude each other: Junior delivers nothing for components \
          behind its clients. Leave one of them out"
     )]
     JuniorForward,
-    /// A serial line carries nothing at 0 bits per second.
-    #[error(
-        "baud {baud} of the serial line {device} cannot be: choose what both ends have, such as 19200 or 115200"
-    )]
-    Baud {
-        /// The device.
-        device: String,
-        /// The configured rate.
-        baud: u32,
-    },
-    /// Neither one nor two stop bits.
-    #[error("stop_bits {stop_bits} of the serial line {device} cannot be: choose 1 or 2")]
-    StopBits {
-        /// The device.
-        device: String,
-        /// The configured number.
-        stop_bits: u8,
-    },
     /// Two lines on one device.
     #[error("the serial port {0} is named twice: leave one out")]
     SerialTwice(String),
-    /// A mailbox without room.
-    #[error("a mailbox must hold at least 1 message")]
-    Mailbox,
-    /// A setting of the section `delivery`.
-    #[error(transparent)]
-    Delivery(InvalidDelivery),
     /// Not a multicast group.
     #[error(transparent)]
-    Group(InvalidGroup),
+    Group(#[from] InvalidGroup),
     /// The id of a peer is invalid.
     #[error("the id of a peer: {0}")]
     PeerId(ParseIdError),
@@ -94,4 +42,48 @@ pub enum ConfigError {
          need the interface) [fe80::2%eth0]:3794"
     )]
     Peer(String),
+    /// Not an address to listen on.
+    #[error(
+        "`{0}` is no address to listen on: write an address of this host, or 0.0.0.0 for all of \
+         them, with a port if it is not 3794, such as 10.0.0.5 or 0.0.0.0:3795"
+    )]
+    Listen(String),
+}
+
+impl ConfigError {
+    pub(super) fn out_of_range(
+        setting: impl Display,
+        value: impl Debug,
+        range: impl Display,
+    ) -> Self {
+        Self::OutOfRange {
+            setting: setting.to_string(),
+            value: format!("{value:?}"),
+            range: range.to_string(),
+        }
+    }
+}
+
+/// Checks that a setting is in its range.
+pub(super) fn in_range<T: PartialOrd + Debug>(
+    setting: impl Display,
+    value: T,
+    range: RangeInclusive<T>,
+) -> Result<(), ConfigError> {
+    if range.contains(&value) {
+        return Ok(());
+    }
+    let range = format!("from {:?} to {:?}", range.start(), range.end());
+    Err(ConfigError::out_of_range(setting, value, range))
+}
+
+/// Checks that a setting is not 0.
+pub(super) fn not_zero<T: PartialEq + Default + Debug>(
+    setting: impl Display,
+    value: T,
+) -> Result<(), ConfigError> {
+    if value != T::default() {
+        return Ok(());
+    }
+    Err(ConfigError::out_of_range(setting, value, "1 or more"))
 }

@@ -19,7 +19,8 @@
 //! ```
 
 use super::ConfigError;
-use crate::endpoint::{self, Rate, Rates};
+use super::error::{in_range, not_zero};
+use crate::endpoint::{self, Rate};
 
 /// The largest valid `max_peers`.
 const MOST_PEERS: usize = 65_536;
@@ -75,22 +76,10 @@ impl Default for Limits {
     }
 }
 
-impl Limits {
-    pub(super) const fn rates(&self) -> Rates {
-        Rates {
-            new_ids: self.new_ids_per_address,
-            messages_per_address: self.messages_per_address,
-            messages_per_id: self.messages_per_id,
-        }
-    }
-}
-
 /// Rejects limits that would block everything, or are too large.
 pub(super) fn validate(routing: &Routing, limits: &Limits) -> Result<(), ConfigError> {
-    if !(1..=MOST_PEERS).contains(&limits.max_peers) {
-        return Err(ConfigError::MaxPeers(limits.max_peers));
-    }
-    for (key, rate) in [
+    in_range("limits.max_peers", limits.max_peers, 1..=MOST_PEERS)?;
+    let rates = [
         ("routing.broadcasts", Some(routing.broadcasts)),
         (
             "limits.new_ids_per_address",
@@ -98,16 +87,13 @@ pub(super) fn validate(routing: &Routing, limits: &Limits) -> Result<(), ConfigE
         ),
         ("limits.messages_per_address", limits.messages_per_address),
         ("limits.messages_per_id", limits.messages_per_id),
-    ] {
-        if let Some(Rate { per_second, burst }) = rate
-            && (per_second == 0 || burst == 0)
-        {
-            return Err(ConfigError::Rate {
-                key,
-                per_second,
-                burst,
-            });
-        }
+    ];
+    for (setting, rate) in rates {
+        let Some(Rate { per_second, burst }) = rate else {
+            continue;
+        };
+        not_zero(format_args!("{setting}.per_second"), per_second)?;
+        not_zero(format_args!("{setting}.burst"), burst)?;
     }
     Ok(())
 }
@@ -115,6 +101,8 @@ pub(super) fn validate(routing: &Routing, limits: &Limits) -> Result<(), ConfigE
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(feature = "serde")]
+    use crate::endpoint::Rates;
     use crate::node::Config;
 
     #[test]
@@ -125,16 +113,12 @@ mod tests {
             config.validate().unwrap_err().to_string()
         };
         let none = error(|config| config.limits.messages_per_id = Some(Rate::new(0, 5)));
-        assert!(none.contains("limits.messages_per_id"), "{none}");
-        assert!(
-            none.contains("per_second = 0") && none.contains("at least 1"),
-            "{none}"
+        assert_eq!(
+            none,
+            "limits.messages_per_id.per_second 0 cannot be: choose 1 or more"
         );
         let none = error(|config| config.routing.broadcasts = Rate::new(5, 0));
-        assert!(
-            none.contains("routing.broadcasts") && none.contains("burst = 0"),
-            "{none}"
-        );
+        assert!(none.contains("routing.broadcasts.burst 0"), "{none}");
         let none = error(|config| config.limits.max_peers = 0);
         assert!(
             none.contains("max_peers 0") && none.contains("1 to 65536"),

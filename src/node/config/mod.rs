@@ -32,30 +32,34 @@
 //! [[serial]]                           # one for each serial line (feature `serial`)
 //! device = "/dev/ttyUSB0"
 //! baud = 115200                        # the default
+//! parity = "none"                      # the default; or "odd", "even"
+//! stop_bits = 1                        # the default; or 2
+//! flow_control = "none"                # the default; or "hardware"
 //! ```
 //!
-//! Each section has its own file here.
+//! The larger sections have their own files here.
 
 mod delivery;
 mod error;
 mod limits;
 mod peer;
-#[cfg(feature = "serial")]
-mod serial;
 mod tcp;
+#[cfg(test)]
+mod tests;
 pub mod units;
 
 #[cfg(unix)]
 use std::path::PathBuf;
 
-pub use self::delivery::{Delivery, InvalidDelivery};
+pub use self::delivery::Delivery;
 pub use self::error::ConfigError;
+use self::error::{in_range, not_zero};
 pub use self::limits::{Limits, Routing};
 pub use self::peer::Peer;
-pub use self::tcp::{InvalidListen, Listen, Tcp};
+pub use self::tcp::{Listen, Tcp};
 use super::mailbox::MailboxLimits;
 use crate::address::JausId;
-use crate::endpoint::{self, Access, PAYLOAD_LIMITS};
+use crate::endpoint::{self, Access, PAYLOAD_LIMITS, Pacing, Rates};
 use crate::link::local::{Address, Local};
 #[cfg(feature = "serial")]
 use crate::link::serial::Settings as SerialLine;
@@ -201,13 +205,6 @@ impl Config {
         self
     }
 
-    /// Uses these IP versions on the interfaces.
-    #[must_use]
-    pub const fn ip(mut self, ip: Ip) -> Self {
-        self.ip = ip;
-        self
-    }
-
     /// Uses this UDP port; 0 selects any free one.
     #[must_use]
     pub const fn port(mut self, port: u16) -> Self {
@@ -284,57 +281,57 @@ impl Config {
     /// # Errors
     /// The first setting that is out of range, and the range.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        if !(1..JausId::ANY_SUBSYSTEM).contains(&self.subsystem) {
-            return Err(ConfigError::Subsystem(self.subsystem));
-        }
-        if !(1..JausId::ANY_NODE).contains(&self.node) {
-            return Err(ConfigError::Node(self.node));
-        }
-        if !PAYLOAD_LIMITS.contains(&self.payload_limit) {
-            return Err(ConfigError::PayloadLimit(self.payload_limit));
-        }
+        in_range("subsystem", self.subsystem, 1..=JausId::ANY_SUBSYSTEM - 1)?;
+        in_range("node", self.node, 1..=JausId::ANY_NODE - 1)?;
+        in_range("payload_limit", self.payload_limit, PAYLOAD_LIMITS)?;
         let longest = LONGEST_MESSAGE.min(self.payload_limit * MOST_FRAGMENTS);
-        if !(self.payload_limit..=longest).contains(&self.max_message) {
-            return Err(ConfigError::MaxMessage {
-                message: self.max_message,
-                payload: self.payload_limit,
-                longest,
-            });
-        }
-        let most = self.tcp.max_accepted.min(self.tcp.max_per_address);
-        if self.tcp.listen.is_some() && most == 0 {
-            return Err(ConfigError::MaxAccepted);
-        }
+        in_range(
+            "max_message",
+            self.max_message,
+            self.payload_limit..=longest,
+        )?;
+        not_zero("mailbox.messages", self.mailbox.messages)?;
         #[cfg(unix)]
         if self.junior.is_some() && self.routing.forward {
             return Err(ConfigError::JuniorForward);
         }
         #[cfg(feature = "serial")]
-        serial::validate(&self.serial)?;
+        validate_serial(&self.serial)?;
+        self.tcp.validate()?;
         limits::validate(&self.routing, &self.limits)?;
-        if self.mailbox.messages == 0 {
-            return Err(ConfigError::Mailbox);
-        }
-        self.delivery.validate().map_err(ConfigError::Delivery)?;
-        self.udp().validate().map_err(ConfigError::Group)
+        self.delivery.validate()?;
+        Ok(self.udp().validate()?)
     }
 
     /// The endpoint's settings. Its limits leave room for two of the longest messages.
     pub(super) fn endpoint(&self, first_sequence: u16) -> endpoint::Config {
         let usual = endpoint::Config::default();
-        self.delivery.apply(endpoint::Config {
+        let (delivery, limits) = (&self.delivery, &self.limits);
+        endpoint::Config {
             payload_limit: self.payload_limit,
             max_message: self.max_message,
             max_reassembly: usual.max_reassembly.max(2 * self.max_message),
-            max_peers: self.limits.max_peers,
+            max_peers: limits.max_peers,
+            acknowledge_patience: delivery.patience,
+            max_window: delivery.window,
+            max_unacknowledged_octets: delivery.waiting,
+            packing: delivery.packing,
+            pacing: (delivery.pace_rate > 0).then_some(Pacing {
+                burst: delivery.pace_burst,
+                rate: delivery.pace_rate as u64,
+            }),
             forwarding: self.routing.forward,
             forwarded_broadcasts: self.routing.broadcasts,
             access: self.access.clone(),
-            rates: self.limits.rates(),
+            rates: Rates {
+                new_ids: limits.new_ids_per_address,
+                messages_per_address: limits.messages_per_address,
+                messages_per_id: limits.messages_per_id,
+            },
             first_sequence,
             profiles: self.profile.clone(),
             ..usual
-        })
+        }
     }
 
     /// Whether links other than UDP are configured.
@@ -371,172 +368,20 @@ impl Config {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ids_that_name_nobody_or_everybody_are_refused() {
-        for (subsystem, node) in [(0, 1), (65535, 1), (1, 0), (1, 255)] {
-            let error = Config::new(subsystem, node).validate().unwrap_err();
-            assert!(
-                error.to_string().contains("choose a number from 1 to"),
-                "{error}"
-            );
+/// Checks the settings of the serial lines, without opening them.
+#[cfg(feature = "serial")]
+fn validate_serial(lines: &[SerialLine]) -> Result<(), ConfigError> {
+    for (index, line) in lines.iter().enumerate() {
+        let device = &line.device;
+        not_zero(format_args!("serial line {device}: baud"), line.baud)?;
+        in_range(
+            format_args!("serial line {device}: stop_bits"),
+            line.stop_bits,
+            1..=2,
+        )?;
+        if lines[..index].iter().any(|other| other.device == *device) {
+            return Err(ConfigError::SerialTwice(device.clone()));
         }
-        assert_eq!(Config::new(65534, 254).validate(), Ok(()));
     }
-
-    #[test]
-    fn sizes_that_no_packet_has_are_refused() {
-        let with = |payload_limit, max_message| {
-            let config = Config {
-                payload_limit,
-                max_message,
-                ..Config::new(1, 1)
-            };
-            config.validate().map_err(|error| error.to_string())
-        };
-        assert!(with(63, 1000).unwrap_err().contains("64 to 4079"));
-        assert!(with(4080, 70_000).unwrap_err().contains("64 to 4079"));
-        assert!(with(1000, 999).unwrap_err().contains("from 1000"));
-        assert!(with(1000, 16_777_217).unwrap_err().contains("16777216"));
-        assert_eq!(with(4079, 16_777_216), Ok(()));
-        assert!(with(64, 4_194_240).is_ok());
-        assert_eq!(
-            with(64, 4_194_241).unwrap_err(),
-            "max_message 4194241 cannot be: choose from 64 (payload_limit) to 4194240"
-        );
-    }
-}
-
-#[cfg(test)]
-#[cfg(feature = "serde")]
-mod toml_tests {
-    use super::*;
-
-    fn error(text: &str) -> String {
-        toml::from_str::<Config>(text).unwrap_err().to_string()
-    }
-
-    #[test]
-    fn a_file_may_do_without_udp_where_there_is_another_way() {
-        let read = |streams: &str| -> Config {
-            toml::from_str(&format!(
-                "subsystem = 1\nnode = 1\ninterfaces = []\n{streams}"
-            ))
-            .unwrap()
-        };
-        let tcp = read("tcp = { connect = [\"10.0.0.7\"] }");
-        let serial = read("[[serial]]\ndevice = \"/dev/ttyUSB0\"");
-        assert!(!tcp.uses_udp() && !serial.uses_udp() && read("").uses_udp());
-        let local = Config::loopback(1, 1).local(Address::Default);
-        assert!(local.uses_udp() && !local.without_udp().uses_udp());
-        assert_eq!((tcp.validate(), serial.validate()), (Ok(()), Ok(())));
-        let closed = read("tcp = { listen = \"0.0.0.0\", max_accepted = 0 }").validate();
-        assert_eq!(closed, Err(ConfigError::MaxAccepted));
-    }
-
-    #[test]
-    fn a_file_sets_what_it_names_and_leaves_the_rest() {
-        let config: Config = toml::from_str(
-            r#"
-            subsystem = 101
-            node = 1
-            interfaces = ["eth0", "10.0.3.2"]
-            port = 0
-            port_taken = "use-free"
-            group = "239.255.0.9"
-            peers = ["192.168.7.2"]
-            [mailbox]
-            messages = 10
-            "#,
-        )
-        .unwrap();
-        let expected = Config {
-            mailbox: MailboxLimits {
-                messages: 10,
-                ..MailboxLimits::default()
-            },
-            ..Config::new(101, 1)
-                .interfaces(["eth0", "10.0.3.2"])
-                .port(0)
-                .or_any_free_port()
-                .group("239.255.0.9:3794".parse().unwrap())
-                .peer("192.168.7.2:3794".parse().unwrap())
-        };
-        assert_eq!(config, expected);
-    }
-
-    #[test]
-    fn the_words_for_interfaces_and_group_are_understood() {
-        let config: Config = toml::from_str("interfaces = \"loopback\"\ngroup = \"off\"").unwrap();
-        assert_eq!(
-            (config.interfaces, config.group),
-            (Interfaces::Loopback, Group::Off)
-        );
-        assert_eq!(
-            toml::from_str::<Config>("interfaces = \"all\"").unwrap(),
-            Config::default()
-        );
-    }
-
-    #[test]
-    fn a_file_says_what_peers_are_that_cannot_be_recognised() {
-        let text = "[[profile]]\nid = \"7.255.255\"\nprofile = \"jaus++\"\n\
-                    [[profile]]\nid = \"8.1.1\"\nprofile = \"iop\"\n\
-                    [delivery]\nrepeat_code_to = [\"9.255.255\"]";
-        let config: Config = toml::from_str(text).unwrap();
-        let endpoint = config.endpoint(0);
-        let found = |id: &str| Assignment::find(&endpoint.profiles, id.parse().unwrap());
-        assert_eq!(found("7.1.33"), Some(crate::peer::Peer::JausPlusPlus));
-        assert_eq!(found("8.1.1"), Some(crate::peer::Peer::Iop));
-        assert_eq!(found("8.1.2"), None);
-        assert_eq!(found("9.1.1"), Some(crate::peer::Peer::JausPlusPlus));
-        let wrong = error("[[profile]]\nid = \"7.1.1\"\nprofile = \"jauspp\"");
-        assert!(
-            wrong.contains("line 3") && wrong.contains("\"jaus++\""),
-            "{wrong}"
-        );
-    }
-
-    #[test]
-    fn versions_of_ip_and_broadcasts_are_chosen_by_words() {
-        let text = "ip = \"both\"\ngroup6 = \"ff15::efff:1\"\nbroadcast = \"off\"\n\
-                    peers = [\"[fe80::2%eth0]:9\"]";
-        let config: Config = toml::from_str(text).unwrap();
-        assert_eq!((config.ip, config.broadcast), (Ip::Both, Broadcasts::Off));
-        assert_eq!(config.group6.to_string(), "[ff15::efff:1]:3794");
-        assert_eq!(config.peers[0].to_string(), "[fe80::2%eth0]:9");
-        assert!(error("ip = \"5\"").contains("expected one of `4`, `6`, `both`"));
-        assert!(error("broadcast = \"yes\"").contains("`auto`, `on`, `off`"));
-        assert!(error("group6 = \"239.255.0.1\"").contains("[ff12::efff:1]:3794"));
-        assert!(error("peers = [\"fe80::2\"]").contains("[fe80::2%eth0]:3794"));
-    }
-
-    #[test]
-    fn mistakes_in_a_file_are_named_with_their_place() {
-        let unknown = error("subsystem = 1\nprot = 3794");
-        assert!(
-            unknown.contains("line 2") && unknown.contains("unknown field `prot`"),
-            "{unknown}"
-        );
-        let range = error("ttl = 300");
-        assert!(range.contains("line 1") && range.contains("300"), "{range}");
-        let group = error("group = \"10.0.0.1\"");
-        assert!(group.contains("224.0.0.0 to 239.255.255.255"), "{group}");
-        let interfaces = error("interfaces = \"eth0\"");
-        assert!(interfaces.contains("[\"eth0\"]"), "{interfaces}");
-        let peer = error("peers = [\"nobody\"]");
-        assert!(peer.contains("`nobody` is no peer's address"), "{peer}");
-    }
-
-    #[test]
-    fn what_is_written_is_read_back() {
-        let config = Config::loopback(7, 3)
-            .peer("10.0.0.2".parse().unwrap())
-            .group(Group::Off);
-        let text = serde_json::to_string(&config).unwrap();
-        assert_eq!(serde_json::from_str::<Config>(&text).unwrap(), config);
-    }
+    Ok(())
 }

@@ -4,7 +4,8 @@ use std::fmt;
 use std::net::{IpAddr, SocketAddr};
 use std::str::FromStr;
 
-use super::Peer;
+use super::error::not_zero;
+use super::{ConfigError, Peer};
 use crate::as_text::serde_as_text;
 use crate::endpoint::Access;
 use crate::link::{STANDARD_PORT, tcp};
@@ -51,6 +52,15 @@ impl Tcp {
         self.listen.is_some() || !self.connect.is_empty()
     }
 
+    /// Checks that a listener can accept connections.
+    pub(super) fn validate(&self) -> Result<(), ConfigError> {
+        if self.listen.is_some() {
+            not_zero("tcp.max_accepted", self.max_accepted)?;
+            not_zero("tcp.max_per_address", self.max_per_address)?;
+        }
+        Ok(())
+    }
+
     /// The settings of the link; `access` limits which addresses may connect.
     pub(in crate::node) fn settings(&self, access: &Access) -> tcp::Settings {
         tcp::Settings {
@@ -68,14 +78,6 @@ impl Tcp {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Listen(SocketAddr);
 
-/// Not an address to listen on.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "`{0}` is no address to listen on: write an address of this host, or 0.0.0.0 for all of them, \
-     with a port if it is not 3794, such as 10.0.0.5 or 0.0.0.0:3795"
-)]
-pub struct InvalidListen(String);
-
 impl From<SocketAddr> for Listen {
     fn from(address: SocketAddr) -> Self {
         Self(address)
@@ -83,16 +85,16 @@ impl From<SocketAddr> for Listen {
 }
 
 impl FromStr for Listen {
-    type Err = InvalidListen;
+    type Err = ConfigError;
 
-    fn from_str(text: &str) -> Result<Self, InvalidListen> {
+    fn from_str(text: &str) -> Result<Self, ConfigError> {
         let standard = |ip: IpAddr| SocketAddr::new(ip, STANDARD_PORT);
         let address = text.parse().or_else(|_| text.parse().map(standard));
         address
             .ok()
             .filter(|address| !address.ip().is_multicast())
             .map(Self)
-            .ok_or_else(|| InvalidListen(text.to_owned()))
+            .ok_or_else(|| ConfigError::Listen(text.to_owned()))
     }
 }
 

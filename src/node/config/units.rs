@@ -23,27 +23,28 @@ pub enum InvalidUnit {
     Duration(String),
 }
 
-const SIZES: [(&str, u64); 8] = [
-    ("", 1),
-    ("B", 1),
-    ("kB", 1000),
-    ("KiB", 1 << 10),
-    ("MB", 1_000_000),
-    ("MiB", 1 << 20),
-    ("GB", 1_000_000_000),
-    ("GiB", 1 << 30),
+const SIZES: [(&str, f64); 8] = [
+    ("", 1.0),
+    ("B", 1.0),
+    ("kB", 1e3),
+    ("KiB", 1024.0),
+    ("MB", 1e6),
+    ("MiB", 1024.0 * 1024.0),
+    ("GB", 1e9),
+    ("GiB", 1024.0 * 1024.0 * 1024.0),
 ];
 
-const MICROSECOND: f64 = 1e-6;
 const TIMES: [(&str, f64); 6] = [
-    ("us", MICROSECOND),
-    ("µs", MICROSECOND),
+    ("us", 1e-6),
+    ("µs", 1e-6),
     ("ms", 1e-3),
     ("s", 1.0),
     ("min", 60.0),
     ("h", 3600.0),
 ];
 
+/// The largest plausible size in octets: below it an `f64` shows fractions.
+const LARGEST: f64 = 9e15;
 /// The longest plausible time: a year, in seconds.
 const LONGEST: f64 = 365.0 * 86_400.0;
 
@@ -52,20 +53,10 @@ const LONGEST: f64 = 365.0 * 86_400.0;
 /// # Errors
 /// [`InvalidUnit::Size`]: no number, an unknown unit, a negative size, or not whole octets.
 pub fn size(text: &str) -> Result<usize, InvalidUnit> {
-    let wrong = || InvalidUnit::Size(text.to_owned());
-    let (number, unit) = split(text);
-    let (_, factor) = SIZES
-        .iter()
-        .find(|(name, _)| *name == unit)
-        .ok_or_else(wrong)?;
-    if let Ok(whole) = number.parse::<u64>() {
-        let octets = whole.checked_mul(*factor).ok_or_else(wrong)?;
-        return usize::try_from(octets).map_err(|_| wrong());
-    }
-    let octets = number.parse::<f64>().map_err(|_| wrong())? * *factor as f64;
-    // Above 2^53 an `f64` has no fraction.
-    let whole = octets.fract() == 0.0 && (0.0..9e15).contains(&octets);
-    whole.then_some(octets as usize).ok_or_else(wrong)
+    let most = LARGEST.min(usize::MAX as f64);
+    let octets = parse(text, &SIZES).filter(|octets| octets.fract() == 0.0 && *octets <= most);
+    let octets = octets.map(|octets| octets as usize);
+    octets.ok_or_else(|| InvalidUnit::Size(text.to_owned()))
 }
 
 /// Parses a time: `5ms`, `1.5s`, `2 min`; at most a year.
@@ -74,112 +65,63 @@ pub fn size(text: &str) -> Result<usize, InvalidUnit> {
 /// [`InvalidUnit::Duration`]: no number, no unit or an unknown one, a negative time, or more than a
 /// year.
 pub fn duration(text: &str) -> Result<Duration, InvalidUnit> {
-    let wrong = || InvalidUnit::Duration(text.to_owned());
-    let (number, unit) = split(text);
-    let (_, factor) = TIMES
-        .iter()
-        .find(|(name, _)| *name == unit)
-        .ok_or_else(wrong)?;
-    let seconds = number.parse::<f64>().map_err(|_| wrong())? * factor;
-    if !(0.0..=LONGEST).contains(&seconds) {
-        return Err(wrong());
-    }
-    Duration::try_from_secs_f64(seconds).map_err(|_| wrong())
+    let seconds = parse(text, &TIMES).filter(|seconds| *seconds <= LONGEST);
+    let duration = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    duration.ok_or_else(|| InvalidUnit::Duration(text.to_owned()))
 }
 
-/// Splits a text into number and unit.
-fn split(text: &str) -> (&str, &str) {
+/// Parses a number with a unit.
+fn parse(text: &str, units: &[(&str, f64)]) -> Option<f64> {
     let text = text.trim();
-    let end = text
-        .find(|c: char| !c.is_ascii_digit() && c != '.')
-        .unwrap_or(text.len());
-    let (number, unit) = text.split_at(end);
-    (number, unit.trim_start())
+    let end = text.find(|c: char| !c.is_ascii_digit() && c != '.');
+    let (number, unit) = text.split_at(end.unwrap_or(text.len()));
+    let unit = unit.trim_start();
+    let (_, factor) = units.iter().find(|(name, _)| *name == unit)?;
+    Some(number.parse::<f64>().ok()? * factor)
 }
 
-/// Deserializes a setting that is a size: an integer is a number of octets, a string may have a
-/// unit.
-///
-/// # Errors
-/// Those of [`size`], and values that are neither integer nor string.
+/// A setting that may have a unit, as a settings file has it.
 #[cfg(feature = "serde")]
-pub fn read_size<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
-    deserializer.deserialize_any(SizeVisitor)
+#[derive(serde::Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected a number, or a text with a unit such as \"4MiB\" or \"5ms\""
+)]
+enum Raw {
+    Integer(i64),
+    Float(f64),
+    Text(String),
 }
 
-/// Deserializes a setting that is a time, as a string with a unit.
-///
-/// # Errors
-/// Those of [`duration`], and values that are not strings.
+/// Deserializes a setting as text, whether it is one or a number.
 #[cfg(feature = "serde")]
-pub fn read_duration<'de, D: serde::Deserializer<'de>>(
-    deserializer: D,
-) -> Result<Duration, D::Error> {
-    deserializer.deserialize_any(DurationVisitor)
+pub(super) fn read_text<'de, D: serde::Deserializer<'de>>(d: D) -> Result<String, D::Error> {
+    Ok(match serde::Deserialize::deserialize(d)? {
+        Raw::Integer(number) => number.to_string(),
+        Raw::Float(number) => number.to_string(),
+        Raw::Text(text) => text,
+    })
+}
+
+/// Deserializes a setting that is a size.
+#[cfg(feature = "serde")]
+pub(crate) fn read_size<'de, D: serde::Deserializer<'de>>(d: D) -> Result<usize, D::Error> {
+    size(&read_text(d)?).map_err(serde::de::Error::custom)
+}
+
+/// Deserializes a setting that is a time.
+#[cfg(feature = "serde")]
+pub(super) fn read_duration<'de, D: serde::Deserializer<'de>>(d: D) -> Result<Duration, D::Error> {
+    duration(&read_text(d)?).map_err(serde::de::Error::custom)
 }
 
 /// The reverse of [`read_duration`].
-///
-/// # Errors
-/// Those of the serializer.
 #[cfg(feature = "serde")]
-pub fn write_duration<S: serde::Serializer>(
+pub(super) fn write_duration<S: serde::Serializer>(
     duration: &Duration,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
     serializer.collect_str(&format_args!("{}s", duration.as_secs_f64()))
-}
-
-#[cfg(feature = "serde")]
-struct SizeVisitor;
-
-#[cfg(feature = "serde")]
-impl serde::de::Visitor<'_> for SizeVisitor {
-    type Value = usize;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("a number of octets, or a text with a unit such as \"4MiB\"")
-    }
-
-    fn visit_u64<E: serde::de::Error>(self, octets: u64) -> Result<usize, E> {
-        usize::try_from(octets).map_err(|_| E::custom(InvalidUnit::Size(octets.to_string())))
-    }
-
-    fn visit_i64<E: serde::de::Error>(self, octets: i64) -> Result<usize, E> {
-        usize::try_from(octets).map_err(|_| E::custom(InvalidUnit::Size(octets.to_string())))
-    }
-
-    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<usize, E> {
-        size(text).map_err(E::custom)
-    }
-}
-
-#[cfg(feature = "serde")]
-struct DurationVisitor;
-
-#[cfg(feature = "serde")]
-impl serde::de::Visitor<'_> for DurationVisitor {
-    type Value = Duration;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("a text with a unit such as \"5ms\", \"1.5s\" or \"2 min\"")
-    }
-
-    fn visit_i64<E: serde::de::Error>(self, number: i64) -> Result<Duration, E> {
-        Err(E::custom(InvalidUnit::Duration(number.to_string())))
-    }
-
-    fn visit_u64<E: serde::de::Error>(self, number: u64) -> Result<Duration, E> {
-        Err(E::custom(InvalidUnit::Duration(number.to_string())))
-    }
-
-    fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<Duration, E> {
-        Err(E::custom(InvalidUnit::Duration(number.to_string())))
-    }
-
-    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Duration, E> {
-        duration(text).map_err(E::custom)
-    }
 }
 
 #[cfg(test)]

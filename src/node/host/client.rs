@@ -1,20 +1,20 @@
 //! A component's connection to its host's node: the state that senders share with the task that
 //! reads and writes, and the reconnection after a loss.
 
-use std::collections::HashMap;
 use std::convert::Infallible;
 use std::future::poll_fn;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
-use tokio::sync::{Notify, oneshot, watch};
+use tokio::sync::{Notify, watch};
 use tokio::time::{sleep, timeout};
 
+use super::super::awaiting::{Awaiting, Waiter};
 use super::super::events::EventSender;
 use super::super::mailbox::Mailbox;
 use super::super::{HostError, SendError, Undelivered};
-use super::{Attached, Host, HostEvent, HostEvents};
+use super::{Attached, Host, HostEvent};
 use crate::address::JausId;
 use crate::endpoint::{self, MessageHandle, Outgoing, Received};
 use crate::link::local::record::{Head, Outcome, Record, RecordError};
@@ -39,10 +39,10 @@ const PAUSES: (Duration, Duration) = (Duration::from_millis(10), Duration::from_
 /// A component's connection to its host's node.
 #[derive(Debug)]
 pub(in super::super) struct Client {
-    id: JausId,
+    pub(in super::super) id: JausId,
     inner: Mutex<Inner>,
-    mailbox: Arc<Mailbox>,
-    events: EventSender<HostEvent>,
+    pub(in super::super) mailbox: Arc<Mailbox>,
+    pub(in super::super) events: EventSender<HostEvent>,
     status: watch::Sender<Status>,
     /// Signalled when the queue is empty: all is written, or there is no connection.
     emptied: Notify,
@@ -53,7 +53,7 @@ struct Inner {
     writer: Writer,
     max_message: usize,
     sent: u64,
-    awaited: HashMap<u64, oneshot::Sender<Result<(), Undelivered>>>,
+    awaited: Awaiting,
 }
 
 /// The state of the connection. It changes under the lock of [`Inner`].
@@ -76,7 +76,7 @@ impl Client {
                 writer: attached.writer,
                 max_message: attached.max_message,
                 sent: 0,
-                awaited: HashMap::new(),
+                awaited: Awaiting::new(MAX_AWAITED),
             }),
             mailbox: Arc::new(Mailbox::new(host.limits)),
             events: EventSender::new(),
@@ -87,20 +87,8 @@ impl Client {
         client
     }
 
-    pub(in super::super) const fn id(&self) -> JausId {
-        self.id
-    }
-
-    pub(in super::super) const fn mailbox(&self) -> &Arc<Mailbox> {
-        &self.mailbox
-    }
-
     pub(in super::super) fn is_connected(&self) -> bool {
         self.status.borrow().is_connected()
-    }
-
-    pub(in super::super) fn events(&self) -> HostEvents {
-        self.events.subscribe()
     }
 
     /// Sends a message to the node. If the message requests an acknowledgement, `waiter` gets the
@@ -108,14 +96,17 @@ impl Client {
     pub(in super::super) fn send(
         &self,
         message: Outgoing,
-        waiter: Option<oneshot::Sender<Result<(), Undelivered>>>,
+        waiter: Option<Waiter>,
     ) -> Result<MessageHandle, SendError> {
         let mut inner = self.lock();
         self.check(&inner, &message)?;
         inner.sent += 1;
         let handle = inner.sent;
-        if let Some(waiter) = waiter {
-            inner.await_outcome(handle, waiter)?;
+        if let Some(waiter) = waiter
+            && !inner.awaited.insert(MessageHandle(handle), self.id, waiter)
+        {
+            let limit = MAX_AWAITED;
+            return Err(endpoint::SendError::TooManyUnacknowledged { limit }.into());
         }
         let acknowledgement = if message.acknowledge {
             Acknowledgement::Request
@@ -295,18 +286,21 @@ impl Client {
     /// for a component that does not read at all: the result is the number of messages it had read
     /// then.
     async fn catch_up(&self, stalled_at: Option<u64>) -> Option<u64> {
-        let room = || poll_fn(|cx| self.mailbox.poll_room(cx, ROOM));
-        let mut taken = stalled_at;
-        while !self.mailbox.has_room(ROOM) {
-            let now = Some(self.mailbox.taken());
-            if taken == now {
-                return now;
+        let mut before = stalled_at;
+        loop {
+            let taken = Some(self.mailbox.taken());
+            // Created before the check, so that no signal is missed.
+            let read = self.mailbox.read.notified();
+            if self.mailbox.has_room(ROOM) {
+                return None;
             }
-            taken = now;
-            // The loop condition checks the room again.
-            let _ = timeout(PATIENCE, room()).await;
+            if taken == before {
+                return before;
+            }
+            before = taken;
+            // On timeout the next turn sees whether anything was read.
+            let _ = timeout(PATIENCE, read).await;
         }
-        None
     }
 
     fn handle_record(&self, record: Record) -> Result<(), RecordError> {
@@ -317,7 +311,7 @@ impl Client {
                 destination,
                 path,
             } => {
-                self.mailbox.push(Received {
+                self.mailbox.deliver(Received {
                     source,
                     destination,
                     priority: flags.priority(),
@@ -352,33 +346,14 @@ impl Client {
             }),
             Outcome::Rejected => Err(Undelivered::Rejected(record.text())),
         };
-        let waiter = self.lock().awaited.remove(&handle);
+        let message = MessageHandle(handle);
+        let waiter = self.lock().awaited.remove(message);
         if let Some(waiter) = waiter {
-            // An error means that the sender no longer waits.
-            let _ = waiter.send(outcome);
+            waiter.notify(outcome);
         } else if let Err(Undelivered::Rejected(why)) = outcome {
             tracing::debug!(id = %self.id, why, "message not sent");
-            let message = MessageHandle(handle);
             self.events.send(HostEvent::Rejected { message, why });
         }
-    }
-}
-
-impl Inner {
-    fn await_outcome(
-        &mut self,
-        handle: u64,
-        waiter: oneshot::Sender<Result<(), Undelivered>>,
-    ) -> Result<(), SendError> {
-        if self.awaited.len() >= MAX_AWAITED {
-            self.awaited.retain(|_, waiter| !waiter.is_closed());
-        }
-        if self.awaited.len() >= MAX_AWAITED {
-            let limit = MAX_AWAITED;
-            return Err(endpoint::SendError::TooManyUnacknowledged { limit }.into());
-        }
-        self.awaited.insert(handle, waiter);
-        Ok(())
     }
 }
 

@@ -13,11 +13,13 @@ mod session;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::sync::Semaphore;
+use tokio::sync::{Semaphore, watch};
 use tokio::time::timeout;
 
+pub(super) use self::session::Answers;
 use self::session::Session;
-use super::attendance::{ComponentEvent, Departure};
+use super::Config;
+use super::components::{ComponentEvent, Departure};
 use super::core::Shared;
 use super::mailbox::Mailbox;
 use crate::address::JausId;
@@ -39,61 +41,35 @@ const OVERLAP: Duration = Duration::from_millis(200);
 #[derive(Debug)]
 pub(super) struct Server {
     listener: Listener,
-    registrar: Registrar,
-    _closed: SignalClosed,
-}
-
-/// The node data needed to attach a component.
-#[derive(Clone, Debug)]
-struct Registrar {
     shared: Arc<Shared>,
-    subsystem: u16,
-    node: u8,
-    max_message: u32,
-}
-
-/// Signals that the listener is closed. It is dropped after the listener, because the next node of
-/// this host may need the same address.
-#[derive(Debug)]
-struct SignalClosed(Arc<Shared>);
-
-impl Drop for SignalClosed {
-    fn drop(&mut self) {
-        self.0.closed.send_replace(true);
-    }
+    /// Dropped after the listener, because the next node of this host may need the same address.
+    _listening: watch::Receiver<()>,
 }
 
 /// Why a component is not attached.
 type Refusal = (Reason, String);
 
 impl Server {
-    pub(super) fn new(listener: Listener, shared: Arc<Shared>, config: &super::Config) -> Self {
-        shared.closed.send_replace(false);
+    pub(super) fn new(listener: Listener, shared: Arc<Shared>) -> Self {
         Self {
             listener,
-            registrar: Registrar {
-                shared: shared.clone(),
-                subsystem: config.subsystem,
-                node: config.node,
-                max_message: u32::try_from(config.max_message).unwrap_or(u32::MAX),
-            },
-            _closed: SignalClosed(shared),
+            _listening: shared.listening.subscribe(),
+            shared,
         }
     }
 
     pub(super) async fn run(self) {
-        let mut stopped = self.registrar.shared.stopped.subscribe();
         let unattached = Arc::new(Semaphore::new(UNATTACHED));
         while let Ok(permit) = unattached.clone().acquire_owned().await {
             let accepted = tokio::select! {
                 accepted = self.listener.accept() => accepted,
-                _ = stopped.wait_for(|stopped| *stopped) => return,
+                () = self.shared.stopped() => return,
             };
             match accepted {
                 Ok(stream) => {
-                    let registrar = self.registrar.clone();
+                    let shared = self.shared.clone();
                     tokio::spawn(async move {
-                        let attached = registrar.attach(stream).await;
+                        let attached = attach(&shared, stream).await;
                         drop(permit);
                         if let Some((session, reader)) = attached {
                             session.run(reader).await;
@@ -112,98 +88,95 @@ impl Server {
     }
 }
 
-impl Registrar {
-    /// Attaches the component at the other end of a connection, or sends it the reason for a
-    /// refusal.
-    async fn attach(&self, stream: Stream) -> Option<(Session, Reader)> {
-        let Stream { read, write, pid } = stream;
-        let (mut reader, mut writer) = (Reader::new(read, LONGEST_HELLO), Writer::new(write));
-        let hello = async {
-            let record = reader.read().await?;
-            match record.head {
-                Head::Hello { version, id } => Ok((version, id, record.text())),
-                _ => Err(Error::Record(RecordError::Unexpected)),
-            }
-        };
-        let (version, id, name) = match timeout(HANDSHAKE, hello).await {
-            Ok(Ok(hello)) => hello,
-            Ok(Err(error)) => {
-                tracing::warn!(?pid, %error, "a connection to the local link is no component's");
-                return None;
-            }
-            Err(_) => {
-                tracing::warn!(?pid, "a connection to the local link is silent");
-                return None;
-            }
-        };
-        let process = Process { pid, name };
-        match self.admit(version, id, &process).await {
-            Ok((id, mailbox)) => {
-                let max_message = self.max_message;
-                reader.set_limit(max_message as usize + LONGEST_HEAD);
-                writer.queue(&Head::Welcome { id, max_message }.into());
-                let shared = self.shared.clone();
-                let session = Session::new(shared, writer, id, process, mailbox);
-                Some((session, reader))
-            }
-            Err((reason, why)) => {
-                tracing::warn!(%process, why, "component refused");
-                writer.queue(&Record::refused(reason, &why));
-                let event = ComponentEvent::Refused { process, why };
-                self.shared.lock().attendance.events.send(event);
-                // A component that does not read misses the reason.
-                let _ = timeout(HANDSHAKE, writer.flush()).await;
-                None
-            }
+/// Attaches the component at the other end of a connection, or sends it the reason for a
+/// refusal.
+async fn attach(shared: &Arc<Shared>, stream: Stream) -> Option<(Session, Reader)> {
+    let Stream { read, write, pid } = stream;
+    let (mut reader, mut writer) = (Reader::new(read, LONGEST_HELLO), Writer::new(write));
+    let hello = async {
+        let record = reader.read().await?;
+        match record.head {
+            Head::Hello { version, id } => Ok((version, id, record.text())),
+            _ => Err(Error::Record(RecordError::Unexpected)),
+        }
+    };
+    let (version, id, name) = match timeout(HANDSHAKE, hello).await {
+        Ok(Ok(hello)) => hello,
+        Ok(Err(error)) => {
+            tracing::warn!(?pid, %error, "a connection to the local link is no component's");
+            return None;
+        }
+        Err(_) => {
+            tracing::warn!(?pid, "a connection to the local link is silent");
+            return None;
+        }
+    };
+    let process = Process { pid, name };
+    match admit(shared, version, id, &process).await {
+        Ok((id, mailbox)) => {
+            let max_message = u32::try_from(shared.config.max_message).unwrap_or(u32::MAX);
+            reader.set_limit(max_message as usize + LONGEST_HEAD);
+            writer.queue(&Head::Welcome { id, max_message }.into());
+            let session = Session::new(shared.clone(), writer, id, process, mailbox);
+            Some((session, reader))
+        }
+        Err((reason, why)) => {
+            tracing::warn!(%process, why, "component refused");
+            writer.queue(&Record::refused(reason, &why));
+            let event = ComponentEvent::Refused { process, why };
+            shared.lock().components.events.send(event);
+            // A component that does not read misses the reason.
+            let _ = timeout(HANDSHAKE, writer.flush()).await;
+            None
         }
     }
+}
 
-    async fn admit(
-        &self,
-        version: u8,
-        wanted: JausId,
-        process: &Process,
-    ) -> Result<(JausId, Arc<Mailbox>), Refusal> {
-        let id = self.full_id(version, wanted)?;
-        let deadline = tokio::time::Instant::now() + OVERLAP;
-        loop {
-            if self.shared.lock().is_stopping() {
-                return Err((Reason::Stopping, "the node is about to stop".to_owned()));
-            }
-            let error = match self.shared.attach(id, Some(process.clone())) {
-                Ok(mailbox) => return Ok((id, mailbox)),
-                Err(error) => error,
-            };
-            let holder = self.shared.lock().attendance.process(id).cloned();
-            let may_be_dead = matches!(error, AttachError::AlreadyAttached(_)) && holder.is_some();
-            if !may_be_dead || tokio::time::Instant::now() >= deadline {
-                return Err(refusal(&error, holder));
-            }
-            tokio::time::sleep(OVERLAP / 10).await;
+async fn admit(
+    shared: &Shared,
+    version: u8,
+    wanted: JausId,
+    process: &Process,
+) -> Result<(JausId, Arc<Mailbox>), Refusal> {
+    let id = full_id(&shared.config, version, wanted)?;
+    let deadline = tokio::time::Instant::now() + OVERLAP;
+    loop {
+        if shared.lock().is_stopping() {
+            return Err((Reason::Stopping, "the node is about to stop".to_owned()));
         }
+        let error = match shared.attach(id, Some(process.clone())) {
+            Ok(mailbox) => return Ok((id, mailbox)),
+            Err(error) => error,
+        };
+        let holder = shared.lock().components.process(id).cloned();
+        let may_be_dead = matches!(error, AttachError::AlreadyAttached(_)) && holder.is_some();
+        if !may_be_dead || tokio::time::Instant::now() >= deadline {
+            return Err(refusal(&error, holder));
+        }
+        tokio::time::sleep(OVERLAP / 10).await;
     }
+}
 
-    /// The id to assign to a component.
-    fn full_id(&self, version: u8, wanted: JausId) -> Result<JausId, Refusal> {
-        if version != VERSION {
+/// The id to assign to a component.
+fn full_id(config: &Config, version: u8, wanted: JausId) -> Result<JausId, Refusal> {
+    if version != VERSION {
+        let why = format!(
+            "the component speaks version {version} of the local link's protocol, the node \
+             version {VERSION}: build both with the same release"
+        );
+        return Err((Reason::Version, why));
+    }
+    let (subsystem, node) = (config.subsystem, config.node);
+    let of_node = JausId::new(subsystem, node, wanted.component());
+    match (wanted.subsystem(), wanted.node()) {
+        (0, 0) => Ok(of_node),
+        _ if wanted == of_node => Ok(of_node),
+        _ => {
             let why = format!(
-                "the component speaks version {version} of the local link's protocol, the node \
-                 version {VERSION}: build both with the same release"
+                "{wanted} does not belong to this node, whose components are \
+                 {subsystem}.{node}.1 to {subsystem}.{node}.254"
             );
-            return Err((Reason::Version, why));
-        }
-        let (subsystem, node) = (self.subsystem, self.node);
-        let of_node = JausId::new(subsystem, node, wanted.component());
-        match (wanted.subsystem(), wanted.node()) {
-            (0, 0) => Ok(of_node),
-            _ if wanted == of_node => Ok(of_node),
-            _ => {
-                let why = format!(
-                    "{wanted} does not belong to this node, whose components are \
-                     {subsystem}.{node}.1 to {subsystem}.{node}.254"
-                );
-                Err((Reason::WrongId, why))
-            }
+            Err((Reason::WrongId, why))
         }
     }
 }

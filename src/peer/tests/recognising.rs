@@ -185,16 +185,16 @@ fn junior_is_likely_by_its_first_call_and_certain_by_its_fault() {
 #[test]
 fn what_speaks_for_junior_speaks_for_a_fork_that_gives_itself_away() {
     let mut recogniser = Recogniser::new();
-    recogniser.handle_answer_for_zero();
+    recogniser.note(Sign::AnswersForZero);
     let guessed = recogniser.verdict();
     assert_eq!(
         (guessed.peer, guessed.certainty),
         (Peer::Jts, Certainty::Likely)
     );
-    recogniser.handle_misread_type();
+    recogniser.note(Sign::MisreadType);
     assert_eq!(recogniser.certain(), Peer::Jts);
     let mut recogniser = Recogniser::new();
-    recogniser.handle_misread_type();
+    recogniser.note(Sign::MisreadType);
     assert_eq!(recogniser.certain(), Peer::Junior);
 }
 
@@ -271,6 +271,6 @@ fn who_begins_with_1_and_calls_may_be_taken_for_junior_and_no_node_of_ours() {
     assert_eq!(presumed(&[frame(1, QUERY)]).0, Peer::Standard);
     let mut recogniser = Recogniser::new();
     recogniser.handle_frame(&call(1), 206);
-    recogniser.handle_repeated_version();
+    recogniser.note(Sign::RepeatedVersion);
     assert_eq!(recogniser.presumed(), Peer::JausPlusPlus);
 }

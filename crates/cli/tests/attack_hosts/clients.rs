@@ -36,9 +36,9 @@ fn config(subsystem: u16) -> Config {
         "" | "echo" => config,
         "ip6" => {
             let cable = if subsystem == NEWCOMER { 3 } else { 1 };
+            let mut config = config.interfaces([format!("fd00:216:{cable}::2")]);
+            config.ip = Ip::V6;
             config
-                .ip(Ip::V6)
-                .interfaces([format!("fd00:216:{cable}::2")])
         }
         "tcp" => config
             .without_udp()

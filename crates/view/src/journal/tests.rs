@@ -6,9 +6,9 @@ use std::time::SystemTime;
 use super::*;
 use crate::{Capture, CaptureError, Dictionary, Entry, MessageStream, Network};
 use jaus::address::JausId;
-use jaus::endpoint::{Outgoing, Received};
+use jaus::endpoint::Outgoing;
 use jaus::node::{Config, Content, Passage, Way};
-use jaus::wire::{Broadcast, Priority};
+use jaus::wire::Frame;
 
 /// A test directory, removed at the end.
 struct Scratch(PathBuf);
@@ -175,15 +175,7 @@ fn passage(seconds: u64, octets: Vec<u8>) -> Passage {
     Passage {
         time: SystemTime::UNIX_EPOCH + Duration::from_secs(seconds),
         way: Way::Local(own),
-        content: Content::Message(Received {
-            source: own,
-            destination: own,
-            to: own,
-            priority: Priority::Standard,
-            broadcast: Broadcast::None,
-            payload: octets.into(),
-            path: None,
-        }),
+        content: Content::Frame(Frame::new(own, own, octets.into())),
     }
 }
 

@@ -10,7 +10,7 @@ use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::messages;
 use jaus::messages::core::Event;
-use jaus::node::{Content, Passage};
+use jaus::node::{Passage, Way};
 use jaus::service::code_of;
 use jaus::wire::{Acknowledgement, Frame};
 
@@ -37,7 +37,7 @@ pub struct Line {
 #[must_use]
 pub fn lines(passage: &Passage, begin: SystemTime) -> Vec<Line> {
     let time = passage.time.duration_since(begin).unwrap_or_default();
-    let is_local = matches!(passage.content, Content::Message(_));
+    let is_local = matches!(passage.way, Way::Local(_));
     let frames = passage.frames().into_iter();
     frames
         .filter_map(|frame| line(&frame, time, is_local))

@@ -1,6 +1,6 @@
 //! Recognises known peers, with the evidence.
 
-use jaus::peer::{Certainty, LargeStyle, Peer, Recogniser, Verdict};
+use jaus::peer::{Certainty, LargeStyle, Peer, Recogniser, Sign, Verdict};
 use jaus::wire::{Version, ra::RaId};
 use serde_json::{Value as Json, json};
 
@@ -23,10 +23,10 @@ impl Case {
     pub(super) fn recognise(&self) -> Verdict {
         let mut recogniser = self.unprovoked();
         if self.reserved.misreads_type {
-            recogniser.handle_misread_type();
+            recogniser.note(Sign::MisreadType);
         }
         if self.reserved.answers_for_zero {
-            recogniser.handle_answer_for_zero();
+            recogniser.note(Sign::AnswersForZero);
         }
         recogniser.verdict()
     }
@@ -115,7 +115,7 @@ impl Profile {
                  \"{id}\", profile = \"{peer}\""
             ));
         }
-        let departures: Vec<_> = peer.departures().map(|d| d.entry().name).collect();
+        let departures: Vec<_> = peer.departures().map(|departure| departure.name).collect();
         if !departures.is_empty() {
             lines.push(format!("known of it: {}", departures.join("; ")));
         }
@@ -128,8 +128,7 @@ impl Profile {
             Self::Ra(subsystem) => json!({"peer": "ra", "subsystem": subsystem}),
             Self::As5669a(verdict) => {
                 let departures = verdict.peer.departures().map(|departure| {
-                    let entry = departure.entry();
-                    json!({"name": entry.name, "does": entry.does, "ours": entry.ours})
+                    json!({"name": departure.name, "does": departure.does, "ours": departure.ours})
                 });
                 let reasons = verdict.reasons.iter().map(ToString::to_string);
                 json!({

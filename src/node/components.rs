@@ -1,11 +1,17 @@
-//! The register of attached components and their processes, and the events about them.
+//! The attached components: their mailboxes, their processes, and the events about them.
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::Arc;
 
+use super::ComponentReport;
 use super::events::EventSender;
+use super::mailbox::Mailbox;
+use super::tap::Taps;
 use crate::address::JausId;
+use crate::endpoint::{Received, Sink};
 use crate::link::local::Process;
+use crate::wire::Priority;
 
 /// An event about a node's components.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -102,37 +108,64 @@ impl fmt::Display for Departure {
     }
 }
 
-/// The attached components of other processes.
+/// The attached components of a node, and the taps: the receivers of the endpoint's messages.
 #[derive(Debug)]
-pub(super) struct Attendance {
-    /// The processes of components outside the node's own process.
-    processes: BTreeMap<JausId, Process>,
+pub(super) struct Components {
+    attached: BTreeMap<JausId, Attached>,
     pub(super) events: EventSender<ComponentEvent>,
+    pub(super) taps: Taps,
 }
 
-impl Attendance {
+#[derive(Debug)]
+struct Attached {
+    mailbox: Arc<Mailbox>,
+    /// Its process, unless it is the node's own.
+    process: Option<Process>,
+}
+
+impl Components {
     pub(super) fn new() -> Self {
         Self {
-            processes: BTreeMap::new(),
+            attached: BTreeMap::new(),
             events: EventSender::new(),
+            taps: Taps::default(),
         }
     }
 
     /// The process of a component, unless it is the node's own.
     pub(super) fn process(&self, id: JausId) -> Option<&Process> {
-        self.processes.get(&id)
+        self.attached.get(&id)?.process.as_ref()
     }
 
-    pub(super) fn arrive(&mut self, id: JausId, process: Option<Process>) {
+    /// Whether a component is attached with this mailbox.
+    pub(super) fn has(&self, id: JausId, mailbox: &Arc<Mailbox>) -> bool {
+        let attached = self.attached.get(&id);
+        attached.is_some_and(|attached| Arc::ptr_eq(&attached.mailbox, mailbox))
+    }
+
+    pub(super) fn reports(&self) -> Vec<ComponentReport> {
+        let report = |(&id, attached): (&JausId, &Attached)| ComponentReport {
+            id,
+            process: attached.process.clone(),
+            mailbox: attached.mailbox.counters(),
+        };
+        self.attached.iter().map(report).collect()
+    }
+
+    pub(super) fn add(&mut self, id: JausId, mailbox: Arc<Mailbox>, process: Option<Process>) {
         if let Some(process) = &process {
             tracing::info!(%id, %process, "component attached");
-            self.processes.insert(id, process.clone());
         }
-        self.events.send(ComponentEvent::Attached { id, process });
+        let event = ComponentEvent::Attached {
+            id,
+            process: process.clone(),
+        };
+        self.attached.insert(id, Attached { mailbox, process });
+        self.events.send(event);
     }
 
-    pub(super) fn depart(&mut self, id: JausId, why: Departure) {
-        let process = self.processes.remove(&id);
+    pub(super) fn remove(&mut self, id: JausId, why: Departure) {
+        let process = self.attached.remove(&id).and_then(|it| it.process);
         if let Some(process) = &process {
             match &why {
                 Departure::Left | Departure::Stopped => {
@@ -145,11 +178,28 @@ impl Attendance {
             .send(ComponentEvent::Detached { id, process, why });
     }
 
-    /// Detaches all components because the node has stopped.
-    pub(super) fn end(&mut self) {
-        for id in std::mem::take(&mut self.processes).into_keys() {
-            tracing::debug!(%id, "component detached: the node has stopped");
-        }
+    /// Detaches all components because the node has stopped, and ends the taps. Returns their ids.
+    pub(super) fn end(&mut self) -> impl Iterator<Item = JausId> {
+        self.taps.end();
         self.events.end();
+        let attached = std::mem::take(&mut self.attached);
+        for attached in attached.values() {
+            attached.mailbox.close();
+        }
+        attached.into_keys()
+    }
+}
+
+impl Sink for Components {
+    fn has_room(&self, to: JausId, priority: Priority) -> bool {
+        let attached = self.attached.get(&to);
+        attached.is_none_or(|attached| attached.mailbox.has_reserve(priority))
+    }
+
+    fn deliver(&mut self, message: Received) {
+        self.taps.message(&message);
+        if let Some(attached) = self.attached.get(&message.to) {
+            attached.mailbox.deliver(message);
+        }
     }
 }
