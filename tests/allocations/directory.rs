@@ -1,5 +1,6 @@
 //! Memory cost of each further component of a node, in virtual time.
 
+use std::net::SocketAddr;
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
@@ -27,7 +28,12 @@ fn attach(node: &Node, numbers: RangeInclusive<u8>) -> impl Iterator<Item = Comp
 #[tokio::test(start_paused = true)]
 async fn a_further_component_costs_no_more_however_many_there_are() {
     let _alone = alone();
-    let node = Node::start(Config::new(101, 1).without_udp()).unwrap();
+    // A link without traffic.
+    let listener = SocketAddr::from(([127, 0, 0, 1], 0));
+    let config = Config::new(101, 1)
+        .without_udp()
+        .tcp_listen(listener.into());
+    let node = Node::start(config).unwrap();
     let mut components: Vec<_> = attach(&node, 1..=50).collect();
     let mut costs = Vec::new();
     for numbers in [51..=150, 151..=250] {

@@ -7,9 +7,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use crate::evidence::{not_tested, this_test};
-
-/// Timeout of every operation; reached only in a failing test.
-const LIMIT: Duration = Duration::from_secs(30);
+use crate::waiting::{LIMIT, block_until};
 
 /// Role of a test node's process.
 const ROLE: &str = "JAUS_TEST_ROLE";
@@ -157,19 +155,12 @@ impl TwoHosts {
 
     /// Waits for duplicate address detection of both hosts' IPv6 addresses: a second or two.
     pub fn wait_for_addresses(&self) {
-        let deadline = Instant::now() + LIMIT;
         for name in &self.names {
-            let shown = ["-n", name, "-6", "-o", "address", "show", "tentative"];
-            while !Command::new("ip")
-                .args(shown)
-                .output()
-                .unwrap()
-                .stdout
-                .is_empty()
-            {
-                assert!(Instant::now() < deadline, "addresses stay tentative");
-                std::thread::sleep(Duration::from_millis(100));
-            }
+            let tentative = ["-n", name, "-6", "-o", "address", "show", "tentative"];
+            block_until(|| {
+                let output = Command::new("ip").args(tentative).output();
+                output.unwrap().stdout.is_empty()
+            });
         }
     }
 

@@ -4,9 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::thread::sleep;
-use std::time::Duration;
 
+use jaus_test_kit::waiting::block_until;
 use serde_json::Value;
 
 /// A directory for one test, which is also the temporary directory of its programs.
@@ -40,16 +39,6 @@ fn sockets(directory: &Path) -> usize {
     });
     runs.map(|run| 1 + fs::read_dir(run.path()).map_or(0, Iterator::count))
         .sum()
-}
-
-fn eventually(what: &str, mut holds: impl FnMut() -> bool) {
-    for _ in 0..600 {
-        if holds() {
-            return;
-        }
-        sleep(Duration::from_millis(50));
-    }
-    panic!("not within 30 s: {what}");
 }
 
 #[test]
@@ -93,18 +82,17 @@ fn a_killed_load_leaves_neither_processes_nor_sockets() {
     let mut parent = load(&directory, &["--rates", "10", "--seconds", "60"])
         .spawn()
         .unwrap();
-    eventually("two children of components, four of nodes", || {
-        sockets(&directory) >= 5 && children(&parent).len() == 6
-    });
+    // Two of components, four of nodes.
+    block_until(|| sockets(&directory) >= 5 && children(&parent).len() == 6);
     let children = children(&parent);
     parent.kill().unwrap();
     parent.wait().unwrap();
-    eventually("all children have ended", || {
+    block_until(|| {
         let mut paths = children.iter().map(|id| format!("/proc/{id}/stat"));
         // What has ended waits as a zombie if nobody collects it.
         paths.all(|path| fs::read_to_string(path).map_or(true, |stat| stat.contains(") Z ")))
     });
-    eventually("the sockets are gone", || sockets(&directory) == 0);
+    block_until(|| sockets(&directory) == 0);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::future::poll_fn;
 use std::net::SocketAddr;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
@@ -159,30 +159,28 @@ pub(crate) async fn vehicle() {
     let rover = Component::builder(Kind::Vehicle, "Rover")
         .attach(&node, 33)
         .unwrap();
-    tell_changes(&rover, Instant::now()).await;
+    tell_changes(&rover).await;
 }
 
 /// An operator that looks for vehicles, until it is killed.
 pub(crate) async fn operator() {
-    let started = Instant::now();
     let node = Node::start(config(102)).unwrap();
     let desk = Component::builder(Kind::OperatorControlUnit, "Desk")
         .attach(&node, 1)
         .unwrap();
-    tell_changes(&desk, started).await;
+    tell_changes(&desk).await;
 }
 
-/// Prints who is found, once its services are known, and who is lost, and the milliseconds since.
-async fn tell_changes(component: &Component, since: Instant) {
+/// Prints who is found, once its services are known, and who is lost.
+async fn tell_changes(component: &Component) {
     let mut changes = component.watch();
     println!("\nstarted");
     while let Some(change) = changes.next().await {
-        let after = since.elapsed().as_millis();
         match change {
             Change::Services(id) if id != component.id() => {
-                println!("found {id} with its services after {after}");
+                println!("found {id} with its services");
             }
-            Change::Lost(id, _) => println!("lost {id} after {after}"),
+            Change::Lost(id, _) => println!("lost {id}"),
             _ => {}
         }
     }

@@ -13,12 +13,11 @@ use jaus::messages::core::{
     SetElement, UpdateEvent, query_events::QueryEventsVar,
 };
 use jaus::wire::{Acknowledgement, Flags, Frame, judp};
+use jaus_test_kit::waiting::LIMIT;
 
 use crate::judge::replay::capture::Said;
 use crate::judge::replay::vehicle::{VEHICLE, Vehicle};
 
-/// How long the judging tool waits for an answer; reached only when a test fails.
-const LIMIT: Duration = Duration::from_millis(1500);
 /// Offset of the message in a datagram: version and header.
 const MESSAGE: usize = 13;
 
