@@ -3,12 +3,16 @@
 use jaus_test_kit::hosts::on_two_hosts;
 use jaus_test_kit::vehicle_process::VehicleProcess;
 
+/// Without those that take long: `tool::judge` takes all of them, on one host.
+const STEPS: &str = "A1-A5,B1-B8,B13-B19";
+
 #[test]
-fn the_vehicle_passes_every_step_from_another_host() {
+fn the_vehicle_passes_from_another_host() {
     on_two_hosts(|hosts| {
         let jaus = |host| hosts.command(host, env!("CARGO_BIN_EXE_jaus"));
         let _vehicle = VehicleProcess::start(jaus(0).args(["vehicle", "--id", "101.1.1"]));
-        let judge = jaus(1).args(["judge", "101.1.1"]).output().unwrap();
+        let steps = ["judge", "101.1.1", "--only", STEPS];
+        let judge = jaus(1).args(steps).output().unwrap();
         let report = String::from_utf8_lossy(&judge.stdout);
         let said = String::from_utf8_lossy(&judge.stderr);
         assert!(judge.status.success(), "{report}{said}");

@@ -27,9 +27,9 @@ use crate::testbed::TO_STRANGERS;
 use jaus_test_kit::rover;
 
 /// Longer than the client needs for two looks and a newcomer to be found.
-const LONG: Duration = Duration::from_secs(30);
+const LONG: Duration = Duration::from_secs(20);
 
-const TIME: Duration = Duration::from_secs(12);
+const TIME: Duration = Duration::from_secs(6);
 /// Datagrams a second of a flood: fewer for an unoptimised vehicle, which shares its processor with
 /// other tests.
 const FLOOD: u32 = if cfg!(debug_assertions) { 5000 } else { 20_000 };
@@ -52,7 +52,7 @@ pub(crate) async fn run(attack: &str) {
         "forged-id" | "forged-id6" => {
             attacker.repeat(LONG / 2, 1000, |it, _| it.send(CLIENT, &pose()));
         }
-        "forged-control" => attacker.repeat(LONG / 6, 20, |it, _| {
+        "forged-control" => attacker.repeat(LONG / 4, 20, |it, _| {
             it.send(
                 CLIENT,
                 &RequestControl {

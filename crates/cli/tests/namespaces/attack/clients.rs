@@ -25,7 +25,7 @@ const NEWCOMER: u16 = 104;
 /// How long the vehicle may be looked for.
 const SEARCH: Duration = Duration::from_secs(20);
 /// How long the client looks before it says what it has seen.
-const SPAN: Duration = Duration::from_secs(6);
+const SPAN: Duration = Duration::from_secs(3);
 /// What takes longer counts as lost.
 const LOST: Duration = Duration::from_millis(500);
 

@@ -15,7 +15,7 @@ use super::clients::VEHICLE;
 use crate::testbed::TO_STRANGERS;
 
 const CONNECTIONS: usize = 160;
-const TIME: Duration = Duration::from_secs(25);
+const TIME: Duration = Duration::from_secs(12);
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// What a connection does.

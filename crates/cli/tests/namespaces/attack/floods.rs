@@ -15,7 +15,7 @@ fn a_flood_costs_nothing(attack: &str) {
         let sent = figures(&attacker.says("attack"))["packets"];
         let memory = scene.memory();
         println!("| {sent} datagrams, {attack} | {seen:?}, {memory} KiB |");
-        assert!(sent > 50_000, "{sent}");
+        assert!(sent > 30_000, "{sent}");
         let (lost, echoes) = (seen["lost"], seen["echoes_lost"]);
         assert!(lost <= echoes + 2, "{seen:?}");
         assert!(echoes > 0 || seen["gap_ms"] < GAP, "{seen:?}");

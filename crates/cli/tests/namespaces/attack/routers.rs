@@ -29,7 +29,7 @@ fn is_quiet_after_an_attack(bed: &Testbed, most_copies: u64) {
     std::thread::sleep(Duration::from_secs(3));
     let after = sent() - before;
     println!("| {attack} messages to nobody through routers | {during} packets, then {after} |");
-    assert!(attack > 4000, "{attack}");
+    assert!(attack > 2000, "{attack}");
     assert!(during > attack, "nothing is passed on: {during}");
     assert!(during <= attack * most_copies + 1000, "{during}");
     assert!(after <= 200, "{after}");

@@ -86,7 +86,7 @@ async fn drive(operator: &Component) {
     println!("ready");
     let mut effort = SetWrenchEffort::default();
     effort.set_propulsive_linear_effort_x_percent(50.0).unwrap();
-    for _ in 0..100 {
+    for _ in 0..60 {
         control.send(&effort).unwrap();
         sleep(Duration::from_millis(50)).await;
     }

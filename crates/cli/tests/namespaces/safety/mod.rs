@@ -12,83 +12,40 @@ use roles::Drive;
 use trial::{Fault, check, check_termination};
 
 #[test]
-fn effort_ends_when_the_controller_is_killed() {
-    check(Drive::Effort, Fault::Killed);
+fn effort_ends_with_its_controller() {
+    let faults = [
+        Fault::Killed,
+        Fault::Suspended,
+        Fault::CutAtController,
+        Fault::CutAtVehicle,
+        Fault::KilledAmongStrangers,
+        Fault::KilledBehindNode,
+        Fault::NodeKilled,
+    ];
+    check(Drive::Effort, &faults);
 }
 
 #[test]
-fn effort_ends_when_the_controller_is_suspended() {
-    check(Drive::Effort, Fault::Suspended);
+fn a_vector_ends_with_its_controller() {
+    let faults = [
+        Fault::Killed,
+        Fault::Suspended,
+        Fault::SuspendedBehindNode,
+        Fault::CutAtController,
+        Fault::KilledAmongStrangers,
+    ];
+    check(Drive::Vector, &faults);
 }
 
 #[test]
-fn effort_ends_when_the_controller_is_cut_off() {
-    check(Drive::Effort, Fault::CutAtController);
+fn a_waypoint_is_given_up_with_its_controller() {
+    let faults = [Fault::Killed, Fault::Suspended, Fault::CutAtVehicle];
+    check(Drive::Waypoint, &faults);
 }
 
 #[test]
-fn effort_ends_when_the_link_of_the_vehicle_is_down() {
-    check(Drive::Effort, Fault::CutAtVehicle);
-}
-
-#[test]
-fn effort_ends_when_the_controller_is_killed_among_many_dead_ids() {
-    check(Drive::Effort, Fault::KilledAmongStrangers);
-}
-
-#[test]
-fn effort_ends_when_the_controller_is_killed_behind_a_node() {
-    check(Drive::Effort, Fault::KilledBehindNode);
-}
-
-#[test]
-fn effort_ends_when_the_node_of_the_controller_is_killed() {
-    check(Drive::Effort, Fault::NodeKilled);
-}
-
-#[test]
-fn a_vector_ends_when_the_controller_is_killed() {
-    check(Drive::Vector, Fault::Killed);
-}
-
-#[test]
-fn a_vector_ends_when_the_controller_is_suspended() {
-    check(Drive::Vector, Fault::Suspended);
-}
-
-#[test]
-fn a_vector_ends_when_the_controller_is_suspended_behind_a_node() {
-    check(Drive::Vector, Fault::SuspendedBehindNode);
-}
-
-#[test]
-fn a_vector_ends_when_the_controller_is_cut_off() {
-    check(Drive::Vector, Fault::CutAtController);
-}
-
-#[test]
-fn a_vector_ends_when_the_controller_is_killed_among_many_dead_ids() {
-    check(Drive::Vector, Fault::KilledAmongStrangers);
-}
-
-#[test]
-fn a_waypoint_is_given_up_when_the_controller_is_killed() {
-    check(Drive::Waypoint, Fault::Killed);
-}
-
-#[test]
-fn a_waypoint_is_given_up_when_the_controller_is_suspended() {
-    check(Drive::Waypoint, Fault::Suspended);
-}
-
-#[test]
-fn a_waypoint_is_given_up_when_the_link_of_the_vehicle_is_down() {
-    check(Drive::Waypoint, Fault::CutAtVehicle);
-}
-
-#[test]
-fn a_list_is_given_up_when_the_controller_is_killed_among_many_dead_ids() {
-    check(Drive::List, Fault::KilledAmongStrangers);
+fn a_list_is_given_up_with_its_controller() {
+    check(Drive::List, &[Fault::KilledAmongStrangers]);
 }
 
 #[test]

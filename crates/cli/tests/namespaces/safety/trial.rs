@@ -2,10 +2,12 @@
 //! vehicle stops.
 
 use std::fmt;
+use std::thread;
 use std::time::Duration;
 
 use super::roles::{Drive, LOCAL, STRANGERS, Sample, wall_clock};
 use crate::testbed::{Host, Testbed};
+use jaus_test_kit::evidence::this_test;
 use jaus_test_kit::hosts::{Process, on_hosts};
 use jaus_test_kit::vehicle_process::VehicleProcess;
 
@@ -77,12 +79,22 @@ impl Drive {
     }
 }
 
-/// Runs one case, prints its row of the table, and checks it.
-pub(crate) fn check(drive: Drive, fault: Fault) {
-    on_hosts(Testbed::new, |bed| {
-        let row = Trial::start(bed, drive, fault).run(fault);
-        println!("{row}");
-        row.check();
+/// Runs the cases of some faults at the same time, prints their rows of the table, and checks them.
+pub(crate) fn check(drive: Drive, faults: &[Fault]) {
+    let beds = || faults.iter().map(|_| Testbed::new()).collect();
+    on_hosts(beds, |beds: &Vec<Testbed>| {
+        let rows: Vec<Row> = thread::scope(|scope| {
+            let start = |(bed, &fault)| {
+                let run = move || Trial::start(bed, drive, fault).run(fault);
+                // A thread that starts test nodes has the name of its test.
+                let thread = thread::Builder::new().name(this_test());
+                thread.spawn_scoped(scope, run).unwrap()
+            };
+            let trials: Vec<_> = beds.iter().zip(faults).map(start).collect();
+            trials.into_iter().map(|it| it.join().unwrap()).collect()
+        });
+        rows.iter().for_each(|row| println!("{row}"));
+        rows.iter().for_each(Row::check);
     });
 }
 
