@@ -11,7 +11,6 @@
 mod agreement;
 mod captures;
 mod captures_sent;
-#[path = "../support/constructs.rs"]
 mod constructs;
 mod golden;
 mod lua_captures;

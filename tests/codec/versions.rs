@@ -1,7 +1,6 @@
 //! One service at two versions with different layouts under the same code: a component offers both,
 //! a client selects one, and both are decoded correctly.
 
-use std::future::Future;
 use std::time::Duration;
 
 use jaus::codec::{Message, ServiceId};
@@ -12,17 +11,13 @@ use jaus::messages::mobility::{self, v1_0};
 use jaus::messages::registry;
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
+use jaus_test_kit::waiting::within_limit;
 use tokio::sync::mpsc;
 
 const NEWEST_FIRST: [ServiceId; 2] = [V1_1, V1_0];
 
 /// What the driver has understood: the version, speed and heading.
 type Heard = (&'static str, Option<f64>, Option<f64>);
-
-async fn within_limit<T>(future: impl Future<Output = T>) -> T {
-    let limit = Duration::from_secs(20);
-    tokio::time::timeout(limit, future).await.unwrap()
-}
 
 fn start(group: Group, subsystem: u16) -> Node {
     Node::start(Config::loopback(subsystem, 1).group(group)).unwrap()

@@ -1,7 +1,6 @@
 //! Subscriptions and control in an application: components on nodes with real sockets on the
 //! loopback interface, and a scripted peer.
 
-use std::future::Future;
 use std::time::Duration;
 
 use jaus::address::JausId;
@@ -19,15 +18,7 @@ use jaus::messages::core::{
 use jaus::node::{Config, Node, Port};
 use jaus::wire::Priority;
 use jaus_test_kit::group::own_group;
-
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(20);
-
-async fn within_limit<T>(future: impl Future<Output = T>) -> T {
-    tokio::time::timeout(LIMIT, future)
-        .await
-        .expect("it takes too long")
-}
+use jaus_test_kit::waiting::{until, within_limit};
 
 /// An operator, and a peer on a node of its own whose strings the test holds.
 struct Scene {
@@ -450,18 +441,19 @@ async fn commands_are_refused_once_the_peer_is_known_to_be_no_longer_ready() {
     .await;
     assert_eq!(control.send(&Resume {}), Ok(()));
     // It was started again, or is in an emergency; the lease asks, and nobody else does.
-    let refused = within_limit(async {
+    let answering = async {
         loop {
             peer.expect::<QueryStatus>().await;
             peer.say(&status(5));
-            tokio::time::sleep(Duration::from_millis(20)).await;
-            if let Err(refused) = control.send(&Resume {}) {
-                return refused;
-            }
         }
-    });
+    };
+    tokio::select! {
+        () = until(|| control.send(&Resume {}).is_err()) => {}
+        () = answering => unreachable!(),
+    }
     let (peer, state) = (control.peer(), 5);
-    assert_eq!(refused.await, ControlError::NotReady { peer, state });
+    let refused = ControlError::NotReady { peer, state };
+    assert_eq!(control.send(&Resume {}), Err(refused));
     assert!(control.is_held());
 }
 

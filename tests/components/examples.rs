@@ -7,10 +7,9 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(30);
+use jaus_test_kit::waiting::LIMIT;
 
 /// Held by a test that has a driver: the group stops every driver on this host.
 static DRIVER: Mutex<()> = Mutex::new(());

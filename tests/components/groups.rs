@@ -1,8 +1,6 @@
 //! Multicast messages and group subscriptions: components on nodes with real sockets on the
 //! loopback interface.
 
-use std::future::Future;
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::time::Duration;
 
 use jaus::address::JausId;
@@ -17,9 +15,8 @@ use jaus::messages::core::{
 };
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
-
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(30);
+use jaus_test_kit::group::own_group;
+use jaus_test_kit::waiting::within_limit;
 
 const QUERY: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
 
@@ -28,12 +25,7 @@ struct Network(Group);
 
 impl Network {
     fn new() -> Self {
-        let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-        let port = socket.local_addr().unwrap().port();
-        Self(Group::At(SocketAddrV4::new(
-            Ipv4Addr::new(239, 255, 0, 1),
-            port,
-        )))
+        Self(own_group())
     }
 
     fn node(&self, subsystem: u16, node: u8) -> Node {
@@ -72,12 +64,6 @@ impl Network {
     }
 }
 
-async fn within_limit<T>(future: impl Future<Output = T>) -> T {
-    tokio::time::timeout(LIMIT, future)
-        .await
-        .expect("it takes too long")
-}
-
 /// Waits until an audience has so many members.
 async fn gathered(component: &Component, audience: &Audience, members: usize) {
     let mut changes = component.watch();
@@ -89,8 +75,8 @@ async fn gathered(component: &Component, audience: &Audience, members: usize) {
     .await;
 }
 
-/// Whether a component is told `M` by the other.
-async fn hears<M: Message>(messages: &mut Messages, from: JausId) -> bool {
+/// Waits until a component is told `M` by the other.
+async fn hears<M: Message>(messages: &mut Messages, from: JausId) {
     let heard = async {
         while let Some(message) = messages.next().await {
             if message.source == from && M::decode(&message.payload).is_ok() {
@@ -99,7 +85,7 @@ async fn hears<M: Message>(messages: &mut Messages, from: JausId) -> bool {
         }
         panic!("the node has stopped");
     };
-    tokio::time::timeout(LIMIT, heard).await.is_ok()
+    within_limit(heard).await;
 }
 
 #[tokio::test]
@@ -124,14 +110,14 @@ async fn a_message_to_a_subsystem_a_node_or_providers_reaches_those_and_nobody_e
     // In this order, so that what came too far would be heard before what is waited for.
     let pulse = ReportHeartbeatPulse {};
     assert_eq!(operator.send_all(Audience::node(101, 2), &pulse), Ok(1));
-    assert!(hears::<ReportHeartbeatPulse>(&mut ears[0], operator.id()).await);
+    hears::<ReportHeartbeatPulse>(&mut ears[0], operator.id()).await;
     assert_eq!(operator.send_all(Audience::subsystem(101), &pulse), Ok(2));
-    assert!(hears::<ReportHeartbeatPulse>(&mut ears[0], operator.id()).await);
-    assert!(hears::<ReportHeartbeatPulse>(&mut ears[1], operator.id()).await);
+    hears::<ReportHeartbeatPulse>(&mut ears[0], operator.id()).await;
+    hears::<ReportHeartbeatPulse>(&mut ears[1], operator.id()).await;
     let providers = Audience::providers(discovery::URN).in_subsystem(102);
     gathered(&operator, &providers, 1).await;
     assert_eq!(operator.send_all(&providers, &pulse), Ok(1));
-    assert!(hears::<ReportHeartbeatPulse>(&mut ears[2], operator.id()).await);
+    hears::<ReportHeartbeatPulse>(&mut ears[2], operator.id()).await;
     drop((here, beside, elsewhere));
     for mut ear in ears {
         assert!(ear.next().await.is_none(), "a message too many");

@@ -1,4 +1,5 @@
-//! Components as applications build them: discovery, queries, subscriptions, control, groups.
+//! Components as applications build them: discovery, queries, subscriptions, control, groups,
+//! other stacks as peers.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,
@@ -13,3 +14,6 @@ mod discovery;
 mod examples;
 mod groups;
 mod offering;
+mod peers;
+#[path = "../support/streams.rs"]
+mod streams;

@@ -1,6 +1,5 @@
 //! Components as an application offers them, on nodes with real sockets on the loopback interface.
 
-use std::future::Future;
 use std::time::Duration;
 
 use jaus::address::JausId;
@@ -15,18 +14,10 @@ use jaus::messages::core::{
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
-
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(20);
+use jaus_test_kit::waiting::within_limit;
 
 fn start(subsystem: u16, group: Group) -> Node {
     Node::start(Config::loopback(subsystem, 1).group(group)).unwrap()
-}
-
-async fn within_limit<T>(future: impl Future<Output = T>) -> T {
-    tokio::time::timeout(LIMIT, future)
-        .await
-        .expect("it takes too long")
 }
 
 /// A rover that reports a speed of 1.5 m/s, and an operator who looks for it.

@@ -9,9 +9,7 @@ use jaus::address::JausId;
 use jaus::endpoint::{Counter, Outgoing, Received};
 use jaus::node::{Config, Node, Port};
 use jaus_test_kit::group::own_group;
-
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(20);
+use jaus_test_kit::waiting::{until, within_limit};
 
 /// A router with UDP and TCP, a component of its own, one beyond UDP and one beyond TCP.
 fn network(forward: bool) -> (Vec<Node>, [Port; 3]) {
@@ -43,7 +41,7 @@ async fn say_until_heard(from: &Port, destination: JausId, to: &mut Port) -> Rec
             }
         }
     };
-    tokio::time::timeout(LIMIT, say).await.expect("it is heard")
+    within_limit(say).await
 }
 
 #[tokio::test]
@@ -74,11 +72,7 @@ async fn a_large_acknowledged_message_passes_from_udp_to_tcp_and_back() {
                     }
                 }
             };
-            tokio::time::timeout(LIMIT, async {
-                tokio::join!(sender.deliver(message), receive)
-            })
-            .await
-            .expect("it arrives")
+            within_limit(async { tokio::join!(sender.deliver(message), receive) }).await
         };
         assert_eq!(sent, Ok(()));
         assert!(received.payload == image);
@@ -94,7 +88,7 @@ async fn a_broadcast_reaches_the_routers_component_and_the_other_side() {
     say_until_heard(&tcp, udp.id(), &mut udp).await;
     let heard = say_until_heard(&udp, JausId::EVERYONE, &mut tcp).await;
     assert_eq!(heard.source, udp.id());
-    let heard = tokio::time::timeout(LIMIT, own.recv()).await.unwrap();
+    let heard = within_limit(own.recv()).await;
     assert_eq!(heard.unwrap().source, udp.id());
 }
 
@@ -103,17 +97,14 @@ async fn a_node_that_was_not_asked_to_forward_does_not() {
     let (nodes, [mut own, udp, mut tcp]) = network(false);
     say_until_heard(&tcp, own.id(), &mut own).await;
     let heard = say_until_heard(&udp, own.id(), &mut own);
-    tokio::time::timeout(LIMIT, heard).await.unwrap();
+    within_limit(heard).await;
     udp.send(Outgoing::new(
         udp.id(),
         tcp.id(),
         Bytes::from_static(&[0x02, 0x22]),
     ))
     .unwrap();
-    let ignored = || nodes[0].counters().get(Counter::NotForUs) > 0;
-    while !ignored() {
-        tokio::time::sleep(Duration::from_millis(2)).await;
-    }
+    until(|| nodes[0].counters().get(Counter::NotForUs) > 0).await;
     assert_eq!(nodes[0].counters().get(Counter::MessagesForwarded), 0);
     assert_eq!(tcp.try_recv(), None);
 }

@@ -13,10 +13,8 @@ use jaus::endpoint::{Outgoing, Received, Remote};
 use jaus::link::serial::Settings;
 use jaus::node::{Config, Node, Port};
 use jaus::wire::{Frame, jserial};
+use jaus_test_kit::waiting::{until, within_limit};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(30);
 
 const QUERY_HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x22]);
 const REPORT_HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x42]);
@@ -58,15 +56,8 @@ fn line(change: impl FnMut(&[u8]) -> Vec<u8> + Clone + Send + 'static) -> (Node,
     nodes
 }
 
-async fn within<T>(what: &str, future: impl Future<Output = T>) -> T {
-    tokio::time::timeout(LIMIT, future)
-        .await
-        .unwrap_or_else(|_| panic!("{what} did not happen"))
-}
-
 async fn receive(port: &mut Port) -> Received {
-    let what = format!("a message for {}", port.id());
-    within(&what, port.recv()).await.expect("a running node")
+    within_limit(port.recv()).await.expect("a running node")
 }
 
 #[tokio::test]
@@ -148,7 +139,7 @@ async fn acknowledged_messages_come_through_noise_each_once() {
                 }
             }
         };
-        assert_eq!(within("an arrival", arrives).await.payload, payload);
+        assert_eq!(within_limit(arrives).await.payload, payload);
     }
     assert!(driver.try_recv().is_none(), "nothing is delivered twice");
     let received = vehicle.serial_lines()[0].counters.received;
@@ -181,21 +172,11 @@ async fn a_port_that_went_away_is_used_again_when_it_is_back() {
     receive(&mut driver).await;
 
     drop(first);
-    let gone = async {
-        while vehicle.serial_lines()[0].is_open {
-            tokio::time::sleep(Duration::from_millis(2)).await;
-        }
-    };
-    within("the loss of the port", gone).await;
+    until(|| !vehicle.serial_lines()[0].is_open).await;
     assert!(vehicle.peers().is_empty(), "who was behind it is unknown");
 
     let second = plug_in();
-    let back = async {
-        while !vehicle.serial_lines()[0].is_open {
-            tokio::time::sleep(Duration::from_millis(2)).await;
-        }
-    };
-    within("the port's return", back).await;
+    until(|| vehicle.serial_lines()[0].is_open).await;
     let again = Frame {
         sequence: 2,
         ..hello

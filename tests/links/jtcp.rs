@@ -11,11 +11,9 @@ use jaus::node::{Config, Node, Peer, Port, StartError};
 use jaus::peer::Peer as Known;
 use jaus::wire::jtcp::{self, Decoder};
 use jaus::wire::{Acknowledgement, Frame, Version};
+use jaus_test_kit::waiting::{until, within_limit};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
-
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(20);
 
 const QUERY_HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x22]);
 const REPORT_HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x42]);
@@ -40,24 +38,8 @@ fn address(node: &Node) -> SocketAddr {
         .expect("a listener")
 }
 
-async fn within<T>(what: &str, future: impl Future<Output = T>) -> T {
-    tokio::time::timeout(LIMIT, future)
-        .await
-        .unwrap_or_else(|_| panic!("{what} did not happen"))
-}
-
-async fn until(what: &str, mut is_so: impl FnMut() -> bool) {
-    let poll = async {
-        while !is_so() {
-            tokio::time::sleep(Duration::from_millis(2)).await;
-        }
-    };
-    within(what, poll).await;
-}
-
 async fn receive(port: &mut Port) -> Received {
-    let what = format!("a message for {}", port.id());
-    within(&what, port.recv()).await.expect("a running node")
+    within_limit(port.recv()).await.expect("a running node")
 }
 
 fn to(port: &Port, destination: JausId, payload: Bytes) -> Outgoing {
@@ -77,7 +59,7 @@ async fn ask_until_heard(console: &Port, driver: &mut Port) -> Received {
             }
         }
     };
-    within("a connection", ask).await
+    within_limit(ask).await
 }
 
 /// A peer that is played by the test.
@@ -89,17 +71,13 @@ struct Scripted {
 impl Scripted {
     async fn connect(address: SocketAddr) -> Self {
         Self {
-            stream: within("connecting", TcpStream::connect(address))
-                .await
-                .unwrap(),
+            stream: within_limit(TcpStream::connect(address)).await.unwrap(),
             decoder: Decoder::new(),
         }
     }
 
     async fn write(&mut self, octets: &[u8]) {
-        within("writing", self.stream.write_all(octets))
-            .await
-            .unwrap();
+        within_limit(self.stream.write_all(octets)).await.unwrap();
     }
 
     /// The next frame; `None` if the other side has closed the connection.
@@ -121,7 +99,7 @@ impl Scripted {
                 }
             }
         };
-        within("a frame or the end", read).await
+        within_limit(read).await
     }
 }
 
@@ -168,10 +146,7 @@ async fn a_broadcast_goes_to_all_connections() {
         .each_ref()
         .map(|vehicle| vehicle.attach(1).unwrap());
     let console = station.attach(1).unwrap();
-    until("two connections", || {
-        station.tcp().unwrap().connections.len() == 2
-    })
-    .await;
+    until(|| station.tcp().unwrap().connections.len() == 2).await;
 
     console
         .send(to(&console, JausId::EVERYONE, QUERY_HEARTBEAT))
@@ -339,7 +314,7 @@ async fn jauspp_is_recognised_by_the_version_octets_in_its_stream() {
             let known = vehicle.peers().into_iter().find(|it| it.id == id);
             known.is_some_and(|it| it.profile == profile)
         };
-        until("recognising it", recognised).await;
+        until(recognised).await;
     }
 }
 
@@ -431,10 +406,7 @@ async fn a_peer_that_was_restarted_is_connected_to_again() {
     ask_until_heard(&console, &mut vehicle.attach(1).unwrap()).await;
 
     vehicle.shutdown().await;
-    until("the end of the connection", || {
-        operator.tcp().unwrap().connections.is_empty()
-    })
-    .await;
+    until(|| operator.tcp().unwrap().connections.is_empty()).await;
     let again = Config::new(101, 1).without_udp().tcp_listen(place.into());
     let vehicle = Node::start(again).unwrap();
     let mut driver = vehicle.attach(1).unwrap();
@@ -454,7 +426,7 @@ async fn the_first_message_to_an_unknown_id_waits_for_the_connection() {
     console
         .send(to(&console, unknown, QUERY_HEARTBEAT))
         .unwrap();
-    let (stream, _) = within("a connection", far.accept()).await.unwrap();
+    let (stream, _) = within_limit(far.accept()).await.unwrap();
     let mut peer = Scripted {
         stream,
         decoder: Decoder::new(),

@@ -10,9 +10,7 @@ use jaus::address::JausId;
 use jaus::endpoint::{Access, LinkId, To, Transmit};
 use jaus::link::tcp::{Arrival, Closed, Counters, HANDSHAKE, STUCK, Settings, TcpLink};
 use jaus::wire::{Frame, Priority, jtcp};
-
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(20);
+use jaus_test_kit::waiting::{LIMIT, within_limit};
 
 fn listening(max_accepted: usize) -> TcpLink {
     let settings = Settings {
@@ -27,8 +25,8 @@ fn listening(max_accepted: usize) -> TcpLink {
 async fn connect_from(address: [u8; 4], to: SocketAddr) -> TcpStream {
     let socket = tokio::net::TcpSocket::new_v4().unwrap();
     socket.bind((address, 0).into()).unwrap();
-    let stream = tokio::time::timeout(LIMIT, socket.connect(to)).await;
-    stream.unwrap().unwrap().into_std().unwrap()
+    let stream = within_limit(socket.connect(to)).await;
+    stream.unwrap().into_std().unwrap()
 }
 
 fn message(octets: usize) -> Bytes {
@@ -67,8 +65,7 @@ async fn turns(
             closed.extend(turn(link, now).await);
         }
     };
-    let turned = tokio::time::timeout(LIMIT, turns).await;
-    assert!(turned.is_ok(), "{:?}", link.counters());
+    within_limit(turns).await;
     closed
 }
 

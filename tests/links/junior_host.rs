@@ -12,10 +12,8 @@ use jaus::component::{Component, Kind};
 use jaus::endpoint::{Counter, Outgoing};
 use jaus::node::{AttachError, Config, Node, StartError};
 use jaus::wire::{Acknowledgement, Broadcast, Flags, Frame, Version, judp};
+use jaus_test_kit::waiting::{until, within_limit};
 use tokio::net::UnixDatagram;
-
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(20);
 
 const VEHICLE: JausId = JausId::new(101, 1, 1);
 const SENSOR: JausId = JausId::new(101, 1, 2);
@@ -73,8 +71,7 @@ impl<'a> Manager<'a> {
     async fn next(&self) -> (Frame, Vec<u8>) {
         let mut buffer = [0; 5000];
         loop {
-            let octets = tokio::time::timeout(LIMIT, self.socket.recv(&mut buffer));
-            let octets = octets.await.expect("a message").unwrap();
+            let octets = within_limit(self.socket.recv(&mut buffer)).await.unwrap();
             if octets > 0 {
                 let datagram = buffer[..octets].to_vec();
                 let mut frames = judp::frames(datagram.clone().into()).unwrap();
@@ -124,17 +121,6 @@ fn message(source: JausId, destination: JausId, payload: &'static [u8], sequence
         sequence,
         ..Frame::new(source, destination, Bytes::from_static(payload))
     }
-}
-
-async fn until(mut is_so: impl FnMut() -> bool) {
-    let waited = async {
-        while !is_so() {
-            tokio::time::sleep(Duration::from_millis(5)).await;
-        }
-    };
-    tokio::time::timeout(LIMIT, waited)
-        .await
-        .expect("it to be so");
 }
 
 #[tokio::test]

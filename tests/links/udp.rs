@@ -3,7 +3,6 @@
 
 use std::future::poll_fn;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
-use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::endpoint::{LinkId, To, Transmit};
@@ -11,9 +10,7 @@ use jaus::link::udp::{PortTaken, Settings, UdpLink, kernel_drops};
 use jaus::link::{Error, Group, Interface, Interfaces, Ip, Slab};
 use jaus::wire::Priority;
 use jaus_test_kit::evidence::not_tested;
-
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(20);
+use jaus_test_kit::waiting::{LIMIT, within_limit};
 
 /// A port that no test of this process gets twice and nothing else uses just now.
 fn free_port() -> u16 {
@@ -37,9 +34,7 @@ fn settings() -> Settings {
 
 async fn receive(link: &mut UdpLink) -> (SocketAddr, Bytes) {
     let mut slab = Slab::new();
-    tokio::time::timeout(LIMIT, poll_fn(|cx| link.poll_recv(cx, &mut slab)))
-        .await
-        .expect("nothing was received")
+    within_limit(poll_fn(|cx| link.poll_recv(cx, &mut slab))).await
 }
 
 #[tokio::test]

@@ -2,15 +2,13 @@
 //! although nothing is retransmitted; with acknowledgement no loss at any size.
 
 use std::collections::BTreeSet;
-use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::endpoint::{Counter, Event, Outgoing};
 use jaus::node::{Config, Node, Port};
 use jaus_test_kit::group::own_group;
+use jaus_test_kit::waiting::{until, within_limit};
 
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(20);
 /// Asked for, this gives the receive buffer of 212992 octets that sockets have on Linux unless
 /// they ask for another: the kernel doubles it.
 const USUAL_BUFFER: usize = 212_992 / 2;
@@ -47,11 +45,8 @@ fn image(length: usize, number: usize) -> Bytes {
 }
 
 async fn receive(port: &mut Port) -> Bytes {
-    let message = tokio::time::timeout(LIMIT, port.recv()).await;
-    message
-        .expect("nothing came")
-        .expect("a running node")
-        .payload
+    let message = within_limit(port.recv()).await;
+    message.expect("a running node").payload
 }
 
 async fn a_thousand_arrive(receive_buffer: Option<usize>) {
@@ -94,7 +89,7 @@ async fn sixteen_mebibytes_with_acknowledgement_arrive_through_usual_buffers() {
             }
         }
     };
-    tokio::time::timeout(LIMIT, told).await.expect("no result");
+    within_limit(told).await;
 }
 
 /// More than a mailbox holds.
@@ -110,12 +105,7 @@ async fn what_was_acknowledged_is_not_dropped_when_the_receiver_is_slow() {
         sent.push(tokio::spawn(async move { sender.deliver(message).await }));
     }
     // Nothing is read before the mailbox is full.
-    let full = async {
-        while nodes[1].counters().get(Counter::ReceiverBusy) == 0 {
-            tokio::time::sleep(Duration::from_millis(1)).await;
-        }
-    };
-    tokio::time::timeout(LIMIT, full).await.expect("never full");
+    until(|| nodes[1].counters().get(Counter::ReceiverBusy) > 0).await;
     let mut received = Vec::new();
     while received.len() < MESSAGES {
         received.push(receive(&mut receiver).await);

@@ -1,8 +1,6 @@
 //! Whole nodes with real sockets on the loopback interface: unicast, both broadcast scopes,
 //! acknowledgement, components that do not read, and shutdown. Needs no network.
 
-use std::time::Duration;
-
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::{Event, Outgoing, Received, Unacknowledged};
@@ -10,9 +8,7 @@ use jaus::link::Group;
 use jaus::node::{Config, Events, MailboxLimits, Node, Port, StartError};
 use jaus::wire::{Broadcast, Priority};
 use jaus_test_kit::group::own_group;
-
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(20);
+use jaus_test_kit::waiting::within_limit;
 
 const QUERY_HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x22]);
 const REPORT_HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x42]);
@@ -22,10 +18,7 @@ fn start(subsystem: u16, node: u8, group: Group) -> Node {
 }
 
 async fn receive(port: &mut Port) -> Received {
-    let message = tokio::time::timeout(LIMIT, port.recv()).await;
-    message
-        .unwrap_or_else(|_| panic!("{} received nothing", port.id()))
-        .expect("a running node")
+    within_limit(port.recv()).await.expect("a running node")
 }
 
 async fn event(events: &mut Events, wanted: impl Fn(&Event) -> bool) -> Event {
@@ -37,9 +30,7 @@ async fn event(events: &mut Events, wanted: impl Fn(&Event) -> bool) -> Event {
             }
         }
     };
-    tokio::time::timeout(LIMIT, search)
-        .await
-        .expect("the event did not come")
+    within_limit(search).await
 }
 
 fn to(port: &Port, destination: JausId, payload: Bytes) -> Outgoing {
@@ -318,7 +309,7 @@ async fn a_node_ends_when_nobody_holds_it_and_its_port_is_free_again() {
     drop(a);
     assert_eq!(port.id(), JausId::new(101, 1, 1));
     drop(port);
-    assert_eq!(tokio::time::timeout(LIMIT, events.recv()).await, Ok(None));
+    assert_eq!(within_limit(events.recv()).await, None);
     Node::start(config.port(number)).unwrap();
 }
 

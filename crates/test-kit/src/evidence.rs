@@ -47,13 +47,18 @@ pub fn outside(part: &str) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
-    let thread = std::thread::current();
-    let test = thread.name().unwrap_or("a test");
     not_tested(
-        test,
+        &this_test(),
         &format!("{} is not there; set JAUS_SHARED", path.display()),
     );
     None
+}
+
+/// The path of the test that runs on this thread, as the test harness names it.
+#[must_use]
+pub fn this_test() -> String {
+    let thread = std::thread::current();
+    thread.name().unwrap_or("a test").to_owned()
 }
 
 /// Reports that a test proves nothing, outside the test harness, which hides the output of passing

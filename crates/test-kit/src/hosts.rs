@@ -6,10 +6,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use crate::evidence::not_tested;
-
-/// Timeout of every operation; reached only in a failing test.
-const LIMIT: Duration = Duration::from_secs(30);
+use crate::evidence::{not_tested, this_test};
+use crate::waiting::{LIMIT, block_until};
 
 /// Role of a test node's process.
 const ROLE: &str = "JAUS_TEST_ROLE";
@@ -20,9 +18,30 @@ pub const SETTINGS: &str = "JAUS_TEST_SETTINGS";
 /// Set for a test that was restarted in a user namespace.
 const INSIDE: &str = "JAUS_TEST_IN_USER_NAMESPACE";
 
-/// Runs a test's body on hosts: created here; otherwise in a user namespace, where this test binary
-/// is restarted for the same test; otherwise [not at all](not_tested).
-pub fn on_hosts<H>(test: &str, make: impl FnOnce() -> Result<H, String>, body: impl FnOnce(&H)) {
+/// The test that plays the roles of test nodes. It stands in the outermost module of the tests that
+/// start them, or at the top of their program, and calls [`play`].
+const PLAYER: &str = "a_process_that_plays_a_node";
+
+/// The path of the [`PLAYER`] of this thread's test.
+fn player() -> String {
+    match this_test().split_once("::") {
+        Some((module, _)) => format!("{module}::{PLAYER}"),
+        None => PLAYER.to_owned(),
+    }
+}
+
+/// Runs the body of this thread's test on hosts: created here; otherwise in a user namespace, where
+/// this test binary is restarted for the same test; otherwise [not at all](not_tested).
+pub fn on_hosts<H>(make: impl FnOnce() -> Result<H, String>, body: impl FnOnce(&H)) {
+    on_hosts_for(&this_test(), make, body);
+}
+
+/// The same for a program that is its own test harness.
+pub fn on_hosts_for<H>(
+    test: &str,
+    make: impl FnOnce() -> Result<H, String>,
+    body: impl FnOnce(&H),
+) {
     let reason = match make() {
         Ok(hosts) => {
             return body(&hosts);
@@ -136,25 +155,24 @@ impl TwoHosts {
 
     /// Waits for duplicate address detection of both hosts' IPv6 addresses: a second or two.
     pub fn wait_for_addresses(&self) {
-        let deadline = Instant::now() + LIMIT;
         for name in &self.names {
-            let shown = ["-n", name, "-6", "-o", "address", "show", "tentative"];
-            while !Command::new("ip")
-                .args(shown)
-                .output()
-                .unwrap()
-                .stdout
-                .is_empty()
-            {
-                assert!(Instant::now() < deadline, "addresses stay tentative");
-                std::thread::sleep(Duration::from_millis(100));
-            }
+            let tentative = ["-n", name, "-6", "-o", "address", "show", "tentative"];
+            block_until(|| {
+                let output = Command::new("ip").args(tentative).output();
+                output.unwrap().stdout.is_empty()
+            });
         }
     }
 
     /// Runs `ip` on one of the two hosts.
     pub fn ip(&self, host: usize, arguments: &[&str]) {
         ip(&[&["-n", &self.names[host]], arguments].concat()).unwrap();
+    }
+
+    /// A program of ours on one of the two hosts.
+    #[must_use]
+    pub fn command(&self, host: usize, program: &str) -> Command {
+        on_host(&self.names[host], program)
     }
 
     /// Starts this test binary in a node's role on one of the two hosts.
@@ -198,8 +216,18 @@ pub fn lay_cable(hosts: &[String; 2], cable: &str, network: &str) -> Result<(), 
 }
 
 /// Runs a test's body on two hosts, or reports that this is impossible.
-pub fn on_two_hosts(test: &str, body: impl FnOnce(&TwoHosts)) {
-    on_hosts(test, TwoHosts::new, body);
+pub fn on_two_hosts(body: impl FnOnce(&TwoHosts)) {
+    on_hosts(TwoHosts::new, body);
+}
+
+/// A program of ours on a host, with its usual log.
+#[must_use]
+pub fn on_host(host: &str, program: &str) -> Command {
+    let mut command = Command::new("ip");
+    command
+        .args(["netns", "exec", host, program])
+        .env_remove("JAUS_LOG");
+    command
 }
 
 /// A node in its own process; killed when dropped.
@@ -211,15 +239,11 @@ pub struct Process {
 impl Process {
     /// Starts this test binary in a role on a host, with settings.
     pub fn start(host: &str, role: &str, settings: &str) -> Self {
+        let this = std::env::current_exe().unwrap();
         let mut child = Command::new("ip")
             .args(["netns", "exec", host])
-            .arg(std::env::current_exe().unwrap())
-            .args([
-                "--exact",
-                "a_process_that_plays_a_node",
-                "--nocapture",
-                "--test-threads=1",
-            ])
+            .arg(this)
+            .args(["--exact", &player(), "--nocapture", "--test-threads=1"])
             .env(ROLE, role)
             .env(SETTINGS, settings)
             .stdout(Stdio::piped())

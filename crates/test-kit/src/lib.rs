@@ -1,4 +1,5 @@
-//! Shared parts of the workspace's tests: evidence, hosts in network namespaces, processes, peers.
+//! Shared parts of the workspace's tests: evidence, hosts in network namespaces, processes, peers,
+//! bounded waiting.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,
@@ -17,3 +18,4 @@ pub mod random;
 pub mod rover;
 pub mod tools;
 pub mod vehicle_process;
+pub mod waiting;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::evidence::not_tested;
+use crate::evidence::{not_tested, this_test};
 
 /// The path of a workspace file, relative to the top level.
 #[must_use]
@@ -21,11 +21,7 @@ pub fn workspace(path: &str) -> PathBuf {
 pub fn has_tshark() -> bool {
     let there = Command::new("tshark").arg("--version").output().is_ok();
     if !there {
-        let thread = std::thread::current();
-        not_tested(
-            thread.name().unwrap_or("a test"),
-            "there is no tshark; install it",
-        );
+        not_tested(&this_test(), "there is no tshark; install it");
     }
     there
 }

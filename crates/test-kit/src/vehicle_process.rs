@@ -2,13 +2,17 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
+
+use crate::waiting::block_until;
 
 /// A running vehicle; killed when dropped.
 pub struct VehicleProcess {
     child: Child,
-    /// Collects the lines after the introduction.
-    reader: Option<JoinHandle<Vec<String>>>,
+    /// Output after the introduction.
+    lines: Arc<Mutex<Vec<String>>>,
+    reader: Option<JoinHandle<()>>,
 }
 
 impl VehicleProcess {
@@ -18,6 +22,7 @@ impl VehicleProcess {
         let mut stdout = BufReader::new(child.stdout.take().unwrap());
         let mut vehicle = Self {
             child,
+            lines: Arc::default(),
             reader: None,
         };
         let mut introduction = String::new();
@@ -25,9 +30,12 @@ impl VehicleProcess {
             let read = stdout.read_line(&mut introduction).unwrap();
             assert_ne!(read, 0, "the vehicle has ended: {introduction}");
         }
-        // The vehicle may print more lines.
-        let lines = move || stdout.lines().map_while(Result::ok).collect();
-        vehicle.reader = Some(std::thread::spawn(lines));
+        let lines = vehicle.lines.clone();
+        vehicle.reader = Some(std::thread::spawn(move || {
+            for line in stdout.lines().map_while(Result::ok) {
+                lines.lock().unwrap().push(line);
+            }
+        }));
         vehicle
     }
 
@@ -43,12 +51,20 @@ impl VehicleProcess {
         assert!(sent.unwrap().success(), "{name} to {id}");
     }
 
+    /// Waits until it has printed a line that contains this, after its introduction.
+    pub fn says(&self, text: &str) {
+        block_until(|| {
+            let lines = self.lines.lock().unwrap();
+            lines.iter().any(|line| line.contains(text))
+        });
+    }
+
     /// Stops it by SIGTERM; returns its output after the introduction.
     pub fn terminate(mut self) -> Vec<String> {
         self.signal("TERM");
-        let lines = self.reader.take().unwrap().join().unwrap();
+        self.reader.take().unwrap().join().unwrap();
         assert!(self.child.wait().unwrap().success());
-        lines
+        std::mem::take(&mut *self.lines.lock().unwrap())
     }
 }
 

@@ -8,8 +8,9 @@ use jaus::component::{Component, Kind, Level};
 use jaus::endpoint::Outgoing;
 use jaus::node::{ComponentEvent, Departure, HostError, HostEvent, SendError, Undelivered};
 use jaus::wire::{Broadcast, Priority};
+use jaus_test_kit::waiting::{until, within_limit};
 
-use crate::local::place::{Place, component_event, message, receive, within};
+use crate::local::place::{Place, component_event, message, receive};
 
 #[tokio::test]
 async fn messages_go_both_ways_with_all_that_is_said_about_them() {
@@ -71,15 +72,15 @@ async fn a_sender_learns_whether_its_message_has_arrived() {
     let nobody = JausId::new(101, 1, 200);
 
     assert_eq!(
-        within(there.deliver(message(&there, here.id(), b"x"))).await,
+        within_limit(there.deliver(message(&there, here.id(), b"x"))).await,
         Ok(())
     );
     assert_eq!(
-        within(here.deliver(message(&here, there.id(), b"x"))).await,
+        within_limit(here.deliver(message(&here, there.id(), b"x"))).await,
         Ok(())
     );
     for port in [&here, &there] {
-        let outcome = within(port.deliver(message(port, nobody, b"x"))).await;
+        let outcome = within_limit(port.deliver(message(port, nobody, b"x"))).await;
         let Err(Undelivered::NotAcknowledged { destination, .. }) = outcome else {
             panic!("{outcome:?}");
         };
@@ -112,13 +113,13 @@ async fn what_cannot_be_sent_is_told_at_once_or_by_the_node() {
     let Some(HostEvent::Rejected {
         message: rejected,
         why,
-    }) = within(events.recv()).await
+    }) = within_limit(events.recv()).await
     else {
         panic!("no word of the message to nobody");
     };
     assert_eq!(rejected, handle);
     assert!(why.contains("names nobody"), "{why}");
-    let outcome = within(port.deliver(message(&port, nobody, b"x"))).await;
+    let outcome = within_limit(port.deliver(message(&port, nobody, b"x"))).await;
     assert_eq!(outcome, Err(Undelivered::Rejected(why)));
 }
 
@@ -157,7 +158,7 @@ async fn a_second_claimant_is_told_who_has_the_id() {
         (process.unwrap().name.as_str(), why),
         ("planner", Departure::Left)
     );
-    within(place.host().attach(33)).await.unwrap();
+    within_limit(place.host().attach(33)).await.unwrap();
 }
 
 #[tokio::test]
@@ -171,7 +172,7 @@ async fn an_attached_component_is_found_and_answers() {
     let desk = Component::builder(Kind::Vehicle, "Desk")
         .attach(&node, 1)
         .unwrap();
-    let found = within(desk.find("urn:jaus:jss:core:Liveness"))
+    let found = within_limit(desk.find("urn:jaus:jss:core:Liveness"))
         .await
         .unwrap();
     assert_eq!(found, rover.id());
@@ -193,12 +194,9 @@ async fn a_guest_that_passes_by_does_not_rename_the_vehicle() {
             .identification(level, id)
             .is_some_and(|told| told.name == wanted)
     };
-    within(async {
-        while !called(&rover, Level::Component, guest.id(), "guest")
-            || !called(&guest, Level::Subsystem, rover.id(), "Rover")
-        {
-            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
-        }
+    until(|| {
+        called(&rover, Level::Component, guest.id(), "guest")
+            && called(&guest, Level::Subsystem, rover.id(), "Rover")
     })
     .await;
     assert!(called(&rover, Level::Subsystem, rover.id(), "Rover"));
@@ -217,14 +215,14 @@ async fn what_is_to_be_acknowledged_is_refused_where_there_is_no_room_for_it() {
     }
     // Behind all of these, since components are served in the order of their messages.
     assert_eq!(
-        within(here.deliver(message(&here, there.id(), b"x"))).await,
+        within_limit(here.deliver(message(&here, there.id(), b"x"))).await,
         Ok(())
     );
     let refused = SendError::Endpoint(jaus::endpoint::SendError::ReceiverFull(full.id()));
     let words = refused.to_string();
-    let outcome = within(here.deliver(message(&here, full.id(), b"x"))).await;
+    let outcome = within_limit(here.deliver(message(&here, full.id(), b"x"))).await;
     assert_eq!(outcome, Err(Undelivered::NotSent(refused)));
-    let outcome = within(there.deliver(message(&there, full.id(), b"x"))).await;
+    let outcome = within_limit(there.deliver(message(&there, full.id(), b"x"))).await;
     assert_eq!(outcome, Err(Undelivered::Rejected(words)));
     assert_eq!(full.counters().dropped, 0);
 }

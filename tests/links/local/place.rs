@@ -4,16 +4,13 @@ use std::fs::{DirBuilder, remove_dir_all};
 use std::os::unix::fs::DirBuilderExt;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::link::Group;
 use jaus::node::{Address, ComponentEvent, ComponentEvents, Config, Host, Node, Port};
-
-/// Longer than anything takes; reached only when a test fails.
-pub(crate) const LIMIT: Duration = Duration::from_secs(20);
+use jaus_test_kit::waiting::within_limit;
 
 /// A directory that is removed when the test ends.
 #[derive(Debug)]
@@ -59,21 +56,17 @@ impl Drop for Place {
     }
 }
 
-/// What must happen some day.
-pub(crate) async fn within<T>(what: impl Future<Output = T>) -> T {
-    let waited = tokio::time::timeout(LIMIT, what).await;
-    waited.expect("it did not happen in time")
-}
-
 pub(crate) async fn receive(port: &mut Port) -> Received {
-    within(port.recv()).await.expect("an attached component")
+    within_limit(port.recv())
+        .await
+        .expect("an attached component")
 }
 
 pub(crate) async fn component_event(
     events: &mut ComponentEvents,
     wanted: impl Fn(&ComponentEvent) -> bool,
 ) -> ComponentEvent {
-    within(async {
+    within_limit(async {
         loop {
             let event = events.recv().await.expect("a running node");
             if wanted(&event) {

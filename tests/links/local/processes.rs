@@ -8,10 +8,11 @@ use jaus::component::{Component, Kind};
 use jaus::node::{
     ComponentEvent, Departure, Host, HostEvent, HostEvents, Node, SendError, Undelivered,
 };
+use jaus_test_kit::waiting::{LIMIT, within_limit};
 use tokio::io::{AsyncBufReadExt, BufReader, Lines};
 use tokio::process::{Child, ChildStdout, Command};
 
-use crate::local::place::{LIMIT, Place, component_event, message, receive, within};
+use crate::local::place::{Place, component_event, message, receive};
 
 /// Names the part that a child process plays, and the socket.
 const ROLE: (&str, &str) = ("JAUS_TEST_ROLE", "JAUS_TEST_SOCKET");
@@ -40,8 +41,10 @@ impl Actor {
             .unwrap();
         let lines = BufReader::new(child.stdout.take().unwrap()).lines();
         let mut actor = Self { child, lines };
-        within(async { while actor.lines.next_line().await.unwrap().expect(role) != "ready" {} })
-            .await;
+        within_limit(async {
+            while actor.lines.next_line().await.unwrap().expect(role) != "ready" {}
+        })
+        .await;
         actor
     }
 
@@ -101,7 +104,7 @@ async fn echo(host: Host) {
 }
 
 async fn host_event(events: &mut HostEvents, wanted: impl Fn(&HostEvent) -> bool) -> HostEvent {
-    within(async {
+    within_limit(async {
         loop {
             let event = events.recv().await.expect("an attached component");
             if wanted(&event) {
@@ -201,7 +204,7 @@ async fn a_component_that_stops_reading_loses_its_own_messages_and_nobody_elses(
     assert!(dropped > 0);
     // The newest message was kept: the oldest go first.
     let last = (FLOOD - 1).to_le_bytes();
-    within(async { while receive(&mut here).await.payload[2..6] != last {} }).await;
+    within_limit(async { while receive(&mut here).await.payload[2..6] != last {} }).await;
 }
 
 #[tokio::test]
@@ -218,7 +221,7 @@ async fn a_restarted_node_is_rejoined_and_components_keep_what_they_know() {
         .live_on(port)
         .unwrap();
     let raw = place.host().attach(2).await.unwrap();
-    within(desk.find("urn:jaus:jss:core:Liveness"))
+    within_limit(desk.find("urn:jaus:jss:core:Liveness"))
         .await
         .unwrap();
     let known = desk.directory().len();
@@ -230,8 +233,11 @@ async fn a_restarted_node_is_rejoined_and_components_keep_what_they_know() {
     tokio::task::yield_now().await;
     first.kill().await;
     host_event(&mut events, |event| matches!(event, HostEvent::Lost { .. })).await;
-    assert_eq!(within(in_flight).await.unwrap(), Err(Undelivered::Lost));
-    within(async {
+    assert_eq!(
+        within_limit(in_flight).await.unwrap(),
+        Err(Undelivered::Lost)
+    );
+    within_limit(async {
         while raw.is_connected() {
             tokio::task::yield_now().await;
         }
@@ -244,7 +250,7 @@ async fn a_restarted_node_is_rejoined_and_components_keep_what_they_know() {
     let _second = Actor::start(&place, "node").await;
     host_event(&mut events, |event| *event == HostEvent::Back).await;
     assert_eq!(desk.directory().len(), known);
-    let outcome = within(async {
+    let outcome = within_limit(async {
         loop {
             match raw.deliver(message(&raw, rover.id(), b"x")).await {
                 Err(Undelivered::NotSent(SendError::NotConnected(_))) => {

@@ -7,8 +7,9 @@ use jaus::address::JausId;
 use jaus::link::local::record::{Head, Reason, Record};
 use jaus::node::{ComponentEvent, Departure, HostError};
 use jaus::wire::Flags;
+use jaus_test_kit::waiting::within_limit;
 
-use crate::local::place::{Place, component_event, message, receive, within};
+use crate::local::place::{Place, component_event, message, receive};
 
 fn write(stream: &mut UnixStream, record: &Record) {
     let mut octets = Vec::new();
@@ -38,7 +39,9 @@ fn read(stream: &mut UnixStream) -> Record {
 
 /// Does what blocks in a thread of its own, so that the node goes on.
 async fn blocking<T: Send + 'static>(what: impl FnOnce() -> T + Send + 'static) -> T {
-    within(tokio::task::spawn_blocking(what)).await.unwrap()
+    within_limit(tokio::task::spawn_blocking(what))
+        .await
+        .unwrap()
 }
 
 #[tokio::test]
@@ -112,7 +115,7 @@ async fn a_node_of_an_older_release_is_named_as_the_reason() {
         assert_eq!(hello[11..], JausId::new(0, 0, 33).to_wire());
         stream.write_all(b"\x05\0\0\0\x12\x01old").unwrap();
     });
-    let error = within(place.host().attach(33)).await.unwrap_err();
+    let error = within_limit(place.host().attach(33)).await.unwrap_err();
     let HostError::Refused { reason, words } = error else {
         panic!("{error}")
     };

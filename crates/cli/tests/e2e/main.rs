@@ -21,32 +21,30 @@ mod system;
 use std::time::Duration;
 
 use browser::{Browser, SCREENS};
-use jaus_test_kit::evidence::not_tested;
+use jaus_test_kit::evidence::{not_tested, this_test};
 use jaus_test_kit::hosts::on_hosts;
 use steps::{emergency, look_from_all_screens, take_control};
 use system::{PAGE, System};
 
 #[test]
 fn a_mission_through_the_page_survives_the_death_of_every_part() {
-    let test = "a_mission_through_the_page_survives_the_death_of_every_part";
     if let Some(reason) = browser::missing() {
-        return not_tested(test, &reason);
+        return not_tested(&this_test(), &reason);
     }
     let missing = system::missing();
     if !missing.is_empty() {
-        return not_tested(test, &format!("not built: {}", missing.join(", ")));
+        return not_tested(&this_test(), &format!("not built: {}", missing.join(", ")));
     }
-    on_hosts(test, System::new, run);
+    on_hosts(System::new, run);
 }
 
 #[test]
 fn a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once() {
-    let test = "a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once";
     if let Some(reason) = browser::missing() {
-        return not_tested(test, &reason);
+        return not_tested(&this_test(), &reason);
     }
     if !system::program("jaus-ocu").exists() {
-        return not_tested(test, "not built: jaus-ocu");
+        return not_tested(&this_test(), "not built: jaus-ocu");
     }
     by_hand::run();
 }

@@ -1,4 +1,4 @@
-//! Programs as processes: components, whole systems, the package.
+//! Programs as processes: components, whole systems, `jaus-tester load`, the package.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,
@@ -8,6 +8,8 @@
     reason = "tests with processes and sockets of their own"
 )]
 
+#[cfg(target_os = "linux")]
+mod load;
 #[cfg(target_os = "linux")]
 mod packaging;
 #[cfg(target_os = "linux")]

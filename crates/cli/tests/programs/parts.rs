@@ -6,7 +6,7 @@ use std::os::unix::net::UnixDatagram;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::component::{Component, Kind};
@@ -14,9 +14,8 @@ use jaus::link::Group;
 use jaus::messages::mobility::primitive_driver;
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
+use jaus_test_kit::waiting::LIMIT;
 
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(60);
 const DRIVER: JausId = JausId::new(101, 33, 33);
 
 /// A running program, and what it says on standard error.
@@ -50,11 +49,8 @@ impl Program {
 
     /// Waits for a line with this text.
     fn says(&self, text: &str) {
-        let start = Instant::now();
-        while start.elapsed() < LIMIT {
-            if let Ok(line) = self.lines.recv_timeout(LIMIT)
-                && line.contains(text)
-            {
+        while let Ok(line) = self.lines.recv_timeout(LIMIT) {
+            if line.contains(text) {
                 return;
             }
         }

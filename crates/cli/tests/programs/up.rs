@@ -3,13 +3,10 @@
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
-use std::time::{Duration, Instant};
 
 use crate::support::{Run, jaus, own_group, run};
+use jaus_test_kit::waiting::block_until;
 use serde_json::Value as Json;
-
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(30);
 
 /// A folder of this test's own.
 struct Folder(PathBuf);
@@ -110,23 +107,14 @@ impl Drop for System {
 }
 
 /// Waits until a process is no more, or nothing but an entry for its parent.
-fn gone(process: u32) -> bool {
-    let end = Instant::now() + LIMIT;
-    while Instant::now() < end {
-        match std::fs::read_to_string(format!("/proc/{process}/stat")) {
-            Err(_) => return true,
-            Ok(stat)
-                if stat
-                    .rsplit(") ")
-                    .next()
-                    .is_some_and(|it| it.starts_with('Z')) =>
-            {
-                return true;
-            }
-            Ok(_) => std::thread::sleep(Duration::from_millis(20)),
-        }
-    }
-    false
+fn wait_for_end(process: u32) {
+    block_until(|| {
+        let stat = std::fs::read_to_string(format!("/proc/{process}/stat"));
+        let state = stat
+            .ok()
+            .and_then(|it| it.rsplit(") ").next()?.chars().next());
+        state.is_none_or(|state| state == 'Z')
+    });
 }
 
 #[test]
@@ -236,7 +224,7 @@ fn parts_end_in_reverse_order_with_what_they_have_started_and_who_will_not_is_ki
     assert!(place("three | leaves") < place("two did not end within 0.5 s and is killed"));
     assert!(place("two did not end") < place("one   | leaves"));
     assert_eq!(code, Some(0), "{output}");
-    assert!(gone(child.unwrap()));
+    wait_for_end(child.unwrap());
 }
 
 #[test]
@@ -259,7 +247,7 @@ fn nothing_survives_when_jaus_up_itself_is_killed() {
     }
     system.signal("-KILL");
     for process in processes {
-        assert!(gone(process), "{process} of {}", system.seen);
+        wait_for_end(process);
     }
 }
 
@@ -291,13 +279,9 @@ fn a_warden_that_is_killed_is_replaced() {
             .unwrap()
             .success()
     );
-    let end = Instant::now() + LIMIT;
-    while [&first, ""].contains(&warden(&system).as_str()) {
-        assert!(Instant::now() < end, "no other warden");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    block_until(|| ![&first, ""].contains(&warden(&system).as_str()));
     system.signal("-KILL");
-    assert!(gone(left));
+    wait_for_end(left);
 }
 
 #[test]
@@ -395,7 +379,7 @@ fn a_reader_that_leaves_ends_the_system() {
         other.wait().unwrap();
         output
     }));
-    assert!(gone(part));
+    wait_for_end(part);
     let (_, code) = system.end();
     assert_eq!(code, Some(0));
 }

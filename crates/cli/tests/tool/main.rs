@@ -17,6 +17,7 @@ mod interoperability;
 mod jsidl;
 mod jsidl_explain;
 mod jsidl_make;
+mod judge;
 mod monitor;
 mod network;
 mod ping;

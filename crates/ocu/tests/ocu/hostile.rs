@@ -2,13 +2,14 @@
 
 use futures_util::{SinkExt, StreamExt};
 use jaus_ocu::{Station, Token};
+use jaus_test_kit::waiting::within_limit;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio_tungstenite::tungstenite::protocol::CloseFrame;
 use tokio_tungstenite::tungstenite::{Error, Message};
 
-use crate::scene::{Page, Scene, driver_of, within_limit};
+use crate::scene::{Page, Scene, driver_of};
 
 const TOKEN: &str = "correct-horse-battery";
 

@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use jaus_ocu::Station;
+use jaus_test_kit::waiting::within_limit;
 use jaus_vehicle::parts::{KnowledgeStore, Part};
 use serde_json::json;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
-use crate::scene::{Scene, within_limit};
+use crate::scene::Scene;
 
 #[tokio::test]
 async fn the_map_of_the_store_is_shown_with_all_its_cells() {

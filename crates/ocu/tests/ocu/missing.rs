@@ -5,10 +5,11 @@ use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::time::Duration;
 
 use jaus::component::{Component, Handlers, Kind, Management};
+use jaus_test_kit::waiting::within_limit;
 use jaus_vehicle::messages::ground::{QueryMission, ReportMission, mission_planner};
 use serde_json::{Value, json};
 
-use crate::scene::{Scene, driver_of, within_limit};
+use crate::scene::{Scene, driver_of};
 
 fn missing(state: &Value) -> Vec<&Value> {
     let missing = state["vehicle"]["missing"].as_array();

@@ -1,6 +1,5 @@
 //! Test scene: a vehicle, the operator's station, and pages.
 
-use std::future::Future;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,6 +13,7 @@ use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_senso
 use jaus::node::{Config, Node};
 use jaus_ocu::{Listen, Station};
 use jaus_test_kit::group::own_group;
+use jaus_test_kit::waiting::{LIMIT, until, within_limit};
 use jaus_vehicle::mobility::Vehicle;
 use jaus_vehicle::motion::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 use jaus_vehicle::parts::{Part, Slot};
@@ -23,15 +23,6 @@ use tokio::task::JoinHandle;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 use tokio_tungstenite::tungstenite::{Error, Message};
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
-
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(30);
-
-pub(crate) async fn within_limit<T>(future: impl Future<Output = T>) -> T {
-    tokio::time::timeout(LIMIT, future)
-        .await
-        .expect("it takes too long")
-}
 
 /// A vehicle that is one component, and a station that looks at it.
 pub(crate) struct Scene {
@@ -120,17 +111,12 @@ impl Scene {
     }
 
     pub(crate) async fn start_rover(&mut self) {
-        let restarted = async {
-            // Its number is free once it has taken leave.
-            while self.nodes[0]
-                .components()
-                .iter()
-                .any(|it| it.id.component() == 1)
-            {
-                tokio::time::sleep(Duration::from_millis(10)).await;
-            }
+        // Its number is free once it has taken leave.
+        let is_gone = || {
+            let components = self.nodes[0].components();
+            components.iter().all(|it| it.id.component() != 1)
         };
-        within_limit(restarted).await;
+        until(is_gone).await;
         let frozen = self.frozen.as_ref();
         self.rover = Some(rover(&self.vehicle, &self.nodes[0], self.timeout, frozen));
     }
@@ -162,12 +148,7 @@ impl Scene {
 
     /// Waits until the vehicle is as wanted.
     pub(crate) async fn until(&self, wanted: impl Fn(&Self) -> bool) {
-        within_limit(async {
-            while !wanted(self) {
-                tokio::time::sleep(Duration::from_millis(10)).await;
-            }
-        })
-        .await;
+        until(|| wanted(self)).await;
     }
 }
 

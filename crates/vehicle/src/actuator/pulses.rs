@@ -344,10 +344,11 @@ mod tests {
         command_until(&mut motor, 0.2, |motor| motor.travel() > 0.02);
         // The program hangs here: no command is repeated. Expected: 0.2 s deadline and a ramp of
         // 0.1 s.
-        std::thread::sleep(Duration::from_secs(2));
-        let sent = chip.pulses.lock().unwrap().len();
-        std::thread::sleep(Duration::from_millis(200));
-        assert_eq!(chip.pulses.lock().unwrap().len(), sent, "it still turns");
+        let (mut sent, start) = (0, Instant::now());
+        while std::mem::replace(&mut sent, chip.pulses.lock().unwrap().len()) != sent {
+            assert!(start.elapsed() < Duration::from_secs(20), "it still turns");
+            std::thread::sleep(Duration::from_millis(200));
+        }
         command_until(&mut motor, 0.2, |motor| motor.travel() > 0.5);
     }
 

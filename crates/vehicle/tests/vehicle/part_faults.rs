@@ -25,6 +25,7 @@ use jaus::messages::mobility::{
 };
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
+use jaus_test_kit::waiting::{LIMIT, within_limit};
 use jaus_vehicle::actuator::{Actuator, MotorConfig, SimulatedMotor, SimulatedStop};
 use jaus_vehicle::ground::{StageReport, StageState};
 use jaus_vehicle::messages::ground::{
@@ -39,9 +40,6 @@ const PRIMITIVE: JausId = JausId::new(101, 33, 33);
 const POSE: JausId = JausId::new(101, 41, 41);
 const VELOCITY: JausId = JausId::new(101, 42, 42);
 const VECTOR: JausId = JausId::new(101, 44, 44);
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(60);
-
 /// A client, and a group for it and the parts.
 struct Scene {
     group: Group,
@@ -122,6 +120,21 @@ impl Scene {
         (report.left, report.right)
     }
 
+    /// Waits until both wheels stand; how far they have come.
+    async fn comes_to_rest(&self) -> (f64, f64) {
+        let mut before = self.wheels().await;
+        within_limit(async {
+            loop {
+                tokio::time::sleep(Duration::from_millis(300)).await;
+                let now = self.wheels().await;
+                if std::mem::replace(&mut before, now) == now {
+                    return now;
+                }
+            }
+        })
+        .await
+    }
+
     /// Tries until there is an answer.
     async fn until<T, F: Future<Output = Option<T>>>(
         &self,
@@ -190,10 +203,7 @@ async fn a_motor_fault_stops_both_sides_and_is_a_failure_until_it_is_gone() {
             is_told.then_some(())
         })
         .await;
-    tokio::time::sleep(Duration::from_secs(1)).await;
-    let before = scene.wheels().await;
-    tokio::time::sleep(Duration::from_millis(300)).await;
-    assert_eq!(scene.wheels().await, before, "both sides stand");
+    let before = scene.comes_to_rest().await;
     switch.mend();
     scene
         .until("recovery", || async {
@@ -243,9 +253,7 @@ async fn a_sensor_that_stays_away_is_a_failure_of_the_driver_until_it_is_back() 
         .await;
     assert_eq!(stage.state, StageState::Blocked);
     assert!(stage.reason.contains("pose"), "{}", stage.reason);
-    let before = scene.wheels().await;
-    tokio::time::sleep(Duration::from_millis(300)).await;
-    assert_eq!(scene.wheels().await, before, "it stands");
+    scene.comes_to_rest().await;
     let pose = scene.start(POSE, |slot| PoseSensor::default().run(slot));
     scene
         .until("recovery", || async {
@@ -286,10 +294,7 @@ async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
         .await;
     // Another one, whose setter does not come back.
     scene.client.set_emergency(PRIMITIVE).await.unwrap();
-    tokio::time::sleep(Duration::from_secs(1)).await;
-    let before = scene.wheels().await;
-    tokio::time::sleep(Duration::from_millis(300)).await;
-    assert_eq!(scene.wheels().await, before, "it stands");
+    let before = scene.comes_to_rest().await;
     button.release();
     scene
         .until_state(PRIMITIVE, State::Standby, &control, &ahead())
@@ -391,17 +396,13 @@ async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_st
         Some(milliseconds(report.time_stamp?))
     };
     let first = scene.until("a pose", &ask).await;
-    let start = Instant::now();
-    // As long as the disk stalls.
-    while start.elapsed() < Duration::from_secs(3) {
-        tokio::time::sleep(Duration::from_millis(100)).await;
-    }
-    let last = scene.until("a pose", &ask).await;
-    let (passed, stamped) = (start.elapsed().as_millis() as i64, last - first);
-    assert!(
-        (stamped - passed).abs() < 1000 || stamped < 0,
-        "{passed} ms passed, and the stamps advanced by {stamped} ms"
-    );
+    scene
+        .until("stamps that advance by 3 s", || async {
+            let stamped = ask().await? - first;
+            // At midnight they begin again.
+            (stamped > 3000 || stamped < 0).then_some(())
+        })
+        .await;
     assert!(!file.exists(), "the disk did stall");
     // Read it, so that the writer can end.
     let reader = std::thread::spawn(move || {

@@ -25,6 +25,7 @@ use jaus::messages::mobility::{
 };
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
+use jaus_test_kit::waiting::LIMIT;
 use jaus_vehicle::ground::{StageReport, StageState};
 use jaus_vehicle::messages::ground::{
     QueryStage, QueryWheelOdometry, ReportStage, ReportWheelOdometry,
@@ -39,9 +40,6 @@ const POSE: JausId = JausId::new(101, 41, 41);
 const VELOCITY: JausId = JausId::new(101, 42, 42);
 const VECTOR: JausId = JausId::new(101, 44, 44);
 const PATH: JausId = JausId::new(101, 48, 48);
-/// Longer than anything takes; reached only when a test fails.
-const LIMIT: Duration = Duration::from_secs(60);
-
 /// A vehicle of five parts, each on a node of its own, and a client.
 struct Scene {
     group: Group,

@@ -14,7 +14,7 @@ mod verdict;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use jaus_test_kit::hosts::on_hosts;
+use jaus_test_kit::hosts::on_hosts_for;
 
 use hosts::Hosts;
 use scenario::Scenario;
@@ -46,7 +46,7 @@ pub(crate) fn main() -> ExitCode {
     }
     // Who plays it in another namespace says for itself whether all was right.
     let mut is_right = true;
-    on_hosts(TEST, Hosts::new, |_| is_right = try_all());
+    on_hosts_for(TEST, Hosts::new, |_| is_right = try_all());
     ExitCode::from(u8::from(!is_right))
 }
 

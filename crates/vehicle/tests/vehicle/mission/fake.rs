@@ -8,6 +8,7 @@ use jaus::component::{Component, Control, Handlers, Kind, Management, Subscripti
 use jaus::messages::mobility::{local_vector_driver, primitive_driver};
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
+use jaus_test_kit::waiting::{LIMIT, within_limit};
 use jaus_vehicle::messages::ground::report_mission::Stage as MissionStage;
 use jaus_vehicle::messages::ground::report_raster_maps::MapRec;
 use jaus_vehicle::messages::ground::report_stage::State;
@@ -21,8 +22,6 @@ use jaus_vehicle::motion::{Frame, Limits, Pilot, SkidSteer, SkidSteerConfig};
 use jaus_vehicle::parts::{Part, Planner, Slot};
 use tokio::task::JoinHandle;
 
-/// How long anything may take; far longer than it does.
-pub(crate) const LIMIT: Duration = Duration::from_secs(30);
 /// The side of the map, whose cells are 1 m wide and which begins at the origin.
 const SIDE: u16 = 16;
 
@@ -190,24 +189,15 @@ impl World {
     pub(crate) async fn engage(&mut self) {
         self.until_stage(MissionStage::PATH).await;
         self.until_ready().await;
-        for (driver, stage) in [
+        let drivers = [
             (&self.path, MissionStage::VECTOR),
             (&self.vector, MissionStage::PRIMITIVE),
             (&self.primitive, MissionStage::DRIVING),
-        ] {
-            let (component, switch) = (driver.component.clone(), driver.stage.clone());
+        ]
+        .map(|(driver, stage)| (driver.component.clone(), driver.stage.clone(), stage));
+        for (component, switch, stage) in drivers {
             switch.set(&component, State::ACTIVE, "").await;
-            let reached = move |report: &ReportMission| report.stage >= stage;
-            let peer = self.control.peer();
-            let deadline = tokio::time::Instant::now() + LIMIT;
-            loop {
-                let report = self.operator.query(peer, &QueryMission {}).await.unwrap();
-                if reached(&report) {
-                    break;
-                }
-                assert!(tokio::time::Instant::now() < deadline, "{report:?}");
-                tokio::time::sleep(Duration::from_millis(20)).await;
-            }
+            self.until(|report| report.stage >= stage).await;
         }
     }
 
@@ -215,7 +205,7 @@ impl World {
     async fn until_ready(&self) {
         let mut standing = self.path.component.watch_standing();
         let ready = standing.wait_for(|standing| standing.may_act());
-        tokio::time::timeout(LIMIT, ready).await.unwrap().unwrap();
+        within_limit(ready).await.unwrap();
     }
 
     pub(crate) async fn shut_down(self) {

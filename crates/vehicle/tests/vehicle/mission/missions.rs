@@ -1,5 +1,6 @@
 //! Missions that arrive, restart, and are stopped.
 
+use jaus_test_kit::waiting::{until, within_limit};
 use jaus_vehicle::messages::ground::report_mission::Stage;
 use jaus_vehicle::messages::ground::report_stage::State;
 use jaus_vehicle::messages::ground::{
@@ -29,25 +30,14 @@ async fn a_mission_is_planned_approved_and_driven_to_its_end() {
     };
     world.control.deliver(&approve).await.unwrap();
     world.engage().await;
-    let deadline = tokio::time::Instant::now() + super::fake::LIMIT;
-    while world.vehicle.motion().pose.distance(9.5, 1.5) > 0.5 {
-        assert!(
-            tokio::time::Instant::now() < deadline,
-            "{:?}",
-            world.vehicle.motion()
-        );
-        tokio::time::sleep(std::time::Duration::from_millis(50)).await;
-    }
+    until(|| world.vehicle.motion().pose.distance(9.5, 1.5) <= 0.5).await;
     let component = world.path.component.clone();
     world.path.stage.set(&component, State::DONE, "").await;
     let report = world.until_stage(Stage::ARRIVED).await;
     assert_eq!((report.attempt, report.progress), (1, 100));
     let mut standing = component.watch_standing();
     let free = standing.wait_for(|standing| standing.controller.is_none());
-    tokio::time::timeout(super::fake::LIMIT, free)
-        .await
-        .expect("it is given back")
-        .unwrap();
+    within_limit(free).await.unwrap();
     world.shut_down().await;
 }
 
@@ -124,10 +114,7 @@ async fn the_operator_stops_it_and_the_driver_is_given_back() {
     world.until_stage(Stage::STOPPED).await;
     let mut standing = world.path.component.watch_standing();
     let free = standing.wait_for(|standing| standing.controller.is_none());
-    tokio::time::timeout(super::fake::LIMIT, free)
-        .await
-        .unwrap()
-        .unwrap();
+    within_limit(free).await.unwrap();
     world.shut_down().await;
 }
 

@@ -1,0 +1,108 @@
+//! A socket that sends with any source id.
+
+use std::net::{SocketAddr, UdpSocket};
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::wire::{Frame, judp};
+
+use super::clients::{ECHO, VEHICLE};
+use crate::testbed::TO_STRANGERS;
+
+/// Sends in any id, and counts what comes back.
+pub(crate) struct Attacker {
+    socket: UdpSocket,
+    /// Gets a copy of everything, if there is one.
+    echo: Option<UdpSocket>,
+    sequence: u16,
+    pub(crate) packets: u64,
+    octets: u64,
+}
+
+impl Attacker {
+    pub(crate) fn new() -> Self {
+        let address = |text: &str| SocketAddr::new(text.parse().unwrap(), judp::PORT);
+        Self::between(address("10.217.0.9"), address(TO_STRANGERS))
+    }
+
+    pub(crate) fn between(own: SocketAddr, victim: SocketAddr) -> Self {
+        let socket = UdpSocket::bind(own).unwrap();
+        socket.connect(victim).unwrap();
+        socket.set_nonblocking(true).unwrap();
+        Self {
+            socket,
+            echo: None,
+            sequence: 0,
+            packets: 0,
+            octets: 0,
+        }
+    }
+
+    /// The echo socket on the vehicle's host gets the same.
+    pub(crate) fn with_echo(mut self) -> Self {
+        let echo = UdpSocket::bind(("10.217.0.10", 0)).unwrap();
+        echo.connect((TO_STRANGERS, ECHO)).unwrap();
+        self.echo = Some(echo);
+        self
+    }
+
+    pub(crate) fn send<M: Message>(&mut self, source: JausId, message: &M) {
+        let payload = message.encode().unwrap();
+        self.sequence = self.sequence.wrapping_add(1);
+        self.send_frame(&Frame {
+            sequence: self.sequence,
+            ..Frame::new(source, VEHICLE, payload)
+        });
+    }
+
+    pub(crate) fn send_frame(&mut self, frame: &Frame) {
+        self.send_octets(&judp::encode(frame).unwrap());
+    }
+
+    pub(crate) fn send_octets(&mut self, datagram: &[u8]) {
+        // What the kernel does not take is lost.
+        let _ = self.socket.send(datagram);
+        self.packets += 1;
+        if let Some(echo) = &self.echo {
+            let _ = echo.send(datagram);
+        }
+    }
+
+    /// Counts what has come; it is not answered.
+    pub(crate) fn listen(&mut self) {
+        let mut buffer = [0; 65_535];
+        while let Ok(length) = self.socket.recv(&mut buffer) {
+            self.octets += length as u64;
+        }
+    }
+
+    /// Does something again and again, so many times a second, and listens meanwhile.
+    pub(crate) fn repeat(
+        &mut self,
+        time: Duration,
+        rate: u32,
+        mut act: impl FnMut(&mut Self, u32),
+    ) {
+        let (begun, mut number) = (Instant::now(), 0);
+        println!("\nbegun");
+        while begun.elapsed() < time {
+            while number < (begun.elapsed().as_secs_f64() * f64::from(rate)) as u32 {
+                act(self, number);
+                number += 1;
+            }
+            self.listen();
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// Counts what another one has sent and got as its own.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.packets += other.packets;
+        self.octets += other.octets;
+    }
+
+    pub(crate) fn report(&self) {
+        println!("\nattack packets={} octets={}", self.packets, self.octets);
+    }
+}

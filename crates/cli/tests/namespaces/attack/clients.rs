@@ -1,0 +1,161 @@
+//! Well-behaved clients. They print the lines that the tests wait for.
+
+use std::net::UdpSocket;
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::component::{Component, Kind, Update, When};
+use jaus::link::Ip;
+use jaus::messages::core::{QueryControl, ReportControl};
+use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
+use jaus::node::{Config, Node};
+use tokio::time::{interval, timeout};
+
+use jaus_test_kit::hosts::SETTINGS;
+
+pub(crate) const VEHICLE: JausId = JausId::new(101, 1, 1);
+pub(crate) const CLIENT: JausId = JausId::new(102, 1, 1);
+/// Where a socket on the vehicle's host gives back what it gets.
+pub(crate) const ECHO: u16 = 9999;
+/// The vehicle's address on the client's cable.
+const TO_CLIENT: &str = "10.216.1.1";
+/// The same on the observer's cable.
+const TO_OBSERVER: &str = "10.216.3.1";
+const NEWCOMER: u16 = 104;
+/// How long the vehicle may be looked for.
+const SEARCH: Duration = Duration::from_secs(20);
+/// How long the client looks before it says what it has seen.
+const SPAN: Duration = Duration::from_secs(3);
+/// What takes longer counts as lost.
+const LOST: Duration = Duration::from_millis(500);
+
+/// A node with the usual settings, but for those that the role was started with.
+fn config(subsystem: u16) -> Config {
+    let config = Config::new(subsystem, 1);
+    match std::env::var(SETTINGS).unwrap_or_default().as_str() {
+        "" | "echo" => config,
+        "ip6" => {
+            let cable = if subsystem == NEWCOMER { 3 } else { 1 };
+            let mut config = config.interfaces([format!("fd00:216:{cable}::2")]);
+            config.ip = Ip::V6;
+            config
+        }
+        "tcp" => config
+            .without_udp()
+            .tcp_connect(TO_OBSERVER.parse().unwrap()),
+        other => panic!("no setting is called {other}"),
+    }
+}
+
+/// Asks the vehicle and the echo socket twenty times a second, and subscribes to 25 poses a second.
+pub(crate) async fn client() {
+    let node = Node::start(config(CLIENT.subsystem())).unwrap();
+    let builder = Component::builder(Kind::OperatorControlUnit, "Client");
+    let client = builder.attach(&node, CLIENT.component()).unwrap();
+    let found = client.find_within(local_pose_sensor::URN, SEARCH).await;
+    assert_eq!(found.unwrap(), VEHICLE);
+    let query = QueryLocalPose { presence_vector: 3 };
+    let events = client.subscribe::<ReportLocalPose, _>(VEHICLE, &query, When::hz(25.0));
+    let mut events = events.await.unwrap();
+    let echo = tokio::net::UdpSocket::bind(("0.0.0.0", 0)).await.unwrap();
+    echo.connect((TO_CLIENT, ECHO)).await.unwrap();
+    let asks_echo = std::env::var(SETTINGS).is_ok_and(|it| it == "echo");
+    let place = async || {
+        let pose: Result<ReportLocalPose, _> = client.query(VEHICLE, &query).await;
+        pose.ok()
+            .map(|pose| (pose.x_m().unwrap(), pose.y_m().unwrap()))
+    };
+    let start = place().await.unwrap();
+    println!("\nclient has found the vehicle");
+    loop {
+        let (mut lost, mut echoes_lost, mut pings) = (0, 0, 0);
+        let (mut last, mut gap) = (Instant::now(), Duration::ZERO);
+        let end = Instant::now() + SPAN;
+        let mut beats = interval(Duration::from_millis(50));
+        while Instant::now() < end {
+            tokio::select! {
+                update = events.next() => if let Some(Update::Report(_)) = update {
+                    gap = gap.max(last.elapsed());
+                    last = Instant::now();
+                },
+                _ = beats.tick() => {
+                    pings += 1;
+                    let echoed = async {
+                        // Where there is none, none is lost.
+                        if !asks_echo {
+                            return true;
+                        }
+                        let _ = echo.send(b"ping").await;
+                        let mut octets = [0; 8];
+                        let answer = timeout(LOST, echo.recv(&mut octets)).await;
+                        matches!(answer, Ok(Ok(_)))
+                    };
+                    let (answer, echoed) = tokio::join!(timeout(LOST, place()), echoed);
+                    lost += u64::from(!matches!(answer, Ok(Some(_))));
+                    echoes_lost += u64::from(!echoed);
+                }
+            }
+        }
+        gap = gap.max(last.elapsed());
+        let control: Result<ReportControl, _> = client.query(VEHICLE, &QueryControl {}).await;
+        let controller = control.map_or(0, |it| it.subsystem_id);
+        let now = place().await.unwrap_or(start);
+        let moved = (now.0 - start.0).hypot(now.1 - start.1) * 1000.0;
+        println!(
+            "client pings={pings} lost={lost} echoes_lost={echoes_lost} gap_ms={} \
+             controller={controller} moved_mm={}",
+            gap.as_millis(),
+            moved.round()
+        );
+    }
+}
+
+/// Starts, finds the vehicle, asks it something, says how long that took, and stays.
+pub(crate) async fn newcomer() {
+    let begun = Instant::now();
+    let node = Node::start(config(NEWCOMER)).unwrap();
+    let builder = Component::builder(Kind::OtherSubsystem, "Newcomer");
+    let newcomer = builder.attach(&node, 1).unwrap();
+    let found = newcomer.find_within(local_pose_sensor::URN, SEARCH).await;
+    assert_eq!(found.unwrap(), VEHICLE);
+    let query = QueryLocalPose { presence_vector: 3 };
+    while newcomer
+        .query::<ReportLocalPose, _>(VEHICLE, &query)
+        .await
+        .is_err()
+    {
+        assert!(begun.elapsed() < SEARCH, "no answer");
+    }
+    println!("\nnewcomer ms={}", begun.elapsed().as_millis());
+    std::future::pending::<()>().await;
+}
+
+/// Subscribes to a thousand poses a second, and reads them until it is stopped.
+pub(crate) async fn subscriber() {
+    let node = Node::start(config(NEWCOMER)).unwrap();
+    let builder = Component::builder(Kind::OtherSubsystem, "Subscriber");
+    let subscriber = builder.attach(&node, 1).unwrap();
+    let found = subscriber.find_within(local_pose_sensor::URN, SEARCH).await;
+    let query = QueryLocalPose { presence_vector: 3 };
+    let often = When::hz(1000.0);
+    let events = subscriber.subscribe::<ReportLocalPose, _>(found.unwrap(), &query, often);
+    let mut events = events.await.unwrap();
+    let mut number = 0;
+    while let Some(update) = events.next().await {
+        number += u32::from(matches!(update, Update::Report(_)));
+        if number == 100 {
+            println!("\nsubscriber reads");
+        }
+    }
+}
+
+/// Gives back what comes, until it is killed.
+pub(crate) fn echo() {
+    let socket = UdpSocket::bind(("0.0.0.0", ECHO)).unwrap();
+    println!("\nechoes");
+    let mut buffer = [0; 2048];
+    while let Ok((length, from)) = socket.recv_from(&mut buffer) {
+        // What the kernel does not take is lost.
+        let _ = socket.send_to(&buffer[..length], from);
+    }
+}

@@ -1,0 +1,100 @@
+//! Floods: garbage, fragments, answers, reports.
+
+use super::scene::{GAP, MEMORY, Scene, figures, on_scene, on_testbed};
+use crate::testbed::Host;
+
+/// A flood costs the client no more than an echo socket loses, and stays within the memory limit.
+fn a_flood_costs_nothing(attack: &str) {
+    on_testbed(|bed| {
+        let echo = bed.start(Host::Vehicle, "echo", "");
+        echo.says("echoes");
+        let scene = Scene::start(bed, &[], "echo");
+        let attacker = scene.bed.start(Host::Strangers, attack, "");
+        attacker.says("begun");
+        let seen = scene.client();
+        let sent = figures(&attacker.says("attack"))["packets"];
+        let memory = scene.memory();
+        println!("| {sent} datagrams, {attack} | {seen:?}, {memory} KiB |");
+        assert!(sent > 30_000, "{sent}");
+        let (lost, echoes) = (seen["lost"], seen["echoes_lost"]);
+        assert!(lost <= echoes + 2, "{seen:?}");
+        assert!(echoes > 0 || seen["gap_ms"] < GAP, "{seen:?}");
+        assert!(memory < MEMORY, "{memory} KiB");
+    });
+}
+
+#[test]
+fn a_flood_of_rubbish_costs_a_client_no_more_than_an_echo_socket() {
+    a_flood_costs_nothing("flood");
+}
+
+#[test]
+fn reports_of_many_services_stay_within_the_memory_limit() {
+    on_scene(&[], |scene| {
+        let attack = scene.attack("services");
+        let memory = scene.memory();
+        println!("| {attack:?} octets of Report Services | {memory} KiB |");
+        assert!(memory < MEMORY, "{memory} KiB");
+    });
+}
+
+/// Two nodes that send each other acknowledged messages, one of them on the attacked host: each
+/// message arrives once and whole, and each is known to have arrived.
+fn acknowledged_messages_arrive(attack: &str) {
+    on_testbed(|bed| {
+        let ids = ["101.1.1", "102.1.1"];
+        let talkers = [
+            bed.start(Host::Vehicle, "talker", &ids.join(" ")),
+            bed.start(Host::Controller, "talker", &[ids[1], ids[0]].join(" ")),
+        ];
+        talkers.iter().for_each(|it| drop(it.says("talker begins")));
+        let attacker = bed.start(Host::Strangers, attack, "");
+        attacker.says("begun");
+        let seen = talkers.each_ref().map(|it| figures(&it.says("talker")));
+        println!("| acknowledged messages, {attack} | {seen:?} |");
+        for (one, other) in [(0, 1), (1, 0)] {
+            let (sent, heard) = (&seen[one], &seen[other]);
+            assert!(sent["acknowledged"] > 100, "{seen:?}");
+            assert_eq!(sent["lost"], 0, "{seen:?}");
+            assert_eq!(sent["acknowledged"], heard["heard"], "{seen:?}");
+            assert_eq!((heard["doubles"], heard["corrupt"]), (0, 0), "{seen:?}");
+        }
+    });
+}
+
+#[test]
+fn acknowledged_messages_arrive_in_a_flood_of_rubbish() {
+    acknowledged_messages_arrive("flood");
+}
+
+#[test]
+fn acknowledged_messages_arrive_whole_among_forged_fragments() {
+    acknowledged_messages_arrive("overlapping");
+}
+
+#[test]
+fn acknowledged_messages_arrive_among_forged_acknowledgements() {
+    acknowledged_messages_arrive("answers");
+}
+
+#[test]
+fn fragments_without_end_cost_neither_memory_nor_a_clients_messages() {
+    a_flood_costs_nothing("unending");
+}
+
+#[test]
+fn fragments_with_gaps_cost_neither_memory_nor_a_clients_messages() {
+    a_flood_costs_nothing("gapped");
+}
+
+#[test]
+fn reports_of_many_services_among_fragments_stay_within_the_memory_limit() {
+    on_scene(&[], |scene| {
+        let fragments = scene.bed.start(Host::Strangers, "unending", "");
+        fragments.says("begun");
+        scene.attack("services");
+        let memory = scene.memory();
+        println!("| Report Services among unending fragments | {memory} KiB |");
+        assert!(memory < MEMORY, "{memory} KiB");
+    });
+}

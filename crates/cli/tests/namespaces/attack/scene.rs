@@ -1,0 +1,108 @@
+//! The vehicle, a well-behaved client, and observations of both.
+
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
+use crate::testbed::{Host, Testbed};
+use jaus_test_kit::hosts::{Process, on_hosts};
+use jaus_test_kit::vehicle_process::VehicleProcess;
+
+/// What `MemoryMax` of the packaged services allows, in KiB.
+pub(crate) const MEMORY: u64 = 64 * 1024;
+
+/// The longest time without one of 25 events a second, in ms: more than a busy machine takes, and less
+/// than a peer whose address was taken over goes without.
+pub(crate) const GAP: u64 = 2500;
+
+/// A vehicle and a client that has found it.
+pub(crate) struct Scene<'a> {
+    pub(crate) bed: &'a Testbed,
+    pub(crate) vehicle: VehicleProcess,
+    pub(crate) client: Process,
+}
+
+/// Numbers that a process has printed, by name.
+pub(crate) type Figures = BTreeMap<String, u64>;
+
+pub(crate) fn figures(line: &str) -> Figures {
+    let pairs = line.split(' ').filter_map(|word| word.split_once('='));
+    pairs
+        .map(|(name, number)| (name.to_owned(), number.parse().unwrap()))
+        .collect()
+}
+
+impl<'a> Scene<'a> {
+    /// Starts the vehicle with flags, and the client with settings.
+    pub(crate) fn start(bed: &'a Testbed, flags: &[&str], settings: &str) -> Self {
+        let arguments = [&["vehicle", "--id", "101.1.1"], flags].concat();
+        let vehicle = VehicleProcess::start(&mut bed.jaus(Host::Vehicle, &arguments));
+        let client = bed.start(Host::Controller, "client", settings);
+        client.says("client");
+        Self {
+            bed,
+            vehicle,
+            client,
+        }
+    }
+
+    /// Runs an attack to its end; what it says of itself.
+    pub(crate) fn attack(&self, name: &str) -> Figures {
+        let attacker = self.bed.start(Host::Strangers, name, "");
+        figures(&attacker.says("attack"))
+    }
+
+    /// What the client has seen since the last time.
+    pub(crate) fn client(&self) -> Figures {
+        self.client.says("client");
+        figures(&self.client.says("client"))
+    }
+
+    /// The most memory that the vehicle has had, in KiB.
+    pub(crate) fn memory(&self) -> u64 {
+        memory(self.vehicle.id())
+    }
+
+    /// Starts a newcomer; checks that it finds the vehicle and is answered within ten seconds, and
+    /// waits until the vehicle's directory has it. Ends the vehicle.
+    pub(crate) fn welcomes_newcomer(self, settings: &str) -> u64 {
+        let newcomer = self.bed.start(Host::Observer, "newcomer", settings);
+        let ms = figures(&newcomer.says("newcomer"))["ms"];
+        assert!(ms < 10_000, "{ms} ms");
+        self.vehicle.says("104.1.1");
+        ms
+    }
+}
+
+/// So often a test may begin again: what else a machine does can starve whoever is attacked as no
+/// attack would.
+const ATTEMPTS: u32 = 3;
+
+/// Runs the body of a test until it passes once.
+pub(crate) fn on_testbed(body: impl Fn(&Testbed)) {
+    for attempt in 1..=ATTEMPTS {
+        let run = || on_hosts(Testbed::new, &body);
+        match catch_unwind(AssertUnwindSafe(run)) {
+            Ok(()) => {
+                return;
+            }
+            Err(failure) if attempt == ATTEMPTS => resume_unwind(failure),
+            Err(_) => println!("attempt {attempt} of {ATTEMPTS} has failed"),
+        }
+    }
+}
+
+pub(crate) fn on_scene(flags: &[&str], body: impl Fn(Scene<'_>)) {
+    on_testbed(|bed| body(Scene::start(bed, flags, "")));
+}
+
+/// The most memory that a process has had, in KiB, without the pages of its program: an unoptimised
+/// one has many, and the kernel need not keep them.
+pub(crate) fn memory(process: u32) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap();
+    let number = |name| {
+        let line = status.lines().find_map(|line| line.strip_prefix(name));
+        let number = line.unwrap().trim().trim_end_matches(" kB");
+        number.parse::<u64>().unwrap()
+    };
+    number("VmHWM:") - number("RssFile:")
+}

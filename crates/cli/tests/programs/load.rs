@@ -1,0 +1,125 @@
+//! `jaus-tester load` with few components: every message is acknowledged, and nothing remains after
+//! it ends or is killed.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use jaus_test_kit::waiting::block_until;
+use serde_json::Value;
+
+/// A directory for one test, which is also the temporary directory of its programs.
+fn directory(name: &str) -> PathBuf {
+    let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    // That of an earlier run.
+    let _ = fs::remove_dir_all(&directory);
+    fs::create_dir_all(&directory).unwrap();
+    directory
+}
+
+fn load(directory: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_jaus-tester"));
+    command
+        .args(["load", "--components", "24", "--processes", "2"])
+        .args(arguments)
+        .env("TMPDIR", directory)
+        .current_dir(directory)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped());
+    command
+}
+
+fn sockets(directory: &Path) -> usize {
+    let runs = fs::read_dir(directory).unwrap().flatten();
+    let runs = runs.filter(|entry| {
+        entry
+            .file_name()
+            .to_string_lossy()
+            .starts_with("jaus-load-")
+    });
+    runs.map(|run| 1 + fs::read_dir(run.path()).map_or(0, Iterator::count))
+        .sum()
+}
+
+#[test]
+fn every_message_is_acknowledged_by_its_receiver() {
+    let directory = directory("tester-load");
+    for who in ["component", "node"] {
+        let schedule = ["--rates", "200,max", "--seconds", "0.3", "--burst", "2"];
+        let output = load(&directory, &schedule)
+            .args([
+                "--acknowledged-by",
+                who,
+                "--json",
+                "load.json",
+                "--svg",
+                "load.svg",
+            ])
+            .output()
+            .unwrap();
+        let table = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success(), "{table}");
+        let report = fs::read_to_string(directory.join("load.json")).unwrap();
+        let report: Value = serde_json::from_str(&report).unwrap();
+        let rows = report["rows"].as_array().unwrap();
+        assert_eq!((rows.len(), &rows[1]["wanted"]), (2, &Value::Null));
+        for row in rows {
+            let count = |what: &str| row[what].as_u64().unwrap();
+            assert!(count("sent") > 0, "{row}");
+            assert_eq!((count("lost"), count("refused")), (0, 0), "{row}");
+            let time = |what: &str| row[what].as_f64().unwrap();
+            assert!(time("p50") > 0.0 && time("p50") <= time("max"), "{row}");
+        }
+        let svg = fs::read_to_string(directory.join("load.svg")).unwrap();
+        assert_eq!(svg.matches("<polyline").count(), 2);
+        assert_eq!(sockets(&directory), 0, "a directory is left behind");
+    }
+}
+
+#[test]
+fn a_killed_load_leaves_neither_processes_nor_sockets() {
+    let directory = directory("tester-load-killed");
+    let mut parent = load(&directory, &["--rates", "10", "--seconds", "60"])
+        .spawn()
+        .unwrap();
+    // Two of components, four of nodes.
+    block_until(|| sockets(&directory) >= 5 && children(&parent).len() == 6);
+    let children = children(&parent);
+    parent.kill().unwrap();
+    parent.wait().unwrap();
+    block_until(|| {
+        let mut paths = children.iter().map(|id| format!("/proc/{id}/stat"));
+        // What has ended waits as a zombie if nobody collects it.
+        paths.all(|path| fs::read_to_string(path).map_or(true, |stat| stat.contains(") Z ")))
+    });
+    block_until(|| sockets(&directory) == 0);
+}
+
+#[test]
+fn settings_that_cannot_be_are_refused_with_a_reason() {
+    let directory = directory("tester-load-refused");
+    for (arguments, reason) in [
+        ("--nodes 1 --components 300", "254"),
+        (
+            "--components 24 --processes 64",
+            "more processes than components",
+        ),
+        ("--rates 0", "from 1 to 10000000, or max"),
+        ("--beside missing.json", "missing.json"),
+        ("--seconds 4000", "an hour at most"),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_jaus-tester"));
+        command.arg("load").args(arguments.split(' '));
+        let output = command.current_dir(&directory).output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains(reason), "{error}");
+    }
+}
+
+/// The processes that a process has started.
+fn children(parent: &Child) -> Vec<u32> {
+    let id = parent.id();
+    let list = fs::read_to_string(format!("/proc/{id}/task/{id}/children")).unwrap_or_default();
+    list.split_whitespace().flat_map(str::parse).collect()
+}

@@ -1,0 +1,9 @@
+//! `jaus judge` against correct, faulty, slow and silent peers.
+
+mod outputs;
+mod peer;
+mod replay;
+mod right;
+mod safety;
+mod vehicle;
+mod wrong;

@@ -1,0 +1,8 @@
+//! The generated dissector, run by Wireshark's own `tshark`.
+
+mod expected;
+mod golden;
+mod packets;
+mod random;
+mod transport;
+mod tshark;

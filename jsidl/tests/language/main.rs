@@ -1,0 +1,28 @@
+//! The language: loading and checking of definitions, their behaviour and documentation, the dynamic
+//! codec, and everything that is emitted from a definition.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that cannot go on fails"
+)]
+
+mod behaviour;
+mod corpus;
+mod diagnostics;
+mod diff;
+mod docs;
+mod dynamic;
+mod emitted;
+mod excerpts;
+mod explain;
+mod format;
+mod golden;
+mod loading;
+mod lua;
+mod machines;
+mod round_trips;
+mod schema;
+mod services;
+mod support;
+mod validator_cases;

@@ -1,0 +1,452 @@
+//! Our own definitions: they are sound, they say on the wire what the public ones say, and they
+//! say it to people in words of their own.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use jaus_test_kit::evidence;
+use jsidl::model::{Item, Meaning, Message, Scalar, Service, Shape};
+use jsidl::{Library, Loader};
+
+fn load(paths: &[PathBuf]) -> Library {
+    let mut loader = Loader::new();
+    for path in paths {
+        loader.path(path);
+    }
+    let loaded = loader.load();
+    for diagnostic in loaded.diagnostics.iter() {
+        eprintln!("{diagnostic}");
+    }
+    assert!(!loaded.diagnostics.has_errors());
+    loaded.library
+}
+
+fn ours() -> Library {
+    let library = load(&[Path::new(env!("CARGO_MANIFEST_DIR")).join("services")]);
+    assert!(library.services().next().is_some());
+    library
+}
+
+/// The public collections, as they name themselves.
+fn public(corpus: &Path) -> [(&'static str, Library); 3] {
+    ["ffi", "jts", "fkie"].map(|source| {
+        let mut loader = Loader::new();
+        loader.path(corpus.join(source));
+        // Some of them are wrong; what is right in them counts.
+        (source, loader.load().library)
+    })
+}
+
+#[test]
+fn every_service_of_each_set_is_there() {
+    let library = ours();
+    for (set, versions) in [
+        // 1.1, and 1.0 without List Manager.
+        ("urn:jaus:jss:core:", 8 + 7),
+        // 1.1, and the layouts that were published before.
+        ("urn:jaus:jss:mobility:", 21 + 3),
+        // 2.0 and 1.0.
+        ("urn:jaus:jss:environmentSensing:", 12 + 5),
+        // 2.0, and 1.0 with one service under two names.
+        ("urn:jaus:jss:manipulator:", 25 + 21),
+        ("urn:jaus:jss:ugv:", 10),
+        ("urn:jaus:jss:HMI:", 5),
+        ("urn:jaus:jss:missionSpooler:", 1),
+        ("urn:jaus:jss:iop:", 10),
+        ("urn:jaus:jss:exp:aeodrs:", 1),
+        ("urn:jaus-rs:ground:", 5),
+        ("urn:jaus-rs:ra33:", 16),
+    ] {
+        let ids = library.services().map(|service| &service.id);
+        assert_eq!(
+            ids.filter(|id| id.urn.starts_with(set)).count(),
+            versions,
+            "{set}"
+        );
+    }
+    for service in library.services() {
+        let root = library
+            .lineage(service)
+            .last()
+            .map(|root| root.name.clone());
+        // The Reference Architecture has the transport beside its services.
+        let expected = match service.id.urn.strip_prefix("urn:jaus-rs:ra33:") {
+            Some(_) => "Core",
+            None => "Transport",
+        };
+        assert_eq!(
+            root.as_deref(),
+            Some(expected),
+            "{} descends from it",
+            service.id
+        );
+    }
+}
+
+#[test]
+fn every_message_and_field_says_what_it_is_for() {
+    for service in ours().services() {
+        assert!(!service.description.is_empty(), "{}", service.id);
+        for message in service.messages() {
+            assert!(
+                !message.description.is_empty(),
+                "{} {}",
+                service.id,
+                message.name
+            );
+            each_field(message, &mut |item| {
+                assert!(
+                    !item.interpretation.is_empty(),
+                    "{} {}",
+                    message.name,
+                    item.name
+                );
+            });
+        }
+    }
+}
+
+/// Where a collection has something else under the same name and version: which one, in which
+/// services, and all the messages that differ in each of them. Ours is as the others have it, or as
+/// the comment says.
+const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
+    // Whether the speed of a vector is optional: two sources, two readings, one version.
+    (
+        "jts",
+        &["mobility:GlobalVectorDriver 1.0"],
+        &["0407 SetGlobalVector", "4407 ReportGlobalVector"],
+    ),
+    (
+        "fkie",
+        &["mobility:LocalVectorDriver 1.0"],
+        &["0408 SetLocalVector", "4408 ReportLocalVector"],
+    ),
+    // The greatest force of a prismatic joint has the unit of a torque there.
+    (
+        "fkie",
+        &[
+            "manipulator:ManipulatorActuatorForceTorqueDriver 1.0",
+            "manipulator:ManipulatorEndEffectorPoseDriver 1.0",
+            "manipulator:ManipulatorEndEffectorPoseListDriver 1.0",
+            "manipulator:ManipulatorEndEffectorPoseSensor 1.0",
+            "manipulator:ManipulatorEndEffectorVelocityStateDriver 1.0",
+            "manipulator:ManipulatorEndEffectorVelocityStateSensor 1.0",
+            "manipulator:ManipulatorJointForceTorqueSensor 1.0",
+            "manipulator:ManipulatorJointPositionDriver 1.0",
+            "manipulator:ManipulatorJointPositionSensor 1.0",
+            "manipulator:ManipulatorJointPositionsListDriver 1.0",
+            "manipulator:ManipulatorJointVelocityDriver 1.0",
+            "manipulator:ManipulatorJointVelocitySensor 1.0",
+            "manipulator:PrimitiveManipulator 1.0",
+        ],
+        &["4600 ReportManipulatorSpecifications"],
+    ),
+    // Names in the singular, among others in the plural: all of 1.0 is in the plural here.
+    (
+        "fkie",
+        &["manipulator:ManipulatorJointPositionSensor 1.0"],
+        &[
+            "2602 QueryJointPosition",
+            "2602 QueryJointPositions",
+            "4602 ReportJointPosition",
+            "4602 ReportJointPositions",
+        ],
+    ),
+    (
+        "fkie",
+        &["manipulator:PrimitiveManipulator 1.0"],
+        &[
+            "0601 SetJointEffort",
+            "0601 SetJointEfforts",
+            "2601 QueryJointEffort",
+            "2601 QueryJointEfforts",
+            "4601 ReportJointEffort",
+            "4601 ReportJointEfforts",
+        ],
+    ),
+    (
+        "fkie",
+        &["manipulator:PrimitivePanTilt 1.0"],
+        &[
+            "0621 SetPanTiltJointEffort",
+            "0621 SetPanTiltJointEfforts",
+            "2621 QueryPanTiltJointEffort",
+            "2621 QueryPanTiltJointEfforts",
+            "4621 ReportPanTiltJointEffort",
+            "4621 ReportPanTiltJointEfforts",
+        ],
+    ),
+    // `ParentID` for `ParentId`, which 2.0 has everywhere.
+    (
+        "fkie",
+        &["manipulator:PrimitiveEndEffector 1.0"],
+        &["4632 ReportEndEffectorSpecification"],
+    ),
+    // The lights are not in the order of their bits; the newest has them so.
+    (
+        "jts",
+        &["ugv:IlluminationService 1.0"],
+        &["0513 SetIlluminationState", "4513 ReportIlluminationState"],
+    ),
+    // It cannot be encoded as published: fourteen optional members, eight presence bits. Theirs is
+    // left out of the service, ours has a wider presence vector.
+    ("fkie", &["iop:CBRNSensor 1.1"], &["F931 CBRNDetection"]),
+    // Two messages of one service with one code: ours has it for one of them, and for the other the
+    // code that its query names.
+    (
+        "fkie",
+        &["iop:CBRNSensor 1.1"],
+        &["F932 CBDetailedMeasurement"],
+    ),
+    (
+        "fkie",
+        &["iop:CBRNSensor 1.1"],
+        &["F933 CBDetailedMeasurement"],
+    ),
+    (
+        "fkie",
+        &["ugv:IlluminationService 1.0"],
+        &["0513 SetIlluminationState", "4513 ReportIlluminationState"],
+    ),
+    // Small letters at the beginning of names, capital ones in the newest.
+    (
+        "jts",
+        &["ugv:PlatformSpecifications 1.0"],
+        &["4502 ReportPlatformSpecifications"],
+    ),
+    (
+        "fkie",
+        &["ugv:PlatformSpecifications 1.0"],
+        &["4502 ReportPlatformSpecifications"],
+    ),
+    // Other capitals, one position instead of two, dimensions from 0 and without a unit, and an
+    // older base: a draft, it seems, as the others agree.
+    (
+        "fkie",
+        &["ugv:StabilizerDriver 1.0"],
+        &[
+            "0503 SetStabilizerEffort",
+            "0504 SetStabilizerPosition",
+            "2503 QueryStabilizerEffort",
+            "2504 QueryStabilizerPosition",
+            "4503 ReportStabilizerEffort",
+            "4504 ReportStabilizerPosition",
+            "4505 ReportStabilizerCapabilities",
+            "base",
+        ],
+    ),
+];
+
+#[test]
+fn every_service_has_the_octets_that_the_public_ones_have() {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
+        return;
+    };
+    let ours = ours();
+    let mut different = BTreeSet::new();
+    for (source, library) in &public(&corpus) {
+        for theirs in library.services() {
+            let Some(service) = ours.service(&theirs.id) else {
+                continue;
+            };
+            for what in differences(service, theirs) {
+                different.insert(format!("{source} {} {what}", theirs.id));
+            }
+        }
+    }
+    let mut expected = BTreeSet::new();
+    for (source, services, messages) in DIFFERENT {
+        for service in *services {
+            let each = messages.iter();
+            expected.extend(each.map(|what| format!("{source} urn:jaus:jss:{service} {what}")));
+        }
+    }
+    let only = |these: &BTreeSet<String>, those| these - those;
+    assert_eq!(
+        (only(&different, &expected), only(&expected, &different)),
+        (BTreeSet::new(), BTreeSet::new()),
+        "differ unexpectedly, and do not differ though expected to"
+    );
+}
+
+/// The messages that two services do not have alike, and the base if it is another.
+fn differences(ours: &Service, theirs: &Service) -> Vec<String> {
+    let (left, right) = (layouts(ours), layouts(theirs));
+    let messages: BTreeSet<_> = left.keys().chain(right.keys()).collect();
+    let mut different: Vec<_> = messages
+        .into_iter()
+        .filter(|message| left.get(message) != right.get(message))
+        .map(|(code, name)| format!("{code:04X} {name}"))
+        .collect();
+    let base = |service: &Service| service.inherits_from.as_ref().map(|base| base.id.clone());
+    if base(ours) != base(theirs) {
+        different.push("base".to_owned());
+    }
+    different
+}
+
+/// Whether a public service is not kept: those of clients have no messages of their own, the first
+/// version of mobility has nothing on the wire that the second has not, and a name that is
+/// misspelt has its service under the right one.
+fn is_left_out(id: &str) -> bool {
+    let is_client = id
+        .rsplit_once(' ')
+        .is_some_and(|(urn, _)| urn.ends_with("Client"));
+    let is_old_mobility = id.starts_with("urn:jaus:jss:mobility:") && id.ends_with(" 1.0");
+    is_client || is_old_mobility || id == "urn:jaus:jss:core:Liveliness 1.0"
+}
+
+#[test]
+fn every_public_service_is_there() {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
+        return;
+    };
+    let ours = ours();
+    let mut missing = BTreeSet::new();
+    for (_, library) in &public(&corpus) {
+        for theirs in library.services() {
+            let id = theirs.id.to_string();
+            if ours.service(&theirs.id).is_none() && !is_left_out(&id) {
+                missing.insert(id);
+            }
+        }
+    }
+    assert_eq!(missing, BTreeSet::new());
+}
+
+#[test]
+fn no_sentence_is_taken_from_the_public_definitions() {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
+        return;
+    };
+    let mut theirs = BTreeSet::new();
+    for (_, library) in &public(&corpus) {
+        for text in texts(library) {
+            theirs.extend(runs(&text));
+        }
+    }
+    let taken: BTreeMap<_, _> = texts(&ours())
+        .into_iter()
+        .flat_map(|text| {
+            runs(&text)
+                .map(|run| (run, text.clone()))
+                .collect::<Vec<_>>()
+        })
+        .filter(|(run, _)| theirs.contains(run))
+        .collect();
+    assert_eq!(taken, BTreeMap::new());
+}
+
+/// All runs of six words in a text.
+fn runs(text: &str) -> impl Iterator<Item = Vec<String>> {
+    let words = text
+        .split(|c: char| !c.is_alphanumeric())
+        .filter(|word| !word.is_empty());
+    let words: Vec<_> = words.map(str::to_lowercase).collect();
+    words
+        .windows(6)
+        .map(<[String]>::to_vec)
+        .collect::<Vec<_>>()
+        .into_iter()
+}
+
+fn texts(library: &Library) -> Vec<String> {
+    let mut texts = Vec::new();
+    for service in library.services() {
+        texts.push(service.description.clone());
+        for message in service.messages() {
+            texts.push(message.description.clone());
+            each_field(message, &mut |item| texts.push(item.interpretation.clone()));
+        }
+    }
+    texts
+}
+
+fn each_field(message: &Message, visit: &mut impl FnMut(&Item)) {
+    message
+        .body
+        .iter()
+        .for_each(|body| each_field_of(body, visit));
+}
+
+fn each_field_of(item: &Item, visit: &mut impl FnMut(&Item)) {
+    match &item.shape {
+        Shape::Group(group) => group
+            .members
+            .iter()
+            .for_each(|member| each_field_of(member, visit)),
+        Shape::List(list) => each_field_of(&list.element, visit),
+        Shape::Variant(variant) => {
+            variant
+                .alternatives
+                .iter()
+                .for_each(|chosen| each_field_of(chosen, visit));
+        }
+        _ => visit(item),
+    }
+}
+
+/// What a service says on the wire, in the words of the definitions: everything but the texts and
+/// the limits of counts, in which ours are more tolerant.
+fn layouts(service: &Service) -> BTreeMap<(u16, String), String> {
+    let messages = service.messages().map(|message| {
+        let body = message.body.as_ref().map(layout);
+        (
+            (message.code, message.name.clone()),
+            format!("{} {body:?}", message.is_command),
+        )
+    });
+    messages.collect()
+}
+
+fn layout(item: &Item) -> String {
+    let optional = if item.optional { "?" } else { "" };
+    let all = |items: &[Item]| items.iter().map(layout).collect::<Vec<_>>().join(" ");
+    let shape = match &item.shape {
+        Shape::Group(group) => format!("{:?}({})", group.presence, all(&group.members)),
+        Shape::List(list) => format!("{:?}[{}]", list.count.unsigned, layout(&list.element)),
+        Shape::Variant(variant) => format!("{:?}<{}>", variant.tag, all(&variant.alternatives)),
+        Shape::Scalar(number) => scalar(number),
+        Shape::Bits(bits) => {
+            let fields = bits
+                .fields
+                .iter()
+                .map(|f| format!("{}:{}..{}", f.name, f.from, f.to));
+            format!("{:?} {:?}", bits.base, fields.collect::<Vec<_>>())
+        }
+        Shape::FixedString { length } => format!("text {length}"),
+        Shape::VariableString { count } => format!("text {:?}", count.unsigned),
+        Shape::Blob { count, format } => format!("{format} {:?}", count.unsigned),
+        Shape::FormattedBlob { formats, count } => format!("{formats:?} {:?}", count.unsigned),
+        Shape::Measure { choices } => {
+            let choices = choices.iter().map(|choice| {
+                format!(
+                    "{} {:?} {}",
+                    choice.index,
+                    choice.name,
+                    scalar(&choice.scalar)
+                )
+            });
+            choices.collect::<Vec<_>>().join(" ")
+        }
+        Shape::Array(array) => format!("{:?}[{}]", array.dimensions, layout(&array.element)),
+        shape => format!("{shape:?}"),
+    };
+    format!("{}{optional}={shape}", item.name)
+}
+
+fn scalar(scalar: &Scalar) -> String {
+    let meaning = match &scalar.meaning {
+        Meaning::Plain => String::new(),
+        Meaning::Scaled(scale) => format!("{scale:?}"),
+        Meaning::Values(set) => {
+            let values: BTreeMap<_, _> = set
+                .values
+                .iter()
+                .map(|value| (value.index, value.name.replace("FEATURE _", "FEATURE_")))
+                .collect();
+            format!("{values:?}")
+        }
+    };
+    format!("{:?} {} {meaning}", scalar.number, scalar.units)
+}
