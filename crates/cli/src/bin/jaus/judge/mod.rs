@@ -25,6 +25,7 @@ use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::output::{Output, say};
 use jaus_cli::runtime;
+use jaus_vehicle::messages::registry;
 use jaus_view::Dictionary;
 
 use judge_nodes::JudgeNodes;
@@ -214,7 +215,7 @@ impl Judge {
     async fn judge(&self, address: JausId) -> Result<Outcome, Failure> {
         let (id, config) = self.network.for_own_node_as(MAIN, "jaus judge")?;
         let recording = self.record.as_deref().map(Recording::create).transpose()?;
-        let dictionary = Dictionary::new();
+        let dictionary = Dictionary::of(registry());
         let mut outputs = Outputs::open(self, &dictionary)?;
         let mut judge_nodes = JudgeNodes::start(id, config, address, recording)?;
         let Some(subject) = Subject::meet(&mut judge_nodes, address, self.limit).await? else {
