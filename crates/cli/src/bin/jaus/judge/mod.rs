@@ -66,7 +66,7 @@ pub(crate) struct Judge {
     address: Option<JausId>,
 
     /// How long an answer may take, in seconds
-    #[arg(long, default_value = "1.5", value_parser = seconds)]
+    #[arg(long, default_value = "1.5", value_parser = runtime::seconds)]
     limit: Duration,
 
     /// Carry out only these steps, and those that they rest on, such as A1,B14-B19
@@ -152,11 +152,6 @@ impl FromStr for Span {
         }
         Ok(Self { first, last })
     }
-}
-
-/// A number of seconds, with an optional s.
-fn seconds(text: &str) -> Result<Duration, String> {
-    runtime::seconds(text.strip_suffix('s').unwrap_or(text))
 }
 
 impl Judge {
