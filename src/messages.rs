@@ -4,9 +4,9 @@
 //! others with the feature `every-set`. The types inside a message are in a module of the message's
 //! name, for example `core::report_services::NodeSeq`.
 
-use crate::codec::{MessageInfo, Registry, ServiceInfo};
+use crate::codec::{Registry, ServiceSet};
 
-/// The modules of the sets, and the tables of those that are switched on.
+/// The modules of the sets, and the table of those that are switched on.
 macro_rules! sets {
     ($($(#[$doc:meta])* $set:ident $(if $feature:literal)?;)*) => {
         $(
@@ -19,12 +19,11 @@ macro_rules! sets {
             }
         )*
 
-        static MESSAGES: &[&[MessageInfo]] = &[
-            $($(#[cfg(feature = $feature)])? $set::MESSAGES,)*
-        ];
-
-        static SERVICES: &[&[ServiceInfo]] = &[
-            $($(#[cfg(feature = $feature)])? $set::SERVICES,)*
+        static SETS: &[ServiceSet] = &[
+            $(
+                $(#[cfg(feature = $feature)])?
+                ServiceSet { services: $set::SERVICES, messages: $set::MESSAGES },
+            )*
         ];
     };
 }
@@ -49,12 +48,7 @@ sets! {
     iop if "every-set";
 }
 
-/// All messages of the service sets that are switched on.
+/// All services and messages of the service sets that are switched on.
 pub const fn registry() -> Registry {
-    Registry::new(MESSAGES)
-}
-
-/// All services of the service sets that are switched on.
-pub fn services() -> impl Iterator<Item = &'static ServiceInfo> {
-    SERVICES.iter().copied().flatten()
+    Registry::new(SETS)
 }

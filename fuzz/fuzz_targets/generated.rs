@@ -23,10 +23,9 @@ fuzz_target!(|octets: &[u8]| {
 });
 
 fn every_message() -> impl Iterator<Item = &'static MessageInfo> {
-    jaus::messages::registry()
-        .iter()
-        .chain(jaus_vehicle::messages::registry().iter())
-        .chain(jaus_ra::messages::registry().iter())
+    let jaus = jaus_vehicle::messages::registry();
+    let ra = jaus_ra::messages::registry();
+    [jaus, ra].into_iter().flat_map(|registry| registry.iter())
 }
 
 fn message_comes_back(info: &MessageInfo, octets: &Bytes) {

@@ -45,7 +45,7 @@ pub fn generated((id, message): &Declared) -> Option<&'static MessageInfo> {
         *service.urn == *id.urn
             && (service.major, service.minor) == (id.version.major, id.version.minor)
     };
-    let mut types = jaus::messages::registry().by_code(message.code);
+    let mut types = jaus_vehicle::messages::registry().by_code(message.code);
     types.find(|info| info.name == message.name && info.services.iter().any(same))
 }
 

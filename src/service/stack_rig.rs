@@ -16,7 +16,7 @@ use crate::wire::{Broadcast, Priority};
 pub(crate) const US: JausId = JausId::new(105, 1, 1);
 
 /// A message and its receiver.
-pub(crate) type Told = (JausId, Bytes);
+pub(crate) type Sent = (JausId, Bytes);
 
 pub(crate) struct StackRig {
     pub(crate) stack: Stack,
@@ -45,7 +45,7 @@ impl StackRig {
     }
 
     /// Handles a client's message; returns the messages to it and to others.
-    pub(crate) fn hear<M: Message>(&mut self, source: JausId, message: &M) -> Vec<Told> {
+    pub(crate) fn hear<M: Message>(&mut self, source: JausId, message: &M) -> Vec<Sent> {
         self.hear_on(None, source, message)
     }
 
@@ -55,7 +55,7 @@ impl StackRig {
         path: Option<Path>,
         source: JausId,
         message: &M,
-    ) -> Vec<Told> {
+    ) -> Vec<Sent> {
         let received = Received {
             source,
             destination: US,
@@ -70,7 +70,7 @@ impl StackRig {
     }
 
     /// The messages sent since the last call, without the probes.
-    pub(crate) fn said(&mut self) -> Vec<Told> {
+    pub(crate) fn said(&mut self) -> Vec<Sent> {
         let mut said = Vec::new();
         while let Some(message) = self.stack.poll_transmit() {
             let client = message.destination;
@@ -84,7 +84,7 @@ impl StackRig {
     }
 
     /// Advances the time, and wakes the component once.
-    pub(crate) fn pass(&mut self, time: Duration) -> Vec<Told> {
+    pub(crate) fn pass(&mut self, time: Duration) -> Vec<Sent> {
         self.now += time;
         self.stack.handle_timeout(self.now);
         self.said()

@@ -11,13 +11,14 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use jaus::codec::view;
-use jaus::codec::{AnyMessage, MessageInfo, ServiceId, ServiceInfo};
-use jaus::messages;
+use jaus::codec::{AnyMessage, MessageInfo, Registry, ServiceId};
 use jsidl::dynamic::{arbitrary, decode, encode, to_json};
 use jsidl::model::{Id, Message, Version};
 use jsidl::{Library, Loader};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
+
+use crate::generated;
 
 fn catalogue() -> Library {
     let mut loader = Loader::new();
@@ -34,20 +35,6 @@ fn id(service: &ServiceId) -> Id {
         urn: service.urn.into(),
         version,
     }
-}
-
-/// All generated messages, those of the Reference Architecture too.
-fn every_message() -> impl Iterator<Item = &'static MessageInfo> {
-    messages::registry()
-        .iter()
-        .chain(jaus_vehicle::messages::registry().iter())
-        .chain(jaus_ra::messages::registry().iter())
-}
-
-fn every_service() -> impl Iterator<Item = &'static ServiceInfo> {
-    messages::services()
-        .chain(jaus_vehicle::messages::services())
-        .chain(jaus_ra::messages::services())
 }
 
 /// What a service says about a generated message.
@@ -131,7 +118,7 @@ fn both_codecs_agree_on_every_generated_message() {
     let wanted = std::env::var("JAUS_CASES").ok();
     let wanted = wanted.map_or(24, |cases| cases.parse().unwrap());
     let mut types = 0;
-    for info in messages::registry().iter() {
+    for info in jaus_vehicle::messages::registry().iter() {
         for service in info.services {
             let message = definition(&library, service, info);
             let cases = if *service == info.services[0] {
@@ -150,18 +137,19 @@ fn both_codecs_agree_on_every_generated_message() {
 #[test]
 fn every_message_of_the_definitions_is_generated() {
     let library = catalogue();
-    let generated: BTreeSet<(ServiceId, u16, &str)> = every_message()
+    let messages = generated().into_iter().flat_map(|it| it.iter());
+    let types: BTreeSet<(ServiceId, u16, &str)> = messages
         .flat_map(|info| {
             info.services
                 .iter()
                 .map(|service| (*service, info.code, info.name))
         })
         .collect();
-    for info in every_service() {
+    for info in generated().iter().flat_map(Registry::services) {
         let service = library.service(&id(&info.id)).unwrap();
         for message in service.messages() {
             let key = (info.id, message.code, message.name.as_str());
-            assert!(generated.contains(&key), "{} {}", service.id, message.name);
+            assert!(types.contains(&key), "{} {}", service.id, message.name);
         }
     }
 }

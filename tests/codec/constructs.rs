@@ -16,7 +16,9 @@ macro_rules! constructs {
         )*
 
         /// All of them.
-        pub(crate) static MESSAGES: &[&[jaus::codec::MessageInfo]] = &[$($name::MESSAGES),*];
+        pub(crate) static SETS: &[jaus::codec::ServiceSet] = &[$(
+            jaus::codec::ServiceSet { services: $name::SERVICES, messages: $name::MESSAGES }
+        ),*];
     };
 }
 

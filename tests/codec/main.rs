@@ -16,3 +16,14 @@ mod golden;
 mod lua_captures;
 mod roundtrip;
 mod versions;
+
+use jaus::codec::Registry;
+
+/// The registries of all generated services: those of the Reference Architecture share codes with
+/// the others.
+fn generated() -> [Registry; 2] {
+    [
+        jaus_vehicle::messages::registry(),
+        jaus_ra::messages::registry(),
+    ]
+}

@@ -5,18 +5,14 @@
 use bytes::Bytes;
 use jaus::codec::arbitrary::Unstructured;
 use jaus::codec::{AnyMessage, MessageInfo, Registry};
-use jaus::messages;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
 /// What the service sets have, and what they have not.
 fn every_message() -> impl Iterator<Item = &'static MessageInfo> {
-    let constructs = Registry::new(crate::constructs::MESSAGES);
-    messages::registry()
-        .iter()
-        .chain(jaus_vehicle::messages::registry().iter())
-        .chain(jaus_ra::messages::registry().iter())
-        .chain(constructs.iter())
+    let constructs = Registry::new(crate::constructs::SETS);
+    let registries = crate::generated().into_iter().chain([constructs]);
+    registries.flat_map(|registry| registry.iter())
 }
 
 /// Octets that a random message is made from.

@@ -53,7 +53,7 @@ pub(crate) fn run(seed: u64) -> Result<Counts, String> {
 }
 
 /// What a directory tells of components: their services.
-type Told = BTreeMap<JausId, Vec<String>>;
+type Listing = BTreeMap<JausId, Vec<String>>;
 
 /// The two components of a node.
 struct Components {
@@ -138,7 +138,7 @@ impl Owner for Components {
     }
 }
 
-fn told(directory: &Directory) -> Told {
+fn told(directory: &Directory) -> Listing {
     let components = directory.components().map(|component| {
         let mut services: Vec<_> = component.offered().map(|it| it.urn.clone()).collect();
         services.sort_unstable();
@@ -250,8 +250,8 @@ impl World {
             let stacks = &self.network.owner(Host(node)).stacks;
             known.extend(stacks.iter().map(|it| (it.id(), told(&it.directory()))));
         }
-        let own = |(id, told): &(JausId, Told)| (*id, told[id].clone());
-        let truth: Told = known.iter().map(own).collect();
+        let own = |(id, told): &(JausId, Listing)| (*id, told[id].clone());
+        let truth: Listing = known.iter().map(own).collect();
         if let Some((id, told)) = known.iter().find(|(_, told)| *told != truth) {
             return Err(format!("{id} knows {told:?}, and the truth is {truth:?}"));
         }

@@ -5,6 +5,15 @@ use std::io::{self, IsTerminal, StdoutLock, Write};
 
 use super::failure::Failure;
 
+/// For example `no errors`, `1 error`, `2 errors`.
+pub fn counted(count: usize, what: &str) -> String {
+    match count {
+        0 => format!("no {what}s"),
+        1 => format!("1 {what}"),
+        count => format!("{count} {what}s"),
+    }
+}
+
 /// Standard output. Every line is flushed when [`line`](Self::line) returns.
 pub struct Output {
     out: StdoutLock<'static>,

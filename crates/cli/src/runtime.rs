@@ -59,9 +59,10 @@ async fn termination() {
     std::future::pending::<()>().await;
 }
 
-/// Parses a flag's number of seconds: `2`, `0.5`.
+/// Parses a flag's number of seconds: `2`, `0.5`, `2s`.
 pub fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text
+    let number = text.strip_suffix('s').unwrap_or(text);
+    let seconds: f64 = number
         .parse()
         .map_err(|_| "write a number of seconds such as 2 or 0.5".to_owned())?;
     match Duration::try_from_secs_f64(seconds) {

@@ -50,7 +50,7 @@ pub use message::{AnyMessage, Message};
 pub use reader::Reader;
 #[doc(hidden)]
 pub use registry::RandomMessage;
-pub use registry::{MessageInfo, Registry, ServiceId, ServiceInfo};
+pub use registry::{MessageInfo, Registry, ServiceId, ServiceInfo, ServiceSet};
 pub use scale::{OutOfRange, Rounding, Scale, Scaled};
 pub use text::Text;
 pub use writer::Writer;

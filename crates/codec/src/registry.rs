@@ -104,29 +104,73 @@ pub trait RandomMessage {}
 #[cfg(not(feature = "arbitrary"))]
 impl<T> RandomMessage for T {}
 
-/// Message types of several service sets, searchable by code and by name.
+/// The tables of a generated module.
+#[derive(Debug, Clone, Copy)]
+pub struct ServiceSet {
+    /// Its `SERVICES`.
+    pub services: &'static [ServiceInfo],
+    /// Its `MESSAGES`, sorted by code.
+    pub messages: &'static [MessageInfo],
+}
+
+/// Services and message types of several service sets, searchable by code and by name.
+///
+/// A crate with services of its own extends the registry of the crate below it:
+///
+/// ```
+/// use jaus_codec::{Registry, ServiceSet};
+///
+/// # mod stack { pub(super) const fn registry() -> jaus_codec::Registry { jaus_codec::Registry::new(&[]) } }
+/// # mod arm { pub(super) const SERVICES: &[jaus_codec::ServiceInfo] = &[]; pub(super) const MESSAGES: &[jaus_codec::MessageInfo] = &[]; }
+/// pub const fn registry() -> Registry {
+///     static STACK: Registry = stack::registry();
+///     static OWN: &[ServiceSet] = &[ServiceSet {
+///         services: arm::SERVICES,
+///         messages: arm::MESSAGES,
+///     }];
+///     Registry::extending(&STACK, OWN)
+/// }
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Registry {
-    sets: &'static [&'static [MessageInfo]],
+    base: Option<&'static Registry>,
+    sets: &'static [ServiceSet],
 }
 
 impl Registry {
-    /// Creates a registry from the `MESSAGES` of generated modules. Each slice is sorted by code.
-    pub const fn new(sets: &'static [&'static [MessageInfo]]) -> Self {
-        Self { sets }
+    /// Creates a registry of these sets.
+    pub const fn new(sets: &'static [ServiceSet]) -> Self {
+        Self { base: None, sets }
+    }
+
+    /// Creates a registry of these sets and everything in `base`. Searches find the types of these
+    /// sets first.
+    pub const fn extending(base: &'static Self, sets: &'static [ServiceSet]) -> Self {
+        let base = Some(base);
+        Self { base, sets }
+    }
+
+    fn sets(&self) -> impl Iterator<Item = &'static ServiceSet> + use<> {
+        std::iter::successors(Some(*self), |registry| registry.base.copied())
+            .flat_map(|registry| registry.sets)
+    }
+
+    /// All services.
+    pub fn services(&self) -> impl Iterator<Item = &'static ServiceInfo> + use<> {
+        self.sets().flat_map(|set| set.services)
     }
 
     /// All message types.
     pub fn iter(&self) -> impl Iterator<Item = &'static MessageInfo> + use<> {
-        self.sets.iter().copied().flatten()
+        self.sets().flat_map(|set| set.messages)
     }
 
     /// The types with this code, usually one. If versions differ on the wire, the newest comes
     /// first.
     pub fn by_code(&self, code: u16) -> impl Iterator<Item = &'static MessageInfo> + use<> {
-        self.sets.iter().flat_map(move |set| {
-            let start = set.partition_point(|info| info.code < code);
-            set[start..]
+        self.sets().flat_map(move |set| {
+            let start = set.messages.partition_point(|info| info.code < code);
+            set.messages[start..]
                 .iter()
                 .take_while(move |info| info.code == code)
         })
@@ -137,11 +181,7 @@ impl Registry {
         &self,
         name: &'n str,
     ) -> impl Iterator<Item = &'static MessageInfo> + use<'n> {
-        self.sets
-            .iter()
-            .copied()
-            .flatten()
-            .filter(move |info| info.name == name)
+        self.iter().filter(move |info| info.name == name)
     }
 
     /// The type that a service declares for this code.

@@ -5,6 +5,7 @@ use super::state;
 use jaus::address::JausId;
 use jaus::messages::core::{ReportControl, ReportStatus};
 use jaus::messages::mobility::{ReportLocalPose, ReportVelocityState};
+use jaus_vehicle::ground::StageState;
 use jaus_vehicle::messages::ground::{
     ReportMission, ReportPlannedPath, ReportRasterMaps, ReportStage,
 };
@@ -111,16 +112,8 @@ impl From<ReportControl> for Report {
 
 impl From<ReportStage> for Report {
     fn from(report: ReportStage) -> Self {
-        let state = match report.state.0 {
-            0 => "idle",
-            1 => "engaging",
-            2 => "active",
-            3 => "blocked",
-            4 => "done",
-            _ => "unknown",
-        };
         Self::Stage(state::Stage {
-            state,
+            state: StageState::of(&report).map_or("unknown", StageState::name),
             progress: report.progress,
             reason: report.reason.to_string(),
         })

@@ -5,7 +5,7 @@
 //! messages have a registry of their own.
 
 use bytes::Bytes;
-use jaus::codec::{AnyMessage, DecodeError, MessageInfo, Registry, ServiceInfo};
+use jaus::codec::{AnyMessage, DecodeError, MessageInfo, Registry, ServiceSet};
 
 pub use crate::forgiving::forgiving;
 
@@ -15,11 +15,14 @@ pub mod ra33 {
     include!(concat!(env!("OUT_DIR"), "/ra33.rs"));
 }
 
-/// All messages of the Reference Architecture.
+/// All services and messages of the Reference Architecture.
 #[must_use]
 pub const fn registry() -> Registry {
-    static MESSAGES: &[&[MessageInfo]] = &[ra33::MESSAGES];
-    Registry::new(MESSAGES)
+    static RA33: &[ServiceSet] = &[ServiceSet {
+        services: ra33::SERVICES,
+        messages: ra33::MESSAGES,
+    }];
+    Registry::new(RA33)
 }
 
 /// Decodes a message of the type, code and data, with the habits of peers forgiven.
@@ -28,9 +31,4 @@ pub const fn registry() -> Registry {
 /// What is wrong beyond those habits, and at which octet.
 pub fn decode(info: &MessageInfo, octets: &Bytes) -> Result<Box<dyn AnyMessage>, DecodeError> {
     forgiving(octets, info.decode)
-}
-
-/// All services of the Reference Architecture.
-pub fn services() -> impl Iterator<Item = &'static ServiceInfo> {
-    ra33::SERVICES.iter()
 }

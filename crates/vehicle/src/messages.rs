@@ -1,6 +1,6 @@
 //! The messages of the ground vehicle's own services, generated from their definitions.
 
-use jaus::codec::{MessageInfo, Registry, ServiceInfo};
+use jaus::codec::{Registry, ServiceSet};
 
 /// World model, missions, stages, odometry.
 #[allow(missing_docs, reason = "what the definitions do not describe")]
@@ -8,14 +8,13 @@ pub mod ground {
     include!(concat!(env!("OUT_DIR"), "/ground.rs"));
 }
 
-/// All messages of these services.
+/// All services and messages that the vehicle speaks: these, and those of the stack.
 #[must_use]
 pub const fn registry() -> Registry {
-    static MESSAGES: &[&[MessageInfo]] = &[ground::MESSAGES];
-    Registry::new(MESSAGES)
-}
-
-/// All of these services.
-pub fn services() -> impl Iterator<Item = &'static ServiceInfo> {
-    ground::SERVICES.iter()
+    static STACK: Registry = jaus::messages::registry();
+    static GROUND: &[ServiceSet] = &[ServiceSet {
+        services: ground::SERVICES,
+        messages: ground::MESSAGES,
+    }];
+    Registry::extending(&STACK, GROUND)
 }

@@ -100,24 +100,23 @@ impl Default for Dictionary {
 impl Dictionary {
     /// The messages of the SAE service sets that `jaus` was built with.
     pub fn new() -> Self {
-        let empty = Self {
-            by_code: BTreeMap::new(),
-            ra: BTreeMap::new(),
-            preferred: Vec::new(),
-            prefers_ra: false,
-        };
-        empty.with_messages(messages::registry())
+        Self::of(messages::registry())
     }
 
-    /// Adds generated messages, after those that are here.
-    #[must_use]
-    pub fn with_messages(mut self, messages: Registry) -> Self {
+    /// The messages of a registry.
+    pub fn of(messages: Registry) -> Self {
+        let mut by_code: BTreeMap<_, Vec<_>> = BTreeMap::new();
         // A registry has the newest of the types with one code first.
         for info in messages.iter() {
             let definition = Definition::generated(info, |info, octets| (info.decode)(octets));
-            self.by_code.entry(info.code).or_default().push(definition);
+            by_code.entry(info.code).or_default().push(definition);
         }
-        self
+        Self {
+            by_code,
+            ra: BTreeMap::new(),
+            preferred: Vec::new(),
+            prefers_ra: false,
+        }
     }
 
     /// Adds the messages of the Reference Architecture. Their codes are those of other layouts in

@@ -10,7 +10,7 @@ use crate::codec::Message;
 use crate::messages::core::confirm_control::ResponseCode as Confirmation;
 use crate::messages::core::reject_control::ResponseCode as Rejection;
 use crate::messages::core::*;
-use crate::service::stack_rig::{StackRig as Rig, Told};
+use crate::service::stack_rig::{Sent, StackRig as Rig};
 use crate::service::{Stack, Standing as Now, State, Transport};
 
 const FIRST: JausId = JausId::new(42, 2, 1);
@@ -26,7 +26,7 @@ impl Rig {
         Self::with(|stack| stack.management(Management::new()))
     }
 
-    fn request(&mut self, client: JausId, authority_code: u8) -> Vec<Told> {
+    fn request(&mut self, client: JausId, authority_code: u8) -> Vec<Sent> {
         self.hear(client, &RequestControl { authority_code })
     }
 
@@ -69,15 +69,15 @@ impl Rig {
     }
 }
 
-fn confirmed(to: JausId, response_code: Confirmation) -> Told {
+fn confirmed(to: JausId, response_code: Confirmation) -> Sent {
     told(to, &ConfirmControl { response_code })
 }
 
-fn rejected(to: JausId, response_code: Rejection) -> Told {
+fn rejected(to: JausId, response_code: Rejection) -> Sent {
     told(to, &RejectControl { response_code })
 }
 
-fn told<M: Message>(to: JausId, message: &M) -> Told {
+fn told<M: Message>(to: JausId, message: &M) -> Sent {
     (to, message.encode().unwrap())
 }
 

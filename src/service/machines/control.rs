@@ -18,7 +18,7 @@ use crate::messages::core::confirm_control::ResponseCode as Confirmation;
 use crate::messages::core::management::machine::{self, Behaviour, Event, Machine, State as Place};
 use crate::messages::core::reject_control::ResponseCode as Rejection;
 use crate::messages::core::*;
-use crate::service::stack_rig::{StackRig, Told};
+use crate::service::stack_rig::{Sent, StackRig};
 use crate::service::{AccessControl, Condition, Management as Settings, State, Transport};
 
 /// The lowest authority that gets control, and the timeout of control in seconds.
@@ -34,7 +34,7 @@ struct Component {
     taking: Option<JausId>,
     deadline: Option<Instant>,
     emergencies: BTreeSet<JausId>,
-    said: Vec<Told>,
+    said: Vec<Sent>,
     state: State,
 }
 

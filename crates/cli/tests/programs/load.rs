@@ -59,6 +59,8 @@ fn every_message_is_acknowledged_by_its_receiver() {
             .unwrap();
         let table = String::from_utf8(output.stdout).unwrap();
         assert!(output.status.success(), "{table}");
+        let log = String::from_utf8(output.stderr).unwrap();
+        assert!(!log.contains("WARN"), "{log}");
         let report = fs::read_to_string(directory.join("load.json")).unwrap();
         let report: Value = serde_json::from_str(&report).unwrap();
         let rows = report["rows"].as_array().unwrap();

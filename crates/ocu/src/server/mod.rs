@@ -87,7 +87,7 @@ impl Server {
         let shared = Shared {
             admission,
             access,
-            dictionary: Dictionary::new().with_messages(jaus_vehicle::messages::registry()),
+            dictionary: Dictionary::of(jaus_vehicle::messages::registry()),
             places: Arc::new(Semaphore::new(Self::PAGES)),
             pages: AtomicU64::new(0),
             counters: Counters::default(),

@@ -24,7 +24,7 @@ pub(super) enum Finished {
         result: Result<Control, ControlError>,
     },
     /// Result of a page's request.
-    Told {
+    Requested {
         reply: Reply,
         result: Result<(), String>,
     },
@@ -117,7 +117,7 @@ impl Client {
                 let waited = PATIENCE.as_secs();
                 Err(format!("the vehicle has not answered for {waited} s"))
             });
-            Finished::Told { reply, result }
+            Finished::Requested { reply, result }
         });
     }
 

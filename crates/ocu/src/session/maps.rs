@@ -1,13 +1,13 @@
-//! Cells of the map shown on pages: fetched in blocks at the first request, and cached until the
+//! Cells of the map shown on pages: fetched at the first request, and cached until the
 //! map changes.
 
-use bytes::{Bytes, BytesMut};
+use bytes::Bytes;
 
 use super::client::{Client, Finished};
 use crate::state::{Edition, Map};
 use jaus::address::JausId;
 use jaus::component::Component;
-use jaus_vehicle::messages::ground::{QueryRasterCells, ReportRasterCells};
+use jaus_vehicle::ground::{RasterEdition, fetch_cells};
 
 /// Callback for the cells or the reason why there are none.
 pub(crate) type CellsReply = Box<dyn FnOnce(Result<Bytes, String>) + Send>;
@@ -65,35 +65,16 @@ impl Maps {
     }
 }
 
-/// Cells per request: a store answers this many well within the query timeout.
-const BLOCK: u32 = 1 << 18;
-
-/// Fetches all cells of a map, row by row.
 async fn cells(component: &Component, store: JausId, map: &Map) -> Result<Bytes, String> {
-    let columns = u32::from(map.columns).max(1);
-    let step = u16::try_from((BLOCK / columns).max(1)).unwrap_or(u16::MAX);
-    let mut all = BytesMut::new();
-    let mut row = 0;
-    while row < map.rows {
-        let query = QueryRasterCells {
-            map: map.id,
-            row,
-            column: 0,
-            rows: step.min(map.rows - row),
-            columns: map.columns,
-        };
-        let block: ReportRasterCells = component
-            .query(store, &query)
-            .await
-            .map_err(|error| error.to_string())?;
-        let length = usize::from(query.rows) * usize::from(query.columns);
-        if (block.map, block.row, block.cells.len()) != (map.id, row, length) {
-            return Err(format!(
-                "{store} answered with other cells than were asked for"
-            ));
-        }
-        all.extend_from_slice(&block.cells);
-        row += query.rows;
+    let edition = RasterEdition {
+        map: map.id,
+        revision: map.revision,
+        rows: map.rows,
+        columns: map.columns,
+    };
+    match fetch_cells(component, store, edition).await {
+        Ok(Some(cells)) => Ok(cells.into()),
+        Ok(None) => Err(format!("{store} changed the map while it was fetched")),
+        Err(error) => Err(error.to_string()),
     }
-    Ok(all.freeze())
 }

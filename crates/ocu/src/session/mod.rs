@@ -136,7 +136,7 @@ impl Session {
             Finished::Taken { peer, result } => {
                 self.lease.handle_taken(now, peer, result, &mut self.client);
             }
-            Finished::Told { reply, result } => reply(result),
+            Finished::Requested { reply, result } => reply(result),
             Finished::Steered { push, acknowledged } => {
                 if acknowledged && push == Push::NONE {
                     self.stick.handle_stopped();

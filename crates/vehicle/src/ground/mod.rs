@@ -6,6 +6,7 @@
 mod knowledge_store;
 mod odometry;
 mod planner;
+mod raster_cells;
 mod raster_maps;
 mod stage;
 mod world_store;
@@ -13,6 +14,7 @@ mod world_store;
 pub use knowledge_store::VectorKnowledgeStore;
 pub use odometry::WheelOdometry;
 pub use planner::{MissionPlanner, Missions, News};
+pub use raster_cells::{RasterEdition, fetch_cells};
 pub use raster_maps::RasterMaps;
 pub use stage::{StageBoard, StageReport, StageState};
 pub use world_store::WorldStore;

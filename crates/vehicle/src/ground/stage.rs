@@ -41,15 +41,36 @@ pub enum StageState {
     Done = 4,
 }
 
-impl fmt::Display for StageState {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl StageState {
+    /// The state of a report; `None` for a number without a meaning.
+    #[must_use]
+    pub const fn of(report: &ReportStage) -> Option<Self> {
+        match report.state {
+            report_stage::State::IDLE => Some(Self::Idle),
+            report_stage::State::ENGAGING => Some(Self::Engaging),
+            report_stage::State::ACTIVE => Some(Self::Active),
+            report_stage::State::BLOCKED => Some(Self::Blocked),
+            report_stage::State::DONE => Some(Self::Done),
+            _ => None,
+        }
+    }
+
+    /// Its name, for example `idle`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
             Self::Idle => "idle",
             Self::Engaging => "engaging",
             Self::Active => "active",
             Self::Blocked => "blocked",
             Self::Done => "done",
-        })
+        }
+    }
+}
+
+impl fmt::Display for StageState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
     }
 }
 
@@ -120,13 +141,7 @@ impl From<&ReportStage> for StageReport {
             message.next_component_id,
         );
         Self {
-            state: match message.state {
-                report_stage::State::ENGAGING => StageState::Engaging,
-                report_stage::State::ACTIVE => StageState::Active,
-                report_stage::State::BLOCKED => StageState::Blocked,
-                report_stage::State::DONE => StageState::Done,
-                _ => StageState::Idle,
-            },
+            state: StageState::of(message).unwrap_or_default(),
             progress: message.progress,
             next: next.is_unicast().then_some(next),
             reason: message.reason.as_str().unwrap_or_default().to_owned(),

@@ -22,18 +22,8 @@ impl Behaviour for AccelerationStateSensor {
 
     fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
         match code {
-            QueryAccelerationState::CODE => {
-                if let Some(query) = exchange.query() {
-                    let report = report(&query, exchange);
-                    exchange.reply(&report);
-                }
-            }
-            QueryAccelerationStateExt::CODE => {
-                if let Some(query) = exchange.query() {
-                    let report = report_ext(&query, exchange);
-                    exchange.reply(&report);
-                }
-            }
+            QueryAccelerationState::CODE => exchange.answer(report),
+            QueryAccelerationStateExt::CODE => exchange.answer(report_ext),
             _ => return Handled::No,
         }
         Handled::Yes

@@ -32,6 +32,29 @@ impl Exchange<'_, '_> {
         read(self.message)
     }
 
+    /// Answers a query from any client with this report.
+    pub(super) fn answer<Q: Message, R: Message>(
+        &mut self,
+        report: impl FnOnce(&Q, &mut Self) -> R,
+    ) {
+        if let Some(query) = self.query() {
+            let report = report(&query, self);
+            self.reply(&report);
+        }
+    }
+
+    /// As [`answer`](Self::answer), unless the report contains a number outside the range of its
+    /// field.
+    pub(super) fn answer_if<Q: Message, R: Message>(
+        &mut self,
+        report: impl FnOnce(&Q, &mut Self) -> Result<R, OutOfRange>,
+    ) {
+        if let Some(query) = self.query() {
+            let report = report(&query, self);
+            self.reply_if(report);
+        }
+    }
+
     /// Reads a configuration command, which only the client in control may send.
     pub(super) fn configure<M: Message>(&self) -> Option<M> {
         self.read_if(Standing::obeys)

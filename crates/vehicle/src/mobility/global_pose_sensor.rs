@@ -26,18 +26,8 @@ impl Behaviour for GlobalPoseSensor {
 
     fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
         match code {
-            QueryGlobalPose::CODE => {
-                if let Some(query) = exchange.query() {
-                    let report = report(&query, exchange);
-                    exchange.reply(&report);
-                }
-            }
-            QueryGlobalPoseExt::CODE => {
-                if let Some(query) = exchange.query() {
-                    let report = report_ext(&query, exchange);
-                    exchange.reply(&report);
-                }
-            }
+            QueryGlobalPose::CODE => exchange.answer(report),
+            QueryGlobalPoseExt::CODE => exchange.answer(report_ext),
             QueryGeomagneticProperty::CODE => {
                 let mut report = ReportGeomagneticProperty::default();
                 let variation = exchange.controls.magnetic_variation;

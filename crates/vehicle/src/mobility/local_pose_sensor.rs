@@ -25,18 +25,8 @@ impl Behaviour for LocalPoseSensor {
 
     fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
         match code {
-            QueryLocalPose::CODE => {
-                if let Some(query) = exchange.query() {
-                    let report = report(&query, exchange);
-                    exchange.reply(&report);
-                }
-            }
-            QueryLocalPoseExt::CODE => {
-                if let Some(query) = exchange.query() {
-                    let report = report_ext(&query, exchange);
-                    exchange.reply(&report);
-                }
-            }
+            QueryLocalPose::CODE => exchange.answer(report),
+            QueryLocalPoseExt::CODE => exchange.answer(report_ext),
             SetLocalPose::CODE => {
                 if let Some(message) = exchange.configure() {
                     set(told(&message, &pose(exchange)), exchange);

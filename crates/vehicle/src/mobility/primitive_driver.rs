@@ -33,12 +33,10 @@ impl Behaviour for PrimitiveDriver {
                     self.set(command, exchange);
                 }
             }
-            QueryWrenchEffort::CODE => {
-                if let Some(query) = exchange.query() {
-                    self.forget_what_others_replaced(exchange.controls);
-                    exchange.reply(&self.report(&query));
-                }
-            }
+            QueryWrenchEffort::CODE => exchange.answer(|query, exchange| {
+                self.forget_what_others_replaced(exchange.controls);
+                self.report(query)
+            }),
             _ => return Handled::No,
         }
         Handled::Yes

@@ -95,19 +95,15 @@ impl Behaviour for LocalVectorDriver {
                     self.0.set(vector, Heading::Local, acts, exchange);
                 }
             }
-            QueryLocalVector::CODE => {
-                if let Some(query) = exchange.query::<QueryLocalVector>() {
-                    let vector = self.0.current(exchange.controls);
-                    let report = local(&vector, Wanted(query.presence_vector.into()));
-                    exchange.reply_if(report);
-                }
-            }
+            QueryLocalVector::CODE => exchange.answer_if(|query: &QueryLocalVector, exchange| {
+                let vector = self.0.current(exchange.controls);
+                local(&vector, Wanted(query.presence_vector.into()))
+            }),
             QueryLocalVectorExt::CODE => {
-                if let Some(query) = exchange.query::<QueryLocalVectorExt>() {
+                exchange.answer_if(|query: &QueryLocalVectorExt, exchange| {
                     let vector = self.0.current(exchange.controls);
-                    let report = local_ext(&vector, Wanted(query.presence_vector.into()));
-                    exchange.reply_if(report);
-                }
+                    local_ext(&vector, Wanted(query.presence_vector.into()))
+                })
             }
             _ => return Handled::No,
         }
@@ -147,18 +143,15 @@ impl Behaviour for GlobalVectorDriver {
                     self.0.set(vector, Heading::North, acts, exchange);
                 }
             }
-            QueryGlobalVector::CODE => {
-                if let Some(query) = exchange.query::<QueryGlobalVector>() {
-                    let vector = self.0.current(exchange.controls);
-                    exchange.reply(&global(&vector, Wanted(query.presence_vector.into())));
-                }
-            }
+            QueryGlobalVector::CODE => exchange.answer(|query: &QueryGlobalVector, exchange| {
+                let vector = self.0.current(exchange.controls);
+                global(&vector, Wanted(query.presence_vector.into()))
+            }),
             QueryGlobalVectorExt::CODE => {
-                if let Some(query) = exchange.query::<QueryGlobalVectorExt>() {
+                exchange.answer_if(|query: &QueryGlobalVectorExt, exchange| {
                     let vector = self.0.current(exchange.controls);
-                    let report = global_ext(&vector, Wanted(query.presence_vector.into()));
-                    exchange.reply_if(report);
-                }
+                    global_ext(&vector, Wanted(query.presence_vector.into()))
+                })
             }
             _ => return Handled::No,
         }

@@ -27,18 +27,8 @@ impl Behaviour for VelocityStateSensor {
 
     fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
         match code {
-            QueryVelocityState::CODE => {
-                if let Some(query) = exchange.query() {
-                    let report = report(&query, exchange);
-                    exchange.reply(&report);
-                }
-            }
-            QueryVelocityStateExt::CODE => {
-                if let Some(query) = exchange.query() {
-                    let report = report_ext(&query, exchange);
-                    exchange.reply(&report);
-                }
-            }
+            QueryVelocityState::CODE => exchange.answer(report),
+            QueryVelocityStateExt::CODE => exchange.answer(report_ext),
             _ => return Handled::No,
         }
         Handled::Yes

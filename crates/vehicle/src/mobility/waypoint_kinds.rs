@@ -35,15 +35,13 @@ impl Kind for Global {
             return Handled::No;
         };
         match code {
-            QueryGlobalWaypoint::CODE => {
-                if let Some(query) = exchange.query::<QueryGlobalWaypoint>() {
-                    exchange.reply_if(waypoint.report(Wanted(query.presence_vector.into())));
-                }
-            }
+            QueryGlobalWaypoint::CODE => exchange.answer_if(|query: &QueryGlobalWaypoint, _| {
+                waypoint.report(Wanted(query.presence_vector.into()))
+            }),
             QueryGlobalWaypointExt::CODE => {
-                if let Some(query) = exchange.query::<QueryGlobalWaypointExt>() {
-                    exchange.reply_if(waypoint.report_ext(Wanted(query.presence_vector.into())));
-                }
+                exchange.answer_if(|query: &QueryGlobalWaypointExt, _| {
+                    waypoint.report_ext(Wanted(query.presence_vector.into()))
+                })
             }
             _ => return Handled::No,
         }
@@ -73,15 +71,13 @@ impl Kind for Local {
             return Handled::No;
         };
         match code {
-            QueryLocalWaypoint::CODE => {
-                if let Some(query) = exchange.query::<QueryLocalWaypoint>() {
-                    exchange.reply_if(waypoint.report(Wanted(query.presence_vector.into())));
-                }
-            }
+            QueryLocalWaypoint::CODE => exchange.answer_if(|query: &QueryLocalWaypoint, _| {
+                waypoint.report(Wanted(query.presence_vector.into()))
+            }),
             QueryLocalWaypointExt::CODE => {
-                if let Some(query) = exchange.query::<QueryLocalWaypointExt>() {
-                    exchange.reply_if(waypoint.report_ext(Wanted(query.presence_vector.into())));
-                }
+                exchange.answer_if(|query: &QueryLocalWaypointExt, _| {
+                    waypoint.report_ext(Wanted(query.presence_vector.into()))
+                })
             }
             _ => return Handled::No,
         }

@@ -105,7 +105,7 @@ impl Communicator {
 
 /// The messages that the log and the debug view show with their fields.
 fn dictionary() -> Dictionary {
-    Dictionary::new().with_messages(messages::registry())
+    Dictionary::of(messages::registry())
 }
 
 /// Logs the node's addresses and services.

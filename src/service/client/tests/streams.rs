@@ -1,6 +1,6 @@
 //! The sequence numbers and the silence of report streams.
 
-use super::subscriptions::{Told, confirm, fire, told, up};
+use super::subscriptions::{Notice, confirm, fire, notices, up};
 use crate::messages::core::CreateEvent;
 use crate::service::{Outage, When};
 
@@ -10,9 +10,9 @@ fn gaps_in_the_numbers_are_lost_reports_and_repetitions_are_no_reports() {
     for sequence in [254, 254, 255, 2, 1, 3] {
         fire(&mut bench, 7, sequence);
     }
-    let report = |lost| Told::Report { lost };
+    let report = |lost| Notice::Report { lost };
     assert_eq!(
-        told(&mut bench),
+        notices(&mut bench),
         [report(0), report(0), report(2), report(0)]
     );
 }
@@ -22,9 +22,9 @@ fn a_periodic_event_that_stops_is_down_until_it_is_confirmed_again() {
     let (mut bench, _) = up(When::hz(2.0));
     fire(&mut bench, 7, 0);
     bench.run_ms(1900);
-    assert_eq!(told(&mut bench), [Told::Report { lost: 0 }]);
+    assert_eq!(notices(&mut bench), [Notice::Report { lost: 0 }]);
     bench.run_ms(200);
-    assert_eq!(told(&mut bench), [Told::Down(Outage::Silent)]);
+    assert_eq!(notices(&mut bench), [Notice::Down(Outage::Silent)]);
     bench.run_ms(60_000);
     let attempts = bench.sent::<CreateEvent>();
     assert!((10..20).contains(&attempts.len()), "{}", attempts.len());
@@ -32,8 +32,8 @@ fn a_periodic_event_that_stops_is_down_until_it_is_confirmed_again() {
     confirm(&mut bench, attempts[0].request_id, 1, 2.0);
     fire(&mut bench, 1, 0);
     assert_eq!(
-        told(&mut bench),
-        [Told::Up(Some(2)), Told::Report { lost: 0 }]
+        notices(&mut bench),
+        [Notice::Up(Some(2)), Notice::Report { lost: 0 }]
     );
 }
 
@@ -44,12 +44,12 @@ fn a_stream_that_goes_on_by_itself_is_up_again() {
     bench.run_ms(2100);
     fire(&mut bench, 7, 6);
     assert_eq!(
-        told(&mut bench),
+        notices(&mut bench),
         [
-            Told::Report { lost: 0 },
-            Told::Down(Outage::Silent),
-            Told::Up(Some(10)),
-            Told::Report { lost: 5 }
+            Notice::Report { lost: 0 },
+            Notice::Down(Outage::Silent),
+            Notice::Up(Some(10)),
+            Notice::Report { lost: 5 }
         ]
     );
 }
@@ -60,14 +60,14 @@ fn a_stream_that_begins_a_second_after_its_first_report_is_not_down() {
     let (mut bench, _) = up(When::hz(25.0));
     fire(&mut bench, 7, 0);
     bench.run_ms(1000);
-    assert_eq!(told(&mut bench), [Told::Report { lost: 0 }]);
+    assert_eq!(notices(&mut bench), [Notice::Report { lost: 0 }]);
     for sequence in 1..=50 {
         fire(&mut bench, 7, sequence);
         bench.run_ms(40);
     }
-    told(&mut bench);
+    notices(&mut bench);
     bench.run_ms(500);
-    assert_eq!(told(&mut bench), [Told::Down(Outage::Silent)]);
+    assert_eq!(notices(&mut bench), [Notice::Down(Outage::Silent)]);
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn numbers_that_the_rate_cannot_explain_are_no_lost_reports() {
     fire(&mut bench, 7, 91);
     bench.run_ms(300);
     fire(&mut bench, 7, 94);
-    let report = |lost| Told::Report { lost };
+    let report = |lost| Notice::Report { lost };
     let reports = [report(0), report(0), report(0), report(2)];
-    assert_eq!(told(&mut bench), reports);
+    assert_eq!(notices(&mut bench), reports);
 }

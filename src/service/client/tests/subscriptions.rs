@@ -76,22 +76,22 @@ pub(super) fn fire(bench: &mut Bench, event: u8, sequence: u8) {
 
 /// A notification in short form.
 #[derive(Debug, PartialEq)]
-pub(super) enum Told {
+pub(super) enum Notice {
     Up(Option<u32>),
     Report { lost: u8 },
     Down(Outage),
     Ended(SubscriptionEnd),
 }
 
-pub(super) fn told(bench: &mut Bench) -> Vec<Told> {
+pub(super) fn notices(bench: &mut Bench) -> Vec<Notice> {
     let events = bench.events().into_iter();
     events
         .filter_map(|event| match event {
             StackEvent::Subscription(_, news) => Some(match news {
-                SubscriptionNews::Up { hz } => Told::Up(hz.map(|hz| hz.round() as u32)),
-                SubscriptionNews::Report { lost, .. } => Told::Report { lost },
-                SubscriptionNews::Down { why, .. } => Told::Down(why),
-                SubscriptionNews::Ended(end) => Told::Ended(end),
+                SubscriptionNews::Up { hz } => Notice::Up(hz.map(|hz| hz.round() as u32)),
+                SubscriptionNews::Report { lost, .. } => Notice::Report { lost },
+                SubscriptionNews::Down { why, .. } => Notice::Down(why),
+                SubscriptionNews::Ended(end) => Notice::Ended(end),
             }),
             _ => None,
         })
@@ -107,7 +107,7 @@ pub(super) fn up(when: When) -> (Bench, SubscriptionId) {
         When::OnChange => 0.0,
     };
     assert_eq!(confirm_all(&mut bench, 7, hz), 1);
-    assert!(matches!(told(&mut bench)[..], [Told::Up(_)]));
+    assert!(matches!(notices(&mut bench)[..], [Notice::Up(_)]));
     (bench, id)
 }
 
@@ -132,7 +132,7 @@ fn the_confirmed_rate_is_told() {
     let mut bench = Bench::new();
     subscribe(&mut bench, &status(When::hz(50.0)));
     confirm_all(&mut bench, 7, 25.0);
-    assert_eq!(told(&mut bench), [Told::Up(Some(25))]);
+    assert_eq!(notices(&mut bench), [Notice::Up(Some(25))]);
 }
 
 #[test]
@@ -144,7 +144,7 @@ fn a_lost_confirmation_is_asked_for_with_the_same_request() {
     assert_eq!(asked.len(), 2);
     assert_eq!(asked[0], asked[1]);
     confirm(&mut bench, asked[1].request_id, 7, 1.0);
-    assert_eq!(told(&mut bench), [Told::Up(Some(1))]);
+    assert_eq!(notices(&mut bench), [Notice::Up(Some(1))]);
 }
 
 #[test]
@@ -152,9 +152,12 @@ fn a_report_that_is_ahead_of_its_confirmation_is_not_lost() {
     let mut bench = Bench::new();
     subscribe(&mut bench, &status(When::OnChange));
     fire(&mut bench, 7, 0);
-    assert_eq!(told(&mut bench), []);
+    assert_eq!(notices(&mut bench), []);
     assert_eq!(confirm_all(&mut bench, 7, 0.0), 1);
-    assert_eq!(told(&mut bench), [Told::Up(None), Told::Report { lost: 0 }]);
+    assert_eq!(
+        notices(&mut bench),
+        [Notice::Up(None), Notice::Report { lost: 0 }]
+    );
 }
 
 #[test]
@@ -162,7 +165,7 @@ fn who_neither_confirms_nor_rejects_is_given_up() {
     let mut bench = Bench::new();
     subscribe(&mut bench, &status(When::hz(1.0)));
     bench.run_ms(1500);
-    let [Told::Ended(SubscriptionEnd::NoAnswer(failure))] = told(&mut bench)[..] else {
+    let [Notice::Ended(SubscriptionEnd::NoAnswer(failure))] = notices(&mut bench)[..] else {
         panic!("it is to be given up");
     };
     assert_eq!((failure.peer, failure.tries), (PEER, 3));
@@ -182,7 +185,7 @@ fn a_rejection_ends_it_with_the_reason() {
         error_message: None,
     };
     bench.hear(PEER, &reject);
-    let [Told::Ended(end)] = &told(&mut bench)[..] else {
+    let [Notice::Ended(end)] = &notices(&mut bench)[..] else {
         panic!("it is rejected");
     };
     assert_eq!(
@@ -197,8 +200,8 @@ fn a_rate_below_what_is_of_use_is_refused_and_cancelled() {
     subscribe(&mut bench, &status(When::hz(50.0).at_least(20.0)));
     confirm_all(&mut bench, 7, 10.0);
     assert!(matches!(
-        told(&mut bench)[..],
-        [Told::Ended(SubscriptionEnd::TooSlow { .. })]
+        notices(&mut bench)[..],
+        [Notice::Ended(SubscriptionEnd::TooSlow { .. })]
     ));
     assert_eq!(bench.sent::<CancelEvent>()[0].event_id, 7);
 }
@@ -221,7 +224,7 @@ fn renewals_in_a_minute(bench: &mut Bench, hz: f64) -> usize {
 fn what_is_sent_on_change_is_renewed_because_its_end_would_not_be_noticed() {
     let (mut bench, _) = up(When::OnChange);
     assert_eq!(renewals_in_a_minute(&mut bench, 0.0), 3);
-    assert_eq!(told(&mut bench), []);
+    assert_eq!(notices(&mut bench), []);
 }
 
 #[test]
@@ -250,9 +253,9 @@ fn a_renewal_brings_the_last_report_once_more_and_that_is_no_change() {
     bench.run_ms(20_000);
     assert_eq!(confirm_all(&mut bench, 7, 0.0), 1);
     fire(&mut bench, 7, 1);
-    assert_eq!(told(&mut bench), [Told::Report { lost: 0 }]);
+    assert_eq!(notices(&mut bench), [Notice::Report { lost: 0 }]);
     fire(&mut bench, 7, 2);
-    assert_eq!(told(&mut bench), [Told::Report { lost: 0 }]);
+    assert_eq!(notices(&mut bench), [Notice::Report { lost: 0 }]);
 }
 
 #[test]
@@ -262,17 +265,17 @@ fn a_confirmation_that_nobody_asked_for_may_be_the_end_of_the_event() {
     confirm(&mut bench, 1, 7, 0.0);
     bench.run_ms(400);
     assert_eq!(confirm_all(&mut bench, 7, 0.0), 1);
-    assert_eq!(told(&mut bench), []);
+    assert_eq!(notices(&mut bench), []);
 }
 
 #[test]
 fn reports_on_change_are_down_when_nobody_confirms_them() {
     let (mut bench, _) = up(When::OnChange);
     bench.run_ms(30_000);
-    assert_eq!(told(&mut bench), [Told::Down(Outage::Unconfirmed)]);
+    assert_eq!(notices(&mut bench), [Notice::Down(Outage::Unconfirmed)]);
     bench.run_ms(600_000);
     assert!(confirm_all(&mut bench, 3, 0.0) > 100);
-    assert_eq!(told(&mut bench), [Told::Up(None)]);
+    assert_eq!(notices(&mut bench), [Notice::Up(None)]);
 }
 
 #[test]
@@ -287,15 +290,15 @@ fn when_discovery_loses_the_peer_it_is_down_and_asked_for_when_the_peer_is_found
     subscribe(&mut bench, &status(When::OnChange));
     // It is as good as silent, and goes down before its first renewal.
     confirm_all(&mut bench, 7, 0.0);
-    assert_eq!(told(&mut bench), [Told::Up(None)]);
+    assert_eq!(notices(&mut bench), [Notice::Up(None)]);
     bench.run_ms(19_000);
-    assert_eq!(told(&mut bench), [Told::Down(Outage::PeerLost)]);
+    assert_eq!(notices(&mut bench), [Notice::Down(Outage::PeerLost)]);
     bench.run_ms(60_000);
     bench.sent.clear();
     bench.hear(PEER, &identified);
     bench.run_ms(0);
     assert_eq!(confirm_all(&mut bench, 7, 0.0), 1, "not only after a pause");
-    assert_eq!(told(&mut bench), [Told::Up(None)]);
+    assert_eq!(notices(&mut bench), [Notice::Up(None)]);
 }
 
 #[test]
@@ -316,8 +319,8 @@ fn a_peer_that_speaks_again_after_a_silence_is_asked_at_once_and_not_for_every_w
     assert!(bench.sent::<CreateEvent>().len() <= 1);
     confirm(&mut bench, asked[0].request_id, 7, 10.0);
     assert_eq!(
-        told(&mut bench)[2..],
-        [Told::Up(Some(10))],
+        notices(&mut bench)[2..],
+        [Notice::Up(Some(10))],
         "after the report and its end"
     );
 }
@@ -333,12 +336,12 @@ fn a_peer_that_restarted_and_does_not_offer_the_report_yet_is_asked_again() {
     };
     bench.hear(PEER, &reject);
     assert!(matches!(
-        told(&mut bench)[..],
-        [Told::Down(Outage::Refused(_))]
+        notices(&mut bench)[..],
+        [Notice::Down(Outage::Refused(_))]
     ));
     bench.run_ms(5200);
     assert_eq!(confirm_all(&mut bench, 7, 0.0), 1);
-    assert_eq!(told(&mut bench), [Told::Up(None)]);
+    assert_eq!(notices(&mut bench), [Notice::Up(None)]);
 }
 
 #[test]
@@ -412,12 +415,12 @@ fn a_first_report_that_comes_four_times_loses_nothing_and_cancels_nothing() {
     }
     bench.run_ms(200);
     fire(&mut bench, 0, 4);
-    let all = told(&mut bench);
+    let all = notices(&mut bench);
     assert_eq!(all.len(), 1 + 5, "{all:?}");
     assert!(
         all[1..]
             .iter()
-            .all(|news| *news == Told::Report { lost: 0 })
+            .all(|news| *news == Notice::Report { lost: 0 })
     );
     assert_eq!(bench.sent::<CancelEvent>(), []);
 }
@@ -433,7 +436,7 @@ fn an_event_that_nobody_wants_is_cancelled_but_not_for_every_copy() {
     assert_eq!(cancelled.len(), 1);
     assert_eq!(cancelled[0].event_id, 9);
     confirm(&mut bench, cancelled[0].request_id, 9, 0.0);
-    assert_eq!(told(&mut bench), []);
+    assert_eq!(notices(&mut bench), []);
     bench.run_ms(10_000);
     assert_eq!(bench.sent::<CancelEvent>(), []);
 }
@@ -470,7 +473,7 @@ fn what_is_dropped_is_cancelled_until_that_is_confirmed() {
     confirm(&mut bench, cancelled[0].request_id, 7, 0.0);
     bench.run_ms(60_000);
     assert_eq!(bench.sent, []);
-    assert_eq!(told(&mut bench), []);
+    assert_eq!(notices(&mut bench), []);
 }
 
 #[test]

@@ -25,8 +25,7 @@ pub(crate) struct Definitions {
 
 /// Every message definition of ours.
 pub(crate) fn built_in() -> Dictionary {
-    Dictionary::new()
-        .with_messages(jaus_vehicle::messages::registry())
+    Dictionary::of(jaus_vehicle::messages::registry())
         .with_reference_architecture(jaus_ra::messages::registry(), jaus_ra::messages::decode)
         .with_catalogue()
 }

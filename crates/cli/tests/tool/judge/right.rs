@@ -1,18 +1,31 @@
-//! A component of the library's own core services passes every applicable step.
+//! Components of the library pass every applicable step.
 
 use std::sync::mpsc;
 
-use jaus::component::{Component, Kind};
+use jaus::component::{Builder, Component, Kind};
 use jaus::link::Group;
 use jaus::node::{Config, Node};
 use jaus::service::Management;
+use jaus_vehicle::ground::StageBoard;
 
 use crate::judge::peer::network;
 use crate::support::run;
 
-/// Judges a component that has Management, in both forms.
 #[test]
 fn the_core_services_pass_every_step_that_they_are_in() {
+    let management = |component: Builder| component.management(Management::default());
+    judge(management, &["--only", "A1-A3,B1-B26"]);
+}
+
+#[test]
+fn a_service_of_the_ground_vehicle_passes_its_steps() {
+    let stage = |component: Builder| component.offer(StageBoard::default().service());
+    let judged = judge(stage, &["--service", "Stage"]);
+    assert!(judged.contains("QueryStage is answered"), "{judged}");
+}
+
+/// Judges a component with these services, and returns the report: no step may fail.
+fn judge(services: fn(Builder) -> Builder, arguments: &[&str]) -> String {
     let flags = network();
     let group: Group = flags.last().unwrap().parse().unwrap();
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -23,18 +36,15 @@ fn the_core_services_pass_every_step_that_they_are_in() {
     let (ready, is_ready) = mpsc::channel();
     runtime.spawn(async move {
         let node = Node::start(Config::loopback(105, 1).group(group)).unwrap();
-        let component = Component::builder(Kind::Vehicle, "Rover")
-            .management(Management::default())
-            .attach(&node, 1)
-            .unwrap();
+        let component = services(Component::builder(Kind::Vehicle, "Rover"));
+        let component = component.attach(&node, 1).unwrap();
         ready.send(()).unwrap();
         std::future::pending::<()>().await;
         drop(component);
     });
     is_ready.recv().unwrap();
     let network: Vec<&str> = flags.iter().map(String::as_str).collect();
-    let judge = ["judge", "105.1.1", "--only", "A1-A3,B1-B26"];
-    let judged = run(&[&judge, &*network].concat(), b"");
+    let judged = run(&[&["judge", "105.1.1"], arguments, &*network].concat(), b"");
     assert_eq!(
         (judged.status, &*judged.stderr),
         (0, ""),
@@ -42,5 +52,5 @@ fn the_core_services_pass_every_step_that_they_are_in() {
         judged.stdout
     );
     assert!(judged.stdout.contains(" 0 failed, "), "{}", judged.stdout);
-    println!("{}", judged.stdout);
+    judged.stdout
 }

@@ -8,10 +8,10 @@ use super::Proxy;
 use super::codes::{RESET, SET_SPEED};
 use super::listing::refuse;
 use super::ra_client::RaClient;
-use super::target::{Target, places};
+use super::target::{RaRequest, Target, places};
+use crate::RaId;
 use crate::gateway::counters::{Counter, Tally};
 use crate::gateway::course::{Entries, Want};
-use crate::{Message, RaId};
 use jaus::codec::Message as _;
 use jaus::endpoint::Received;
 use jaus::messages::mobility::ReportActiveElement;
@@ -22,39 +22,35 @@ impl RaClient {
     const MOST_ENTRIES: usize = 16;
 
     /// Handles a message of the RA component that sets a place or a speed.
-    pub(super) fn enter(
-        &mut self,
-        now: Instant,
-        request: &Message,
-        peer: Target,
-        stack: &mut Stack,
-        tally: &mut Tally,
-    ) -> bool {
-        let Some(places) = places(request, peer) else {
+    pub(super) fn enter(&mut self, request: &mut RaRequest<'_>) -> bool {
+        let RaRequest {
+            now, message, peer, ..
+        } = *request;
+        let Some(places) = places(message, peer) else {
             return false;
         };
-        let at = request.destination;
-        if request.code == RESET {
+        let at = message.destination;
+        if message.code == RESET {
             self.entries.remove(&at);
             return false;
         }
-        if request.code != places.set && request.code != SET_SPEED {
+        if message.code != places.set && message.code != SET_SPEED {
             return false;
         }
         let is_new = !self.entries.contains_key(&at);
         if is_new && self.entries.len() >= Self::MOST_ENTRIES {
-            tally.refuse(now, Counter::TooManyWaiting, request.code, request.source);
+            request.refuse(Counter::TooManyWaiting);
             return true;
         }
-        tally.add(Counter::CommandsFromRa);
+        request.tally.add(Counter::CommandsFromRa);
         let patience = self.patience.interval * self.patience.tries;
         let new = || (peer, Entries::new(places, patience));
         let (_, entries) = self.entries.entry(at).or_insert_with(new);
-        match request.code == SET_SPEED {
-            true => entries.handle_speed(now, request.code, &request.data),
-            false => entries.handle_set(now, &request.data),
+        match message.code == SET_SPEED {
+            true => entries.handle_speed(now, message.code, &message.data),
+            false => entries.handle_set(now, &message.data),
         }
-        self.follow_entries(now, at, stack, tally);
+        self.follow_entries(now, at, request.stack, request.tally);
         true
     }
 

@@ -10,7 +10,7 @@ use bytes::Bytes;
 
 use super::ra_client::RaClient;
 use super::ra_event::RaEvent;
-use super::target::Target;
+use super::target::{RaRequest, Target};
 use crate::Message;
 use crate::gateway::convert::{self, Words};
 use crate::gateway::counters::{Counter, Tally};
@@ -26,33 +26,26 @@ use jaus::service::{Stack, SubscriptionId, SubscriptionNews, Topic, When, code_o
 
 impl RaClient {
     /// Handles an event request of the RA component.
-    pub(super) fn handle_event_request(
-        &mut self,
-        now: Instant,
-        request: &Message,
-        peer: Target,
-        stack: &mut Stack,
-        tally: &mut Tally,
-    ) -> bool {
-        let read = match request.code {
-            CreateEvent::CODE => request.body().map(|create: CreateEvent| {
-                self.create_event(now, (request, None), peer, &create, stack, tally);
+    pub(super) fn handle_event_request(&mut self, request: &mut RaRequest<'_>) -> bool {
+        let RaRequest { now, message, .. } = *request;
+        let read = match message.code {
+            CreateEvent::CODE => message.body().map(|create: CreateEvent| {
+                self.create_event(request, None, &create);
             }),
-            UpdateEvent::CODE => request.body().map(|update: UpdateEvent| {
+            UpdateEvent::CODE => message.body().map(|update: UpdateEvent| {
                 let id = update.event_id_rec.event_id;
-                let create = as_create(update);
-                self.create_event(now, (request, Some(id)), peer, &create, stack, tally);
+                self.create_event(request, Some(id), &as_create(update));
             }),
-            CancelEvent::CODE => request.body().map(|cancel: CancelEvent| {
-                self.cancel_events(now, request, &cancel, stack);
+            CancelEvent::CODE => message.body().map(|cancel: CancelEvent| {
+                self.cancel_events(now, message, &cancel, request.stack);
             }),
-            QueryEvents::CODE => request.body().map(|query: QueryEvents| {
-                self.tell_events(request, &query);
+            QueryEvents::CODE => message.body().map(|query: QueryEvents| {
+                self.tell_events(message, &query);
             }),
             _ => return false,
         };
         if let Err(why) = read {
-            convert::refuse(now, tally, request.code, &why.into());
+            convert::refuse(now, request.tally, message.code, &why.into());
         }
         true
     }
@@ -60,15 +53,12 @@ impl RaClient {
     /// Creates an event; with a number, replaces that one.
     fn create_event(
         &mut self,
-        now: Instant,
-        (request, replaced): (&Message, Option<u8>),
-        peer: Target,
+        request: &mut RaRequest<'_>,
+        replaced: Option<u8>,
         create: &CreateEvent,
-        stack: &mut Stack,
-        tally: &mut Tally,
     ) {
         let wanted = create.create_event_rec;
-        let made = self.subscribe_event(now, (request, replaced), peer, create, stack);
+        let made = self.subscribe_event(request, replaced, create);
         if let Err(code) = made {
             let counter = match code {
                 ResponseCode::MESSAGE_NOT_SUPPORTED => Counter::NoCounterpart,
@@ -76,39 +66,41 @@ impl RaClient {
                 _ => Counter::NotConverted,
             };
             let why = format_args!("event of type {}: {code:?}", wanted.event_type.0);
-            tally.refuse(now, counter, wanted.report_code, why);
+            let RaRequest { now, message, .. } = *request;
+            request.tally.refuse(now, counter, wanted.report_code, why);
             let id = replaced.unwrap_or_default();
-            self.answer_event(request, (wanted, id), None, code);
+            self.answer_event(message, (wanted, id), None, code);
         }
     }
 
     fn subscribe_event(
         &mut self,
-        now: Instant,
-        (request, replaced): (&Message, Option<u8>),
-        peer: Target,
+        request: &mut RaRequest<'_>,
+        replaced: Option<u8>,
         create: &CreateEvent,
-        stack: &mut Stack,
     ) -> Result<(), ResponseCode> {
-        let at = request.destination;
+        let RaRequest {
+            now, message, peer, ..
+        } = *request;
+        let at = message.destination;
         let words = self.words(at, peer.minor);
         let topic = topic(create, peer, &words)?;
         let same = |it: &RaEvent| it.at == at && it.topic == topic;
         let known = self.events.values_mut().find(|it| same(it));
         if let Some(known) = known.filter(|it| replaced.is_none_or(|id| id == it.id)) {
             // Repeated, because the answer got lost.
-            known.request = request.clone();
+            known.request = message.clone();
             known.wanted = create.create_event_rec;
             let (wanted, id, confirmed) = (known.wanted, known.id, known.confirmed);
             if confirmed {
                 let hz = hz_of(&topic);
-                self.answer_event(request, (wanted, id), hz, ResponseCode::SUCCESSFUL);
+                self.answer_event(message, (wanted, id), hz, ResponseCode::SUCCESSFUL);
             }
             return Ok(());
         }
         let of_number = |id: u8| move |it: &RaEvent| it.at == at && it.id == id;
         if let Some(id) = replaced
-            && !self.end_events(now, of_number(id), stack)
+            && !self.end_events(now, of_number(id), request.stack)
         {
             return Err(ResponseCode::INVALID_EVENT);
         }
@@ -116,12 +108,12 @@ impl RaClient {
         let free = replaced.or_else(|| (0..=u8::MAX).find(is_free));
         let free = free.filter(|_| self.events.len() < Self::MOST_EVENTS);
         let id = free.ok_or(ResponseCode::CONNECTION_REFUSED)?;
-        let subscription = stack.subscribe(now, &topic, self.patience);
+        let subscription = request.stack.subscribe(now, &topic, self.patience);
         let subscription = subscription.map_err(|_| ResponseCode::CONNECTION_REFUSED)?;
         let event = RaEvent {
             id,
             at,
-            request: request.clone(),
+            request: message.clone(),
             wanted: create.create_event_rec,
             topic,
             words,

@@ -15,9 +15,9 @@ use super::codes::{RESET, SET_EMERGENCY, SHUTDOWN, STANDBY, STATUS};
 use super::motion::moves;
 use super::ra_client::RaClient;
 use super::stop;
-use super::target::Target;
+use super::target::{RaRequest, Target};
 use crate::Message;
-use crate::gateway::counters::{Counter, Tally};
+use crate::gateway::counters::Counter;
 use crate::ids::RaComponent;
 use jaus::messages::core::Standby;
 use jaus::service::{MotionGuard, MotionPolicy, Stack, StopCause, Validity};
@@ -134,20 +134,15 @@ impl RaClient {
 
     /// Refuses a command of a client without control and notifies it: it may have had control
     /// through an earlier gateway with our id, and must request control again.
-    pub(super) fn refuse_uncontrolled(
-        &mut self,
-        now: Instant,
-        request: &Message,
-        peer: Target,
-        tally: &mut Tally,
-    ) -> bool {
-        if self.controls(peer) {
+    pub(super) fn refuse_uncontrolled(&mut self, request: &mut RaRequest<'_>) -> bool {
+        if self.controls(request.peer) {
             return false;
         }
-        tally.refuse(now, Counter::NotInControl, request.code, request.source);
+        request.refuse(Counter::NotInControl);
+        let now = request.now;
         if self.rejected.is_none_or(|at| now >= at + Self::REJECTION) {
             self.rejected = Some(now);
-            self.reject_control(request);
+            self.reject_control(request.message);
         }
         true
     }

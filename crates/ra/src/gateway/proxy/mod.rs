@@ -49,6 +49,7 @@ use self::ready::Readiness;
 pub(super) use self::ready::status;
 use self::streams::Streams;
 use self::subscribed::hz_of;
+use self::target::RaRequest;
 pub(super) use self::target::Target;
 use self::waiting::{Held, Relayed};
 use super::convert::{self, Ids, Words};
@@ -296,7 +297,13 @@ impl Proxy {
             let Self {
                 ra_client, stack, ..
             } = self;
-            ra_client.handle_ra(now, message, target, stack, tally);
+            ra_client.handle_ra(&mut RaRequest {
+                now,
+                message,
+                peer: target,
+                stack,
+                tally,
+            });
         } else {
             self.handle_for_us(now, message, tally);
         }

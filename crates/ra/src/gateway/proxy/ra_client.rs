@@ -23,7 +23,7 @@ use super::codes::{
 };
 use super::hold::{ClientLife, Hold};
 use super::ra_event::RaEvent;
-use super::target::{Target, element_query, place_report, places};
+use super::target::{RaRequest, Target, element_query, place_report, places};
 use crate::connection::{ConnectionId, Connections, Request, ResponseCode};
 use crate::convert::Refusal;
 use crate::messages::ra33::CreateServiceConnection;
@@ -138,74 +138,58 @@ impl RaClient {
     }
 
     /// Handles a message of the RA component to a JAUS component.
-    pub(super) fn handle_ra(
-        &mut self,
-        now: Instant,
-        request: &Message,
-        peer: Target,
-        stack: &mut Stack,
-        tally: &mut Tally,
-    ) {
-        match request.code {
-            REQUEST_CONTROL => self.request_control(now, request, peer, stack, tally),
-            RELEASE_CONTROL => self.release_control(now, peer.id, stack),
+    pub(super) fn handle_ra(&mut self, request: &mut RaRequest<'_>) {
+        match request.message.code {
+            REQUEST_CONTROL => self.request_control(request),
+            RELEASE_CONTROL => self.release_control(request.now, request.peer.id, request.stack),
             // Answers to requests that JAUS components never send to RA components.
-            CONFIRM_CONTROL | REJECT_CONTROL => {
-                tally.refuse(now, Counter::Unasked, request.code, request.source);
-            }
-            _ => self.pass_on(now, request, peer, stack, tally),
+            CONFIRM_CONTROL | REJECT_CONTROL => request.refuse(Counter::Unasked),
+            _ => self.pass_on(request),
         }
     }
 
-    fn pass_on(
-        &mut self,
-        now: Instant,
-        request: &Message,
-        peer: Target,
-        stack: &mut Stack,
-        tally: &mut Tally,
-    ) {
-        let drives = is_management(request.code) || matches!(request.code, 0x0400..=0x04FF);
-        if drives
-            && needs_control(request.code)
-            && self.refuse_uncontrolled(now, request, peer, tally)
-        {
+    fn pass_on(&mut self, request: &mut RaRequest<'_>) {
+        let RaRequest {
+            now, message, peer, ..
+        } = *request;
+        let drives = is_management(message.code) || matches!(message.code, 0x0400..=0x04FF);
+        if drives && needs_control(message.code) && self.refuse_uncontrolled(request) {
             return;
         }
-        if self.enter(now, request, peer, stack, tally)
-            || self.handle_event_request(now, request, peer, stack, tally)
-        {
+        if self.enter(request) || self.handle_event_request(request) {
             return;
         }
-        let words = self.words(request.destination, peer.minor);
-        let place = places(request, peer).filter(|it| it.query == request.code);
-        let payload = match place.and_then(|places| element_query(places, request)) {
+        let words = self.words(message.destination, peer.minor);
+        let place = places(message, peer).filter(|it| it.query == message.code);
+        let payload = match place.and_then(|places| element_query(places, message)) {
             Some(query) => Ok(query),
-            None => words.to_jaus(request.code, &request.data),
+            None => words.to_jaus(message.code, &message.data),
         };
         let payload = match payload {
             Ok(payload) => payload,
-            Err(refusal) => return convert::refuse(now, tally, request.code, &refusal),
+            Err(refusal) => return convert::refuse(now, request.tally, message.code, &refusal),
         };
         let Some(report) = code_of(&payload).and_then(pairs::report_of) else {
-            tally.add(Counter::CommandsFromRa);
-            self.note_setpoint(now, (request, &payload), peer, stack);
-            return stack.send_octets(peer.id, payload);
+            request.tally.add(Counter::CommandsFromRa);
+            self.note_setpoint(now, (message, &payload), peer, request.stack);
+            return request.stack.send_octets(peer.id, payload);
         };
         let same = |it: &Message| {
-            it.destination == request.destination
-                && it.code == request.code
-                && it.data == request.data
+            it.destination == message.destination
+                && it.code == message.code
+                && it.data == message.data
         };
         if self.asked.values().any(|(it, _)| same(it)) {
-            return tally.add(Counter::Repeated);
+            return request.tally.add(Counter::Repeated);
         }
         if self.asked.len() >= Self::MOST_ASKED {
-            return tally.refuse(now, Counter::TooManyWaiting, request.code, request.source);
+            return request.refuse(Counter::TooManyWaiting);
         }
-        tally.add(Counter::QueriesFromRa);
-        let inquiry = stack.ask(now, peer.id, payload, report, self.patience);
-        self.asked.insert(inquiry, (request.clone(), peer));
+        request.tally.add(Counter::QueriesFromRa);
+        let inquiry = request
+            .stack
+            .ask(now, peer.id, payload, report, self.patience);
+        self.asked.insert(inquiry, (message.clone(), peer));
     }
 
     /// Handles the answer to a query, or its timeout.
@@ -342,39 +326,38 @@ impl RaClient {
         }
     }
 
-    fn request_control(
-        &mut self,
-        now: Instant,
-        request: &Message,
-        peer: Target,
-        stack: &mut Stack,
-        tally: &mut Tally,
-    ) {
-        let Some(&authority) = request.data.first() else {
-            return tally.refuse(now, Counter::NotConverted, request.code, request.source);
+    fn request_control(&mut self, request: &mut RaRequest<'_>) {
+        let RaRequest {
+            now, message, peer, ..
+        } = *request;
+        let Some(&authority) = message.data.first() else {
+            return request.refuse(Counter::NotConverted);
         };
         if let Some(held_control) = self
             .held_controls
             .values_mut()
             .find(|it| it.peer == peer.id)
         {
-            held_control.request = request.clone();
+            held_control.request = message.clone();
             if held_control.held {
-                self.confirm_control(request);
+                self.confirm_control(message);
             }
             return;
         }
         if self.is_closed {
-            return self.reject_control(request);
+            return self.reject_control(message);
         }
         if self.held_controls.len() >= Self::MOST_GRIPS {
-            tally.refuse(now, Counter::TooManyWaiting, request.code, request.source);
-            return self.reject_control(request);
+            request.refuse(Counter::TooManyWaiting);
+            return self.reject_control(message);
         }
-        match stack.request_control(now, peer.id, authority, self.patience) {
+        match request
+            .stack
+            .request_control(now, peer.id, authority, self.patience)
+        {
             Ok(id) => {
                 let held_control = HeldControl {
-                    request: request.clone(),
+                    request: message.clone(),
                     peer: peer.id,
                     held: false,
                     hold: Hold::new(),
@@ -382,8 +365,10 @@ impl RaClient {
                 self.held_controls.insert(id, held_control);
             }
             Err(why) => {
-                tally.refuse(now, Counter::NotInControl, request.code, why);
-                self.reject_control(request);
+                request
+                    .tally
+                    .refuse(now, Counter::NotInControl, message.code, why);
+                self.reject_control(message);
             }
         }
     }

@@ -1,14 +1,18 @@
 //! A JAUS component as an RA component addresses it, and its list elements as numbered places of
 //! the Reference Architecture.
 
+use std::time::Instant;
+
 use bytes::Bytes;
 
 use crate::Message;
 use crate::convert::{Element, Places, Refusal};
+use crate::gateway::counters::{Counter, Tally};
 use crate::ids::RaComponent;
 use jaus::address::JausId;
 use jaus::codec::Message as _;
 use jaus::messages::core::{QueryElement, ReportElement};
+use jaus::service::Stack;
 
 /// A JAUS component addressed by an RA component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +23,23 @@ pub(in crate::gateway) struct Target {
     pub(in crate::gateway) minor: u8,
     /// Whether it executes a list of places.
     pub(in crate::gateway) lists: bool,
+}
+
+/// A message of an RA component to a JAUS component, and what its handling needs.
+pub(super) struct RaRequest<'a> {
+    pub(super) now: Instant,
+    pub(super) message: &'a Message,
+    pub(super) peer: Target,
+    pub(super) stack: &'a mut Stack,
+    pub(super) tally: &'a mut Tally,
+}
+
+impl RaRequest<'_> {
+    /// Counts the message as refused.
+    pub(super) fn refuse(&mut self, counter: Counter) {
+        let Message { code, source, .. } = *self.message;
+        self.tally.refuse(self.now, counter, code, source);
+    }
 }
 
 /// The places of a JAUS driver, if it has a list.

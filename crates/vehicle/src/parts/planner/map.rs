@@ -1,19 +1,16 @@
-//! Fetches the map from the knowledge store in tiles, and the pose from the pose sensor.
+//! Fetches the map from the knowledge store, and the pose from the pose sensor.
 
 use std::sync::Arc;
 
 use super::{find_soon, hand_over::in_words};
+use crate::ground::{RasterEdition, fetch_cells};
 use crate::messages::ground::report_raster_maps::MapRec;
-use crate::messages::ground::{
-    QueryRasterCells, QueryRasterMaps, ReportRasterCells, ReportRasterMaps, raster_maps,
-};
+use crate::messages::ground::{QueryRasterMaps, ReportRasterMaps, raster_maps};
 use crate::mission::{Point, Terrain};
 use jaus::address::JausId;
 use jaus::component::Component;
 use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
 
-/// The most cells requested at once.
-const TILE: usize = 1 << 16;
 /// Number of attempts to fetch a map that changes during the transfer.
 const TRIES: u32 = 3;
 
@@ -54,7 +51,14 @@ pub(in crate::parts) async fn fetch_from(
         {
             return Ok(known.clone());
         }
-        if let Some(cells) = fetch_cells(component, store, &about).await? {
+        let edition = RasterEdition {
+            map: about.map,
+            revision: about.revision,
+            rows: about.rows,
+            columns: about.columns,
+        };
+        let cells = fetch_cells(component, store, edition).await;
+        if let Some(cells) = cells.map_err(in_words)? {
             tracing::info!(
                 "map \"{}\" of {store}, {} x {} cells, revision {}",
                 about.name.to_string_lossy(),
@@ -96,38 +100,6 @@ fn choose(maps: Vec<MapRec>, name: &str, store: JausId) -> Result<MapRec, String
             names.join(", ")
         )),
     }
-}
-
-/// Fetches all cells; `None` if they change during the transfer.
-async fn fetch_cells(
-    component: &Component,
-    store: JausId,
-    about: &MapRec,
-) -> Result<Option<Vec<u8>>, String> {
-    let columns = usize::from(about.columns);
-    let at_once = (TILE / columns.max(1)).clamp(1, usize::from(u16::MAX)) as u16;
-    let mut cells = Vec::new();
-    let mut row = 0;
-    while row < about.rows {
-        let rows = at_once.min(about.rows - row);
-        let query = QueryRasterCells {
-            map: about.map,
-            row,
-            column: 0,
-            rows,
-            columns: about.columns,
-        };
-        let tile: ReportRasterCells = component.query(store, &query).await.map_err(in_words)?;
-        let is_asked =
-            (tile.map, tile.row, tile.rows, tile.columns) == (about.map, row, rows, about.columns);
-        let is_full = tile.cells.len() == usize::from(rows) * columns;
-        if !is_asked || !is_full || tile.revision != about.revision {
-            return Ok(None);
-        }
-        cells.extend_from_slice(&tile.cells);
-        row += rows;
-    }
-    Ok(Some(cells))
 }
 
 /// Fetches the vehicle's position.

@@ -8,11 +8,12 @@ use bytes::Bytes;
 
 use jaus::address::JausId;
 use jaus::codec::Message;
-use jaus::messages;
 use jaus::messages::core::Event;
 use jaus::node::{Passage, Way};
 use jaus::service::code_of;
 use jaus::wire::{Acknowledgement, Frame};
+
+use crate::messages::registry;
 
 /// A message on the wire.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -68,9 +69,8 @@ fn name(code: u16, payload: &Bytes) -> String {
 }
 
 fn plain_name(code: u16) -> String {
-    let ours = crate::messages::registry();
-    let mut known = messages::registry().by_code(code).chain(ours.by_code(code));
-    known
+    registry()
+        .by_code(code)
         .next()
         .map_or_else(|| format!("{code:04X}h"), |info| info.name.to_owned())
 }

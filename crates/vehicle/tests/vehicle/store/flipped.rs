@@ -39,7 +39,7 @@ fn flip_bits(test: &str, image: &[u8]) {
     let mut bits: Vec<usize> = (0..HEADER * 8).collect();
     for (page, octets) in image.chunks(PAGE).enumerate() {
         if octets.iter().any(|&octet| octet != 0) {
-            let any_bit = || (page * PAGE) * 8 + chance.below(PAGE as u64 * 8) as usize;
+            let any_bit = || (page * PAGE) * 8 + chance.below(PAGE * 8);
             bits.extend(std::iter::repeat_with(any_bit).take(cuts(60) as usize));
         }
     }

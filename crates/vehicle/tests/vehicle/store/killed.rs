@@ -20,7 +20,7 @@ fn nothing_acknowledged_is_lost_when_the_writer_is_killed() {
     let mut last = 0;
     for cut in 0..cuts(25) {
         // The first instants are those in which the file is made or put right.
-        let instant = Duration::from_micros(chance.below(60_000));
+        let instant = Duration::from_micros(chance.number() % 60_000);
         let acknowledged = write_until_killed(&file, instant).max(last);
         let world = World::open(&file).unwrap_or_else(|error| panic!("cut {cut}: {error}"));
         last = if world.rasters().is_empty() {

@@ -4,9 +4,10 @@
 use std::io;
 use std::sync::{Arc, Mutex};
 
+use jaus_test_kit::random::Random;
 use jaus_vehicle::world::{StorageBackend, World};
 
-use crate::store::{Chance, chance, cuts, ledger};
+use crate::store::{chance, cuts, ledger};
 
 /// What a disk writes whole.
 const SECTOR: usize = 512;
@@ -17,7 +18,7 @@ fn nothing_acknowledged_is_lost_when_the_power_fails() {
     let mut image = first_image();
     let mut last = 0;
     for cut in 0..cuts(60) {
-        let disk = Disk::new(image, 1 + chance.below(120));
+        let disk = Disk::new(image, 1 + chance.number() % 120);
         let acknowledged = write_until_cut(&disk, last);
         image = disk.after_the_cut(&mut chance);
         let spare = Disk::new(image.clone(), u64::MAX);
@@ -90,14 +91,14 @@ impl Disk {
     }
 
     /// What is found once there is power again.
-    fn after_the_cut(&self, chance: &mut Chance) -> Vec<u8> {
+    fn after_the_cut(&self, chance: &mut Random) -> Vec<u8> {
         let mut state = self.0.lock().unwrap();
         let mut image = std::mem::take(&mut state.kept);
         let mut unsure = std::mem::take(&mut state.unsure);
         // In half of the cuts the order is any.
         if chance.below(2) == 0 {
             for i in (1..unsure.len()).rev() {
-                unsure.swap(i, chance.below(i as u64 + 1) as usize);
+                unsure.swap(i, chance.below(i + 1));
             }
         }
         for write in unsure {
@@ -114,7 +115,7 @@ impl Disk {
 }
 
 /// All of it, nothing, or some sectors.
-fn tear(image: &mut Vec<u8>, offset: usize, octets: &[u8], chance: &mut Chance) {
+fn tear(image: &mut Vec<u8>, offset: usize, octets: &[u8], chance: &mut Random) {
     let kind = chance.below(3);
     let mut at = offset;
     for part in octets.chunks(SECTOR) {

@@ -56,6 +56,9 @@ async fn obey(mut orders: UnboundedReceiver<String>) -> Result<Outcome, Failure>
         let answer = serde_json::to_string(&answer).map_err(Failure::of)?;
         Output::new().line(answer)?;
     }
+    if let Some(components) = running.components {
+        components.detach().await;
+    }
     if let Some(node) = running.node {
         let socket = match &node.config().local {
             jaus::link::local::Local::At(Address::Path(path)) => Some(path.clone()),

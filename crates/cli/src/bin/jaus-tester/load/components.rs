@@ -12,6 +12,7 @@ use bytes::{BufMut, Bytes, BytesMut};
 use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::node::{Port, Sender};
+use tokio::task::JoinSet;
 use tokio::time::MissedTickBehavior;
 
 use super::process::{Acknowledger, Pace, Run, Tally};
@@ -41,6 +42,7 @@ pub(super) struct Components {
     step: Mutex<Step>,
     /// Start of the send times.
     origin: Instant,
+    receivers: Mutex<JoinSet<()>>,
 }
 
 /// Sender of one component.
@@ -80,11 +82,24 @@ impl Components {
             members: members.collect(),
             step: Mutex::default(),
             origin: Instant::now(),
+            receivers: Mutex::default(),
         });
+        let mut receivers = locked(&components.receivers);
         for (member, port) in ports.into_iter().enumerate() {
-            tokio::spawn(components.clone().receive(member, port));
+            receivers.spawn(components.clone().receive(member, port));
         }
+        drop(receivers);
         components
+    }
+
+    /// Detaches all components, and waits until their nodes have been notified: a node warns of
+    /// connections that close without notice.
+    pub(super) async fn detach(&self) {
+        let mut receivers = std::mem::take(&mut *locked(&self.receivers));
+        receivers.shutdown().await;
+        for member in &self.members {
+            member.sender.disconnected().await;
+        }
     }
 
     /// Sets the partner of each component.

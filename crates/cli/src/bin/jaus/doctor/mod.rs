@@ -19,7 +19,7 @@ use self::peer::{Options, Target};
 use jaus::node::Config;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
-use jaus_cli::output::{Output, colours_wanted, say};
+use jaus_cli::output::{Output, colours_wanted, counted, say};
 use jaus_cli::runtime;
 
 /// Find out why nodes do not find each other
@@ -162,10 +162,6 @@ impl Report {
                 "findings": findings,
             }))?;
         } else {
-            let counted = |count: usize, what: &str| match count {
-                1 => format!("1 {what}"),
-                _ => format!("{count} {what}s"),
-            };
             self.output.line(match (problems, warnings) {
                 (0, 0) => "\nAll is well.".to_owned(),
                 _ => format!(

@@ -5,12 +5,12 @@ use std::process::ExitCode;
 
 use clap::Args;
 use jaus_cli::failure::Failure;
-use jaus_cli::output::Output;
+use jaus_cli::output::{Output, counted};
 use jsidl::model::Location;
 use jsidl::{Diagnostic, Loaded, Severity};
 use serde_json::{Value, json};
 
-use super::definitions::{counted, load, own_findings, own_services, style};
+use super::definitions::{load, own_findings, own_services, style};
 
 /// Check service definitions: form, references, rules, state machines
 ///

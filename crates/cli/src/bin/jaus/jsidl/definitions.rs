@@ -68,12 +68,3 @@ pub(crate) fn style() -> Style {
             .map_or(Style::default().width, |(width, _)| usize::from(width.0)),
     }
 }
-
-/// For example `no errors`, `1 error`, `2 errors`.
-pub(crate) fn counted(count: usize, what: &str) -> String {
-    match count {
-        0 => format!("no {what}s"),
-        1 => format!("1 {what}"),
-        count => format!("{count} {what}s"),
-    }
-}

@@ -5,13 +5,13 @@ use std::process::ExitCode;
 
 use clap::Args;
 use jaus_cli::failure::Failure;
-use jaus_cli::output::Output;
+use jaus_cli::output::{Output, counted};
 use jsidl::diff::{Change, compare};
 use jsidl::model::Location;
 use jsidl::{Loaded, Severity, catalogue};
 use serde_json::{Value, json};
 
-use super::definitions::{complain, counted, load, own_findings};
+use super::definitions::{complain, load, own_findings};
 
 /// Compare two sets of service definitions, and tell whether the wire is affected
 ///

@@ -7,10 +7,10 @@ use std::process::ExitCode;
 
 use clap::Args;
 use jaus_cli::failure::Failure;
-use jaus_cli::output::{Output, say};
+use jaus_cli::output::{Output, counted, say};
 use jsidl::{Diagnostics, format};
 
-use super::definitions::{STANDARD_INPUT, complain, counted, standard_input};
+use super::definitions::{STANDARD_INPUT, complain, standard_input};
 
 /// Prefix of the JSIDL namespaces.
 const NAMESPACE: &str = "urn:jaus:jsidl:";

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use jaus_cli::failure::Failure;
-use jaus_cli::output::Output;
+use jaus_cli::output::{Output, counted};
 use jsidl::schema;
 
 use super::sources::{self, Sources};
@@ -39,10 +39,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     for (name, schema) in &files {
         sources::write(&arguments.output.join(name), &format!("{schema:#}\n"))?;
     }
-    let count = match files.len() {
-        1 => "1 schema".to_owned(),
-        n => format!("{n} schemas"),
-    };
+    let count = counted(files.len(), "schema");
     Output::new().line(format_args!("{}: {count}", arguments.output.display()))?;
     Ok(ExitCode::from(u8::from(!sound)))
 }

@@ -4,10 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use jaus_cli::failure::Failure;
+use jaus_cli::output::counted;
 use jsidl::model::Service;
 use jsidl::{Library, Loaded, Severity, catalogue};
 
-use super::definitions::{self, counted};
+use super::definitions;
 
 /// Loaded definitions; findings are printed on standard error.
 pub(super) struct Sources {

@@ -25,6 +25,7 @@ use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::output::{Output, say};
 use jaus_cli::runtime;
+use jaus_vehicle::messages::registry;
 use jaus_view::Dictionary;
 
 use judge_nodes::JudgeNodes;
@@ -65,7 +66,7 @@ pub(crate) struct Judge {
     address: Option<JausId>,
 
     /// How long an answer may take, in seconds
-    #[arg(long, default_value = "1.5", value_parser = seconds)]
+    #[arg(long, default_value = "1.5", value_parser = runtime::seconds)]
     limit: Duration,
 
     /// Carry out only these steps, and those that they rest on, such as A1,B14-B19
@@ -153,11 +154,6 @@ impl FromStr for Span {
     }
 }
 
-/// A number of seconds, with an optional s.
-fn seconds(text: &str) -> Result<Duration, String> {
-    runtime::seconds(text.strip_suffix('s').unwrap_or(text))
-}
-
 impl Judge {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         if self.list {
@@ -214,7 +210,7 @@ impl Judge {
     async fn judge(&self, address: JausId) -> Result<Outcome, Failure> {
         let (id, config) = self.network.for_own_node_as(MAIN, "jaus judge")?;
         let recording = self.record.as_deref().map(Recording::create).transpose()?;
-        let dictionary = Dictionary::new();
+        let dictionary = Dictionary::of(registry());
         let mut outputs = Outputs::open(self, &dictionary)?;
         let mut judge_nodes = JudgeNodes::start(id, config, address, recording)?;
         let Some(subject) = Subject::meet(&mut judge_nodes, address, self.limit).await? else {

@@ -396,9 +396,7 @@ fn name_of(octets: &Bytes) -> String {
     let Some(code) = super::judge_nodes::code_of(octets) else {
         return "a message without a code".to_owned();
     };
-    let known = jaus::messages::registry()
-        .iter()
-        .find(|info| info.code == code);
+    let known = jaus_vehicle::messages::registry().by_code(code).next();
     known.map_or_else(|| format!("{code:04X}h"), |info| info.name.to_owned())
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::output::Output;
+use jaus_cli::output::{Output, counted};
 
 use super::system::{Part, System};
 
@@ -34,17 +34,9 @@ pub(super) fn check(file: &Path, system: &System) -> Result<Outcome, Failure> {
             output.line(format_args!("    with {name}={value}"))?;
         }
     }
-    let parts = system.parts.len();
-    output.line(format_args!(
-        "{parts} {}, nothing is wrong",
-        parts_in_words(parts)
-    ))?;
+    let parts = counted(system.parts.len(), "part");
+    output.line(format_args!("{parts}, nothing is wrong"))?;
     Ok(Outcome::Done)
-}
-
-/// "part" or "parts".
-pub(super) const fn parts_in_words(count: usize) -> &'static str {
-    if count == 1 { "part" } else { "parts" }
 }
 
 /// The mistake that one of our own programs finds in its flags: it parses them before `--help`, and

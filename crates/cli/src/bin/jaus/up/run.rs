@@ -7,6 +7,7 @@
 use std::time::Instant;
 
 use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::output::counted;
 use nix::sys::signal::Signal;
 use tokio::signal::unix::{SignalKind, signal};
 
@@ -16,20 +17,19 @@ use super::status::{self, StatusFile, in_words};
 use super::supervisor::{Exit, News, Order, Supervisor};
 use super::system::{OURSELVES, System};
 use super::warden::Guard;
-use super::{Up, check};
+use super::Up;
 
 /// Runs a system until it ends.
 pub(super) async fn run(flags: &Up, system: System) -> Result<Outcome, Failure> {
     let names = system.parts.iter().map(|part| part.name.len());
     let width = names.max().unwrap_or_default().max(OURSELVES.len());
     let (console, mut printer) = Console::start(width)?;
-    let mut wishes = Wishes::new(flags)?;
+    let mut shutdown = Shutdown::new(flags)?;
     let mut ended = listen(SignalKind::child())?;
     let mut running = Running::new(flags, system, &console)?;
     drop(console);
-    let parts = running.system.parts.len();
-    let words = check::parts_in_words(parts);
-    running.say(&format!("{parts} {words}; Ctrl-C ends all"));
+    let parts = counted(running.system.parts.len(), "part");
+    running.say(&format!("{parts}; Ctrl-C ends all"));
     loop {
         running.settle();
         if running.supervisor.is_over() {
@@ -39,7 +39,7 @@ pub(super) async fn run(flags: &Up, system: System) -> Result<Outcome, Failure> 
         tokio::select! {
             _ = ended.recv() => running.reap().await,
             () = sleep_until(wake) => {}
-            () = wishes.next() => running.stop(),
+            () = shutdown.requested() => running.stop(),
             () = printer.closed(), if !running.unheard => {
                 running.unheard = true;
                 running.stop();
@@ -55,13 +55,13 @@ fn listen(kind: SignalKind) -> Result<tokio::signal::unix::Signal, Failure> {
     signal(kind).map_err(|error| Failure::new(format!("cannot listen for signals: {error}")))
 }
 
-/// Shutdown requests: signals and a time limit.
-struct Wishes {
+/// What ends a run from outside: signals and a time limit.
+struct Shutdown {
     signals: [tokio::signal::unix::Signal; 3],
     limit: Option<Instant>,
 }
 
-impl Wishes {
+impl Shutdown {
     fn new(flags: &Up) -> Result<Self, Failure> {
         let signals = [
             listen(SignalKind::interrupt())?,
@@ -72,7 +72,7 @@ impl Wishes {
         Ok(Self { signals, limit })
     }
 
-    async fn next(&mut self) {
+    async fn requested(&mut self) {
         let [interrupt, terminate, hangup] = &mut self.signals;
         tokio::select! {
             _ = interrupt.recv() => {}
@@ -97,7 +97,7 @@ struct Running<'f> {
     supervisor: Supervisor,
     /// One slot per part.
     children: Vec<Option<Child>>,
-    voices: Vec<PrefixedConsole>,
+    consoles: Vec<PrefixedConsole>,
     own: PrefixedConsole,
     guard: Guard,
     status: Option<StatusFile>,
@@ -111,14 +111,14 @@ impl<'f> Running<'f> {
         let restarts = system.parts.iter().map(|part| part.restart);
         let supervisor = Supervisor::new(Instant::now(), restarts, flags.grace);
         let names = system.parts.iter().map(|part| &part.name).enumerate();
-        let voices = names.map(|(number, name)| console.prefixed_console(name, Some(number)));
+        let consoles = names.map(|(number, name)| console.prefixed_console(name, Some(number)));
         let guard = Guard::start(flags.grace)
             .map_err(|error| Failure::new(format!("cannot start a second process: {error}")))?;
         Ok(Self {
             flags,
             supervisor,
             children: system.parts.iter().map(|_| None).collect(),
-            voices: voices.collect(),
+            consoles: consoles.collect(),
             own: console.prefixed_console(OURSELVES, None),
             guard,
             status: flags.status.clone().map(StatusFile::new),
@@ -167,7 +167,7 @@ impl<'f> Running<'f> {
     }
 
     fn start(&mut self, part: usize) {
-        let places = (self.system.parts.get(part), self.voices.get(part));
+        let places = (self.system.parts.get(part), self.consoles.get(part));
         let (Some(plan), Some(prefixed_console)) = places else {
             return;
         };

@@ -3,7 +3,7 @@
 use jaus::component::When;
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState};
 
-use super::{Outcome, Told};
+use super::{Outcome, RoleArguments};
 
 /// The query for the forward velocity alone, which whoever moves can tell.
 pub(super) const FORWARD: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
@@ -13,10 +13,10 @@ const ENOUGH: usize = 10;
 const HZ: f64 = 10.0;
 
 /// Subscribes to the velocity, and hears enough of it.
-pub(super) async fn periodic(told: &Told) -> Outcome {
-    let (_node, component) = told.component()?;
+pub(super) async fn periodic(arguments: &RoleArguments) -> Outcome {
+    let (_node, component) = arguments.component()?;
     let mut reports = component
-        .subscribe::<ReportVelocityState, _>(told.sensor(), &FORWARD, When::hz(HZ))
+        .subscribe::<ReportVelocityState, _>(arguments.sensor(), &FORWARD, When::hz(HZ))
         .await
         .map_err(|error| error.to_string())?;
     for _ in 0..ENOUGH {
@@ -34,12 +34,12 @@ pub(super) async fn periodic(told: &Told) -> Outcome {
 }
 
 /// Tells each report of the velocity, for ever.
-pub(super) async fn keep(told: &Told) -> Outcome {
-    let (_node, component) = told.component()?;
+pub(super) async fn keep(arguments: &RoleArguments) -> Outcome {
+    let (_node, component) = arguments.component()?;
     loop {
         // One that is not there yet is asked again.
         let subscribed = component
-            .subscribe::<ReportVelocityState, _>(told.sensor(), &FORWARD, When::hz(HZ))
+            .subscribe::<ReportVelocityState, _>(arguments.sensor(), &FORWARD, When::hz(HZ))
             .await;
         let mut reports = match subscribed {
             Ok(reports) => reports,

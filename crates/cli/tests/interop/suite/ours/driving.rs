@@ -8,7 +8,7 @@ use jaus::messages::mobility::{ReportVelocityState, SetWrenchEffort};
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::asking::FORWARD;
-use super::{Outcome, Told, operator};
+use super::{Outcome, RoleArguments, operator};
 
 /// Less and more authority.
 const AUTHORITIES: [u8; 2] = [100, 200];
@@ -18,7 +18,7 @@ const BEAT: Duration = Duration::from_millis(100);
 const EFFORT: f64 = 60.0;
 /// What is motion, in metres a second.
 const MOTION: f64 = 0.1;
-/// Different velocities that show that changes are told.
+/// Different velocities that show that changes are reported.
 const CHANGES: usize = 3;
 
 fn in_words(error: impl std::fmt::Display) -> String {
@@ -26,22 +26,22 @@ fn in_words(error: impl std::fmt::Display) -> String {
 }
 
 /// Takes control, loses it to somebody of more authority, who then gives it back.
-pub(super) async fn control(told: &Told) -> Outcome {
-    let (node, weak) = told.component()?;
-    let strong = operator(&node, told.colleague())?;
+pub(super) async fn control(arguments: &RoleArguments) -> Outcome {
+    let (node, weak) = arguments.component()?;
+    let strong = operator(&node, arguments.colleague())?;
     let mut held = weak
-        .control(told.other, AUTHORITIES[0])
+        .control(arguments.other, AUTHORITIES[0])
         .await
         .map_err(in_words)?;
-    controller_is(&weak, told, &weak).await?;
+    controller_is(&weak, arguments, &weak).await?;
     let stronger = strong
-        .control(told.other, AUTHORITIES[1])
+        .control(arguments.other, AUTHORITIES[1])
         .await
         .map_err(in_words)?;
     println!("lost as it must be: {}", held.lost().await);
-    controller_is(&weak, told, &strong).await?;
+    controller_is(&weak, arguments, &strong).await?;
     stronger.release().await;
-    let report = ask(&weak, told).await?;
+    let report = ask(&weak, arguments).await?;
     if report.subsystem_id != 0 {
         return Err(format!(
             "it was released, and still controlled by {report:?}"
@@ -50,15 +50,19 @@ pub(super) async fn control(told: &Told) -> Outcome {
     Ok(())
 }
 
-async fn ask(component: &Component, told: &Told) -> Result<ReportControl, String> {
+async fn ask(component: &Component, arguments: &RoleArguments) -> Result<ReportControl, String> {
     component
-        .query(told.other, &QueryControl {})
+        .query(arguments.other, &QueryControl {})
         .await
         .map_err(in_words)
 }
 
-async fn controller_is(component: &Component, told: &Told, wanted: &Component) -> Outcome {
-    let report = ask(component, told).await?;
+async fn controller_is(
+    component: &Component,
+    arguments: &RoleArguments,
+    wanted: &Component,
+) -> Outcome {
+    let report = ask(component, arguments).await?;
     let (id, found) = (
         wanted.id(),
         (report.subsystem_id, report.node_id, report.component_id),
@@ -72,13 +76,13 @@ async fn controller_is(component: &Component, told: &Told, wanted: &Component) -
 }
 
 /// Takes control, has it move, and stops it.
-pub(super) async fn drive(told: &Told) -> Outcome {
-    let (_node, component) = told.component()?;
-    let control = ready(&component, told).await?;
+pub(super) async fn drive(arguments: &RoleArguments) -> Outcome {
+    let (_node, component) = arguments.component()?;
+    let control = ready(&component, arguments).await?;
     push_until(&control, async {
         loop {
             let report: Result<ReportVelocityState, _> =
-                component.query(told.sensor(), &FORWARD).await;
+                component.query(arguments.sensor(), &FORWARD).await;
             let velocity = report.map_err(in_words)?.velocity_x_m_per_s();
             if velocity.is_some_and(|velocity| velocity > MOTION) {
                 println!("it moves at {velocity:?} m/s");
@@ -92,13 +96,13 @@ pub(super) async fn drive(told: &Told) -> Outcome {
 }
 
 /// Subscribes to the velocity on change, has it change, and hears of that.
-pub(super) async fn on_change(told: &Told) -> Outcome {
-    let (_node, component) = told.component()?;
+pub(super) async fn on_change(arguments: &RoleArguments) -> Outcome {
+    let (_node, component) = arguments.component()?;
     let mut reports = component
-        .subscribe::<ReportVelocityState, _>(told.sensor(), &FORWARD, When::OnChange)
+        .subscribe::<ReportVelocityState, _>(arguments.sensor(), &FORWARD, When::OnChange)
         .await
         .map_err(in_words)?;
-    let control = ready(&component, told).await?;
+    let control = ready(&component, arguments).await?;
     push_until(&control, async {
         let mut velocities = Vec::new();
         while velocities.len() < CHANGES {
@@ -114,9 +118,9 @@ pub(super) async fn on_change(told: &Told) -> Outcome {
 }
 
 /// Control over a vehicle that obeys.
-async fn ready(component: &Component, told: &Told) -> Result<Control, String> {
+async fn ready(component: &Component, arguments: &RoleArguments) -> Result<Control, String> {
     let control = component
-        .control(told.other, AUTHORITIES[0])
+        .control(arguments.other, AUTHORITIES[0])
         .await
         .map_err(in_words)?;
     control.resume().await.map_err(in_words)?;

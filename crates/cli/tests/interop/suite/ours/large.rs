@@ -8,7 +8,7 @@ use jaus::endpoint::Outgoing;
 use jaus::node::{Node, Port};
 use tokio::time::{interval, sleep, timeout};
 
-use super::{Outcome, Told};
+use super::{Outcome, RoleArguments};
 
 /// The code of a test message: user-defined (AS5710 leaves D000h and above to users), so that no
 /// service acts on it.
@@ -32,27 +32,27 @@ fn test(size: usize) -> Bytes {
 }
 
 /// Sends a message, gets it back as it was, and takes leave.
-pub(super) async fn send(told: &Told) -> Outcome {
-    let (node, port) = open(told)?;
-    let outcome = there_and_back(port, told).await;
+pub(super) async fn send(arguments: &RoleArguments) -> Outcome {
+    let (node, port) = open(arguments)?;
+    let outcome = there_and_back(port, arguments).await;
     node.shutdown().await;
     outcome
 }
 
-async fn there_and_back(mut port: Port, told: &Told) -> Outcome {
-    let is_acknowledged = told.by != "unacknowledged";
-    greet(&mut port, told).await?;
-    let message = test(told.size);
+async fn there_and_back(mut port: Port, arguments: &RoleArguments) -> Outcome {
+    let is_acknowledged = arguments.by != "unacknowledged";
+    greet(&mut port, arguments).await?;
+    let message = test(arguments.size);
     loop {
         let wait = if is_acknowledged {
-            deliver(&port, told, message.clone()).await?;
-            told.within
+            deliver(&port, arguments, message.clone()).await?;
+            arguments.within
         } else {
-            let outgoing = Outgoing::new(port.id(), told.other, message.clone());
+            let outgoing = Outgoing::new(port.id(), arguments.other, message.clone());
             port.send(outgoing).map_err(|error| error.to_string())?;
             AGAIN
         };
-        if let Ok(outcome) = timeout(wait, returns(&mut port, told, &message)).await {
+        if let Ok(outcome) = timeout(wait, returns(&mut port, arguments, &message)).await {
             outcome?;
             println!("{} octets there and back", message.len());
             return Ok(());
@@ -62,13 +62,13 @@ async fn there_and_back(mut port: Port, told: &Told) -> Outcome {
 }
 
 /// Has messages come back again and again, and tells of each.
-pub(super) async fn keep(told: &Told) -> Outcome {
-    let (_node, mut port) = open(told)?;
+pub(super) async fn keep(arguments: &RoleArguments) -> Outcome {
+    let (_node, mut port) = open(arguments)?;
     let message = test(GREETING);
     loop {
-        let outgoing = Outgoing::new(port.id(), told.other, message.clone());
+        let outgoing = Outgoing::new(port.id(), arguments.other, message.clone());
         port.send(outgoing).map_err(|error| error.to_string())?;
-        if let Ok(outcome) = timeout(AGAIN, returns(&mut port, told, &message)).await {
+        if let Ok(outcome) = timeout(AGAIN, returns(&mut port, arguments, &message)).await {
             outcome?;
             println!("report: it came back");
         } else {
@@ -80,12 +80,12 @@ pub(super) async fn keep(told: &Told) -> Outcome {
 
 /// Sends every test message back, acknowledged. Calls everybody now and then, as discovery does, so
 /// that who calls nobody knows where we are.
-pub(super) async fn echo(told: &Told) -> Outcome {
+pub(super) async fn echo(arguments: &RoleArguments) -> Outcome {
     let everywhere = "0.0.0.0".parse().map_err(|error| format!("{error}"))?;
-    let node = Node::start(told.config()?.tcp_listen(everywhere));
+    let node = Node::start(arguments.config()?.tcp_listen(everywhere));
     let node = node.map_err(|error| error.to_string())?;
     let mut port = node
-        .attach(told.id.component())
+        .attach(arguments.id.component())
         .map_err(|error| error.to_string())?;
     println!("listening");
     let mut calls = interval(CALL);
@@ -113,44 +113,44 @@ pub(super) async fn echo(told: &Told) -> Outcome {
     }
 }
 
-fn open(told: &Told) -> Result<(Node, Port), String> {
-    let config = if told.by == "tcp" {
-        let peer = format!("{}@{}:3794", told.other, told.address);
+fn open(arguments: &RoleArguments) -> Result<(Node, Port), String> {
+    let config = if arguments.by == "tcp" {
+        let peer = format!("{}@{}:3794", arguments.other, arguments.address);
         let peer = peer.parse().map_err(|error| format!("{peer}: {error}"))?;
-        told.config()?.without_udp().tcp_connect(peer)
+        arguments.config()?.without_udp().tcp_connect(peer)
     } else {
-        told.config()?
+        arguments.config()?
     };
     let node = Node::start(config).map_err(|error| error.to_string())?;
     let port = node
-        .attach(told.id.component())
+        .attach(arguments.id.component())
         .map_err(|error| error.to_string())?;
     Ok((node, port))
 }
 
 /// Makes both known to each other, so that what is large does not go to everybody.
-async fn greet(port: &mut Port, told: &Told) -> Outcome {
+async fn greet(port: &mut Port, arguments: &RoleArguments) -> Outcome {
     let greeting = test(GREETING);
     loop {
-        let outgoing = Outgoing::new(port.id(), told.other, greeting.clone());
+        let outgoing = Outgoing::new(port.id(), arguments.other, greeting.clone());
         port.send(outgoing).map_err(|error| error.to_string())?;
-        if let Ok(outcome) = timeout(AGAIN, returns(port, told, &greeting)).await {
+        if let Ok(outcome) = timeout(AGAIN, returns(port, arguments, &greeting)).await {
             return outcome;
         }
     }
 }
 
-async fn deliver(port: &Port, told: &Told, message: Bytes) -> Outcome {
-    let outgoing = Outgoing::new(port.id(), told.other, message);
+async fn deliver(port: &Port, arguments: &RoleArguments, message: Bytes) -> Outcome {
+    let outgoing = Outgoing::new(port.id(), arguments.other, message);
     port.deliver(outgoing)
         .await
         .map_err(|error| error.to_string())
 }
 
 /// Waits until the message has come back, and nothing else of its size.
-async fn returns(port: &mut Port, told: &Told, message: &Bytes) -> Outcome {
+async fn returns(port: &mut Port, arguments: &RoleArguments, message: &Bytes) -> Outcome {
     while let Some(received) = port.recv().await {
-        if received.source != told.other || received.payload.len() != message.len() {
+        if received.source != arguments.other || received.payload.len() != message.len() {
             continue;
         }
         if received.payload == *message {

@@ -17,9 +17,9 @@ use crate::suite::scripted;
 /// Says what went wrong, in a line.
 pub(crate) type Outcome = Result<(), String>;
 
-/// What a role is told on the command line: `KEY=VALUE` each.
+/// Arguments of a role on the command line: `KEY=VALUE` each.
 #[derive(Debug, Clone)]
-pub(crate) struct Told {
+pub(crate) struct RoleArguments {
     /// Who we are.
     pub(crate) id: JausId,
     /// Whom to speak to.
@@ -42,7 +42,7 @@ pub(crate) struct Told {
 pub(crate) fn play(arguments: &[String]) -> ExitCode {
     let outcome = match arguments {
         [scripted, peer, part, rest @ ..] if scripted == "scripted" => {
-            Told::read(rest).and_then(|told| scripted::play(peer, part, &told))
+            RoleArguments::read(rest).and_then(|arguments| scripted::play(peer, part, &arguments))
         }
         _ => play_ours(arguments),
     };
@@ -65,19 +65,19 @@ fn play_ours(arguments: &[String]) -> Outcome {
 
 async fn play_within(arguments: &[String]) -> Outcome {
     let (role, rest) = arguments.split_first().ok_or("which role?")?;
-    let told = Told::read(rest)?;
-    let limit = told.within;
+    let arguments = RoleArguments::read(rest)?;
+    let limit = arguments.within;
     let work = async {
         match role.as_str() {
-            "subscribe-periodic" => asking::periodic(&told).await,
-            "subscribe-on-change" => driving::on_change(&told).await,
-            "control" => driving::control(&told).await,
-            "drive" => driving::drive(&told).await,
-            "large" => large::send(&told).await,
+            "subscribe-periodic" => asking::periodic(&arguments).await,
+            "subscribe-on-change" => driving::on_change(&arguments).await,
+            "control" => driving::control(&arguments).await,
+            "drive" => driving::drive(&arguments).await,
+            "large" => large::send(&arguments).await,
             // These go on until they are killed.
-            "keep" => return Some(asking::keep(&told).await),
-            "keep-echo" => return Some(large::keep(&told).await),
-            "echo" => return Some(large::echo(&told).await),
+            "keep" => return Some(asking::keep(&arguments).await),
+            "keep-echo" => return Some(large::keep(&arguments).await),
+            "echo" => return Some(large::echo(&arguments).await),
             other => Err(format!("no role {other}")),
         }
         .into()
@@ -91,9 +91,9 @@ async fn play_within(arguments: &[String]) -> Outcome {
     outcome.unwrap_or_else(|| Err(format!("not done within {} s", limit.as_secs())))
 }
 
-impl Told {
+impl RoleArguments {
     fn read(arguments: &[String]) -> Result<Self, String> {
-        let mut told = Self {
+        let mut read = Self {
             id: JausId::new(42, 1, 1),
             other: JausId::new(101, 1, 1),
             sensor: None,
@@ -107,20 +107,20 @@ impl Told {
             let wrong = || format!("`{argument}` cannot be");
             let (key, value) = argument.split_once('=').ok_or_else(wrong)?;
             match key {
-                "id" => told.id = value.parse().map_err(|_| wrong())?,
-                "other" => told.other = value.parse().map_err(|_| wrong())?,
-                "sensor" => told.sensor = Some(value.parse().map_err(|_| wrong())?),
-                "address" => value.clone_into(&mut told.address),
-                "size" => told.size = value.parse().map_err(|_| wrong())?,
+                "id" => read.id = value.parse().map_err(|_| wrong())?,
+                "other" => read.other = value.parse().map_err(|_| wrong())?,
+                "sensor" => read.sensor = Some(value.parse().map_err(|_| wrong())?),
+                "address" => value.clone_into(&mut read.address),
+                "size" => read.size = value.parse().map_err(|_| wrong())?,
                 "seconds" => {
-                    told.within = Duration::from_secs(value.parse().map_err(|_| wrong())?);
+                    read.within = Duration::from_secs(value.parse().map_err(|_| wrong())?);
                 }
-                "by" => value.clone_into(&mut told.by),
-                "needs" => value.clone_into(&mut told.needs),
+                "by" => value.clone_into(&mut read.by),
+                "needs" => value.clone_into(&mut read.needs),
                 _ => return Err(wrong()),
             }
         }
-        Ok(told)
+        Ok(read)
     }
 
     /// Somebody on the same node.

@@ -13,20 +13,20 @@ mod vehicle;
 use std::net::Ipv4Addr;
 use std::time::Instant;
 
-use crate::suite::ours::{Outcome, Told};
+use crate::suite::ours::{Outcome, RoleArguments};
 use asking::Asker;
 use habits::Habits;
 use speaker::Speaker;
 
 /// Plays a part of a peer: `jauspp drive`.
-pub(crate) fn play(peer: &str, part: &str, told: &Told) -> Outcome {
+pub(crate) fn play(peer: &str, part: &str, arguments: &RoleArguments) -> Outcome {
     let habits = Habits::of(peer).ok_or_else(|| format!("no peer {peer}"))?;
-    let address: Ipv4Addr = told
+    let address: Ipv4Addr = arguments
         .address
         .parse()
         .map_err(|_| "what is our address?".to_owned())?;
     let open = |id| Speaker::open(id, habits, address).map_err(|error| error.to_string());
-    let speaker = open(told.id)?;
+    let speaker = open(arguments.id)?;
     match part {
         "vehicle" => return vehicle::run(speaker),
         "echo" => return echoing::echo(speaker),
@@ -34,8 +34,8 @@ pub(crate) fn play(peer: &str, part: &str, told: &Told) -> Outcome {
     }
     let asker = |speaker| Asker {
         speaker,
-        other: told.other,
-        deadline: Instant::now() + told.within,
+        other: arguments.other,
+        deadline: Instant::now() + arguments.within,
     };
     let mut asks = asker(speaker);
     match part {
@@ -43,9 +43,9 @@ pub(crate) fn play(peer: &str, part: &str, told: &Told) -> Outcome {
         "query" => asks.query().map(|velocity| println!("{velocity:.3} m/s")),
         "subscribe-periodic" => asks.periodic(),
         "subscribe-on-change" => asks.on_change(),
-        "control" => asks.control(&mut asker(open(told.colleague())?)),
+        "control" => asks.control(&mut asker(open(arguments.colleague())?)),
         "drive" => asks.drive(),
-        "large" => asks.send(told.size, told.by != "unacknowledged"),
+        "large" => asks.send(arguments.size, arguments.by != "unacknowledged"),
         "keep" => asks.keep(),
         "keep-echo" => asks.keep_echo(),
         other => Err(format!("{peer} has no part {other}")),

@@ -8,6 +8,7 @@ use jaus::messages::core::{
     QueryConfiguration, QueryServices, ReportConfiguration, ReportIdentification, ReportServices,
     query_configuration, query_services, report_identification::Type,
 };
+use jaus_cli::output::counted;
 
 use super::case::{Case, Offer, Question};
 use super::exchange::{Exchange, Mark, Verdict};
@@ -223,13 +224,6 @@ pub(super) fn configured(case: &mut Case, mark: usize) -> Judgement {
         "its node manager does not know the component, or lists another node's",
         "whoever finds components by their node's list does not find it: name its id outright",
     ))
-}
-
-pub(super) fn counted(count: usize, what: &str) -> String {
-    match count {
-        1 => format!("1 {what}"),
-        _ => format!("{count} {what}s"),
-    }
 }
 
 pub(super) fn not_configured(case: &Case, mark: usize) -> Verdict {

@@ -1,11 +1,11 @@
 //! Report of an examination, as text and as JSON.
 
 use jaus_cli::failure::Outcome;
+use jaus_cli::output::counted;
 use serde_json::{Value as Json, json};
 
 use super::super::finding::wrapped;
 use super::case::Case;
-use super::discovery::counted;
 use super::exchange::{Mark, Trial};
 
 /// Columns before the text: mark and exchange.

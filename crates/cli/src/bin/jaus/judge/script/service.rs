@@ -14,7 +14,7 @@ use jaus::messages::mobility::{
     QueryGlobalPathSegment, QueryGlobalPathSegmentExt, QueryGlobalWaypoint, QueryGlobalWaypointExt,
     QueryLocalPathSegment, QueryLocalPathSegmentExt, QueryLocalWaypoint, QueryLocalWaypointExt,
 };
-use jaus::messages::{registry, services};
+use jaus_vehicle::messages::registry;
 use serde_json::Value as Json;
 
 use super::super::memory::Memory;
@@ -60,10 +60,10 @@ const OF_SOMETHING: [u16; 9] = [
 /// The URN of a service, from its URN or name.
 pub(in super::super) fn known(text: &str) -> Result<&'static str, String> {
     let is_it = |info: &&ServiceInfo| info.id.urn == text || info.name == text;
-    if let Some(info) = services().find(is_it) {
+    if let Some(info) = registry().services().find(is_it) {
         return Ok(info.id.urn);
     }
-    let names: BTreeSet<_> = services().map(|info| info.name).collect();
+    let names: BTreeSet<_> = registry().services().map(|info| info.name).collect();
     let names: Vec<_> = names.into_iter().collect();
     Err(format!(
         "there is no service {text} here; there are {}",
@@ -80,7 +80,7 @@ pub(in super::super) fn steps(
     let mut steps = Vec::new();
     for urn in urns {
         let version = offered(urn);
-        let of_urn = || services().filter(|info| info.id.urn == *urn);
+        let of_urn = || registry().services().filter(|info| info.id.urn == *urn);
         let is_offered = |info: &&ServiceInfo| version == Some((info.id.major, info.id.minor));
         let newest = || of_urn().max_by_key(|info| (info.id.major, info.id.minor));
         let Some(service) = of_urn().find(is_offered).or_else(newest) else {
@@ -147,7 +147,7 @@ fn is_controlled(service: &ServiceInfo) -> bool {
         return true;
     }
     let parent = service.inherits_from;
-    let parent = parent.and_then(|id| services().find(|info| info.id == id));
+    let parent = parent.and_then(|id| registry().services().find(|info| info.id == id));
     parent.is_some_and(is_controlled)
 }
 
@@ -291,6 +291,14 @@ mod tests {
     }
 
     #[test]
+    fn the_ground_vehicles_own_services_become_steps() {
+        assert_eq!(titles("WheelOdometry"), ["QueryWheelOdometry is answered"]);
+        let planner = titles("urn:jaus-rs:ground:MissionPlanner");
+        let query = "QueryMission is answered".to_owned();
+        assert!(planner.contains(&query), "{planner:#?}");
+    }
+
+    #[test]
     fn the_states_of_control_are_walked_through_with_their_own_service_alone() {
         let management = titles("Management");
         for title in [
@@ -306,7 +314,7 @@ mod tests {
 
     #[test]
     fn every_service_can_be_walked_through() {
-        for service in services() {
+        for service in registry().services() {
             let steps = steps(&[service.id.urn], |_| {
                 Some((service.id.major, service.id.minor))
             });

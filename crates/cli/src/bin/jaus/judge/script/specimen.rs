@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn there_is_a_specimen_of_every_message() {
-        for info in jaus::messages::registry().iter() {
+        for info in jaus_vehicle::messages::registry().iter() {
             for specimen in [shortest(info), telling(info)] {
                 let specimen = specimen.unwrap_or_else(|| panic!("no specimen of {info:?}"));
                 assert!(is_valid(info, &specimen), "{info:?}: {specimen:02X?}");
