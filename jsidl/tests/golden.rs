@@ -3,7 +3,7 @@
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails"
+    reason = "a test fails by panicking"
 )]
 
 mod support;
@@ -236,7 +236,7 @@ fn every_golden_message_is_read_shown_and_written_as_it_is() {
 /// Messages that are laid out otherwise in our definitions than in those the vectors were made
 /// from; `services.rs` says why.
 const LAID_OUT_OTHERWISE: &[(&str, &str)] = &[
-    // A code of its own, which its query names; theirs has that of another message.
+    // Its own code, which its query names; theirs has that of another message.
     ("fkie-iop", "CBDetailedMeasurement"),
     // The singular of a name.
     ("fkie-manipulator", "ReportJointPosition"),
@@ -244,7 +244,7 @@ const LAID_OUT_OTHERWISE: &[(&str, &str)] = &[
     ("fkie-mobility", "SetLocalVector"),
     ("jts-mobility", "ReportGlobalVector"),
     ("jts-mobility", "SetGlobalVector"),
-    // Names with a small letter at the beginning.
+    // Names that start with a lower-case letter.
     ("jts-ugv", "ReportPlatformSpecifications"),
 ];
 

@@ -1,9 +1,6 @@
 //! Merged state machines: how they are drawn, how they run, and that those of the published
 //! definitions are whole.
-#![allow(
-    clippy::expect_used,
-    reason = "a broken test setup should stop the test"
-)]
+#![allow(clippy::expect_used, reason = "a failed test setup stops the test")]
 
 mod support;
 
@@ -77,8 +74,8 @@ fn a_machine_is_drawn_with_all_that_it_does() {
             s2 [label="Lit\nentry / warm()\lexit / fade()\lBack, then back\lTick / glow()\l"];
         }
         start -> s1;
-        s1 -> s2 [label="Test, to come back"];
-        s2 -> s2 [label="Test, to come back"];
+        s1 -> s2 [label="Test, with return"];
+        s2 -> s2 [label="Test, with return"];
         s1 -> s2 [label="Switch [may() && !late('x')] / Send('Gone')"];
         s2 -> s2 [label="Flash / click()"];
     }

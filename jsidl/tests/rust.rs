@@ -1,5 +1,5 @@
-//! The emitter against small definitions, one for each part of the language: what it writes is
-//! kept beside them, to be read. `BLESS=1 cargo test -p jsidl --test rust` writes it anew.
+//! The emitter against small definitions, one for each part of the language: what it writes is kept
+//! beside them, to be read. `BLESS=1 cargo test -p jsidl --test rust` rewrites it.
 //!
 //! The package `jaus` compiles these texts and sends values through them.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]

@@ -16,7 +16,7 @@ const LIMIT: Duration = Duration::from_secs(30);
 static DRIVER: Mutex<()> = Mutex::new(());
 
 fn alone_with_a_driver() -> MutexGuard<'static, ()> {
-    // A test that failed leaves nothing behind that matters here.
+    // Leftovers of a failed test do not matter here.
     DRIVER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

@@ -23,7 +23,7 @@ const LIMIT: Duration = Duration::from_secs(30);
 
 const QUERY: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
 
-/// A network of its own, so that tests beside it are not heard.
+/// A separate network, isolated from other tests.
 struct Network(Group);
 
 impl Network {
@@ -78,7 +78,7 @@ async fn within_limit<T>(future: impl Future<Output = T>) -> T {
         .expect("it takes too long")
 }
 
-/// Waits until an audience has so many members.
+/// Waits until an audience has this number of members.
 async fn gathered(component: &Component, audience: &Audience, members: usize) {
     let mut changes = component.watch();
     within_limit(async {
@@ -89,7 +89,7 @@ async fn gathered(component: &Component, audience: &Audience, members: usize) {
     .await;
 }
 
-/// Whether a component is told `M` by the other.
+/// Whether a component receives `M` from the other.
 async fn hears<M: Message>(messages: &mut Messages, from: JausId) -> bool {
     let heard = async {
         while let Some(message) = messages.next().await {
@@ -121,7 +121,7 @@ async fn a_message_to_a_subsystem_a_node_or_providers_reaches_those_and_nobody_e
     let mut ears = [&here, &beside, &elsewhere].map(Component::messages);
     gathered(&operator, &Audience::EVERYBODY, 3).await;
 
-    // In this order, so that what came too far would be heard before what is waited for.
+    // In this order, so a message that went too far would arrive before the expected one.
     let pulse = ReportHeartbeatPulse {};
     assert_eq!(operator.send_all(Audience::node(101, 2), &pulse), Ok(1));
     assert!(hears::<ReportHeartbeatPulse>(&mut ears[0], operator.id()).await);
@@ -158,7 +158,7 @@ async fn everybody_who_acknowledged_or_answered_is_told_apart_from_who_did_not()
     assert_eq!(named.await.successes().count(), 2);
 
     drop((doomed, doomed_node));
-    // By their ids, so that it does not matter whether discovery has noticed.
+    // By id, so discovery need not have noticed.
     let both = [alive, dead].map(Audience::from);
     let [to_the_living, to_the_dead] = both.map(|one| operator.deliver_all(one, &pulse));
     assert!(within_limit(to_the_living).await.is_complete());
@@ -182,7 +182,7 @@ async fn a_group_subscription_follows_providers_as_they_come_restart_and_go() {
     let second = network.sensor(102, 2.0);
     let other = second.id();
     while next().await != (other, GroupUpdate::Up) {}
-    // Both are heard, each with its own speed.
+    // Both report, each with its own speed.
     let mut heard = [false; 2];
     while heard != [true; 2] {
         if let (id, GroupUpdate::Report(report)) = next().await {

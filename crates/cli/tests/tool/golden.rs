@@ -143,7 +143,7 @@ fn a_json_line_that_cannot_be_written_gives_an_error_that_helps() {
         ("{\"code\":\"D001\"}", "D001h"),
         (
             "{\"error\":\"cut\",\"offset\":1}",
-            "there is no message here",
+            "this line is an error, not a message",
         ),
         ("[]", "not a JSON object"),
         ("{", "not a JSON object"),

@@ -55,7 +55,7 @@ impl Scene {
         Self::start(Station::default(), 0, Some(switch)).await
     }
 
-    /// With a vehicle whose control has to be renewed after so many seconds; 0 for never.
+    /// With a vehicle whose control times out after this many seconds; 0 for never.
     pub(crate) async fn with(station: Station, timeout: u8) -> Self {
         Self::start(station, timeout, None).await
     }
@@ -97,7 +97,7 @@ impl Scene {
         Page::open(self.address).await
     }
 
-    /// A page of an operator who has the vehicle under control, and ready.
+    /// The page of an operator in control of a vehicle that is ready.
     pub(crate) async fn driver(&self) -> Page {
         let mut page = self.page().await;
         page.until(|state| !state["vehicle"]["pose"].is_null())
@@ -121,7 +121,7 @@ impl Scene {
 
     pub(crate) async fn start_rover(&mut self) {
         let restarted = async {
-            // Its number is free once it has taken leave.
+            // Its id is free once it has detached.
             while self.nodes[0]
                 .components()
                 .iter()

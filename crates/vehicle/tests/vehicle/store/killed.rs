@@ -19,7 +19,7 @@ fn nothing_acknowledged_is_lost_when_the_writer_is_killed() {
     let file = directory.join("world.redb");
     let mut last = 0;
     for cut in 0..cuts(25) {
-        // The first instants are those in which the file is made or put right.
+        // In the first instants the file is created or repaired.
         let instant = Duration::from_micros(chance.below(60_000));
         let acknowledged = write_until_killed(&file, instant).max(last);
         let world = World::open(&file).unwrap_or_else(|error| panic!("cut {cut}: {error}"));
@@ -52,7 +52,7 @@ fn write_until_killed(file: &Path, instant: Duration) -> u32 {
     let output = BufReader::new(child.stdout.take().unwrap());
     let reader = std::thread::spawn(move || {
         let lines = output.lines().map_while(Result::ok);
-        // What the test harness says comes first, and the last line may be cut off.
+        // The test harness's output comes first, and the last line may be truncated.
         let numbers =
             lines.filter_map(|line| line.strip_prefix("done ")?.strip_suffix('.')?.parse().ok());
         numbers.last().unwrap_or(0)

@@ -35,10 +35,7 @@ pub(super) fn check(file: &Path, system: &System) -> Result<Outcome, Failure> {
         }
     }
     let parts = system.parts.len();
-    output.line(format_args!(
-        "{parts} {}, nothing is wrong",
-        parts_in_words(parts)
-    ))?;
+    output.line(format_args!("{parts} {}, no errors", parts_in_words(parts)))?;
     Ok(Outcome::Done)
 }
 
@@ -68,7 +65,7 @@ fn mistake_in_flags(part: &Part) -> Option<String> {
 }
 
 fn cannot_run(error: &io::Error) -> String {
-    format!("its program cannot be started: {error}")
+    format!("cannot start its program: {error}")
 }
 
 /// The error message on flags, without the usage text.

@@ -1,7 +1,7 @@
 //! Runs a system: executes the supervisor's orders and reports events to it.
 #![expect(
     clippy::disallowed_methods,
-    reason = "here the supervisor gets its clock and its processes"
+    reason = "gives the supervisor its clock and processes"
 )]
 
 use std::time::Instant;
@@ -29,7 +29,7 @@ pub(super) async fn run(flags: &Up, system: System) -> Result<Outcome, Failure> 
     drop(console);
     let parts = running.system.parts.len();
     let words = check::parts_in_words(parts);
-    running.say(&format!("{parts} {words}; Ctrl-C ends all"));
+    running.say(&format!("{parts} {words}; press Ctrl-C to end"));
     loop {
         running.settle();
         if running.supervisor.is_over() {
@@ -218,10 +218,10 @@ impl<'f> Running<'f> {
     fn stop(&mut self) {
         let now = Instant::now();
         if std::mem::replace(&mut self.stopping, true) {
-            self.say("kills what is left");
+            self.say("kills the remaining parts");
             self.supervisor.hurry(now);
         } else {
-            self.say("stops all parts, the last one first");
+            self.say("stops all parts in reverse order");
             self.supervisor.stop(now);
         }
     }
@@ -261,7 +261,7 @@ impl<'f> Running<'f> {
                 ran,
                 pause,
             } => format!(
-                "{} ended after {:.1} s ({}) and starts again in {:.1} s",
+                "{} ended after {:.1} s ({}) and restarts in {:.1} s",
                 self.name(part),
                 ran.as_secs_f64(),
                 in_words(exit),
@@ -271,8 +271,8 @@ impl<'f> Running<'f> {
                 format!("{} has ended ({})", self.name(part), in_words(exit))
             }
             News::GaveUp { part } => format!(
-                "{} says that it cannot begin (status 2): see what it printed, correct its flags in \
-                 {}, and start again. It is given up; the others go on",
+                "{} cannot start (status 2) and is given up; the others continue. See its output, \
+                 correct its flags in {}, and start again",
                 self.name(part),
                 self.flags.file.display()
             ),
@@ -282,7 +282,10 @@ impl<'f> Running<'f> {
                 self.flags.grace.as_secs_f64()
             ),
             News::Stuck { part } => {
-                format!("{} cannot be killed: the system holds it", self.name(part))
+                format!(
+                    "{} cannot be killed: it is blocked in the kernel",
+                    self.name(part)
+                )
             }
         }
     }
