@@ -149,7 +149,7 @@ impl fmt::Display for Unacknowledged {
         f.pad(match self {
             Self::Refused => "refused by the receiver",
             Self::TimedOut => "not acknowledged in time",
-            Self::NotSent => "not sent, as the receiver acknowledges nothing",
+            Self::NotSent => "not sent: the receiver acknowledges nothing",
         })
     }
 }

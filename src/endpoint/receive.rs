@@ -174,7 +174,8 @@ impl Endpoint {
             if self.warnings.is_due(now, Warning::TableFull) {
                 warn!(
                     id = %frame.source, from = %path.peer,
-                    "no room for another peer: raise limits.max_peers, or see who invents ids"
+                    "no room for another peer: raise limits.max_peers, or find the sender of \
+                     forged ids"
                 );
             }
             return Err(Counter::PeersFull);
@@ -259,7 +260,7 @@ impl Endpoint {
             return Ok(());
         }
         if self.warnings.is_due(now, Warning::PinnedElsewhere) {
-            warn!(%id, from = %from.peer, "refused: peers says that this id is at another address");
+            warn!(%id, from = %from.peer, "refused: `peers` pins this id to another address");
         }
         Err(Counter::PinnedElsewhere)
     }
@@ -399,7 +400,8 @@ impl Endpoint {
             self.conflicts.insert(id, now);
             debug!(%id, ?from, "id conflict");
             if self.warnings.is_due(now, Warning::IdConflict) {
-                warn!(%id, from = %from.peer, "somebody else uses an id of this node: change one of the two");
+                warn!(%id, from = %from.peer, "another node uses an id of this node: change one \
+                    of the two");
             }
             self.announce(Event::IdConflict { id, path: from });
         }

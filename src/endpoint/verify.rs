@@ -107,7 +107,8 @@ impl Endpoint {
                     if self.warnings.is_due(now, Warning::TableFull) {
                         warn!(
                             forgotten = %id, newcomer = %frame.source, from = %path.peer,
-                            "the table of peers is full: raise limits.max_peers, or see who invents ids"
+                            "the peer table is full: raise limits.max_peers, or find the sender \
+                             of forged ids"
                         );
                     }
                 }
@@ -137,7 +138,7 @@ impl Endpoint {
         debug!(%id, ?from, ?to, "peer moved");
         self.announce(Event::PeerMoved { id, from, to });
         if self.warnings.is_due(now, Warning::PeerMoved) {
-            warn!(%id, from = %from.peer, to = %to.peer, "a peer has another address now");
+            warn!(%id, from = %from.peer, to = %to.peer, "a peer moved to another address");
         }
     }
 
@@ -287,7 +288,8 @@ impl Endpoint {
             if self.warnings.is_due(now, Warning::PeerConflict) {
                 warn!(
                     %id, at = %incumbent.peer, other = %rival.path.peer,
-                    "an id is used at two addresses: give each component an id of its own, or pin it with peers"
+                    "an id is used at two addresses: give each component its own id, or pin it \
+                     with peers"
                 );
             }
         }
@@ -310,7 +312,8 @@ impl Endpoint {
             if !is_asked && self.warnings.is_due(now, Warning::Unverified) {
                 warn!(
                     to = %to.peer,
-                    "too much for an address that acknowledges nothing: name the peer in peers if it is real"
+                    "too much traffic for an unverified address: add the peer to `peers` if it is \
+                     genuine"
                 );
             }
         }

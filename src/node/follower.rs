@@ -46,7 +46,7 @@ impl Follower {
 
     #[expect(
         clippy::disallowed_methods,
-        reason = "it looks at interfaces, and decides nothing by time"
+        reason = "it polls interfaces; the protocol does not depend on its clock"
     )]
     pub(super) async fn run(mut self) {
         let mut stopped = self.shared.stopped.subscribe();
@@ -93,7 +93,7 @@ impl Follower {
                 Ok(link) => links.push(link),
                 Err(error) => {
                     if !before.contains(&interface.at(0)) {
-                        tracing::warn!(%interface, %error, "no link on an interface that came up");
+                        tracing::warn!(%interface, %error, "cannot open a link on a new interface");
                     }
                     self.refused.insert(interface.at(0));
                 }

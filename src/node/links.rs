@@ -180,7 +180,8 @@ impl Links {
         let mut gone = Vec::new();
         for id in ids {
             if let Some(Link::Udp(link)) = self.open.remove(&id) {
-                tracing::info!(interface = %link.interface(), "link closed: the interface is gone");
+                tracing::info!(interface = %link.interface(), "link closed: the interface was \
+                    removed");
                 gone.push((id, link));
             }
         }
@@ -293,7 +294,7 @@ fn way_to<'a>(
 /// Ensures that an interface on the route to the peer is selected.
 fn lead_to(peer: Peer, wanted: &Interfaces, chosen: &mut Vec<Interface>) -> Result<(), StartError> {
     let Some(local) = way_to(peer.address(), chosen.iter()) else {
-        tracing::debug!(%peer, "no way there just now");
+        tracing::debug!(%peer, "no route to the peer");
         return Ok(());
     };
     if chosen.iter().any(|interface| interface.address == local) {

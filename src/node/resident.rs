@@ -27,10 +27,7 @@ impl Default for Residents {
 
 impl Residents {
     /// Asks the residents to leave, and waits until all have, or for [`LIMIT`].
-    #[expect(
-        clippy::disallowed_methods,
-        reason = "a node that stops waits in real time"
-    )]
+    #[expect(clippy::disallowed_methods, reason = "shutdown waits in real time")]
     pub(super) async fn close(&self) {
         self.closing.send_replace(true);
         let mut count = self.count.subscribe();
@@ -54,7 +51,7 @@ impl Resident {
         Self(None)
     }
 
-    /// Waits until the node is about to stop.
+    /// Waits until the node is stopping.
     pub async fn closing(&self) {
         match &self.0 {
             Some(residents) => {

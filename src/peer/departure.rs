@@ -20,7 +20,7 @@ impl fmt::Display for Source {
         f.pad(match self {
             Self::Recorded => "recorded",
             Self::Provoked => "provoked",
-            Self::Read => "read in its code",
+            Self::Read => "read in its source",
         })
     }
 }
@@ -46,7 +46,7 @@ impl fmt::Display for Recognition {
                 }
                 Ok(())
             }
-            Self::NeedNotBe => f.write_str("need not be: what we do suits everybody"),
+            Self::NeedNotBe => f.write_str("not needed: our handling suits every peer"),
             Self::Configured => f.write_str("must be configured: `[[profile]]`"),
         }
     }
@@ -92,7 +92,7 @@ impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "| departure | whose | known from | recognised | what we do | where, and the test |"
+            "| departure | peers | known from | recognised by | our handling | file and test |"
         )?;
         writeln!(f, "|---|---|---|---|---|---|")?;
         for departure in Departure::ALL {

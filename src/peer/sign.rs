@@ -121,28 +121,28 @@ impl fmt::Display for Sign {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::RepeatedCode => {
-                "the fragments of its large messages each begin with the message code, and have \
-                 1573 octets"
+                "each fragment of its large messages starts with the message code and has 1573 \
+                 octets"
             }
-            Self::StaleOctets => "octets of older datagrams stand behind its messages",
+            Self::StaleOctets => "octets of older datagrams follow its messages",
             Self::RegistersAcrossSubsystems => "it sends Register Services to other subsystems",
             Self::JausPlusPlusService => "it offers a service of urn:jaus:jss:jpp:extras",
             Self::OnlyFirstVersions => "all its core services have version 1.0",
             Self::RepeatedVersion => "it writes the version octet before each message over TCP",
-            Self::NumberZero => "a message of it has the sequence number 0",
-            Self::PriorityFault => "a message of it has all flags set, as with priority 0",
+            Self::NumberZero => "one of its messages has the sequence number 0",
+            Self::PriorityFault => "one of its messages has all flags set, as with priority 0",
             Self::LongFragments => "the fragments of its large messages have 4079 octets",
             Self::CallsUnknownIds => {
-                "a message for one component went to everybody and wants an acknowledgement"
+                "it broadcasts a message for one component and requests acknowledgement"
             }
-            Self::BeginsWithOne => "the first message that was heard of it has the number 1",
-            Self::MisreadType => "it takes bits of the message type for header compression",
+            Self::BeginsWithOne => "the first message received from it has the number 1",
+            Self::MisreadType => "it reads message type bits as header compression flags",
             Self::AnswersForZero => "it answers for an id with a 0 in it",
-            Self::NumbersByDestination => "its sequence numbers count for each destination",
+            Self::NumbersByDestination => "it counts sequence numbers per destination",
             Self::AsksWholeNodes => {
-                "it asks all components of a node, in global broadcasts, what others ask one"
+                "it queries all components of a node by global broadcast where others query one"
             }
-            Self::ZeroInDestination => "it writes 0 into destinations, for \"all\"",
+            Self::ZeroInDestination => "it uses 0 as a wildcard in destinations",
             Self::IopService => "it offers a service of the interoperability profiles",
         })
     }

@@ -13,7 +13,7 @@ use jaus_test_kit::group::own_group;
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);
 
-/// A router with UDP and TCP, a component of its own, one beyond UDP and one beyond TCP.
+/// A router with UDP and TCP and its own component, one component beyond UDP and one beyond TCP.
 fn network(forward: bool) -> (Vec<Node>, [Port; 3]) {
     let group = own_group();
     let listen: SocketAddr = ([127, 0, 0, 1], 0).into();
@@ -30,7 +30,7 @@ fn network(forward: bool) -> (Vec<Node>, [Port; 3]) {
     (vec![router, by_udp, by_tcp], ports)
 }
 
-/// Says something until it is heard: there may be no connection yet.
+/// Sends until received: there may be no connection yet.
 async fn say_until_heard(from: &Port, destination: JausId, to: &mut Port) -> Received {
     let say = async {
         loop {

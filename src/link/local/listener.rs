@@ -47,7 +47,7 @@ impl Listener {
             listener.set_nonblocking(true)?;
             TcpListener::from_std(listener)
         };
-        tracing::warn!(%port, "every program on this host may attach components through a TCP port");
+        tracing::warn!(%port, "any program on this host can attach components through a TCP port");
         listen().map(Self::Tcp).map_err(failed)
     }
 

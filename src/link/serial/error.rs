@@ -8,7 +8,7 @@ use serial2_tokio::SerialPort;
 /// A serial port that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "the serial port `{device}` cannot be used ({source}): {}; {ports}",
+    "cannot open the serial port `{device}` ({source}): {}; {ports}",
     remedy(source)
 )]
 pub struct SerialError {
@@ -49,7 +49,7 @@ impl Ports {
 impl fmt::Display for Ports {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.0.is_empty() {
-            f.write_str("no serial port is found on this host")
+            f.write_str("no serial ports found on this host")
         } else {
             write!(f, "there are: {}", self.0.join(", "))
         }
@@ -63,13 +63,13 @@ fn remedy(error: &io::Error) -> &'static str {
     match error.kind() {
         NotFound => "plug it in or choose another",
         PermissionDenied => {
-            "its user must belong to the group that owns it, usually `dialout` \
-             (`sudo usermod -aG dialout $USER`, then log in again)"
+            "add the user to the group that owns it, usually `dialout` (`sudo usermod -aG dialout \
+             $USER`, then log in again)"
         }
-        ResourceBusy => "end the other program that uses it (`sudo fuser -v` on it shows which)",
+        ResourceBusy => "stop the other program that uses it (find it with `sudo fuser -v`)",
         InvalidInput => "choose a baud rate, parity and stop bits that it supports",
         _ if cfg!(unix) && error.raw_os_error() == Some(ENOTTY) => {
-            "it is no serial port, choose another"
+            "it is not a serial port, choose another"
         }
         _ => "check the device, or choose another",
     }

@@ -237,7 +237,7 @@ impl SerialLink {
 
     /// Handles the loss of the port.
     fn lose(&mut self, error: &io::Error) {
-        tracing::warn!(device = self.settings.device, %error, "serial port lost; it is tried again");
+        tracing::warn!(device = self.settings.device, %error, "serial port lost; retrying");
         self.counters.failures += 1;
         self.counters.port_away += self.outbox.len() as u64 + u64::from(!self.leaving.is_empty());
         self.outbox = Backlog::new(OUTBOX);
@@ -277,7 +277,8 @@ impl SerialLink {
                 self.port = Ok(port);
             }
             Err(error) => {
-                tracing::debug!(device = self.settings.device, %error, "still no serial port");
+                tracing::debug!(device = self.settings.device, %error, "serial port still \
+                    unavailable");
                 away.pause = (away.pause * 2).min(LONGEST_PAUSE);
                 away.retry_at = Some(now + away.pause);
             }

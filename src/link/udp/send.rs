@@ -175,7 +175,8 @@ impl UdpLink {
     fn lower_gso_limit(&mut self, limit: usize, error: &io::Error) {
         self.gso_limit = limit;
         let interface = &self.interface.name;
-        tracing::info!(interface, limit, %error, "datagrams above the limit leave one by one");
+        tracing::info!(interface, limit, %error, "batched send is unavailable; datagrams are sent \
+            one by one");
     }
 }
 

@@ -132,18 +132,18 @@ impl Delivery {
 #[non_exhaustive]
 pub enum InvalidDelivery {
     /// Too short for a round trip, or longer than is useful.
-    #[error("delivery.patience {0:?} cannot be: choose from 0.1s to 10min")]
+    #[error("delivery.patience {0:?} is out of range: choose from 0.1s to 10min")]
     Patience(Duration),
     /// A window without room, or larger than the sequence numbers allow.
-    #[error("delivery.window {0} cannot be: choose from 2 to 16384 packets")]
+    #[error("delivery.window {0} is out of range: choose from 2 to 16384 packets")]
     Window(usize),
     /// Messages would be stale.
-    #[error("delivery.packing cannot be so long: choose \"off\" or a time up to 1s")]
+    #[error("delivery.packing is out of range: choose \"off\" or a time up to 1s")]
     Packing,
     /// Less than one packet occupies.
     #[error(
-        "delivery.pace_burst {0} cannot be: choose from 8192 octets to 1GiB, or turn pacing off \
-         with pace_rate = 0"
+        "delivery.pace_burst {0} is out of range: choose from 8192 octets to 1GiB, or disable \
+         pacing with pace_rate = 0"
     )]
     Burst(usize),
 }
@@ -195,20 +195,20 @@ mod tests {
                 patience: Duration::from_millis(5),
                 ..usual()
             }),
-            "delivery.patience 5ms cannot be: choose from 0.1s to 10min"
+            "delivery.patience 5ms is out of range: choose from 0.1s to 10min"
         );
         assert_eq!(
             refused(Delivery {
                 window: 1,
                 ..usual()
             }),
-            "delivery.window 1 cannot be: choose from 2 to 16384 packets"
+            "delivery.window 1 is out of range: choose from 2 to 16384 packets"
         );
         let short = Delivery {
             pace_burst: 100,
             ..usual()
         };
-        assert!(refused(short.clone()).starts_with("delivery.pace_burst 100 cannot be"));
+        assert!(refused(short.clone()).starts_with("delivery.pace_burst 100 is out of range"));
         let unpaced = Delivery {
             pace_rate: 0,
             ..short

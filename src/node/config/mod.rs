@@ -405,7 +405,7 @@ mod tests {
         assert!(with(64, 4_194_240).is_ok());
         assert_eq!(
             with(64, 4_194_241).unwrap_err(),
-            "max_message 4194241 cannot be: choose from 64 (payload_limit) to 4194240"
+            "max_message 4194241 is out of range: choose from 64 (payload_limit) to 4194240"
         );
     }
 }
@@ -528,7 +528,7 @@ mod toml_tests {
         let interfaces = error("interfaces = \"eth0\"");
         assert!(interfaces.contains("[\"eth0\"]"), "{interfaces}");
         let peer = error("peers = [\"nobody\"]");
-        assert!(peer.contains("`nobody` is no peer's address"), "{peer}");
+        assert!(peer.contains("`nobody` is not a peer's address"), "{peer}");
     }
 
     #[test]

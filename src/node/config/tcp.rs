@@ -71,8 +71,8 @@ pub struct Listen(SocketAddr);
 /// Not an address to listen on.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no address to listen on: write an address of this host, or 0.0.0.0 for all of them, \
-     with a port if it is not 3794, such as 10.0.0.5 or 0.0.0.0:3795"
+    "`{0}` is not an address to listen on: write an address of this host, or 0.0.0.0 for all of \
+     them, with a port if it is not 3794, such as 10.0.0.5 or 0.0.0.0:3795"
 )]
 pub struct InvalidListen(String);
 

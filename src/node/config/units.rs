@@ -11,13 +11,13 @@ use std::time::Duration;
 pub enum InvalidUnit {
     /// Not a size.
     #[error(
-        "`{0}` is no size: write a number of octets, or a number with one of the units B, kB, \
+        "`{0}` is not a size: write a number of octets, or a number with one of the units B, kB, \
          KiB, MB, MiB, GB and GiB, such as 1500, \"64 KiB\" or \"4MiB\""
     )]
     Size(String),
     /// Not a time.
     #[error(
-        "`{0}` is no time: write a number with one of the units us, ms, s, min and h, such as \
+        "`{0}` is not a time: write a number with one of the units us, ms, s, min and h, such as \
          \"5ms\", \"1.5s\" or \"2 min\""
     )]
     Duration(String),
@@ -138,7 +138,7 @@ impl serde::de::Visitor<'_> for SizeVisitor {
     type Value = usize;
 
     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("a number of octets, or a text with a unit such as \"4MiB\"")
+        f.write_str("a number of octets, or a string with a unit such as \"4MiB\"")
     }
 
     fn visit_u64<E: serde::de::Error>(self, octets: u64) -> Result<usize, E> {
@@ -162,7 +162,7 @@ impl serde::de::Visitor<'_> for DurationVisitor {
     type Value = Duration;
 
     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("a text with a unit such as \"5ms\", \"1.5s\" or \"2 min\"")
+        f.write_str("a string with a unit such as \"5ms\", \"1.5s\" or \"2 min\"")
     }
 
     fn visit_i64<E: serde::de::Error>(self, number: i64) -> Result<Duration, E> {

@@ -5,7 +5,7 @@
 //! one does not delay others. To the endpoint they are like components of the node's own process.
 #![expect(
     clippy::disallowed_methods,
-    reason = "sessions get tasks, and components little time for their first record"
+    reason = "sessions have tasks, and the first record has a timeout"
 )]
 
 mod session;
@@ -101,7 +101,7 @@ impl Server {
                     });
                 }
                 Err(error) => {
-                    tracing::warn!(%error, "a component could not be accepted");
+                    tracing::warn!(%error, "cannot accept a component");
                     // For instance too many open files: do not retry at once.
                     if matches!(error, Error::Io { .. }) {
                         tokio::time::sleep(OVERLAP).await;
@@ -128,11 +128,12 @@ impl Registrar {
         let (version, id, name) = match timeout(HANDSHAKE, hello).await {
             Ok(Ok(hello)) => hello,
             Ok(Err(error)) => {
-                tracing::warn!(?pid, %error, "a connection to the local link is no component's");
+                tracing::warn!(?pid, %error, "rejected a connection to the local link: not a \
+                    component");
                 return None;
             }
             Err(_) => {
-                tracing::warn!(?pid, "a connection to the local link is silent");
+                tracing::warn!(?pid, "closed a silent connection to the local link");
                 return None;
             }
         };
@@ -168,7 +169,7 @@ impl Registrar {
         let deadline = tokio::time::Instant::now() + OVERLAP;
         loop {
             if self.shared.lock().is_stopping() {
-                return Err((Reason::Stopping, "the node is about to stop".to_owned()));
+                return Err((Reason::Stopping, "the node is stopping".to_owned()));
             }
             let error = match self.shared.attach(id, Some(process.clone())) {
                 Ok(mailbox) => return Ok((id, mailbox)),
@@ -187,8 +188,8 @@ impl Registrar {
     fn full_id(&self, version: u8, wanted: JausId) -> Result<JausId, Refusal> {
         if version != VERSION {
             let why = format!(
-                "the component speaks version {version} of the local link's protocol, the node \
-                 version {VERSION}: build both with the same release"
+                "the component uses version {version} of the local link's protocol, the node \
+                 version {VERSION}: build both from the same release"
             );
             return Err((Reason::Version, why));
         }
@@ -215,7 +216,7 @@ fn refusal(error: &AttachError, holder: Option<Process>) -> Refusal {
                 Some(process) => process.to_string(),
                 None => format!("the node itself (process {})", std::process::id()),
             };
-            let why = format!("{id} is held by {holder}: choose another component number");
+            let why = format!("{id} is used by {holder}: choose another component number");
             return (Reason::Taken, why);
         }
         AttachError::TooMany { .. } => Reason::TooMany,
