@@ -14,7 +14,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let node = Node::start(Config::loopback(44, 1))?;
     let watch = Component::builder(Kind::OperatorControlUnit, "Watch").attach(&node, 1)?;
 
-    // Whoever offers the service, now or later: nobody is named.
+    // All providers of the service, now and later.
     let query = QueryVelocityState { presence_vector: 1 };
     let mut speeds = watch.subscribe_all::<ReportVelocityState, _>(
         velocity_state_sensor::URN,
@@ -39,7 +39,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Stops all that can be stopped, and says who has not heard of it.
+/// Stops every component with Management, and lists those that did not acknowledge.
 async fn stop_everybody(watch: &Component) {
     let vehicles = Audience::providers(management::URN);
     let stop = SetEmergency {

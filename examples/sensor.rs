@@ -1,5 +1,5 @@
-//! A vehicle that tells its speed to whoever asks or subscribes, until Ctrl-C.
-//! `cargo run --example client` listens to it.
+//! A vehicle that reports its speed to queries and subscriptions, until Ctrl-C. `cargo run
+//! --example client` subscribes to it.
 
 use jaus::component::{Component, Handlers, Kind};
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState};

@@ -16,7 +16,7 @@ fn a_forged_id_takes_nothing_from_a_client() {
             attack["packets"]
         );
         assert!(seen["lost"] <= 2 && seen["gap_ms"] < GAP, "{seen:?}");
-        // Challenges and the like, and no stream.
+        // Challenges and similar messages, but no stream.
         assert!(attack["octets"] < 40_000, "{attack:?}");
     });
 }
@@ -38,7 +38,7 @@ fn no_events_stream_to_an_address_that_has_proved_nothing() {
     on_scene(&[], |scene| {
         let attack = scene.attack("events");
         println!("| 256 forged Create Events | {attack:?} |");
-        // 4 KiB at once and 1 KiB a second, for 12 s.
+        // A burst of 4 KiB and 1 KiB per second, for 12 s.
         assert!(attack["octets"] <= 20_000, "{attack:?}");
         assert!(scene.client()["lost"] <= 2);
     });
@@ -69,7 +69,7 @@ fn queries_are_not_amplified_to_an_address_that_has_proved_nothing() {
     on_scene(&[], |scene| {
         let attack = scene.attack("queries");
         println!("| Query Services of 256 forged ids | {attack:?} |");
-        // 4 KiB at once and 1 KiB a second, for 12 s.
+        // A burst of 4 KiB and 1 KiB per second, for 12 s.
         assert!(attack["octets"] <= 20_000, "{attack:?}");
         assert!(scene.client()["lost"] <= 2);
     });

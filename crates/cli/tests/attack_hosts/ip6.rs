@@ -6,7 +6,8 @@ use crate::testbed::Host;
 
 /// A vehicle and a client with IPv6 alone.
 fn on_ip6_scene(body: impl Fn(Scene<'_>)) {
-    // By their global addresses, which strangers reach; by default a node uses the link's own.
+    // Uses global addresses, which off-link attackers reach; by default a node uses link-local
+    // ones.
     let interfaces = "[\"fd00:216:1::1\", \"fd00:216:2::1\", \"fd00:216:3::1\"]";
     let file = settings("ip6", &format!("ip = \"6\"\ninterfaces = {interfaces}\n"));
     on_testbed(|bed| {
@@ -33,7 +34,7 @@ fn no_events_stream_to_a_network_that_has_proved_nothing() {
     on_ip6_scene(|scene| {
         let attack = scene.attack("events6");
         println!("| IPv6: Create Events from 256 addresses | {attack:?} |");
-        // 4 KiB at once and 1 KiB a second, for 12 s.
+        // A burst of 4 KiB and 1 KiB per second, for 12 s.
         assert!(attack["octets"] <= 20_000, "{attack:?}");
         assert!(scene.client()["lost"] <= 2);
     });

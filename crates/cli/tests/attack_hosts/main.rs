@@ -35,10 +35,10 @@ mod soak;
 mod streams;
 mod talkers;
 #[path = "../safety_hosts/testbed.rs"]
-#[allow(dead_code, reason = "shared with tests that do more")]
+#[allow(dead_code, reason = "shared with tests that use more of it")]
 mod testbed;
 
-/// Not a test of its own: does nothing unless another test starts it in a role.
+/// Not a test by itself: does nothing unless another test starts it in a role.
 #[test]
 fn a_process_that_plays_a_node() {
     jaus_test_kit::hosts::play(async |role| match role {

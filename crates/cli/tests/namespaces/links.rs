@@ -104,7 +104,7 @@ fn nodes_that_know_addresses_need_neither_multicast_nor_broadcast() {
         }
         let _echo = hosts.start_with(0, "echo", "broadcast=off peer=10.213.77.2");
         answers(hosts, "broadcast=off peer=10.213.77.1", "10.213.77.1:3794");
-        // The caller moves; it still knows where to call.
+        // The caller moves; it still knows the other's address.
         hosts.ip(1, &["address", "flush", "dev", "jaus0"]);
         hosts.ip(1, &["address", "add", "10.213.77.9/24", "dev", "jaus0"]);
         answers(hosts, "broadcast=off peer=10.213.77.1", "10.213.77.1:3794");
@@ -150,8 +150,8 @@ fn an_interface_is_used_as_soon_as_it_has_an_address() {
             hosts.ip(0, &["address", "flush", "dev", "jaus0"]);
             while follower.says("links at").contains(&address) {}
         }
-        // Polling would take almost its interval of 2 s for each of the changes, which come when
-        // the node has just looked.
+        // Polling would take almost its interval of 2 s per change, because changes happen just
+        // after a poll.
         let each = started.elapsed() / (2 * ROUNDS as u32);
         assert!(each < Duration::from_secs(1), "{each:?} for each change");
     });

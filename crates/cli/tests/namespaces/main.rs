@@ -96,7 +96,8 @@ fn nodes_on_two_hosts_discover_each_other_within_a_second_and_notice_a_death() {
     on_two_hosts(test, |hosts| {
         let vehicle = hosts.start(0, "vehicle");
         vehicle.says("started");
-        // Long enough that the vehicle's first calls are over: the second one must find it.
+        // Long enough that the vehicle's first announcements are over: the second party must find
+        // it.
         std::thread::sleep(Duration::from_secs(4));
         let operator = hosts.start(1, "operator");
         operator.says("started");
@@ -116,7 +117,7 @@ fn nodes_on_two_hosts_discover_each_other_within_a_second_and_notice_a_death() {
         drop(vehicle);
         let killed = Instant::now();
         operator.says("lost 101.1.33");
-        // The rule of discovery: silent for a call and a half, then asked three times in vain.
+        // The rule of discovery: silent for one and a half periods, then three unanswered queries.
         assert!(
             killed.elapsed() < Duration::from_secs(14),
             "{:?}",
@@ -138,7 +139,7 @@ fn what_comes_through_two_cables_is_delivered_once() {
     });
 }
 
-/// Not a test of its own: does nothing unless another test starts it in a role.
+/// Not a test by itself: does nothing unless another test starts it in a role.
 #[test]
 fn a_process_that_plays_a_node() {
     jaus_test_kit::hosts::play(async |role| match role {

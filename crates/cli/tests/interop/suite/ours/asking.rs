@@ -5,14 +5,14 @@ use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState};
 
 use super::{Outcome, Told};
 
-/// The query for the forward velocity alone, which whoever moves can tell.
+/// The query for the forward velocity alone, which every vehicle reports.
 pub(super) const FORWARD: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
 /// Reports in a row that make a subscription.
 const ENOUGH: usize = 10;
 /// Reports in a second.
 const HZ: f64 = 10.0;
 
-/// Subscribes to the velocity, and hears enough of it.
+/// Subscribes to the velocity and expects enough reports.
 pub(super) async fn periodic(told: &Told) -> Outcome {
     let (_node, component) = told.component()?;
     let mut reports = component
@@ -33,11 +33,11 @@ pub(super) async fn periodic(told: &Told) -> Outcome {
     Ok(())
 }
 
-/// Tells each report of the velocity, for ever.
+/// Prints each velocity report, until killed.
 pub(super) async fn keep(told: &Told) -> Outcome {
     let (_node, component) = told.component()?;
     loop {
-        // One that is not there yet is asked again.
+        // Retry if it has not started yet.
         let subscribed = component
             .subscribe::<ReportVelocityState, _>(told.sensor(), &FORWARD, When::hz(HZ))
             .await;

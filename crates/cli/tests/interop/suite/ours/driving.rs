@@ -18,14 +18,14 @@ const BEAT: Duration = Duration::from_millis(100);
 const EFFORT: f64 = 60.0;
 /// What is motion, in metres a second.
 const MOTION: f64 = 0.1;
-/// Different velocities that show that changes are told.
+/// The number of different velocities that show that changes are reported.
 const CHANGES: usize = 3;
 
 fn in_words(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
-/// Takes control, loses it to somebody of more authority, who then gives it back.
+/// Takes control, loses it to a client with more authority, which then releases it.
 pub(super) async fn control(told: &Told) -> Outcome {
     let (node, weak) = told.component()?;
     let strong = operator(&node, told.colleague())?;
@@ -91,7 +91,7 @@ pub(super) async fn drive(told: &Told) -> Outcome {
     stop(control).await
 }
 
-/// Subscribes to the velocity on change, has it change, and hears of that.
+/// Subscribes to the velocity on change, changes it, and expects the reports.
 pub(super) async fn on_change(told: &Told) -> Outcome {
     let (_node, component) = told.component()?;
     let mut reports = component

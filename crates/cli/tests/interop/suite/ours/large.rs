@@ -78,8 +78,8 @@ pub(super) async fn keep(told: &Told) -> Outcome {
     }
 }
 
-/// Sends every test message back, acknowledged. Calls everybody now and then, as discovery does, so
-/// that who calls nobody knows where we are.
+/// Echoes every test message, acknowledged. Multicasts now and then, as discovery does, so that
+/// peers without multicast learn our address.
 pub(super) async fn echo(told: &Told) -> Outcome {
     let everywhere = "0.0.0.0".parse().map_err(|error| format!("{error}"))?;
     let node = Node::start(told.config()?.tcp_listen(everywhere));
@@ -108,7 +108,7 @@ pub(super) async fn echo(told: &Told) -> Outcome {
             acknowledge: true,
             ..Outgoing::new(port.id(), source, message.payload)
         };
-        // An answer that nobody waits for is not missed.
+        // A late answer is ignored.
         let _ = port.send(back);
     }
 }

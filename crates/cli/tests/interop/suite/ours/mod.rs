@@ -17,14 +17,14 @@ use crate::suite::scripted;
 /// Says what went wrong, in a line.
 pub(crate) type Outcome = Result<(), String>;
 
-/// What a role is told on the command line: `KEY=VALUE` each.
+/// The arguments of a role on the command line, each `KEY=VALUE`.
 #[derive(Debug, Clone)]
 pub(crate) struct Told {
     /// Who we are.
     pub(crate) id: JausId,
     /// Whom to speak to.
     pub(crate) other: JausId,
-    /// Who tells the velocity, if that is somebody else.
+    /// The component that reports the velocity, if it is a different one.
     sensor: Option<JausId>,
     /// An address: of the other for ours, of its own for a scripted peer.
     pub(crate) address: String,
@@ -74,7 +74,7 @@ async fn play_within(arguments: &[String]) -> Outcome {
             "control" => driving::control(&told).await,
             "drive" => driving::drive(&told).await,
             "large" => large::send(&told).await,
-            // These go on until they are killed.
+            // These run until they are killed.
             "keep" => return Some(asking::keep(&told).await),
             "keep-echo" => return Some(large::keep(&told).await),
             "echo" => return Some(large::echo(&told).await),
@@ -123,7 +123,7 @@ impl Told {
         Ok(told)
     }
 
-    /// Somebody on the same node.
+    /// Another component on the same node.
     pub(crate) fn colleague(&self) -> JausId {
         let (subsystem, node) = (self.id.subsystem(), self.id.node());
         JausId::new(subsystem, node, self.id.component() + 1)
@@ -142,7 +142,7 @@ impl Told {
         Ok(config.or_any_free_port())
     }
 
-    /// A node with a component that offers nothing of its own.
+    /// A node with a component without own services.
     fn component(&self) -> Result<(Node, Component), String> {
         let node = Node::start(self.config()?).map_err(|error| error.to_string())?;
         let component = operator(&node, self.id)?;
@@ -150,7 +150,7 @@ impl Told {
     }
 }
 
-/// A component that offers nothing of its own.
+/// A component without own services.
 fn operator(node: &Node, id: JausId) -> Result<Component, String> {
     Component::builder(Kind::OperatorControlUnit, "Interoperability")
         .attach(node, id.component())
