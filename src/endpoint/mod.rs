@@ -19,13 +19,16 @@
 //! use jaus::address::JausId;
 //! use jaus::endpoint::{Config, Endpoint, Outgoing, Received};
 //!
-//! let (driver, sensor) = (JausId::new(101, 1, 33), JausId::new(101, 1, 41)); let mut endpoint =
-//! Endpoint::new(Config::default()); endpoint.attach(driver)?; endpoint.attach(sensor)?; #
-//! #[expect(clippy::disallowed_methods, reason = "an example of an owner, which has the clock")]
-//! let now = Instant::now(); let query_identification = Bytes::from_static(b"\x00\x2B\x02"); let
-//! mut received = Vec::<Received>::new(); endpoint.send(now, Outgoing::new(driver, sensor,
-//! query_identification), &mut received)?; assert_eq!((received[0].source, received[0].to),
-//! (driver, sensor));
+//! let (driver, sensor) = (JausId::new(101, 1, 33), JausId::new(101, 1, 41));
+//! let mut endpoint = Endpoint::new(Config::default());
+//! endpoint.attach(driver)?;
+//! endpoint.attach(sensor)?;
+//! # #[expect(clippy::disallowed_methods, reason = "an example of an owner, who has the clock")]
+//! let now = Instant::now();
+//! let query_identification = Bytes::from_static(b"\x00\x2B\x02");
+//! let mut received = Vec::<Received>::new();
+//! endpoint.send(now, Outgoing::new(driver, sensor, query_identification), &mut received)?;
+//! assert_eq!((received[0].source, received[0].to), (driver, sensor));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

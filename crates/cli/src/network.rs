@@ -51,7 +51,7 @@ pub struct Network {
     #[arg(long)]
     ttl: Option<u8>,
 
-    /// Speak to this address by unicast too, for a host that multicast does not reach (repeatable)
+    /// Also send by unicast to this address, where multicast does not reach (repeatable)
     ///
     /// ADDRESS, ADDRESS:PORT or ID@ADDRESS:PORT, for example 192.168.7.2 or 102.255.255@192.168.7.2
     #[arg(long, value_name = "PEER")]
@@ -84,7 +84,8 @@ pub struct Network {
 
     /// Read settings from a TOML file; flags take precedence
     ///
-    /// For example:   id = "101.1.1"                  # our id: for `jaus node` only
+    /// For example:
+    ///   id = "101.1.1"                  # our id: for `jaus node` only
     ///   name = "Rover"
     ///   kind = "vehicle"
     ///   interfaces = ["eth0"]           # or "all", or "loopback"

@@ -2,10 +2,13 @@
 //!
 //! ```toml
 //! [ids]
-//! ra_offset = 1000                # RA subsystem 20 appears as JAUS subsystem 1020 jaus_offset = 0
-//! # JAUS subsystem 101 appears as RA subsystem 101 # Subsystems that need another number:
-//! ra_subsystems = [{ ra = 20, jaus = 1200 }] jaus_subsystems = [{ jaus = 4711, ra = 101 }] #
-//! Components that need another id: ra_components = [{ ra = "20.1.70.1", jaus = "1200.1.200" }]
+//! ra_offset = 1000                # RA subsystem 20 appears as JAUS subsystem 1020
+//! jaus_offset = 0                 # JAUS subsystem 101 appears as RA subsystem 101
+//! # Subsystems that need another number:
+//! ra_subsystems = [{ ra = 20, jaus = 1200 }]
+//! jaus_subsystems = [{ jaus = 4711, ra = 101 }]
+//! # Components that need another id:
+//! ra_components = [{ ra = "20.1.70.1", jaus = "1200.1.200" }]
 //! jaus_components = [{ jaus = "4711.1.9", ra = "101.1.33.1" }]
 //! ```
 //!

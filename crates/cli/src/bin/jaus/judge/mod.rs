@@ -88,7 +88,7 @@ pub(crate) struct Judge {
     #[arg(long, conflicts_with = "unicast")]
     multicast: bool,
 
-    /// Ask by unicast only, for a host that multicast does not reach
+    /// Query by unicast only, where multicast does not reach
     #[arg(long)]
     unicast: bool,
 
