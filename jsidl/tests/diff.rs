@@ -74,7 +74,7 @@ fn names_and_limits_leave_the_wire_as_it_is() {
     check(
         "max_count=\"20\"",
         "max_count=\"30\"",
-        &["same SetLights D001.LightsRec.Label: the greatest count is 30, was 20"],
+        &["same SetLights D001.LightsRec.Label: the maximum count is 30, was 20"],
     );
     check(
         "is_command=\"true\"",

@@ -197,7 +197,7 @@ const REJECTED: &[(&str, &str)] = &[
         "`QueryMessage` is optional, but the element of an array",
     ),
     ("BitField1", "belongs to `Milliseconds` already"),
-    ("BitRange1", "go from 10 to 9"),
+    ("BitRange1", "range from 10 to 9"),
     (
         "Body2",
         "`HeaderRec` is optional, but the composite at the top",
@@ -205,7 +205,7 @@ const REJECTED: &[(&str, &str)] = &[
     ("Body3", "`List2` is optional, but the composite at the top"),
     ("ClientOf1", "`2 WaypointDriver` cannot be a name"),
     ("CountField1", "`min_count` is -100"),
-    ("DefaultState1", "the transition `Run` is there twice"),
+    ("DefaultState1", "the transition `Run` appears twice"),
     (
         "DefaultTransition4",
         "`default_transition` lacks the element `internal`",
@@ -247,7 +247,7 @@ const REJECTED: &[(&str, &str)] = &[
     ),
     (
         "ProtocolBehavior5",
-        "no `state_machine` named `FSM_C` here to start",
+        "no `state_machine` named `FSM_C` to start",
     ),
     ("Record1", "two members named `RequestID`"),
     ("ScaleRange1", "the limits of the scale are 2 and 1"),

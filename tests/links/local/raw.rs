@@ -94,7 +94,7 @@ async fn a_component_of_an_older_release_is_refused_with_the_reason() {
     assert_eq!(refused.head, Head::Refused(Reason::Version));
     let why = refused.text();
     assert!(
-        why.contains("speaks version 1") && why.contains("same release"),
+        why.contains("uses version 1") && why.contains("same release"),
         "{why}"
     );
 }

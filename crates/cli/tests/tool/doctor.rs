@@ -96,7 +96,7 @@ fn two_nodes_with_one_id_are_found() {
         ids[0]["what"]
             .as_str()
             .unwrap()
-            .starts_with("109.1.1 was heard from")
+            .starts_with("109.1.1 sends from")
     );
     assert!(
         ids[0]["advice"]

@@ -119,7 +119,7 @@ fn a_json_line_that_cannot_be_written_gives_an_error_that_helps() {
         ),
         (
             "{\"message\":\"queryidentification\"}",
-            "perhaps QueryIdentification is meant",
+            "did you mean QueryIdentification?",
         ),
         (
             "{\"message\":\"QueryIdentification\",\"code\":\"4B00\"}",
@@ -195,7 +195,7 @@ fn a_service_that_is_named_must_exist() {
         b"",
     );
     assert!(
-        run.stderr.contains("perhaps urn:jaus:jss:core:Events"),
+        run.stderr.contains("did you mean urn:jaus:jss:core:Events"),
         "{}",
         run.stderr
     );

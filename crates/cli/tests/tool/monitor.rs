@@ -86,5 +86,5 @@ fn a_node_tells_its_statistics_now_and_then() {
         assert!(told.contains("link lo 127.0.0.1:"), "{told}");
     }
     let wrong = run(&[&["node", "--stats=5"], &*network].concat(), b"");
-    assert!(wrong.stderr.contains("`5` is no time"), "{wrong:?}");
+    assert!(wrong.stderr.contains("`5` is not a time"), "{wrong:?}");
 }

@@ -98,7 +98,7 @@ fn whoever_comes_is_watched() {
     watcher.read_until("Ctrl-C");
     let _comer = Running::node(&[&["--id", "105.1.1", "--name", "Latecomer"], &*network].concat());
     let seen = watcher.read_until("105.1.1 offers");
-    assert!(seen.contains("105.1.1 has come"), "{seen}");
+    assert!(seen.contains("105.1.1 appeared"), "{seen}");
     assert!(seen.contains("Latecomer"), "{seen}");
 }
 
@@ -144,7 +144,7 @@ fn a_wrong_flag_is_refused_with_what_would_be_right() {
         ),
         (
             &["node", "--peer", "nobody"],
-            "write an address of one host",
+            "write the address of one host",
         ),
         (&["node", "--kind", "ship"], "vehicle, ocu, other"),
         (&["node", "--config", "no/such.toml"], "no/such.toml"),
