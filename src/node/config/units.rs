@@ -230,7 +230,7 @@ mod tests {
         ] {
             let error = size(text).unwrap_err().to_string();
             assert!(
-                error.starts_with(&format!("`{text}` is no size")),
+                error.starts_with(&format!("`{text}` is not a size")),
                 "{error}"
             );
             assert!(error.contains("4MiB"), "{error}");
@@ -240,7 +240,7 @@ mod tests {
         ] {
             let error = duration(text).unwrap_err().to_string();
             assert!(
-                error.starts_with(&format!("`{text}` is no time")),
+                error.starts_with(&format!("`{text}` is not a time")),
                 "{error}"
             );
             assert!(error.contains("1.5s"), "{error}");
@@ -261,13 +261,13 @@ mod tests {
         assert_eq!(read("buffer = 7").unwrap().buffer, 7);
         assert_eq!(read("buffer = \"2 KiB\"").unwrap().buffer, 2048);
         assert_eq!(read("every = \"5ms\"").unwrap().every.as_millis(), 5);
-        assert!(read("buffer = -1").unwrap_err().contains("`-1` is no size"));
+        assert!(read("buffer = -1").unwrap_err().contains("`-1` is not a size"));
         assert!(read("buffer = true").unwrap_err().contains("\"4MiB\""));
-        assert!(read("every = 5").unwrap_err().contains("`5` is no time"));
+        assert!(read("every = 5").unwrap_err().contains("`5` is not a time"));
         assert!(
             read("every = \"5\"")
                 .unwrap_err()
-                .contains("`5` is no time")
+                .contains("`5` is not a time")
         );
     }
 }
