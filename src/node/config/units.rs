@@ -261,7 +261,11 @@ mod tests {
         assert_eq!(read("buffer = 7").unwrap().buffer, 7);
         assert_eq!(read("buffer = \"2 KiB\"").unwrap().buffer, 2048);
         assert_eq!(read("every = \"5ms\"").unwrap().every.as_millis(), 5);
-        assert!(read("buffer = -1").unwrap_err().contains("`-1` is not a size"));
+        assert!(
+            read("buffer = -1")
+                .unwrap_err()
+                .contains("`-1` is not a size")
+        );
         assert!(read("buffer = true").unwrap_err().contains("\"4MiB\""));
         assert!(read("every = 5").unwrap_err().contains("`5` is not a time"));
         assert!(
