@@ -81,7 +81,10 @@ fn datagram(c: &mut Criterion) {
 }
 
 /// An endpoint that knows a peer, by its configured address perhaps, with a clock that stands still.
-#[expect(clippy::disallowed_methods, reason = "an arbitrary beginning of time")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
 fn endpoint(is_configured: bool) -> (Endpoint, Path, Instant) {
     let peer = Path {
         link: LinkId(0),

@@ -1,4 +1,4 @@
-//! Finds whoever tells a speed, subscribes to it, and notices when it goes and comes back: end
+//! Finds a velocity sensor, subscribes to it, and reports when it goes down and comes back: stop
 //! `cargo run --example sensor`, and start it again.
 
 use jaus::component::{Component, Kind, Update, When};

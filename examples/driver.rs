@@ -11,7 +11,7 @@ use jaus::node::{Config, Node};
 #[tokio::main(flavor = "current_thread")]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let node = Node::start(Config::loopback(102, 1))?;
-    // What the motor is driven with, in percent.
+    // The motor's effort, in percent.
     let motor = Arc::new(AtomicI32::new(0));
     let throttle = motor.clone();
     let driver = Handlers::new(primitive_driver::LATEST)

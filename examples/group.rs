@@ -1,12 +1,12 @@
-//! Watches the speed of everybody who tells one, and has all vehicles stopped in an emergency:
-//! start `cargo run --example sensor` and `cargo run --example driver` beside it, and end them.
+//! Watches the speed of all velocity sensors, and stops all vehicles in an emergency. Start and stop
+//! `cargo run --example sensor` and `cargo run --example driver` beside it.
 
 use jaus::component::{Audience, Component, GroupUpdate, Kind, When};
 use jaus::messages::core::{ClearEmergency, SetEmergency, management};
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
 
-/// Faster than this, and everybody has to stop.
+/// Above this speed all vehicles are stopped.
 const TOO_FAST: f64 = 2.4;
 
 #[tokio::main(flavor = "current_thread")]
@@ -14,7 +14,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let node = Node::start(Config::loopback(44, 1))?;
     let watch = Component::builder(Kind::OperatorControlUnit, "Watch").attach(&node, 1)?;
 
-    // Whoever offers the service, now or later: nobody is named.
+    // All providers of the service, now and later.
     let query = QueryVelocityState { presence_vector: 1 };
     let mut speeds = watch.subscribe_all::<ReportVelocityState, _>(
         velocity_state_sensor::URN,
@@ -23,14 +23,14 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     )?;
     while let Some((sensor, update)) = speeds.next().await {
         match update {
-            GroupUpdate::Up => println!("{sensor} tells its speed"),
+            GroupUpdate::Up => println!("{sensor} reports its speed"),
             GroupUpdate::Down { why, .. } => println!("{sensor} is down: {why}"),
             GroupUpdate::Gone => println!("{sensor} is gone"),
             GroupUpdate::NotSubscribed { why, .. } => println!("{why}"),
             GroupUpdate::Report(report) => {
                 let speed = report.velocity_x_m_per_s().unwrap_or_default();
                 if speed > TOO_FAST {
-                    println!("{sensor} drives at {speed:.2} m/s: everybody stops");
+                    println!("{sensor} drives at {speed:.2} m/s: stopping all vehicles");
                     stop_everybody(&watch).await;
                 }
             }
@@ -39,7 +39,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Stops all that can be stopped, and says who has not heard of it.
+/// Stops every component with Management, and lists those that did not acknowledge.
 async fn stop_everybody(watch: &Component) {
     let vehicles = Audience::providers(management::URN);
     let stop = SetEmergency {
@@ -47,15 +47,15 @@ async fn stop_everybody(watch: &Component) {
     };
     let told = watch.deliver_all(&vehicles, &stop).await;
     for (vehicle, _) in told.successes() {
-        println!("{vehicle} is told to stop");
+        println!("{vehicle} acknowledged the stop");
     }
     for (vehicle, why) in told.failures() {
-        println!("{vehicle} does not know: {why}");
+        println!("{vehicle} did not acknowledge: {why}");
     }
     let go_on = ClearEmergency {
         emergency_code: 1.into(),
     };
     if let Err(error) = watch.send_all(&vehicles, &go_on) {
-        println!("the emergency stays: {error}");
+        println!("the emergency is not cleared: {error}");
     }
 }

@@ -1,5 +1,5 @@
-//! A vehicle that tells its speed to whoever asks or subscribes, until Ctrl-C.
-//! `cargo run --example client` listens to it.
+//! A vehicle that reports its speed to queries and subscriptions, until Ctrl-C.
+//! `cargo run --example client` subscribes to it.
 
 use jaus::component::{Component, Handlers, Kind};
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState};
@@ -13,7 +13,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut time = 0.0_f64;
     let speedometer =
         Handlers::new(velocity_state_sensor::LATEST).answer(move |_: QueryVelocityState| {
-            // Here a real one would read its sensor.
+            // A real vehicle would read its sensor here.
             time += 0.1;
             ReportVelocityState {
                 velocity_x: VelocityX::new(1.5 + time.sin()).ok(),

@@ -193,14 +193,14 @@ impl fmt::Debug for JausId {
 #[non_exhaustive]
 pub enum ParseIdError {
     /// Not three parts with dots between them.
-    #[error("\"{text}\" is not a JAUS id: write subsystem.node.component, for instance 101.1.33")]
+    #[error("\"{text}\" is not a JAUS id: write subsystem.node.component, such as 101.1.33")]
     Shape {
         /// The text, truncated.
         text: String,
     },
     /// A part is not a decimal number.
     #[error(
-        "the {field} of \"{text}\" is not a number: write subsystem.node.component, for instance 101.1.33"
+        "the {field} of \"{text}\" is not a number: write subsystem.node.component, such as 101.1.33"
     )]
     NotANumber {
         /// The text, truncated.
@@ -209,7 +209,7 @@ pub enum ParseIdError {
         field: &'static str,
     },
     /// A part exceeds the largest number of its field.
-    #[error("the {field} of \"{text}\" is above {limit} (which stands for every {field})")]
+    #[error("the {field} of \"{text}\" is above {limit} (the wildcard)")]
     TooLarge {
         /// The text, truncated.
         text: String,
@@ -325,7 +325,7 @@ mod tests {
     fn a_wrong_text_is_told_what_is_wrong_with_it() {
         assert_eq!(
             error("101.1"),
-            "\"101.1\" is not a JAUS id: write subsystem.node.component, for instance 101.1.33"
+            "\"101.1\" is not a JAUS id: write subsystem.node.component, such as 101.1.33"
         );
         assert!(error("1.2.3.4").contains("is not a JAUS id"));
         assert!(error("").contains("is not a JAUS id"));
@@ -334,11 +334,11 @@ mod tests {
         assert!(error("+1.2.3").starts_with("the subsystem of"));
         assert_eq!(
             error("65536.1.1"),
-            "the subsystem of \"65536.1.1\" is above 65535 (which stands for every subsystem)"
+            "the subsystem of \"65536.1.1\" is above 65535 (the wildcard)"
         );
         assert_eq!(
             error("1.1.256"),
-            "the component of \"1.1.256\" is above 255 (which stands for every component)"
+            "the component of \"1.1.256\" is above 255 (the wildcard)"
         );
         assert!(error("99999999999999999999999999.1.1").contains("is above 65535"));
         assert!(error(&"9".repeat(100_000)).len() < 200);

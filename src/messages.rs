@@ -12,8 +12,9 @@ macro_rules! sets {
         $(
             $(#[$doc])*
             $(#[cfg(feature = $feature)])?
-            #[allow(missing_docs, reason = "what the definitions do not describe")]
-            #[allow(clippy::module_inception, reason = "a set may have a service of its name")]
+            #[allow(missing_docs, reason = "the definitions lack descriptions")]
+            #[allow(clippy::module_inception, reason = "a set may contain a service of the same \
+                name")]
             pub mod $set {
                 include!(concat!(env!("OUT_DIR"), "/", stringify!($set), ".rs"));
             }

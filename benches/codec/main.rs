@@ -14,7 +14,7 @@
 //! A figure is the *least* time per operation over short batches: what the code takes while nobody
 //! else wants the processor. `encode` appends to a buffer that is there already; `bytes` makes new
 //! shared octets.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a bench")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "a benchmark")]
 
 mod hand;
 mod samples;
@@ -29,7 +29,7 @@ use jaus::codec::Message;
 
 /// Runs in batches and counts each of them as long as the shortest.
 fn least<T>(bencher: &mut Bencher<'_>, mut operation: impl FnMut() -> T) {
-    #[expect(clippy::disallowed_methods, reason = "a bench reads the clock")]
+    #[expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
     let now = Instant::now;
     bencher.iter_custom(|iterations| {
         let batch = iterations.clamp(1, 512);

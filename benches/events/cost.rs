@@ -88,7 +88,7 @@ fn answer_queries() -> f64 {
     start.elapsed().as_nanos() as f64 / 1000.0
 }
 
-/// Nanoseconds for each of at least a thousand reports, of so many subscriptions.
+/// Nanoseconds per report over at least a thousand reports, with this number of subscriptions.
 fn fire_events(subscriptions: u16) -> f64 {
     let mut now = Instant::now();
     let mut stack = stack(now);

@@ -14,7 +14,7 @@
     clippy::unwrap_used,
     clippy::expect_used,
     clippy::panic,
-    reason = "a benchmark has a clock, and stops when something is wrong"
+    reason = "a benchmark owns the clock and panics on failure"
 )]
 
 mod cost;

@@ -13,7 +13,7 @@
     clippy::unwrap_used,
     clippy::expect_used,
     clippy::panic,
-    reason = "a benchmark has a clock, and stops when something is wrong"
+    reason = "a benchmark owns the clock and panics on failure"
 )]
 
 use std::future::Future;
@@ -113,7 +113,7 @@ fn cells(side: u16) -> Bytes {
 
 async fn measure(runs: usize) {
     let node = Node::start(Config::loopback(101, 2)).expect("a node");
-    // Who has to ask again has not had an answer in time.
+    // A repeated query means that no answer arrived in time.
     let patience = Patience {
         tries: 1,
         interval: Duration::from_secs(2),

@@ -6,7 +6,7 @@
 //!
 //! Each row is the median of a few runs; memory is the most that the process held in one of them
 //! beyond the map itself (Linux).
-#![expect(clippy::disallowed_methods, reason = "a bench measures time")]
+#![expect(clippy::disallowed_methods, reason = "a benchmark measures time")]
 
 use std::time::{Duration, Instant};
 
@@ -26,7 +26,7 @@ fn main() {
 
 type Ground = fn(usize, usize, usize) -> u8;
 
-/// What is at a row and a column of a map with so many of each.
+/// The cell at a row and column of a map of that size.
 const GROUNDS: [(&str, Ground); 5] = [
     ("open", |_, _, _| 255),
     ("uneven", |row, column, _| {

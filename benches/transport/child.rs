@@ -12,7 +12,7 @@ use crate::run;
 /// A running child, ended when dropped.
 pub(crate) struct Process {
     child: Child,
-    /// What it said when it was ready, such as an address.
+    /// The line it printed when ready, such as an address.
     pub(crate) ready: String,
 }
 
@@ -32,8 +32,8 @@ impl Process {
         let mut ready = String::new();
         BufReader::new(output)
             .read_line(&mut ready)
-            .expect("a word from the child");
-        assert!(!ready.is_empty(), "the child {role:?} died at once");
+            .expect("a line from the child");
+        assert!(!ready.is_empty(), "the child {role:?} exited at once");
         Self {
             child,
             ready: ready.trim().to_owned(),
@@ -44,7 +44,7 @@ impl Process {
         self.child.id()
     }
 
-    /// Processor time that it has used.
+    /// CPU time used so far.
     pub(crate) fn processor_time(&self) -> Duration {
         let stat = std::fs::read_to_string(format!("/proc/{}/schedstat", self.id()));
         let stat = stat.expect("Linux");

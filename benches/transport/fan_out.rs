@@ -1,4 +1,5 @@
-//! What one event costs its sender with one subscriber and with a hundred, each on a node of its own.
+//! The cost of one event for its sender with one subscriber and with a hundred, each on its own
+//! node.
 
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -1,4 +1,4 @@
-//! What a node costs that has nothing to do: processor time and memory.
+//! The cost of an idle node: CPU time and memory.
 
 use std::fs;
 use std::thread::sleep;
@@ -15,10 +15,10 @@ use crate::placement::{Placement, Side};
 use crate::report;
 use crate::roles::Role;
 
-/// Idle components of each node that is watched.
+/// The number of idle components of each measured node.
 const COMPONENTS: [usize; 3] = [1, 11, 101];
 
-/// A child: a node with so many components, each with the core services, and nothing to do.
+/// A child process: a node with `components` idle components that offer the core services.
 pub(crate) async fn stay(components: usize) {
     let node = Node::start(place::settings(JausId::new(101, 1, 1))).expect("a node");
     let alive: Vec<_> = (1..=components)
@@ -36,7 +36,7 @@ pub(crate) async fn stay(components: usize) {
 pub(crate) fn measure(effort: Effort) {
     let watch = |components| {
         let process = Process::start(&Role::Idle(components), &Placement::Free.of(Side::Theirs));
-        // Discovery has more to say in the beginning.
+        // Discovery sends more at the start.
         sleep(Duration::from_secs(3));
         let (before, time) = (process.processor_time().as_secs_f64(), effort.idle_seconds);
         sleep(Duration::from_secs_f64(time));
@@ -68,7 +68,7 @@ pub(crate) fn measure(effort: Effort) {
     }
 }
 
-/// Resident memory of a process, in KiB; the pages of the program itself are part of it.
+/// Resident memory of a process in KiB, including the pages of the program itself.
 fn resident(process: u32) -> f64 {
     let status = fs::read_to_string(format!("/proc/{process}/status")).expect("Linux");
     status

@@ -17,7 +17,7 @@
     clippy::panic,
     clippy::disallowed_methods,
     clippy::disallowed_types,
-    reason = "a benchmark: it owns clock and sockets, and ends at the first surprise"
+    reason = "a benchmark owns clock and sockets and panics on failure"
 )]
 
 mod baseline;

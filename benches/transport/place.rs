@@ -1,5 +1,4 @@
-//! Where a component of the benchmark lives: in a node of its own, or on the node of another
-//! process.
+//! Where a component of the benchmark runs: in its own node, or on another process's node.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -14,7 +13,7 @@ use crate::run;
 /// Where a component lives.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
-    /// In a node of its own.
+    /// In its own node.
     Own,
     /// On the node that serves this socket.
     On(PathBuf),
@@ -40,7 +39,7 @@ impl FromStr for Place {
     }
 }
 
-/// An attached component, with the node if it has one of its own.
+/// An attached component, with its node if it runs its own.
 pub(crate) struct Component {
     pub(crate) port: Port,
     _node: Option<Node>,

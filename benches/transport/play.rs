@@ -27,8 +27,8 @@ pub(crate) fn play(role: Role) {
     }
 }
 
-/// Runs a component in a task of its own, as most are: what a runtime blocks on costs it one call
-/// into the kernel more for each turn.
+/// Runs a component in its own task, like most components: a future that the runtime blocks on
+/// costs one more system call per turn.
 fn run(role: impl Future<Output = ()> + Send + 'static) {
     let runtime = runtime();
     let task = runtime.spawn(role);

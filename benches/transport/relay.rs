@@ -110,7 +110,7 @@ pub(crate) fn datagram_relay(at: &PathBuf, other: Option<SocketAddr>) {
     );
 }
 
-/// Until there is no more, or nobody takes it.
+/// Until the input ends or the output is closed.
 fn copy(
     mut read: impl FnMut(&mut [u8]) -> io::Result<usize>,
     mut write: impl FnMut(&[u8]) -> io::Result<()>,

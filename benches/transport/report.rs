@@ -23,7 +23,7 @@ pub(crate) fn median<T: PartialOrd + Copy>(values: &[T]) -> T {
     percentile(values, 50)
 }
 
-/// The value that so many percent do not exceed.
+/// The given percentile.
 pub(crate) fn percentile<T: PartialOrd + Copy>(values: &[T], percent: usize) -> T {
     let mut sorted = values.to_vec();
     sorted.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));

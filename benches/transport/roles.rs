@@ -1,4 +1,4 @@
-//! What a child process of the benchmark may be, and how it is told.
+//! Roles of the benchmark's child processes, and their encoding for the command line.
 
 use std::env;
 use std::net::SocketAddr;
@@ -39,7 +39,7 @@ pub(crate) enum Role {
     Relay(PathBuf),
     /// Copies between a stream and another relay, at this address if it is there already.
     DatagramRelay(PathBuf, Option<SocketAddr>),
-    /// Delays datagrams between two addresses, and loses so many percent, by a seed.
+    /// Delays datagrams between two addresses and drops a percentage of them, by a seed.
     Network(SocketAddr, SocketAddr, u8, u64),
     /// A component that sends messages back.
     Echo(JausId, Place),
@@ -51,7 +51,7 @@ pub(crate) enum Role {
     Sensor(SocketAddr, Vec<SocketAddr>),
     /// A node for other processes, that serves this socket.
     Node(JausId, Place),
-    /// An idle node with so many components.
+    /// An idle node with this number of components.
     Idle(usize),
 }
 

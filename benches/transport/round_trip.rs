@@ -1,4 +1,4 @@
-//! The time from a component to another and back, in processes of their own.
+//! Round-trip times between two components in separate processes.
 
 use std::time::{Duration, Instant};
 
@@ -21,9 +21,9 @@ use crate::setting::Setting;
 
 const LENGTHS: [usize; 2] = [64, 1024];
 
-/// What answers a message.
+/// Two ends that exchange messages.
 trait Pair {
-    /// So many round trips, one after the other.
+    /// Times of `count` consecutive round trips.
     fn round_trips(&mut self, message: &Bytes, count: usize) -> Vec<Duration>;
 }
 
@@ -39,7 +39,7 @@ impl Pair for StreamEcho {
     }
 }
 
-/// A component here and one in another process, which sends back what it gets.
+/// A local component, and an echo component in another process.
 struct Components {
     runtime: Runtime,
     ours: Option<Component>,
@@ -68,7 +68,7 @@ impl Pair for Components {
     fn round_trips(&mut self, message: &Bytes, count: usize) -> Vec<Duration> {
         let mut component = self.ours.take().expect("given back after each run");
         let (theirs, message) = (self.theirs, message.clone());
-        // A task of its own, as a component is.
+        // In its own task, like a real component.
         let run = self.runtime.spawn(async move {
             let mut times = Vec::with_capacity(count);
             while times.len() < count {
@@ -87,7 +87,7 @@ async fn round_trip(port: &mut Port, theirs: JausId, message: &Bytes) -> Duratio
         let start = Instant::now();
         port.send(Outgoing::new(port.id(), theirs, message.clone()))
             .expect("sent");
-        // The first may go astray while the two do not know each other.
+        // The first message may be lost before the two know each other.
         if let Ok(answer) = timeout(Duration::from_secs(1), port.recv()).await {
             assert!(answer.is_some(), "the node has stopped");
             return start.elapsed();
@@ -95,7 +95,7 @@ async fn round_trip(port: &mut Port, theirs: JausId, message: &Bytes) -> Duratio
     }
 }
 
-/// The pairs that are compared: a name, the place of its baseline in this list, and the pair.
+/// The compared pairs: name, index of the baseline in this list, and the pair.
 fn pairs(placement: Placement) -> Vec<(&'static str, usize, Box<dyn Pair>)> {
     let stream = |relays| Box::new(StreamEcho::start(relays, placement));
     let components = |setting| Box::new(Components::start(setting, placement));

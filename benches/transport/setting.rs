@@ -11,7 +11,7 @@ use crate::run::folder;
 /// How two components of the benchmark stand to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Setting {
-    /// Each carries a node of its own.
+    /// Each runs its own node.
     OwnNodes,
     /// Both are attached to one node in a third process.
     OneNode,

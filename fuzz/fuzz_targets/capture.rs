@@ -19,7 +19,7 @@ struct Kept {
     octets: Vec<u8>,
 }
 
-/// A reader that gives at most so many octets at a time.
+/// A reader that returns at most this many octets at a time.
 struct Pieces<'a>(&'a [u8], usize);
 
 impl Read for Pieces<'_> {

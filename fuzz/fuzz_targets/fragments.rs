@@ -3,7 +3,7 @@
 //!
 //! The first octet chooses roomy or narrow budgets. Then each step is an octet that says what
 //! happens and octets that say with what: a sender cuts another message, a fragment is given (in
-//! any order, again, never), time passes, or a forged fragment comes with numbers of its own.
+//! any order, again, never), time passes, or a forged fragment arrives with its own numbers.
 #![no_main]
 
 use std::net::SocketAddr;
@@ -151,7 +151,7 @@ impl World {
         self.arrive(sender, data, sequence, payload);
     }
 
-    /// Somebody sends a fragment in a sender's name.
+    /// An attacker sends a fragment in a sender's name.
     fn forge(&mut self, sender: u8, flags: u8, near: u8) {
         let sender = usize::from(sender) % SENDERS;
         self.forged[sender] = true;

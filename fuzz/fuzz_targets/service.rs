@@ -93,7 +93,7 @@ fuzz_target!(|octets: &[u8]| {
         stack.handle_message(now, &received(client, payload, how & 4 != 0));
         settle(&mut stack, &wheels);
     }
-    // Whoever was in control is dead, and nobody forbids it to end.
+    // The client in control is lost, so the motion may end.
     pass(&mut stack, &wheels, now, u8::MAX);
     assert!(!moves(&wheels), "it moves for a client that is dead");
 });

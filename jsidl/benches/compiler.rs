@@ -5,7 +5,7 @@
 //! |---|---|
 //! | read | XML to a resolved library, with all rules checked |
 //! | rust | the library to Rust source, one module for each set as the build script makes them |
-#![allow(missing_docs, clippy::unwrap_used, reason = "a bench")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "a benchmark")]
 
 use std::collections::BTreeMap;
 use std::hint::black_box;

@@ -1,7 +1,6 @@
-//! Generates Rust from service definitions in a build script.
-//!
-//! A crate with definitions of its own in `services/` and the crate `jsidl` among its
-//! build-dependencies needs this in the `main` of its `build.rs`:
+//! Generates Rust from service definitions in a build script. A crate with its own definitions in
+//! `services/` and the crate `jsidl` among its build-dependencies needs this in the `main` of its
+//! `build.rs`:
 //!
 //! ```no_run
 //! jsidl::build::Build::new()
@@ -115,7 +114,7 @@ impl Build {
         for (name, text) in files {
             let path = out_dir.join(name);
             if let Err(reason) = fs::write(&path, text) {
-                error(&format!("{} cannot be written: {reason}", path.display()));
+                error(&format!("cannot write {}: {reason}", path.display()));
             }
         }
     }

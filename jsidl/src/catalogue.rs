@@ -47,7 +47,7 @@ impl Entry {
         let text = miniz_oxide::inflate::decompress_to_vec(self.packed).ok();
         #[expect(
             clippy::expect_used,
-            reason = "the build script packed a text, and a test reads all"
+            reason = "the build script packed valid text, and a test reads all of it"
         )]
         let text = text
             .and_then(|octets| String::from_utf8(octets).ok())

@@ -72,8 +72,8 @@ impl Expression {
         let whole = all_consuming(delimited(multispace0, |i| sum(i, 0), multispace0)).parse(text);
         match whole.finish() {
             Ok((_, expression)) => Ok(expression),
-            Err(error) if error.input.is_empty() => Err("it ends too early".into()),
-            Err(error) => Err(format!("`{}` is not understood", error.input)),
+            Err(error) if error.input.is_empty() => Err("it is incomplete".into()),
+            Err(error) => Err(format!("`{}` is not recognised", error.input)),
         }
     }
 
@@ -246,9 +246,9 @@ mod tests {
 
     #[test]
     fn what_is_no_expression_is_refused_with_the_place() {
-        assert_eq!(value("3 +"), Err("it ends too early".into()));
+        assert_eq!(value("3 +"), Err("it is incomplete".into()));
         assert_eq!(value("3 $ 4"), Err("`$ 4` is not understood".into()));
-        assert_eq!(value("(3"), Err("it ends too early".into()));
+        assert_eq!(value("(3"), Err("it is incomplete".into()));
         assert_eq!(
             value("1/0"),
             Err("the result is not a finite number".into())

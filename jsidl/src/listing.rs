@@ -36,14 +36,14 @@ impl Listing {
 
     fn add(&mut self, path: &Path, depth: usize) {
         if depth > DEEPEST {
-            self.skip(path, "directories are nested too deeply here".into());
+            self.skip(path, "directories are nested too deeply".into());
             return;
         }
         let entries = fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>);
         let mut entries = match entries {
             Ok(entries) => entries,
             Err(error) => {
-                self.skip(path, format!("the directory cannot be read: {error}"));
+                self.skip(path, format!("cannot read the directory: {error}"));
                 return;
             }
         };

@@ -45,8 +45,8 @@ impl Loader {
         if path.is_dir() {
             let found = Listing::of(path);
             if found.files.is_empty() && found.unreadable.is_empty() {
-                let message = "there is no `.xml` file in this directory: service definitions are \
-                               XML files whose names end so";
+                let message = "this directory has no `.xml` files: service definitions are files \
+                    with that extension";
                 self.unreadable(path, message);
             }
             for (path, reason) in found.unreadable {
@@ -120,10 +120,9 @@ impl Loader {
 
 /// The text of a file, or the reason why it cannot be read.
 fn readable(path: &Path) -> Result<String, String> {
-    let metadata =
-        fs::metadata(path).map_err(|error| format!("the file cannot be read: {error}"))?;
+    let metadata = fs::metadata(path).map_err(|error| format!("cannot read the file: {error}"))?;
     if !metadata.is_file() {
-        return Err("this is neither a file nor a directory".into());
+        return Err("neither a file nor a directory".into());
     }
     if metadata.len() > crate::syntax::LARGEST {
         return Err(format!(
@@ -131,7 +130,7 @@ fn readable(path: &Path) -> Result<String, String> {
             crate::syntax::LARGEST >> 20
         ));
     }
-    let octets = fs::read(path).map_err(|error| format!("the file cannot be read: {error}"))?;
+    let octets = fs::read(path).map_err(|error| format!("cannot read the file: {error}"))?;
     String::from_utf8(octets).map_err(|error| {
         format!(
             "the file is not UTF-8 at octet {}: convert it",

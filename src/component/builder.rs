@@ -18,7 +18,7 @@ use crate::service::{
 
 /// A component that is not attached yet. It always offers Transport, Discovery, Liveness and
 /// Events.
-#[must_use = "a component exists once it is attached to a node"]
+#[must_use = "attach the component to a node"]
 pub struct Builder {
     profile: Profile,
     scope: Scope,
@@ -50,7 +50,7 @@ pub enum AttachError {
     #[error(transparent)]
     Unsafe(#[from] UnsafeService),
     /// Report Identification has one octet for the length of a name.
-    #[error("the name \"{name}\" has {length} octets, and at most 255 can be told to others")]
+    #[error("the name \"{name}\" has {length} octets: use at most 255")]
     NameTooLong {
         /// The beginning of the name.
         name: String,

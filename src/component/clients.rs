@@ -48,7 +48,7 @@ pub(super) struct Ticket {
 
 impl Drop for Ticket {
     fn drop(&mut self) {
-        // An error means that the component has stopped, which has ended it.
+        // An error means that the component has stopped, so it has ended already.
         let _ = self.cancellations.send(self.cancellation);
     }
 }
@@ -82,7 +82,7 @@ pub(super) enum Condition {
     Released,
 }
 
-/// All held and pending subscriptions and control.
+/// All active and pending subscriptions and control leases.
 pub(super) struct Clients {
     cancellations: mpsc::UnboundedSender<Cancellation>,
     subscribing: HashMap<SubscriptionId, oneshot::Sender<Subscribed>>,
@@ -92,7 +92,7 @@ pub(super) struct Clients {
 }
 
 impl Clients {
-    /// Takes the channel on which cancellations return to [`part`](Self::part).
+    /// `cancellations` is the channel whose entries the task passes to [`part`](Self::part).
     pub(super) fn new(cancellations: mpsc::UnboundedSender<Cancellation>) -> Self {
         Self {
             cancellations,
@@ -118,7 +118,7 @@ impl Clients {
         patience: Patience,
         transmit: impl FnOnce(&mut Stack) -> Result<(), node::SendError>,
     ) {
-        // A failed reply is ignored: the caller may have gone.
+        // A failed reply is ignored: the caller may be gone.
         match hold {
             Hold::Subscribe { topic, reply } => {
                 match begin_subscription(stack, &topic, patience, transmit) {
@@ -196,8 +196,8 @@ impl Clients {
         }
     }
 
-    /// Cancels requests whose callers have gone.
-    pub(super) fn forget_the_impatient(&mut self, stack: &mut Stack) {
+    /// Cancels requests whose callers are gone.
+    pub(super) fn cancel_abandoned(&mut self, stack: &mut Stack) {
         self.subscribing.retain(|&id, reply| {
             if reply.is_closed() {
                 stack.unsubscribe(Instant::now(), id);

@@ -68,7 +68,7 @@ impl Control {
         self.check_held().is_ok()
     }
 
-    /// Waits until control is lost, and returns the reason. Waits for ever while it is held.
+    /// Waits until control is lost, and returns the reason. Pending while control is held.
     pub async fn lost(&mut self) -> ControlError {
         let is_over = |now: &Condition| !matches!(now, Condition::Held(_));
         drop(self.condition.wait_for(is_over).await);

@@ -217,7 +217,7 @@ impl Driver {
     /// Executes the output of the services.
     fn settle(&mut self) {
         if let Err(error) = self.transmit() {
-            tracing::debug!(id = %self.stack.id(), %error, "message not sent");
+            tracing::debug!(id = %self.stack.id(), %error, "cannot send the message");
         }
         let mut changed = false;
         while let Some(event) = self.stack.poll_event() {
@@ -243,7 +243,7 @@ impl Driver {
             }
         }
         self.membership.publish();
-        self.forget_the_impatient();
+        self.cancel_abandoned();
     }
 
     fn hold(&mut self, hold: Hold) {
@@ -265,7 +265,7 @@ impl Driver {
     }
 
     /// Cancels queries whose callers have gone.
-    fn forget_the_impatient(&mut self) {
+    fn cancel_abandoned(&mut self) {
         let stack = &mut self.stack;
         self.waiting.retain(|&inquiry, reply| {
             if reply.is_closed() {
@@ -273,7 +273,7 @@ impl Driver {
             }
             !reply.is_closed()
         });
-        self.clients.forget_the_impatient(stack);
+        self.clients.cancel_abandoned(stack);
     }
 }
 

@@ -40,7 +40,7 @@ pub enum DeliverError {
 pub enum QueryError {
     /// The query timed out.
     #[error(
-        "{peer} did not answer {query} with {report}: asked {tries} times in {:.1} s",
+        "{peer} did not answer {query} with {report}: {tries} attempts in {:.1} s",
         waited.as_secs_f64()
     )]
     NoAnswer {
@@ -56,7 +56,7 @@ pub enum QueryError {
         waited: Duration,
     },
     /// The answer does not match its definition.
-    #[error("{peer} answered {query}, but the answer cannot be read")]
+    #[error("{peer} answered {query}, but the answer cannot be decoded")]
     Unreadable {
         /// The component that answered.
         peer: JausId,
@@ -66,7 +66,7 @@ pub enum QueryError {
         source: DecodeError,
     },
     /// The query could not be sent.
-    #[error("{query} could not be sent to {peer}")]
+    #[error("cannot send {query} to {peer}")]
     NotSent {
         /// The component to query.
         peer: JausId,
@@ -76,7 +76,7 @@ pub enum QueryError {
         source: SendError,
     },
     /// The component has stopped, because its node has.
-    #[error("the component has stopped with its node and asks nothing any more")]
+    #[error("the component stopped with its node and sends no more queries")]
     Stopped,
 }
 
@@ -106,7 +106,7 @@ impl QueryError {
 #[non_exhaustive]
 pub enum SubscribeError {
     /// No valid request for it can be made.
-    #[error("no subscription to {query} of {peer} is possible: {why}")]
+    #[error("cannot subscribe to {query} of {peer}: {why}")]
     Impossible {
         /// The component that would send the reports.
         peer: JausId,
@@ -126,7 +126,7 @@ pub enum SubscribeError {
         why: SubscriptionEnd,
     },
     /// The request could not be sent.
-    #[error("CreateEvent for {query} could not be sent to {peer}")]
+    #[error("CreateEvent for cannot send {query} to {peer}")]
     NotSent {
         /// The component that would send the reports.
         peer: JausId,
@@ -136,7 +136,7 @@ pub enum SubscribeError {
         source: SendError,
     },
     /// The component has stopped, because its node has.
-    #[error("the component has stopped with its node and subscribes to nothing any more")]
+    #[error("the component stopped with its node and accepts no more subscriptions")]
     Stopped,
 }
 
@@ -145,7 +145,7 @@ pub enum SubscribeError {
 #[non_exhaustive]
 pub enum ControlError {
     /// It was not granted.
-    #[error("no control over {peer}: {why}")]
+    #[error("no control of {peer}: {why}")]
     Refused {
         /// The component to control.
         peer: JausId,
@@ -153,7 +153,7 @@ pub enum ControlError {
         why: ControlRefused,
     },
     /// It was granted, and lost.
-    #[error("control over {peer} is lost: {why}")]
+    #[error("control of {peer} is lost: {why}")]
     Lost {
         /// The component that was controlled.
         peer: JausId,
@@ -163,8 +163,8 @@ pub enum ControlError {
     /// Control is held, but the peer does not act on commands: it was resumed, and is no longer
     /// ready.
     #[error(
-        "{peer} is not ready any more: it reports the status {state}; `resume` makes it ready, \
-         unless it is in an emergency or has failed"
+        "{peer} is no longer ready: it reports the status {state}; call `resume`, unless it is in \
+         an emergency or failed"
     )]
     NotReady {
         /// The controlled component.
@@ -179,7 +179,7 @@ pub enum ControlError {
     #[error(transparent)]
     Undelivered(#[from] DeliverError),
     /// The component has stopped, because its node has.
-    #[error("the component has stopped with its node and controls nothing any more")]
+    #[error("the component stopped with its node and controls no more peers")]
     Stopped,
 }
 
@@ -194,7 +194,7 @@ pub enum ManageError {
     #[error(transparent)]
     Query(#[from] QueryError),
     /// It is in another state.
-    #[error("{peer} was told to be in the state {wanted}, and reports the status {found}")]
+    #[error("{peer} was set to the state {wanted}, but reports the status {found}")]
     State {
         /// The commanded component.
         peer: JausId,
@@ -211,7 +211,7 @@ pub enum ManageError {
 pub enum FindError {
     /// None was found in time.
     #[error(
-        "no component that offers {service} was found within {:.1} s ({})",
+        "no component with {service} found within {:.1} s ({})",
         waited.as_secs_f64(), Instead(*others, instead)
     )]
     NotFound {
@@ -225,7 +225,7 @@ pub enum FindError {
         instead: Vec<(JausId, Offer)>,
     },
     /// The component has stopped, because its node has.
-    #[error("the component has stopped with its node and finds nobody any more")]
+    #[error("the component stopped with its node and finds no more components")]
     Stopped,
 }
 

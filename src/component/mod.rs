@@ -59,7 +59,7 @@
 //! the clock, the channels and the names.
 #![expect(
     clippy::disallowed_methods,
-    reason = "here the services get their time and their task"
+    reason = "gives the services their clock and task"
 )]
 
 mod builder;

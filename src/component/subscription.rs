@@ -83,7 +83,7 @@ impl<R: Message> Subscription<R> {
                     Ok(report) => Update::Report(report),
                     Err(error) => {
                         self.feed.count_unreadable();
-                        tracing::debug!(peer = %self.peer, %error, "report cannot be read");
+                        tracing::debug!(peer = %self.peer, %error, "cannot decode the report");
                         continue;
                     }
                 },

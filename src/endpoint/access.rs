@@ -75,18 +75,18 @@ impl Subsystems {
 pub enum AccessError {
     /// Neither a subsystem number nor a range.
     #[error(
-        "`{0}` names no subsystems: write a number from 1 to 65534 such as \"101\", or a range \
-         with the smaller first such as \"200-299\""
+        "`{0}` is not a subsystem or range: write a number from 1 to 65534 such as \"101\", or a \
+         range in ascending order such as \"200-299\""
     )]
     Subsystems(String),
     /// Not a network.
     #[error(
-        "`{0}` is no network: write an address and the number of its leading bits that count, \
-         such as \"10.0.9.0/24\" or \"fd00::/8\", or one address such as \"10.0.9.7\""
+        "`{0}` is not a network: write an address and its prefix length, such as \"10.0.9.0/24\" \
+         or \"fd00::/8\", or one address such as \"10.0.9.7\""
     )]
     Network(String),
     /// The address has bits set beyond the prefix.
-    #[error("`{text}` has bits set behind the first {prefix}: write \"{meant}\"")]
+    #[error("`{text}` has bits set after the first {prefix}: write \"{meant}\"")]
     HostBits {
         /// The text.
         text: String,

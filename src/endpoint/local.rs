@@ -11,14 +11,15 @@ use crate::wire::Broadcast;
 pub enum AttachError {
     /// The id contains a zero or a wildcard.
     #[error(
-        "{0} does not name one component: the subsystem must be 1 to 65534, node and component 1 to 254 each"
+        "{0} is not a single component: the subsystem must be 1 to 65534, node and component 1 to \
+         254 each"
     )]
     NotOneComponent(JausId),
     /// The id is attached already.
-    #[error("{0} is attached already: give each component an id of its own")]
+    #[error("{0} is attached already: give each component its own id")]
     AlreadyAttached(JausId),
     /// The table is full.
-    #[error("{limit} components are attached already, and more are not allowed")]
+    #[error("the limit of {limit} attached components is reached")]
     TooMany {
         /// [`Config::max_components`](super::Config::max_components).
         limit: usize,

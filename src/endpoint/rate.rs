@@ -240,7 +240,7 @@ mod tests {
 
     #[expect(
         clippy::disallowed_methods,
-        reason = "an arbitrary beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     fn start() -> Instant {
         Instant::now()

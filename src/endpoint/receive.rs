@@ -174,7 +174,8 @@ impl Endpoint {
             if self.warnings.is_due(now, Warning::TableFull) {
                 warn!(
                     id = %frame.source, from = %path.peer,
-                    "no room for another peer: raise limits.max_peers, or see who invents ids"
+                    "no room for another peer: raise limits.max_peers, or find the sender of \
+                     forged ids"
                 );
             }
             return Err(Counter::PeersFull);

@@ -178,7 +178,7 @@ mod tests {
     #[test]
     #[expect(
         clippy::disallowed_methods,
-        reason = "an arbitrary beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     fn the_memory_is_bounded_in_number_and_time() {
         let start = Instant::now();
@@ -201,7 +201,7 @@ mod tests {
     #[test]
     #[expect(
         clippy::disallowed_methods,
-        reason = "an arbitrary beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     fn what_is_put_in_again_is_remembered_from_then_on() {
         let start = Instant::now();
@@ -217,7 +217,7 @@ mod tests {
     #[test]
     #[expect(
         clippy::disallowed_methods,
-        reason = "an arbitrary beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     fn strangers_push_out_only_what_strangers_sent() {
         let start = Instant::now();

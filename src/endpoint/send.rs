@@ -13,7 +13,7 @@ use crate::wire::{
     Acknowledgement, Broadcast, EncodeError, Flags, Frame, Priority, Version, as5669a,
 };
 
-/// Why a message cannot be sent. No part of it was sent.
+/// Why a cannot send the message. No part of it was sent.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SendError {
@@ -21,16 +21,16 @@ pub enum SendError {
     #[error("{0} is not attached here, so it cannot send")]
     UnknownSource(JausId),
     /// The destination contains a zero.
-    #[error("{0} names nobody: a subsystem, node or component of 0 does not exist")]
+    #[error("{0} is not a valid destination: subsystem, node and component start at 1")]
     Nobody(JausId),
     /// The payload does not begin with a message code.
-    #[error("a message begins with two code octets, this one has {length} octets")]
+    #[error("a message starts with two code octets, but this one has {length} octets")]
     NoMessageCode {
         /// Octets of the payload.
         length: usize,
     },
     /// The payload exceeds the longest message.
-    #[error("the message has {length} octets, and at most {limit} can be sent to this receiver")]
+    #[error("the message has {length} octets, but the limit for this receiver is {limit}")]
     TooLong {
         /// Octets of the payload.
         length: usize,
@@ -40,32 +40,32 @@ pub enum SendError {
     },
     /// An acknowledgement was requested from many receivers.
     #[error(
-        "a message to {0} goes to many, and only a message to one component can be acknowledged"
+        "{0} is not a single component, and only messages to one component can be acknowledged"
     )]
     ManyAcknowledgements(JausId),
     /// A local broadcast to another subsystem.
     #[error("a local broadcast stays in the sender's subsystem and cannot go to {0}")]
     OutOfScope(JausId),
     /// Too many messages wait for acknowledgements.
-    #[error("{limit} messages wait for acknowledgements already")]
+    #[error("the limit of {limit} unacknowledged messages is reached")]
     TooManyUnacknowledged {
         /// [`Config::max_unacknowledged`](super::Config::max_unacknowledged).
         limit: usize,
     },
     /// Too many octets wait for acknowledgements.
-    #[error("messages of {limit} octets wait for acknowledgements already")]
+    #[error("the limit of {limit} unacknowledged octets is reached")]
     TooMuchUnacknowledged {
         /// [`Config::max_unacknowledged_octets`](super::Config::max_unacknowledged_octets).
         limit: usize,
     },
     /// Messages to too many destinations wait for acknowledgements.
-    #[error("messages to {limit} destinations wait for acknowledgements already")]
+    #[error("the limit of {limit} destinations with unacknowledged messages is reached")]
     TooManyDestinations {
         /// [`Config::max_flows`](super::Config::max_flows).
         limit: usize,
     },
     /// Too many octets of large messages wait to be sent.
-    #[error("large messages of {limit} octets wait to be sent already")]
+    #[error("the limit of {limit} queued octets of large messages is reached")]
     TooMuchQueued {
         /// [`Config::max_paced`](super::Config::max_paced).
         limit: usize,
@@ -75,13 +75,13 @@ pub enum SendError {
     #[error("{0} does not read fast enough: its mailbox is full")]
     ReceiverFull(JausId),
     /// Too many datagrams wait to be sent.
-    #[error("{limit} messages of this priority wait already")]
+    #[error("the limit of {limit} queued messages of this priority is reached")]
     QueueFull {
         /// [`Config::queue_limit`](super::Config::queue_limit).
         limit: usize,
     },
     /// The destination is on another node, and there is no link.
-    #[error("{0} is not here, and there is no link to another node")]
+    #[error("{0} is not attached here, and there is no link to another node")]
     NoLink(JausId),
     /// The receiver's older header cannot carry it.
     #[error("the receiver's header cannot carry the message: {0}")]

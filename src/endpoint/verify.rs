@@ -100,7 +100,7 @@ impl Endpoint {
         debug!(%id, ?from, ?to, "peer moved");
         self.announce(Event::PeerMoved { id, from, to });
         if self.warnings.is_due(now, Warning::PeerMoved) {
-            warn!(%id, from = %from.peer, to = %to.peer, "a peer has another address now");
+            warn!(%id, from = %from.peer, to = %to.peer, "a peer moved to another address");
         }
     }
 
@@ -230,7 +230,8 @@ impl Endpoint {
             if self.warnings.is_due(now, Warning::PeerConflict) {
                 warn!(
                     %id, at = %incumbent.peer, other = %rival.path.peer,
-                    "an id is used at two addresses: give each component an id of its own, or pin it with peers"
+                    "an id is used at two addresses: give each component its own id, or pin it \
+                     with peers"
                 );
             }
         }
@@ -256,7 +257,8 @@ impl Endpoint {
             if !is_asked && self.warnings.is_due(now, Warning::Unverified) {
                 warn!(
                     to = %to.peer,
-                    "too much for an address that acknowledges nothing: name the peer in peers if it is real"
+                    "too much traffic for an unverified address: add the peer to `peers` if it is \
+                     genuine"
                 );
             }
         }

@@ -12,7 +12,7 @@ use super::interface::{Available, Interface, Ip};
 #[non_exhaustive]
 pub enum Error {
     /// The name or address does not belong to this host.
-    #[error("there is no network interface `{wanted}` on this host; there are: {available}")]
+    #[error("there is no network interface `{wanted}` on this host; choose from: {available}")]
     NoSuchInterface {
         /// The name or address as given.
         wanted: String,
@@ -22,7 +22,7 @@ pub enum Error {
     /// The interface exists but is not up.
     #[error(
         "the network interface {interface} is not up: bring it up (`ip link set {name} up`) or \
-         choose another; there are: {available}",
+         choose another: {available}",
         name = interface.name
     )]
     InterfaceDown {
@@ -34,7 +34,7 @@ pub enum Error {
     /// The interface has addresses, but none of the requested IP version.
     #[error(
         "the network interface `{wanted}` has no {} address: give it one, or set `ip` to another \
-         version; there are: {available}",
+         version; choose from: {available}",
         ip.name()
     )]
     NoAddress {
@@ -46,12 +46,12 @@ pub enum Error {
         available: Available,
     },
     /// There is no interface to open a link on.
-    #[error("no network interface can be used; there are: {0}")]
+    #[error("no network interface is usable; found: {0}")]
     NoInterface(Available),
     /// Multicast is enabled, but no selected interface carries multicast or broadcasts.
     #[error(
-        "none of the chosen interfaces carries multicast ({0}), so this node could find nobody: \
-         choose another interface, or name peers by address, or turn the group off"
+        "none of the chosen interfaces has multicast ({0}), so discovery cannot work: choose \
+         another interface, name peers by address, or turn the group off"
     )]
     NoMulticast(Available),
     /// The group is not a multicast address with a port.
@@ -59,11 +59,10 @@ pub enum Error {
     InvalidGroup(#[from] InvalidGroup),
     /// The unicast address and port are in use.
     #[error(
-        "UDP port {} of {} is taken{holder}. Each node of a host needs a port or an address for \
-         itself, because a datagram to a shared one reaches only one of them. Choose another port \
-         (0: any free one; peers answer to the port that they hear us from), or another address \
-         (on loopback any of 127.0.0.0/8, such as 127.0.0.2), or end the other program. \
-         {}",
+        "UDP port {} of {} is taken{holder}. Each node of a host needs its own port or address, \
+         because a datagram to a shared one reaches only one node. Choose another port (0: any \
+         free one; peers answer to the source port), or another address (on loopback any of \
+         127.0.0.0/8, such as 127.0.0.2), or stop the other program. {}",
         .address.port(), .address.ip(), holder_hint(holder, *address)
     )]
     PortTaken {
@@ -74,9 +73,9 @@ pub enum Error {
     },
     /// Another program has the multicast group's port and does not share it.
     #[error(
-        "the multicast group {group} cannot be received: UDP port {} is held{holder} for all \
-         addresses, without sharing. End that program, or move both to another group and port, \
-         or turn the group off and name peers by address. {}",
+        "the multicast group {group} cannot be received: UDP port {} is bound{holder} to all \
+         addresses without sharing. Stop that program, or move both to another group and port, or \
+         turn the group off and name peers by address. {}",
         .group.port(), holder_hint(holder, *group)
     )]
     GroupTaken {
@@ -101,8 +100,8 @@ pub enum Error {
     },
     /// Another program listens at that address.
     #[error(
-        "TCP port {} of {} is taken: choose another, or another address of this host, or end the \
-         other program (`sudo ss -ltnp 'sport = :{}'` shows who it is)",
+        "TCP port {} of {} is taken: choose another, or another address of this host, or stop the \
+         other program (find it with `sudo ss -ltnp 'sport = :{}'`)",
         .address.port(), .address.ip(), .address.port()
     )]
     ListenerTaken {
@@ -110,7 +109,7 @@ pub enum Error {
         address: SocketAddr,
     },
     /// This process lacks a permission.
-    #[error("this process lacks the right for {doing} ({source}){}", privileged(*port))]
+    #[error("permission denied for {doing} ({source}){}", privileged(*port))]
     Permission {
         /// The attempted operation.
         doing: String,
@@ -120,7 +119,7 @@ pub enum Error {
         source: io::Error,
     },
     /// The address disappeared between listing the interfaces and binding to it.
-    #[error("the address {0} is not (or no longer) an address of this host")]
+    #[error("{0} is not (or no longer) an address of this host")]
     AddressGone(IpAddr),
     /// Any other error of the operating system.
     #[error("{doing} failed: {source}")]
@@ -159,13 +158,13 @@ impl Error {
 fn holder_hint(holder: &Holder, address: SocketAddr) -> String {
     match holder {
         _ if cfg!(unix) && holder.is_junior() => {
-            "(It is Junior's node manager: with --junior, in a settings file junior = \"/tmp\", this \
-             node is its client.)"
+            "(It is Junior's node manager: connect through it with --junior, or junior = \"/tmp\" \
+             in a settings file.)"
                 .to_owned()
         }
-        Holder::Process { pid, .. } => format!("(`kill {pid}` asks it to end.)"),
+        Holder::Process { pid, .. } => format!("(Stop it with `kill {pid}`.)"),
         _ => format!(
-            "(`sudo ss -ulpn 'sport = :{}'` shows who it is.)",
+            "(Find it with `sudo ss -ulpn 'sport = :{}'`.)",
             address.port()
         ),
     }
@@ -173,7 +172,7 @@ fn holder_hint(holder: &Holder, address: SocketAddr) -> String {
 
 const fn privileged(port: u16) -> &'static str {
     if port < 1024 && port != 0 {
-        ": ports below 1024 are for privileged processes, choose a higher one"
+        ": ports below 1024 need privileges, choose a higher one"
     } else {
         ": see the container's or the security module's settings"
     }

@@ -43,8 +43,8 @@ pub type Group6 = Group<SocketAddrV6>;
 /// Not a multicast group.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{given}` is no multicast group: write an address from {range}, with a port if it is not \
-     3794, or `off`; the usual group for JAUS is {usual}"
+    "`{given}` is not a multicast group: write an address from {range}, with a port if it is not \
+     3794, or `off`; the usual JAUS group is {usual}"
 )]
 pub struct InvalidGroup {
     given: String,

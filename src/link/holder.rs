@@ -34,7 +34,7 @@ pub enum Holder {
 impl fmt::Display for Holder {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Ourselves => f.write_str(" by this very process"),
+            Self::Ourselves => f.write_str(" by this process"),
             Self::Process { pid, name } => write!(f, " by process {pid} ({name})"),
             Self::User { uid } => write!(f, " by a process of user {uid}"),
             Self::Unknown => Ok(()),

@@ -25,7 +25,7 @@
 //!
 //! A program that binds port 3794 of *all* addresses without sharing, as Junior does, leaves no
 //! room for either socket. One of the two has to move, or the node becomes its client (`junior`).
-#![expect(clippy::disallowed_types, reason = "this is where sockets live")]
+#![expect(clippy::disallowed_types, reason = "this module owns the sockets")]
 
 pub(crate) mod backlog;
 mod error;

@@ -16,9 +16,8 @@ use tokio::io::unix::AsyncFd;
 /// Registers a non-blocking socket with the runtime.
 #[allow(
     deprecated,
-    reason = "the successor must be promised that the descriptor stays open as long as it is \
-              watched, by an unsafe call; an owned standard socket, which is what is watched here, \
-              keeps that promise by itself"
+    reason = "its successor needs an unsafe call that promises an open descriptor; the owned \
+        standard socket watched here guarantees that"
 )]
 pub(super) fn watch<S: AsRawFd>(socket: S, interest: Interest) -> io::Result<AsyncFd<S>> {
     AsyncFd::with_interest(socket, interest)

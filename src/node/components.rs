@@ -73,10 +73,11 @@ impl ComponentEvent {
             }
             Self::Refused { process, why } => Some(format!("{process} was refused: {why}")),
             Self::Stuck { id, process } => Some(format!(
-                "{id} of {process} reads nothing; what it cannot keep is dropped"
+                "{id} of {process} stopped reading; its messages are dropped when its mailbox is \
+                 full"
             )),
             Self::Resumed { id, dropped } => Some(format!(
-                "{id} reads again; {dropped} messages were dropped since it came"
+                "{id} reads again; {dropped} messages dropped since it attached"
             )),
         }
     }
@@ -100,10 +101,10 @@ pub enum Departure {
 impl fmt::Display for Departure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Left => f.pad("has left"),
-            Self::Vanished => f.pad("is gone without a word: its process has ended"),
-            Self::Failed(why) => write!(f, "was sent away: {why}"),
-            Self::Stopped => f.pad("went with the node"),
+            Self::Left => f.pad("detached"),
+            Self::Vanished => f.pad("disconnected without detaching: its process ended"),
+            Self::Failed(why) => write!(f, "was disconnected: {why}"),
+            Self::Stopped => f.pad("detached: the node stopped"),
         }
     }
 }

@@ -42,10 +42,7 @@ pub(super) const LAST_WORDS: Duration = Duration::from_millis(250);
 
 /// The node's clock. It is tokio's, so that a paused test clock applies to timers and endpoint
 /// alike.
-#[expect(
-    clippy::disallowed_methods,
-    reason = "the node is the owner that has the clock"
-)]
+#[expect(clippy::disallowed_methods, reason = "the node owns the clock")]
 pub(super) fn now() -> Instant {
     tokio::time::Instant::now().into_std()
 }
@@ -132,10 +129,7 @@ impl Shared {
 }
 
 /// The first sequence number.
-#[expect(
-    clippy::disallowed_methods,
-    reason = "the node is the owner that has the clock"
-)]
+#[expect(clippy::disallowed_methods, reason = "the node owns the clock")]
 fn first_sequence() -> u16 {
     let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     // A clock before 1970 was never set; then every start uses the same number.

@@ -31,8 +31,8 @@ pub enum StartError {
     Serial(#[from] link::serial::SerialError),
     /// A peer lies behind an interface that is not selected.
     #[error(
-        "the peer {peer} is reached from {local}, and that is none of the chosen interfaces \
-         ({chosen}): add `{local}` to them, or leave the peer out"
+        "the peer {peer} is reached from {local}, which is not one of the chosen interfaces \
+         ({chosen}): add `{local}`, or remove the peer"
     )]
     PeerOutOfReach {
         /// The peer.
@@ -44,7 +44,7 @@ pub enum StartError {
     },
     /// There is no tokio runtime to run on.
     #[error(
-        "a node runs on a tokio runtime with I/O and time enabled: start it within one \
+        "a node needs a tokio runtime with I/O and time enabled: start it within one \
          (`#[tokio::main]`, or `Runtime::enter`)"
     )]
     NoRuntime,
@@ -58,13 +58,10 @@ pub enum SendError {
     #[error(transparent)]
     Endpoint(#[from] endpoint::SendError),
     /// The component is attached to the host's node, and the connection is down at present.
-    #[error(
-        "{0} has no connection to the node of this host just now; it is made again as soon as the \
-         node is back"
-    )]
+    #[error("{0} is not connected to the node of this host; it reconnects when the node is back")]
     NotConnected(JausId),
     /// The host's node takes messages more slowly than the component sends them.
-    #[error("{octets} octets wait for the node of this host already: send more slowly")]
+    #[error("{octets} octets are already queued for the node of this host: send more slowly")]
     Busy {
         /// The waiting octets.
         octets: usize,
@@ -82,7 +79,7 @@ pub enum Undelivered {
     #[error("the node of this host did not send it: {0}")]
     Rejected(String),
     /// It was sent, but not or not completely acknowledged.
-    #[error("{destination} has acknowledged {acknowledged} of {length} octets: {reason}")]
+    #[error("{destination} acknowledged {acknowledged} of {length} octets: {reason}")]
     NotAcknowledged {
         /// Its destination.
         destination: JausId,
@@ -94,7 +91,7 @@ pub enum Undelivered {
         length: usize,
     },
     /// The component or its node ended before the outcome was known. The message may have arrived.
-    #[error("the node was lost before it could tell whether the message arrived")]
+    #[error("the node was lost before it reported the delivery")]
     Lost,
 }
 
@@ -106,7 +103,7 @@ pub enum HostError {
     #[error(transparent)]
     Link(#[from] link::local::Error),
     /// The node refused the component.
-    #[error("the node of this host refuses: {words}")]
+    #[error("the node of this host refused: {words}")]
     Refused {
         /// The reason, for programs.
         reason: Reason,

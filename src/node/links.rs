@@ -150,7 +150,8 @@ impl Links {
         let mut gone = Vec::new();
         for id in ids {
             if let Some(Link::Udp(link)) = self.open.remove(&id) {
-                tracing::info!(interface = %link.interface(), "link closed: the interface is gone");
+                tracing::info!(interface = %link.interface(), "link closed: the interface was \
+                    removed");
                 gone.push((id, link));
             }
         }

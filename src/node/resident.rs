@@ -22,10 +22,7 @@ impl Residents {
     }
 
     /// Asks the residents to leave, and waits until all have, or for [`LIMIT`].
-    #[expect(
-        clippy::disallowed_methods,
-        reason = "a node that stops waits in real time"
-    )]
+    #[expect(clippy::disallowed_methods, reason = "shutdown waits in real time")]
     pub(super) async fn close(&self) {
         self.0.send_replace(true);
         // On timeout the peers' own timeouts release what the residents held.
@@ -43,7 +40,7 @@ impl Resident {
         Self(None)
     }
 
-    /// Waits until the node is about to stop.
+    /// Waits until the node is stopping.
     pub async fn closing(&self) {
         match self.0.clone() {
             Some(mut closing) => {

@@ -253,7 +253,7 @@ impl Taps {
     #[cold]
     #[expect(
         clippy::disallowed_methods,
-        reason = "people want the time of day, and only when they look"
+        reason = "formats the time of day for people"
     )]
     fn tell_all(&mut self, way: Way, content: Content) {
         let passage = Passage {

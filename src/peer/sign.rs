@@ -47,10 +47,9 @@ macro_rules! signs {
 signs! {
     /// A fragment of JAUS++'s length that begins with the code of its message.
     RepeatedCode = JausPlusPlus, 4:
-        "the fragments of its large messages each begin with the message code, and have 1573 \
-         octets";
+        "each fragment of its large messages starts with the message code and has 1573 octets";
     /// Stale octets after the messages of a datagram.
-    StaleOctets = JausPlusPlus, 2: "octets of older datagrams stand behind its messages";
+    StaleOctets = JausPlusPlus, 2: "octets of older datagrams follow its messages";
     /// Register Services sent to another subsystem.
     RegistersAcrossSubsystems = JausPlusPlus, 2: "it sends Register Services to other subsystems";
     /// A private service of JAUS++.
@@ -60,28 +59,28 @@ signs! {
     /// The version octet before each message of a TCP stream.
     RepeatedVersion = JausPlusPlus, 2: "it writes the version octet before each message over TCP";
     /// Sequence number 0, which peers that begin with 1 skip.
-    NumberZero = JausPlusPlus, 1: "a message of it has the sequence number 0";
+    NumberZero = JausPlusPlus, 1: "one of its messages has the sequence number 0";
     /// All flags set on a message other than an acknowledgement.
-    PriorityFault = Junior, 4: "a message of it has all flags set, as with priority 0";
+    PriorityFault = Junior, 4: "one of its messages has all flags set, as with priority 0";
     /// A fragment of Junior's length.
     LongFragments = Junior, 2: "the fragments of its large messages have 4079 octets";
     /// A message for one component that was broadcast and requests an acknowledgement.
     CallsUnknownIds = Junior, 1:
-        "a message for one component went to everybody and wants an acknowledgement";
+        "it broadcasts a message for one component and requests acknowledgement";
     /// The first message heard has the number 1.
-    BeginsWithOne = Junior, 1: "the first message that was heard of it has the number 1";
+    BeginsWithOne = Junior, 1: "the first message received from it has the number 1";
     /// Acknowledgements of reserved message types, except those that look like header compression
     /// if the bits are read from the wrong end. It must be provoked.
-    MisreadType = Junior, 4: "it takes bits of the message type for header compression";
+    MisreadType = Junior, 4: "it reads message type bits as header compression flags";
     /// An acknowledgement of a message for an id with a 0. It must be provoked.
     AnswersForZero = Jts, 2: "it answers for an id with a 0 in it";
     /// Sequence numbers counted per destination.
-    NumbersByDestination = OpenJausSdk, 2: "its sequence numbers count for each destination";
+    NumbersByDestination = OpenJausSdk, 2: "it counts sequence numbers per destination";
     /// Queries to all components of one node, as global broadcasts.
     AsksWholeNodes = OpenJausSdk, 2:
-        "it asks all components of a node, in global broadcasts, what others ask one";
+        "it queries all components of a node by global broadcast where others query one";
     /// A destination that contains a 0.
-    ZeroInDestination = Iop, 2: "it writes 0 into destinations, for \"all\"";
+    ZeroInDestination = Iop, 2: "it uses 0 as a wildcard in destinations";
     /// A service of the interoperability profiles.
     IopService = Iop, 4: "it offers a service of the interoperability profiles";
 }

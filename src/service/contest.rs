@@ -2,7 +2,7 @@
 //! Challenge, steps 3 to 26), octet for octet, and checks the answers.
 #![allow(
     clippy::disallowed_methods,
-    reason = "a test begins at some time, and all that follows is virtual"
+    reason = "virtual time starts at any instant"
 )]
 
 use std::time::{Duration, Instant};
@@ -96,11 +96,11 @@ const CONTROL: [Row; 31] = [
     (26, A, "0220", &[(A, STANDBY)]),
 ];
 
-/// The code 5, and 80 octets of text: "nobody here answers this query".
+/// The code 5, and 80 octets of text: "this component does not answer this query".
 const NOBODY_ANSWERS: &str = concat!(
     "f401030305",
-    "6e6f626f6479206865726520616e73776572732074686973207175657279",
-    "00000000000000000000000000000000000000000000000000",
+    "7468697320636f6d706f6e656e7420646f6573206e6f7420616e737765722074686973207175657279",
+    "0000000000000000000000000000",
     "00000000000000000000000000000000000000000000000000"
 );
 

@@ -82,7 +82,7 @@ pub struct Offer {
     pub minor: u8,
 }
 
-/// The three levels that have an identification of their own.
+/// The three levels with their own identification.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Level {
     /// The subsystem.

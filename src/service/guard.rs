@@ -119,25 +119,25 @@ impl StopCause {
 impl fmt::Display for StopCause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Expired(client) => write!(f, "{client} has not repeated its command in time"),
-            Self::ControllerSilent(client) => write!(f, "{client} shows no life"),
+            Self::Expired(client) => write!(f, "{client} did not repeat its command in time"),
+            Self::ControllerSilent(client) => write!(f, "{client} is silent"),
             Self::ControlChanged => f.write_str("control was released, lost or taken over"),
             Self::Standby => f.write_str("the component is in standby"),
-            Self::Requested => f.write_str("the application has stopped it"),
+            Self::Requested => f.write_str("the application stopped it"),
             Self::Emergency => f.write_str("emergency"),
-            Self::Failure => f.write_str("the component has failed"),
-            Self::Shutdown => f.write_str("the component shuts down"),
+            Self::Failure => f.write_str("the component failed"),
+            Self::Shutdown => f.write_str("the component is shutting down"),
             Self::Fault(what) => f.write_str(what),
             Self::PoseStale(age) => write!(f, "the pose is {:.1} s old", age.as_secs_f64()),
             Self::Hung(gap) => {
                 write!(
                     f,
-                    "the component was held up for {:.1} s",
+                    "the component was delayed for {:.1} s",
                     gap.as_secs_f64()
                 )
             }
-            Self::PoseUnknown => f.write_str("the pose is not known"),
-            Self::Ended => f.write_str("the component has ended"),
+            Self::PoseUnknown => f.write_str("the pose is unknown"),
+            Self::Ended => f.write_str("the component ended"),
         }
     }
 }
@@ -229,7 +229,7 @@ impl MotionGuard {
         }
         let setpoint = self.setpoint?;
         let cause = if self.life_matters() {
-            tracing::warn!(client = %setpoint.owner, "stopped: the client shows no life");
+            tracing::warn!(client = %setpoint.owner, "stopped: the client is silent");
             StopCause::ControllerSilent(setpoint.owner)
         } else {
             self.log_expiry(&setpoint);
@@ -249,7 +249,7 @@ impl MotionGuard {
         if setpoint.interval.is_some_and(|interval| interval < brief)
             || self.logged.replace(client) == Some(client)
         {
-            tracing::debug!(%client, "stopped: the command was not repeated");
+            tracing::debug!(%client, "stopped: the command expired");
             return;
         }
         let interval = setpoint.interval.map_or_else(
@@ -258,7 +258,7 @@ impl MotionGuard {
         );
         tracing::warn!(
             %client,
-            "stopped: a command is valid for {:.2} s and the client {interval}; let it send more \
+            "stopped: a command is valid for {:.2} s, but the client {interval}; let it send more \
              often, or choose the motion policy \"hold\"",
             brief.as_secs_f64()
         );

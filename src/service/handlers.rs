@@ -113,8 +113,8 @@ impl Handlers {
         const {
             assert!(
                 !Q::NEEDS_CONTROL,
-                "this is a command of a service with Access Control, not a query: take it with \
-                 `command` or `configure`"
+                "this is a command of a service with Access Control, not a query: register it \
+                 with `command` or `configure`"
             );
         }
         self.handle::<Q>(move |received, context| {
@@ -136,8 +136,8 @@ impl Handlers {
         const {
             assert!(
                 !M::NEEDS_CONTROL,
-                "this is a command of a service with Access Control: take it with `command` or \
-                 `configure`, or from anyone with `receive_unguarded`"
+                "this is a command of a service with Access Control: register it with `command` \
+                 or `configure`, or for any client with `receive_unguarded`"
             );
         }
         self.receive_unguarded(function)
@@ -228,7 +228,8 @@ impl Handlers {
                 function(M::decode(&received.payload)?, received, context);
                 return Ok(taken);
             }
-            tracing::debug!(source = %received.source, message = M::NAME, "not in control");
+            tracing::debug!(source = %received.source, message = M::NAME, "ignored: sender not in \
+                control");
             Ok(Taken::Message)
         });
         self
@@ -286,7 +287,7 @@ impl Service for Handlers {
                     break;
                 }
                 Err(error) => {
-                    tracing::debug!(source = %message.source, %error, "message cannot be read");
+                    tracing::debug!(source = %message.source, %error, "cannot decode the message");
                 }
             }
         }

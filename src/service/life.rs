@@ -227,7 +227,7 @@ impl Peer {
 #[cfg(test)]
 #[expect(
     clippy::disallowed_methods,
-    reason = "an arbitrary beginning of virtual time"
+    reason = "virtual time starts at any instant"
 )]
 mod tests {
     use super::*;

@@ -161,7 +161,7 @@ pub fn code_of(payload: &[u8]) -> Option<u16> {
 pub fn read<M: crate::codec::Message>(received: &Received) -> Option<M> {
     M::decode(&received.payload)
         .inspect_err(|error| {
-            tracing::debug!(source = %received.source, %error, "message cannot be read");
+            tracing::debug!(source = %received.source, %error, "cannot decode the message");
         })
         .ok()
 }

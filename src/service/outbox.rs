@@ -122,7 +122,7 @@ impl Outbox {
                 payload,
             }),
             // A service built a message with more elements than its count field can hold.
-            Err(error) => tracing::error!(%destination, %error, "message cannot be sent"),
+            Err(error) => tracing::error!(%destination, %error, "cannot send the message"),
         }
     }
 }

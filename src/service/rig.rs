@@ -2,7 +2,7 @@
 #![allow(
     clippy::missing_panics_doc,
     clippy::unwrap_used,
-    reason = "a test that cannot go on fails"
+    reason = "a test fails by panicking"
 )]
 
 use std::collections::BTreeSet;
@@ -39,7 +39,7 @@ impl Rig {
     /// Services in the state Ready, with [`CLIENT`] in control.
     #[expect(
         clippy::disallowed_methods,
-        reason = "any moment will do as the beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     pub fn new(services: Vec<Box<dyn Service>>) -> Self {
         let mut rig = Self {

@@ -24,8 +24,8 @@ pub struct Hazards {
 pub enum UnsafeService {
     /// It moves something, and the component has no states that forbid motion.
     #[error(
-        "{service} acts on {command}, and the component has no Management, without which it would \
-         obey anyone and could not be stopped: add `.management(Management::new())` to its builder"
+        "{service} acts on {command}, but without Management the component would obey any client \
+         and could not be stopped: add `.management(Management::new())` to its builder"
     )]
     NoManagement {
         /// The service.
@@ -35,8 +35,8 @@ pub enum UnsafeService {
     },
     /// It moves something, and nothing would stop it.
     #[error(
-        "{service} acts on {command} and has no stop action: add `.on_stop(…)`, which stops what \
-         the command moves"
+        "{service} acts on {command} but has no stop action: add `.on_stop(…)`, which stops the \
+         motion"
     )]
     NoStop {
         /// The service.
@@ -46,9 +46,9 @@ pub enum UnsafeService {
     },
     /// Anyone could configure it.
     #[error(
-        "{service} is set up by {command}, and the component has no Access Control, without which \
-         it would obey anyone: add `.access_control(AccessControl::new())` or \
-         `.management(Management::new())` to its builder"
+        "{command} configures {service}, but without Access Control the component would obey any \
+         client: add `.access_control(AccessControl::new())` or `.management(Management::new())` \
+         to its builder"
     )]
     NoAccessControl {
         /// The service.

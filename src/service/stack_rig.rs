@@ -29,7 +29,7 @@ impl StackRig {
     /// A component without search, with these services and settings.
     #[expect(
         clippy::disallowed_methods,
-        reason = "any moment will do as the beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     pub(crate) fn new(
         services: Vec<Box<dyn Service>>,

@@ -159,12 +159,12 @@ impl Service for Time {
             Some(SetTime::CODE) => {
                 let source = message.source;
                 if !context.standing().obeys(source) {
-                    tracing::debug!(%source, "not in control, so the time stays");
+                    tracing::debug!(%source, "time not set: sender not in control");
                 } else if let Some(set) = read::<SetTime>(message) {
                     if self.set(&set) {
                         context.changed::<QueryTime>();
                     } else {
-                        tracing::debug!(%source, ?set, "there is no such time");
+                        tracing::debug!(%source, ?set, "time not set: invalid time");
                     }
                 }
             }

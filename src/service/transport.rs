@@ -7,7 +7,7 @@ use crate::codec::ServiceId;
 use crate::endpoint::Received;
 use crate::messages::core;
 
-/// Lists Transport among the services of a component. It has no messages of its own.
+/// Lists Transport among the services of a component. It has no messages.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Transport;
 

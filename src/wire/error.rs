@@ -18,10 +18,10 @@ pub enum Problem {
     #[error("the datagram is empty")]
     Empty,
     /// The first octet belongs to no JAUS transport.
-    #[error("no JAUS transport begins with {0:02X}h (AS5669A: 02h, AS5669: 01h, RA: \"JAUS01.0\")")]
+    #[error("no JAUS transport starts with {0:02X}h (AS5669A: 02h, AS5669: 01h, RA: \"JAUS01.0\")")]
     UnknownVersion(u8),
     /// There are fewer octets than a header needs.
-    #[error("a header takes {needed} octets, only {available} are left")]
+    #[error("a header takes {needed} octets, but only {available} are left")]
     Truncated {
         /// The length of the header.
         needed: usize,
@@ -45,7 +45,7 @@ pub enum Problem {
         available: usize,
     },
     /// The size before an AS5669 header and the size in it differ.
-    #[error("the size field says {stated} octets, the header behind it {by_header}")]
+    #[error("the size field says {stated} octets, but the header after it {by_header}")]
     SizesDiffer {
         /// Octets of header and data according to the size field.
         stated: usize,
@@ -56,7 +56,7 @@ pub enum Problem {
     #[error("the data control {0} is not defined (0 single, 1 first, 2 or 4 middle, 8 last)")]
     UnknownDataControl(u8),
     /// An AS5669 message with a compressed header.
-    #[error("the header is compressed, which cannot be read")]
+    #[error("the header is compressed, which is not supported")]
     Compressed,
 }
 
@@ -65,7 +65,7 @@ pub enum Problem {
 #[non_exhaustive]
 pub enum EncodeError {
     /// The payload does not fit the size field.
-    #[error("the payload has {length} octets, at most {limit} fit one message with this header")]
+    #[error("the payload has {length} octets, but at most {limit} fit a message with this header")]
     PayloadTooLong {
         /// Octets of the payload.
         length: usize,

@@ -216,14 +216,14 @@ fn what_is_wrong_with_a_datagram_is_said_with_its_place() {
     assert_eq!(error(""), "octet 0: the datagram is empty");
     assert_eq!(
         error("03 00"),
-        "octet 0: no JAUS transport begins with 03h (AS5669A: 02h, AS5669: 01h, RA: \"JAUS01.0\")"
+        "octet 0: no JAUS transport starts with 03h (AS5669A: 02h, AS5669: 01h, RA: \"JAUS01.0\")"
     );
     assert!(
-        error("4a41555330322e30 0602").starts_with("octet 0: no JAUS transport begins with 4Ah")
+        error("4a41555330322e30 0602").starts_with("octet 0: no JAUS transport starts with 4Ah")
     );
     assert_eq!(
         error("02 00 0e00"),
-        "octet 1: a header takes 14 octets, only 3 are left"
+        "octet 1: a header takes 14 octets, but only 3 are left"
     );
     assert_eq!(
         error("02 00 0d00 31 01010100 01010200 0100"),
@@ -235,11 +235,11 @@ fn what_is_wrong_with_a_datagram_is_said_with_its_place() {
     );
     assert_eq!(
         error("01 00000010 3602"),
-        "octet 1: a header takes 20 octets, only 6 are left"
+        "octet 1: a header takes 20 octets, but only 6 are left"
     );
     assert_eq!(
         error("01 00400010 3602 014b 01010100 01010200 0000 0100"),
-        "octet 1: the header is compressed, which cannot be read"
+        "octet 1: the header is compressed, which is not supported"
     );
     assert_eq!(
         error("01 00000010 3602 014b 01010100 01010200 0500 0100"),

@@ -65,7 +65,7 @@ fn a_small_message_is_received_and_sent_without_allocation() {
             ..Frame::new(PEER, US, payload.clone())
         };
         let octets = judp::encode(&frame).expect("a short frame");
-        // The first copy of what a vector held allocates its counter.
+        // The first copy of a vector's buffer allocates its reference counter.
         [octets.clone(), octets]
     };
     let mut datagrams = (1..=MESSAGES as u16).map(datagram).collect::<Vec<_>>();

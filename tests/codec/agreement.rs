@@ -70,7 +70,7 @@ fn agree(info: &MessageInfo, message: &Message, octets: &[u8]) -> Result<(), Tes
         &text
     );
     let again = from_text(info, &text);
-    // A NaN has many patterns of bits and one name.
+    // A NaN has many bit patterns but one name.
     if !text.contains("\"NaN\"") {
         prop_assert_eq!(&again.encode().unwrap()[..], octets);
     }

@@ -146,7 +146,7 @@ fn every_recorded_datagram_is_read() {
     }
 }
 
-/// An endpoint in the place of a recorded party, after it has heard all that this party was sent.
+/// An endpoint in place of a recorded party, after it has received all messages to that party.
 struct Replay {
     endpoint: Endpoint,
     received: Vec<Received>,
@@ -156,7 +156,7 @@ struct Replay {
 impl Replay {
     #[expect(
         clippy::disallowed_methods,
-        reason = "an arbitrary beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     fn new(file: &FilePath, address: &str, ids: &[&str]) -> Self {
         let address: IpAddr = address.parse().expect("an address");

@@ -69,7 +69,7 @@ impl Party {
     /// its first sequence number.
     #[expect(
         clippy::disallowed_methods,
-        reason = "an arbitrary beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     fn in_place_of(recorded: &[Recorded], address: SocketAddr) -> Self {
         let ours = || recorded.iter().filter(|it| it.source == address);
@@ -111,7 +111,7 @@ impl Party {
         let wanted = frame.flags.acknowledgement() == Acknowledgement::Request;
         let outgoing = Outgoing {
             priority: frame.flags.priority(),
-            // To somebody unknown the flags are the transport's doing, not the sender's wish.
+            // For an unknown peer the transport sets the flags, not the sender.
             broadcast: match frame.flags.broadcast() {
                 Some(broadcast) if frame.destination.has_wildcard() => broadcast,
                 _ => Broadcast::None,
@@ -133,7 +133,7 @@ impl Party {
         }
     }
 
-    /// Lets time pass in which nothing is heard, for what is paced.
+    /// Advances time without input, for paced messages.
     fn wait(&mut self, time: Duration) {
         let end = self.now + time;
         while let Some(due) = self.endpoint.poll_timeout().filter(|due| *due <= end) {
@@ -212,7 +212,7 @@ fn in_juniors_place_we_send_the_same_octets() {
     ] {
         let party: SocketAddr = party.parse().unwrap();
         let mut datagrams = recorded(&captures.join(format!("junior/{file}.pcap")));
-        // What Junior repeats we repeat at times of our own, and what it spoils we do not: see the
+        // Our retransmission times differ from Junior's, and we do not copy its faults: see the
         // table above.
         let mut seen = BTreeSet::new();
         datagrams.retain(|it| {
@@ -246,7 +246,7 @@ fn in_juniors_place_we_send_the_same_octets() {
     }
 }
 
-/// All that JAUS++'s components sent, one after the other; its peers are heard before.
+/// All messages of JAUS++'s components in order, after those of its peers.
 #[test]
 fn in_jausplusplus_place_we_send_the_same_octets_but_for_the_numbers() {
     let captures = evidence::captures();

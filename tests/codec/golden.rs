@@ -72,9 +72,9 @@ fn big(text: &str) -> Option<Value> {
 const OTHERWISE: &[(&str, &str)] = &[
     // One position for each stabilizer, where the two other sources have two.
     ("fkie-ugv.jsonl", "ReportStabilizerPosition"),
-    // The names of the lights in another order.
+    // The lights in another order.
     ("jts-ugv.jsonl", "ReportIlluminationState"),
-    // Small letters at the beginning of names.
+    // Names start with a lower-case letter.
     ("jts-ugv.jsonl", "ReportPlatformSpecifications"),
 ];
 
@@ -134,7 +134,7 @@ fn every_vector_decodes_shows_its_values_and_encodes_to_the_same_octets() {
     for entry in fs::read_dir(evidence::golden()).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap().to_owned();
-        // The examples have services of their own, whose messages only look like these.
+        // The examples have their own services, whose messages only look like these.
         if !name.ends_with(".jsonl") || name.starts_with("scaling") || name == "jts-examples.jsonl"
         {
             continue;

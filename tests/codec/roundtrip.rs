@@ -8,14 +8,14 @@ use jaus::codec::{AnyMessage, MessageInfo, Registry};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
-/// What the service sets have, and what they have not.
+/// All messages of the service sets, and the constructs that no set uses.
 fn every_message() -> impl Iterator<Item = &'static MessageInfo> {
     let constructs = Registry::new(crate::constructs::SETS);
     let registries = crate::generated().into_iter().chain([constructs]);
     registries.flat_map(|registry| registry.iter())
 }
 
-/// Octets that a random message is made from.
+/// Octets from which a random message is created.
 fn seed() -> impl Strategy<Value = Vec<u8>> {
     prop::collection::vec(any::<u8>(), 0..400)
 }
@@ -42,7 +42,7 @@ fn message(info: &MessageInfo, seed: &[u8]) -> Box<dyn AnyMessage> {
     (info.arbitrary)(&mut Unstructured::new(seed)).unwrap()
 }
 
-/// What the decoder accepts encodes to the same octets.
+/// Octets that the decoder accepts encode to the same octets.
 fn accepted_octets_come_back(info: &MessageInfo, octets: &Bytes) -> Result<(), TestCaseError> {
     match (info.decode)(octets) {
         Ok(message) => prop_assert_eq!(&message.encode().unwrap(), octets),
@@ -161,8 +161,16 @@ mod people {
                         "{generated}\n{dynamic}"
                     );
                 }
-                (Ok(_), Err(error)) => prop_assert!(false, "only the generated takes it: {error}"),
-                (Err(error), Ok(_)) => prop_assert!(false, "only the dynamic takes it: {error}"),
+                (Ok(_), Err(error)) => prop_assert!(
+                    false,
+                    "only the generated codec accepts it: \
+                    {error}"
+                ),
+                (Err(error), Ok(_)) => prop_assert!(
+                    false,
+                    "only the dynamic codec accepts it: \
+                    {error}"
+                ),
             }
             Ok(())
         });

@@ -23,7 +23,7 @@ fn start(group: Group, subsystem: u16) -> Node {
     Node::start(Config::loopback(subsystem, 1).group(group)).unwrap()
 }
 
-/// A driver that understands both versions, and tells what it has heard.
+/// A driver that accepts both versions, and reports what it received.
 fn both(heard: mpsc::UnboundedSender<Heard>) -> Handlers {
     let newer = heard.clone();
     Handlers::new(V1_1)
@@ -64,7 +64,7 @@ async fn a_client_is_told_which_version_it_speaks_and_is_understood_in_it() {
     let told = within_limit(hears.recv()).await.map(rounded);
     assert_eq!(told, Some(("1.1", Some(3.0), Some(0.5))));
 
-    // A client that was made before there was a 1.1, and which need not say how fast.
+    // A client built before version 1.1, in which the speed is optional.
     let found = within_limit(client.find_common_version(&[V1_0])).await;
     assert_eq!(found, Ok((rover.id(), V1_0)));
     let mut vector = v1_0::SetLocalVector::default();
@@ -93,8 +93,8 @@ async fn a_client_without_a_common_version_is_told_the_versions_of_both_sides() 
     let error = finding.await.unwrap_err();
     assert!(matches!(error, FindError::NotFound { .. }), "{error:?}");
     let told = error.to_string();
-    let sought = "no component that offers urn:jaus:jss:mobility:LocalVectorDriver 1.2 or \
-                  urn:jaus:jss:mobility:LocalVectorDriver 1.1 was found within 0.";
+    let sought = "no component with urn:jaus:jss:mobility:LocalVectorDriver 1.2 or \
+                  urn:jaus:jss:mobility:LocalVectorDriver 1.1 found within 0.";
     assert!(told.starts_with(sought), "{told}");
     assert!(told.ends_with("(101.1.1 offers version 1.0)"), "{told}");
 }

@@ -20,7 +20,7 @@ use jaus::wire::Priority;
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::{until, within_limit};
 
-/// An operator, and a peer on a node of its own whose strings the test holds.
+/// An operator, and a scripted peer on its own node.
 struct Scene {
     operator: Component,
     peer: Puppet,
@@ -147,7 +147,7 @@ async fn a_subscription_yields_reports_and_says_when_it_is_down() {
         ),
         "{down:?}"
     );
-    // The peer has restarted, and numbers its events anew.
+    // The peer has restarted and numbers its events from the start.
     within_limit(scene.peer.confirm_event(1)).await;
     scene.peer.fire(1, 0, &status(5));
     assert_eq!(next().await, Update::Up);
@@ -214,13 +214,13 @@ async fn a_peer_that_rejects_or_says_nothing_is_named_with_what_it_did() {
     assert!(
         told.starts_with(
             "no subscription to QueryStatus of 101.1.33: CreateEvent was answered with neither \
-             ConfirmEventRequest nor RejectEventRequest: asked 2 times in 0."
+             ConfirmEventRequest nor RejectEventRequest: 2 attempts in 0."
         ),
         "{told}"
     );
     let peer = &mut scene.peer;
     let rejecting = async {
-        // The last one of the two before.
+        // The last of the two before.
         loop {
             let request_id = peer.expect::<CreateEvent>().await.request_id;
             peer.say(&RejectEventRequest {
@@ -280,7 +280,7 @@ async fn resume_waits_until_the_peer_says_that_it_is_ready() {
     let mut scene = Scene::new();
     let control = scene.controlled().await;
     let peer = &mut scene.peer;
-    // The lease asks for the status besides.
+    // The lease queries the status as well.
     let answering = async {
         peer.expect::<Resume>().await;
         for code in [2, 2].into_iter().chain(std::iter::repeat(1)) {
@@ -312,7 +312,7 @@ async fn resume_waits_until_the_peer_says_that_it_is_ready() {
     assert!(matches!(refused, ManageError::State { found: 1, .. }));
     assert_eq!(
         refused.to_string(),
-        "101.1.33 was told to be in the state standby, and reports the status 1"
+        "101.1.33 was set to the state standby, but reports the status 1"
     );
 }
 
@@ -335,7 +335,7 @@ async fn the_greater_authority_takes_control_and_an_emergency_stops_everybody() 
     let query = QueryStatus {};
     let subscribing = teacher.subscribe::<ReportStatus, _>(peer, &query, When::OnChange);
     let mut states = within_limit(subscribing).await.unwrap();
-    // Each is waited for, because changes that follow one another too fast are told at once.
+    // Wait for each change, because changes in quick succession are reported as one.
     let mut state = async || within_limit(states.report()).await.unwrap().status.0;
     assert_eq!(state().await, 2, "standby");
 
@@ -346,7 +346,7 @@ async fn the_greater_authority_takes_control_and_an_emergency_stops_everybody() 
     assert!(
         refused
             .to_string()
-            .starts_with("no control over 101.1.1: the authority 50 is too low"),
+            .starts_with("no control of 101.1.1: the authority 50 is too low"),
         "{refused}"
     );
     let taken = within_limit(teacher.control(peer, 60)).await.unwrap();
@@ -410,7 +410,7 @@ async fn a_version_that_nobody_offers_is_told_with_the_versions_that_are_there()
     assert!(matches!(&error, FindError::NotFound { instead, .. } if instead.len() == 1));
     let told = error.to_string();
     assert!(
-        told.starts_with("no component that offers urn:test:Camera 1.3 was found within 0."),
+        told.starts_with("no component with urn:test:Camera 1.3 found within 0."),
         "{told}"
     );
     assert!(told.ends_with("(102.1.1 offers version 1.2)"), "{told}");

@@ -15,7 +15,7 @@ use jaus_test_kit::waiting::LIMIT;
 static DRIVER: Mutex<()> = Mutex::new(());
 
 fn alone_with_a_driver() -> MutexGuard<'static, ()> {
-    // A test that failed leaves nothing behind that matters here.
+    // Leftovers of a failed test do not matter here.
     DRIVER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -111,9 +111,9 @@ fn the_group_stops_everybody_when_one_is_too_fast() {
     let mut driver = Example::start("driver");
     driver.expect("102.1.33 is up");
     let mut group = Example::start("group");
-    group.expect("101.1.33 tells its speed");
-    group.expect("everybody stops");
-    group.expect("102.1.33 is told to stop");
+    group.expect("101.1.33 reports its speed");
+    group.expect("stopping all vehicles");
+    group.expect("102.1.33 acknowledged the stop");
 }
 
 #[test]

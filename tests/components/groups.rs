@@ -20,7 +20,7 @@ use jaus_test_kit::waiting::within_limit;
 
 const QUERY: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
 
-/// A network of its own, so that tests beside it are not heard.
+/// A separate network, isolated from other tests.
 struct Network(Group);
 
 impl Network {
@@ -107,7 +107,7 @@ async fn a_message_to_a_subsystem_a_node_or_providers_reaches_those_and_nobody_e
     let mut ears = [&here, &beside, &elsewhere].map(Component::messages);
     gathered(&operator, &Audience::EVERYBODY, 3).await;
 
-    // In this order, so that what came too far would be heard before what is waited for.
+    // In this order, so a message that went too far would arrive before the expected one.
     let pulse = ReportHeartbeatPulse {};
     assert_eq!(operator.send_all(Audience::node(101, 2), &pulse), Ok(1));
     hears::<ReportHeartbeatPulse>(&mut ears[0], operator.id()).await;
@@ -144,7 +144,7 @@ async fn everybody_who_acknowledged_or_answered_is_told_apart_from_who_did_not()
     assert_eq!(named.await.successes().count(), 2);
 
     drop((doomed, doomed_node));
-    // By their ids, so that it does not matter whether discovery has noticed.
+    // By id, so discovery need not have noticed.
     let both = [alive, dead].map(Audience::from);
     let [to_the_living, to_the_dead] = both.map(|one| operator.deliver_all(one, &pulse));
     assert!(within_limit(to_the_living).await.is_complete());
@@ -168,7 +168,7 @@ async fn a_group_subscription_follows_providers_as_they_come_restart_and_go() {
     let second = network.sensor(102, 2.0);
     let other = second.id();
     while next().await != (other, GroupUpdate::Up) {}
-    // Both are heard, each with its own speed.
+    // Both report, each with its own speed.
     let mut heard = [false; 2];
     while heard != [true; 2] {
         if let (id, GroupUpdate::Report(report)) = next().await {

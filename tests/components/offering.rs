@@ -76,7 +76,7 @@ async fn who_does_not_answer_is_named_with_what_was_asked_and_for_how_long() {
     );
     let told = error.to_string();
     assert!(
-        told.starts_with("101.1.33 did not answer QueryStatus with ReportStatus: asked 2 times"),
+        told.starts_with("101.1.33 did not answer QueryStatus with ReportStatus: 2 attempts"),
         "{told}"
     );
 }

@@ -48,7 +48,7 @@ impl Scene {
         let config = adapt(config, client.links()[0].local.into());
         let vehicle = Node::start(config.serial(Settings::new(device))).unwrap();
         let line = File::from(end);
-        // What the vehicle says there is read and forgotten.
+        // The vehicle's output there is read and discarded.
         let mut other = line.try_clone().unwrap();
         std::thread::spawn(move || while let Ok(1..) = other.read(&mut [0; 4096]) {});
         Self {
@@ -76,7 +76,7 @@ impl Scene {
             from_line.extend(more);
             number += 1;
         }
-        // The last of it may still be on the way.
+        // The last part may still be in transit.
         let rest = async {
             while let Some(message) = self.driver.recv().await {
                 from_line.push((message.source, message.payload));

@@ -38,7 +38,7 @@ fn flood(victim: SocketAddr, receiver: JausId, over: &AtomicBool) {
                 Bytes::from_static(&[0x02, 0x42, 1, 2, 3, 4]),
             )
         };
-        // What the kernel does not take is lost, as on a network.
+        // Datagrams that the kernel refuses are lost, as on a network.
         let _ = socket.send_to(&judp::encode(&frame).unwrap(), victim);
         if number % VOLLEY == 0 {
             std::thread::sleep(PAUSE);

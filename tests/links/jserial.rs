@@ -84,7 +84,7 @@ async fn nodes_talk_over_a_line() {
         (driver.id(), REPORT_HEARTBEAT)
     );
 
-    // Long, and full of octets that are doubled on the line.
+    // Long, and full of octets that are escaped on the line.
     let map = Bytes::from(vec![0x10; 20_000]);
     driver
         .send(Outgoing::new(
@@ -106,7 +106,7 @@ async fn nodes_talk_over_a_line() {
 async fn acknowledged_messages_come_through_noise_each_once() {
     const MESSAGES: u16 = 60;
     let mut passed = 0_usize;
-    // One octet in 331 is another one; one in 401 is gone; one in 239 has company.
+    // One octet in 331 is changed, one in 401 dropped, and one inserted per 239.
     let noise = move |octets: &[u8]| {
         let mut changed = Vec::new();
         for &octet in octets {
@@ -129,7 +129,7 @@ async fn acknowledged_messages_come_through_noise_each_once() {
             acknowledge: true,
             ..Outgoing::new(console.id(), driver.id(), payload.clone())
         };
-        // One that noise has hit too often is asked for again, as an application would.
+        // A message that noise hit too often is requested again, as an application would.
         let arrives = async {
             loop {
                 console.send(message.clone()).unwrap();
@@ -157,7 +157,7 @@ async fn a_port_that_went_away_is_used_again_when_it_is_back() {
     let name: PathBuf = folder.join("ttyUSB0");
     let plug_in = || {
         let (end, device) = terminal();
-        // Over the old one, which must not be away for a moment.
+        // Replaces the old one atomically.
         std::os::unix::fs::symlink(device, folder.join("new")).unwrap();
         fs::rename(folder.join("new"), &name).unwrap();
         end
@@ -203,5 +203,5 @@ async fn a_port_that_cannot_be_used_is_refused_with_the_reason_and_the_remedy() 
         "{missing}"
     );
     let no_port = refused("/dev/null");
-    assert!(no_port.contains("it is no serial port"), "{no_port}");
+    assert!(no_port.contains("it is not a serial port"), "{no_port}");
 }

@@ -46,7 +46,7 @@ fn to(port: &Port, destination: JausId, payload: Bytes) -> Outgoing {
     Outgoing::new(port.id(), destination, payload)
 }
 
-/// Asks until the other one is heard: there may be no connection yet.
+/// Queries until the other one answers: there may be no connection yet.
 async fn ask_until_heard(console: &Port, driver: &mut Port) -> Received {
     let ask = async {
         loop {
@@ -87,7 +87,7 @@ impl Scripted {
                 if let Some(frame) = self.decoder.next_frame().expect("a sound stream") {
                     return Some(frame);
                 }
-                // A reset is as good an end as any.
+                // A reset also counts as the end.
                 if self
                     .stream
                     .read_buf(self.decoder.input())
@@ -172,7 +172,7 @@ async fn a_large_message_arrives_whole() {
         .send(to(&console, driver.id(), map.clone()))
         .unwrap();
     loop {
-        // The query may have been asked more than once.
+        // The query may have been sent more than once.
         let message = receive(&mut driver).await;
         if message.payload != QUERY_HEARTBEAT {
             assert!(message.payload == map);
@@ -220,7 +220,7 @@ async fn a_peer_that_writes_one_octet_at_a_time_is_answered_on_its_connection() 
     assert_eq!(report.flags.acknowledgement(), Acknowledgement::None);
 }
 
-/// Junior opens a connection for each id, and takes a connection for the first id heard on it.
+/// Junior opens a connection for each id, and assigns a connection to the first id received on it.
 #[tokio::test]
 async fn each_id_is_answered_on_the_connection_on_which_it_was_heard_last() {
     let vehicle = Node::start(listening(101)).unwrap();
@@ -239,7 +239,7 @@ async fn each_id_is_answered_on_the_connection_on_which_it_was_heard_last() {
         let report = connection.read().await.unwrap();
         assert_eq!((report.destination, report.payload), (id, REPORT_HEARTBEAT));
     }
-    // It was restarted, and has the first id in a connection of its own again.
+    // It restarted and has the first id on its own connection again.
     let mut again = Scripted::connect(address(&vehicle)).await;
     let encoded = jtcp::encode(&frame(ids[0], driver.id(), 2)).unwrap();
     again.write(&encoded).await;
@@ -267,12 +267,12 @@ async fn a_node_begins_at_the_number_that_the_clock_tells() {
         .send(to(&driver, query.source, REPORT_HEARTBEAT))
         .unwrap();
     let number = junior.read().await.unwrap().sequence;
-    // The first is the one behind it; 0 is left out.
+    // The first is the one after it; 0 is skipped.
     let ahead = number.wrapping_sub(earliest);
     assert!((1..=started + 2).contains(&ahead), "{ahead} of {started}");
 }
 
-/// JAUS++ writes the version octet before each message, as a segment of its own.
+/// JAUS++ writes the version octet before each message, in its own segment.
 #[tokio::test]
 async fn a_version_octet_before_each_message_is_taken() {
     let vehicle = Node::start(listening(101)).unwrap();
@@ -393,7 +393,7 @@ async fn a_peer_that_does_not_read_loses_its_own_messages_only() {
     let connections = vehicle.tcp().unwrap().connections;
     let overflows: Vec<_> = connections.iter().map(|c| c.overflows > 0).collect();
     assert_eq!(overflows.iter().filter(|&&lost| lost).count(), 1);
-    // It is not cut off yet: what is left for it arrives when it reads.
+    // It is not disconnected yet: its backlog arrives when it reads.
     assert_eq!(slow.read().await.unwrap().payload, payload);
 }
 

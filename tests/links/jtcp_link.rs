@@ -48,7 +48,7 @@ async fn turn(link: &mut TcpLink, now: Instant) -> Vec<Closed> {
         Poll::Ready(())
     })
     .await;
-    // So that the runtime looks at its sockets.
+    // Let the runtime poll its sockets.
     tokio::time::sleep(Duration::from_millis(1)).await;
     closed
 }
@@ -87,7 +87,7 @@ async fn a_connection_that_says_nothing_loses_its_place_when_it_is_needed() {
     let _silent = TcpStream::connect(address).unwrap();
     turns(&mut link, now, |link| link.counters().accepted == 1).await;
 
-    // Too early: it may be about to say something.
+    // Too early: it may be about to send.
     let _second = TcpStream::connect(address).unwrap();
     turns(&mut link, now, |link| link.counters().refused == 1).await;
 

@@ -234,7 +234,7 @@ async fn discovery_answers_what_the_node_manager_brings_from_the_network() {
         .attach(&node, 1)
         .unwrap();
     manager.accept(VEHICLE).await;
-    // Query Identification of a subsystem, to all; the wildcards have become our id on the way.
+    // Query Identification of a subsystem, to all; Junior replaced the wildcards by our id.
     let mut query = message(OPERATOR, VEHICLE, &[0x00, 0x2B, 2], 9);
     query.flags = Flags::default().with_broadcast(Broadcast::Global);
     manager.deliver(VEHICLE, &query);
@@ -290,7 +290,7 @@ async fn a_node_manager_that_reads_nothing_blocks_nobody_and_all_is_counted() {
         assert!(sensor.recv().await.is_some(), "the node goes on");
     }
     until(|| node.junior().unwrap().counters.send_overflows > 0).await;
-    // It reads again, and gets what was kept: the newest.
+    // It reads again and receives the kept messages: the newest ones.
     let mut read = 0;
     let newest = (MESSAGES - 1).to_le_bytes();
     while manager.wait_for(VEHICLE, QUERY_HEARTBEAT).await.payload[2..] != newest {
@@ -311,7 +311,7 @@ async fn an_id_of_another_client_is_refused_and_a_crashed_ones_taken_over() {
     assert!(matches!(refused, AttachError::Link(_)), "{refused}");
     let words = refused.to_string();
     assert!(
-        words.contains("101.1.1 is held by another client of Junior"),
+        words.contains("101.1.1 is used by another client of Junior"),
         "{words}"
     );
     assert!(node.components().is_empty());

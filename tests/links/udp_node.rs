@@ -116,7 +116,7 @@ async fn a_local_broadcast_stays_in_its_subsystem() {
 
     assert_eq!(receive(&mut sibling).await.payload, QUERY_HEARTBEAT);
     assert_eq!(receive(&mut sibling).await.payload, REPORT_HEARTBEAT);
-    // Sent later, heard first: the other one was not for it.
+    // Sent later, received first: the other one was not for it.
     assert_eq!(receive(&mut stranger).await.payload, REPORT_HEARTBEAT);
 }
 
@@ -257,7 +257,7 @@ async fn large_messages_arrive_whole_whatever_the_size_of_packets() {
         let b = Node::start(config).unwrap();
         let (mut receiver, sender) = (a.attach(1).unwrap(), b.attach(1).unwrap());
 
-        // No longer than what a receive buffer of the usual size holds at once.
+        // No longer than a default receive buffer holds.
         for length in [2, 1425, 1426, 100_000] {
             let image: Bytes = (0..length).map(|i| (i * 7 % 251) as u8).collect();
             sender

@@ -90,7 +90,7 @@ impl Client {
         self.next = now;
     }
 
-    /// Asks for control anew, if it has lost it.
+    /// Requests control again if it was lost.
     pub(crate) fn take_control_again(&mut self, now: Instant) {
         if !self.holds {
             self.let_go(now);
@@ -171,7 +171,7 @@ impl Client {
             self.act(now, endpoint);
         }
         while let Some(message) = self.stack.poll_transmit() {
-            // There may be no way to the vehicle yet.
+            // There may be no route to the vehicle yet.
             let _ = endpoint.send(now, message);
         }
     }

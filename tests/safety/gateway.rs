@@ -43,7 +43,7 @@ pub(crate) struct Operator {
     sets_out: bool,
     /// Whether it repeats its setpoints.
     streams: bool,
-    /// Whether it goes on with its commands after the fault.
+    /// Whether it keeps sending commands after the fault.
     insists: bool,
     ticks: u32,
     next: Instant,
@@ -130,7 +130,7 @@ impl Crossing {
                 Action::Attach(id) => endpoint.attach(id).expect("each id once"),
                 Action::Detach(id) => endpoint.detach(id),
                 Action::Send(message) => {
-                    // There may be no way to the receiver any more.
+                    // The route to the receiver may be gone.
                     let _ = endpoint.send(now, message);
                 }
             }
@@ -224,7 +224,7 @@ impl Operator {
                 && message.code == 0x2002
             {
                 let ready = Bytes::from_static(&[1, 0, 0, 0, 0]);
-                // Whoever asked may be gone.
+                // The requester may be gone.
                 let _ = self.node.send(now, &message.answer(0x4002, ready));
             }
         }

@@ -243,7 +243,7 @@ mod tests {
     /// A plant that was ordered to move and is left alone for a second.
     #[expect(
         clippy::disallowed_methods,
-        reason = "an arbitrary beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     fn left_alone() -> (Plant, Instant, Instant) {
         let start = Instant::now();

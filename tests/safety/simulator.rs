@@ -29,7 +29,7 @@ fn pair(conditions: Conditions) -> (Network, [Host; 2]) {
     (network, hosts)
 }
 
-/// One node sends so many messages to the other.
+/// One node sends this many messages to the other.
 fn say(network: &mut Network, hosts: [Host; 2], from: usize, count: u8) {
     for number in 0..count {
         let payload = Bytes::copy_from_slice(&[2, 0x44, number]);
@@ -75,7 +75,7 @@ fn a_suspended_host_does_nothing_and_then_reads_what_was_queued() {
 #[test]
 fn a_suspended_host_sends_nothing_though_its_timers_are_due() {
     let (mut network, hosts) = pair(Conditions::good());
-    // Its acknowledgement is missing: the sender has to send it again and again.
+    // Its acknowledgement is missing, so the sender must retransmit it.
     network.set_cut(hosts[0], hosts[1], true);
     let message = Outgoing {
         acknowledge: true,

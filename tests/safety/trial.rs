@@ -151,7 +151,7 @@ impl Trial {
         self.outcome.moved
     }
 
-    /// Whether it has covered more than so many metres and is faster than this.
+    /// Whether it has covered more than this distance in metres and is faster than this.
     fn has_moved(&self, metres: f64, speed: f64) -> bool {
         let plant = self.world.plant.lock();
         plant.odometer > metres && plant.speed() > speed
@@ -255,8 +255,8 @@ impl Trial {
         for &(from, to) in directions {
             self.world.network.set_cut_one_way(from, to, true);
         }
-        // A client that goes on although it has lost control. One that only hears nothing any more is
-        // still in control, as far as the vehicle can know, until its last request has timed out.
+        // A client that continues although it has lost control. A client that only stops receiving
+        // is still in control, as far as the vehicle can know, until its last request times out.
         let is_deaf = self.cell.fault == Fault::CutToController;
         if self.insists && self.random.happens(500) && !is_deaf {
             let controller = self.world.controller;
@@ -335,7 +335,7 @@ impl Trial {
         if dies {
             self.run_between(0, 900);
             self.world.network.kill(controller);
-            // Whatever is shorter than half a second counts as late, and not as hung.
+            // A delay below half a second counts as late, not as hung.
             self.run_between(600, 10_000);
         } else {
             self.run_between(6000, 12_000);
@@ -350,7 +350,7 @@ impl Trial {
         }
     }
 
-    /// The controller goes on while something is broken, which is mended after a while, or never.
+    /// The controller continues during a fault, which is repaired after a while, or never.
     fn outlast(&mut self, mend: impl FnOnce(&mut Plant)) {
         let time = match self.cell.fault {
             Fault::DiskStall => Duration::from_secs(5),
@@ -424,7 +424,7 @@ impl Trial {
         let limit = self.limit();
         let (movement, wheels, odometer) = {
             let plant = self.world.plant.lock();
-            // A hung program cannot order anything else: its actuator stops by itself.
+            // A hung program sends no commands: its actuator stops by itself.
             let movement = match self.cell.fault {
                 Fault::Hung => plant.actuator,
                 _ => plant.order,

@@ -62,7 +62,7 @@ impl Vehicle {
             return;
         };
         while let Some(message) = program.poll_transmit() {
-            // There may be no way to the client any more.
+            // The route to the client may be gone.
             let _ = endpoint.send(now, message);
         }
         let controller = program.standing().controller;
@@ -129,7 +129,7 @@ impl Owner for Party {
 
 fn settle_peer(stack: &mut Stack, now: Instant, endpoint: &mut OwnedEndpoint) {
     while let Some(message) = stack.poll_transmit() {
-        // There may be no way to the peer yet.
+        // There may be no route to the peer yet.
         let _ = endpoint.send(now, message);
     }
     while stack.poll_event().is_some() {}
@@ -248,7 +248,7 @@ impl World {
             };
             vehicle.plant.lock().advance(now);
             for message in act(now, vehicle) {
-                // There may be no way to the client any more.
+                // The route to the client may be gone.
                 let _ = endpoint.send(now, message);
             }
         });
@@ -320,7 +320,7 @@ impl World {
             self.network.act(self.crowd, |now, _, endpoint| {
                 for &id in some {
                     let payload = payloads[random.below(2)].clone();
-                    // What a full queue refuses is not in the crowd.
+                    // A datagram refused by a full queue does not count.
                     let _ = endpoint.send(now, Outgoing::new(id, VEHICLE, payload));
                 }
             });

@@ -167,7 +167,7 @@ impl<O: Owner> Network<O> {
     /// A network without nodes. The seed decides about every loss and delay.
     #[expect(
         clippy::disallowed_methods,
-        reason = "an arbitrary beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     pub fn new(seed: u64, conditions: Conditions) -> Self {
         let now = Instant::now();
@@ -260,7 +260,7 @@ impl<O: Owner> Network<O> {
         self.settle(host.0);
     }
 
-    /// Puts a datagram of somebody who is no node on the wire to a node's first link.
+    /// Puts a datagram from outside the nodes on the wire to a node's first link.
     pub fn inject(&mut self, from: SocketAddr, to: Host, datagram: &Bytes) {
         let what = format_args!("{from} sends {} octets to {to:?}", datagram.len());
         self.trace.note(self.now, what);
@@ -407,10 +407,10 @@ impl<O: Owner> Network<O> {
         self.set_now(end);
     }
 
-    /// Goes on until nothing is left to happen.
+    /// Runs until no event is left.
     ///
     /// # Panics
-    /// After 100 000 steps: then nodes keep each other awake for ever.
+    /// After 100 000 steps: the nodes then keep each other busy for ever.
     pub fn run_until_idle(&mut self) {
         for _step in 0..100_000 {
             if !self.step() {

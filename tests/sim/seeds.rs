@@ -65,7 +65,7 @@ fn kept_seeds(test: &str, kept: &str) -> Vec<u64> {
 
 /// Prints a line past the test harness, which keeps the output of tests that pass.
 pub(crate) fn announce(line: &str) {
-    // Where nothing can be printed, the tests still count.
+    // If printing fails, the tests still count.
     let _written = writeln!(std::io::stderr().lock(), "{line}");
 }
 

@@ -39,8 +39,8 @@ const TROUBLE: Duration = Duration::from_secs(120);
 const ACTIONS: usize = 150;
 /// After this time with a good wire, operators and vehicle agree.
 const REST: Duration = Duration::from_secs(10);
-/// Who has lost control knows it at the latest when it has not been confirmed for five seconds; the
-/// confirmation may have been under way for a moment.
+/// A client knows that it lost control at the latest when control is unconfirmed for five seconds,
+/// plus the delay of the last confirmation.
 const DELUSION: Duration = Duration::from_millis(5500);
 
 /// Once the wire is good, an operator with the greatest authority gets control of a vehicle without
@@ -122,7 +122,7 @@ impl Vehicle {
         let mut outcome = Ok(());
         while let Some(message) = self.stack.poll_transmit() {
             outcome = outcome.and_then(|()| self.rules.say(now, &message));
-            // There may be no way to the operator any more.
+            // The route to the operator may be gone.
             let _ = endpoint.send(now, message);
         }
         while self.stack.poll_event().is_some() {}
@@ -150,7 +150,7 @@ impl Operator {
 
     fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         while let Some(message) = self.stack.poll_transmit() {
-            // There may be no way to the vehicle yet.
+            // There may be no route to the vehicle yet.
             let _ = endpoint.send(now, message);
         }
         while let Some(event) = self.stack.poll_event() {
@@ -325,7 +325,7 @@ impl World {
     fn request(&mut self, host: Host, authority: u8) {
         self.count("requests");
         self.with(host, |stack, now, asked| {
-            // What was lost is let go before it is asked for again.
+            // Release lost control before requesting it again.
             if let Some(id) = *asked {
                 stack.release_control(now, id);
             }
@@ -384,7 +384,7 @@ impl World {
         Ok(())
     }
 
-    /// With a good wire, whoever believes to be in control is.
+    /// With a good wire, every client that believes to be in control is.
     fn come_to_rest(&mut self) -> Result<(), String> {
         self.network.set_conditions(Conditions::good());
         for host in self.operators {

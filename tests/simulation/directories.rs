@@ -201,7 +201,7 @@ impl World {
                 self.count("restarts");
                 self.restart(node);
             }
-            // A router that is dead would leave two networks.
+            // A dead router would leave two networks.
             6 if node > 0 => {
                 self.count("deaths");
                 self.is_dead[node] = true;
@@ -220,7 +220,7 @@ impl World {
         self.is_dead[node] = false;
     }
 
-    /// Ends all trouble; who is dead stays dead.
+    /// Ends all faults; dead nodes stay dead.
     fn heal(&mut self) {
         self.network.set_conditions(Conditions::good());
         let count = self.is_dead.len();

@@ -42,7 +42,7 @@ fn check_bounds_of(nodes: &mut Nodes, node: usize) -> Result<(), String> {
 /// for them than is sensible.
 pub(crate) fn check_rest(nodes: &mut Nodes, packets: u64) -> Result<(), String> {
     let links: usize = nodes.plan.nodes.iter().map(|it| it.networks.len()).sum();
-    // A router sends on each of its other links what comes by one.
+    // A router forwards each datagram to all its other links.
     let hops = (1 + links - nodes.len()) as u64;
     let (carried, most) = (nodes.network.carried(), 100 + packets * TRIES * hops);
     if carried > most {

@@ -78,7 +78,7 @@ impl Ledger {
         *self.counts.entry(name).or_default() += 1;
     }
 
-    /// A payload of so many octets, at least 2, that no other message has.
+    /// A unique payload of this many octets, at least 2.
     pub(crate) fn payload(&mut self, random: &mut Random, length: usize) -> Bytes {
         let code = self.sent.len() as u16 + 1;
         let start = random.below(self.noise.len() - length);

@@ -45,7 +45,7 @@ mod vehicle;
 
 use totals::run_seeds;
 
-/// So many seeds are tried if nobody says otherwise.
+/// The default number of seeds.
 const SEEDS: u64 = 1000;
 /// So many of them send a large message: it has 736 fragments.
 const LARGE_SEEDS: u64 = 100;

@@ -110,7 +110,7 @@ impl NodePlan {
     }
 }
 
-/// The same message is told from its copies for a minute.
+/// Copies of a message are recognised for a minute.
 fn lengthen_windows(config: &mut Config) {
     let long = Duration::from_secs(60);
     config.duplicate_window = long;

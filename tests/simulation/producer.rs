@@ -17,18 +17,18 @@ use crate::sim::{Event as EndpointEvent, OwnedEndpoint, Owner, Random};
 /// How a peer treats events.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Habits {
-    /// It numbers events for each query anew, like JAUS++.
+    /// It numbers events per query, like JAUS++.
     numbers_by_query: bool,
     /// It takes a repeated Create Event for a new one.
     pub(crate) multiplies: bool,
-    /// It forgets events that nobody renews for a minute, as version 1.1 does.
+    /// It drops events that are not renewed for a minute, as version 1.1 does.
     forgets: bool,
 }
 
 impl Habits {
     pub(crate) fn choose(random: &mut Random) -> Self {
-        // No known peer does both: who has an event cancelled whose number is another's as well,
-        // and creates that one again, would begin anew for ever.
+        // No known peer does both: a client that cancels an event with a duplicate id and
+        // re-creates the other one would loop for ever.
         let numbers_by_query = random.happens(300);
         Self {
             numbers_by_query,
@@ -76,7 +76,7 @@ impl Producer {
 
     fn say<M: Message>(&self, endpoint: &mut OwnedEndpoint, now: Instant, to: JausId, message: &M) {
         let payload = message.encode().expect("a message");
-        // The client may have gone, or there may be no way to it yet.
+        // The client may be gone, or there may be no route to it yet.
         let _ = endpoint.send(now, Outgoing::new(self.id, to, payload));
     }
 
@@ -204,7 +204,7 @@ impl Owner for Producer {
             let mut report = running.query.to_vec();
             // From a query to its report: 2402h to 4402h.
             report[1] += 0x20;
-            // Each is another.
+            // Each one differs.
             report.push(running.sequence);
             let event = Event {
                 event_id: running.number,

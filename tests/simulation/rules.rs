@@ -21,8 +21,8 @@ pub(crate) struct Rules {
     /// When it asked for it last.
     asked: Instant,
     emergencies: BTreeSet<JausId>,
-    /// When each client was heard last: an emergency whose setter is silent for long is the
-    /// controller's to clear.
+    /// When each client last sent a message: the client in control may clear an emergency whose
+    /// setter is silent for long.
     heard: BTreeMap<JausId, Instant>,
     /// Whether the client in control has said Resume, and nothing has stopped the vehicle since.
     resumed: bool,
@@ -51,7 +51,7 @@ impl Rules {
         }
     }
 
-    /// The vehicle is about to hear something.
+    /// The vehicle is about to receive a message.
     pub(crate) fn hear(&mut self, now: Instant, message: &Received) {
         let client = message.source;
         self.heard.insert(client, now);
@@ -69,7 +69,7 @@ impl Rules {
                     is_cleared |= self.emergencies.len() < before;
                 }
                 if is_cleared {
-                    // It takes no control away, and the time begins anew.
+                    // It keeps control, and the timeout restarts.
                     self.asked = now;
                 }
             }

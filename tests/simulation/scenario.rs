@@ -26,8 +26,7 @@ const MOST_ACTIONS: usize = 40;
 /// After the last action the network rests by then: each packet of a large message is tried for some
 /// time, 20 times, with up to 2 seconds between.
 const REST: Duration = Duration::from_secs(240);
-/// When all is mended, so much time passes before anything is sent again: windows and memories of
-/// what was heard before are over.
+/// The pause after the repair before the next message: windows and duplicate memories have expired.
 const PAUSE: Duration = Duration::from_secs(10);
 /// After the first words of everybody, all know where all are.
 const ACQUAINTANCE: Duration = Duration::from_secs(1);
@@ -102,7 +101,7 @@ impl World {
 
     fn act(&mut self) -> Result<(), String> {
         if self.random.happens(220) {
-            // A restart forgets what nobody has looked at.
+            // A restart loses unread messages.
             self.look()?;
             self.faults.strike(&mut self.random, &mut self.nodes);
         } else {
@@ -117,7 +116,7 @@ impl World {
             random.below(self.nodes.len()),
             random.below(self.nodes.len()),
         );
-        // As many short ones as long ones.
+        // Equally many short and long ones.
         let length = (2 << random.below(16)) + random.below(500);
         let broadcast = random.happens(100);
         let destination = match random.choose(&components(to)) {

@@ -22,8 +22,8 @@ const CLIENTS: [JausId; 2] = [JausId::new(42, 1, 1), JausId::new(43, 1, 1)];
 const NAMES: [&str; 4] = ["times up", "times down", "reports", "ended"];
 /// How long things go wrong.
 const TROUBLE: Duration = Duration::from_secs(120);
-/// How long it may take until all is well: the longest pause of a client, and the time in which a
-/// producer that nobody reminds forgets an event.
+/// The time limit for recovery: the longest pause of a client, and the time after which a producer
+/// drops an event that is not renewed.
 const REST: Duration = Duration::from_secs(70);
 /// How long streams are then measured.
 const MEASURED: Duration = Duration::from_secs(20);
@@ -100,7 +100,7 @@ impl Client {
 
     fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         while let Some(message) = self.stack.poll_transmit() {
-            // There may be no way to the producer yet.
+            // There may be no route to the producer yet.
             let _ = endpoint.send(now, message);
         }
         while let Some(event) = self.stack.poll_event() {
@@ -153,7 +153,7 @@ impl Stream {
         };
         let limit = Duration::from_secs_f64(4.0 / hz).max(Duration::from_millis(500));
         let silent = now.saturating_duration_since(self.sign);
-        // A renewal is a sign, too, and nobody is told of it.
+        // A renewal is a sign of life too, and is not reported.
         let has_begun = now.saturating_duration_since(self.since) > BEGINNING;
         if self.up && has_begun && silent > 2 * limit {
             return Err(format!(
@@ -291,7 +291,7 @@ impl World {
         };
         self.network.act(host, |now, party, endpoint| {
             let Party::Client(client) = party else { return };
-            // What is subscribed to already is refused.
+            // A second subscription is refused.
             if let Ok(id) = client.stack.subscribe(now, &topic, Patience::default()) {
                 let stream = Stream {
                     topic,
@@ -371,7 +371,7 @@ impl World {
                 continue;
             };
             let running = producer.events_of(CLIENTS[place]);
-            // What a renewal has doubled is noticed when it fires.
+            // An event that a renewal duplicated is noticed when it fires.
             let multiplies = self.habits.is_some_and(|habits| habits.multiplies);
             let most = if multiplies { 2 * wanted } else { wanted };
             if minds && !(wanted..=most).contains(&running) {
@@ -392,7 +392,7 @@ impl Stream {
             When::Periodic { hz, .. } => hz * seconds,
             When::OnChange => seconds / 3.0,
         };
-        // What is on change is sent once more with each of up to two renewals.
+        // An event on change is repeated with each of up to two renewals.
         let (got, room) = (f64::from(self.reports), (wanted * 0.05).max(2.1));
         if self.up && (got - wanted).abs() <= room {
             return Ok(());

@@ -42,7 +42,7 @@ impl Vehicle {
 
     fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         while let Some(message) = self.stack.poll_transmit() {
-            // There may be no way to the client any more.
+            // The route to the client may be gone.
             let _ = endpoint.send(now, message);
         }
         while self.stack.poll_event().is_some() {}

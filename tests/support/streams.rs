@@ -10,8 +10,8 @@ use jaus_view::Capture;
 /// The octets of one direction of a connection, in order.
 pub(crate) type Streams = BTreeMap<(u16, u16), Vec<u8>>;
 
-/// The streams from and to the JAUS port, by their ports. The captures are of loopback-like links:
-/// Ethernet, IPv4, nothing lost or out of order, which is checked.
+/// The streams to and from the JAUS port, by port pair. Expects Ethernet and IPv4, and panics if a
+/// segment is lost or out of order.
 pub(crate) fn streams(file: &Path) -> Streams {
     let mut capture = Capture::new(File::open(file).expect("a readable file")).unwrap();
     let mut streams = Streams::new();

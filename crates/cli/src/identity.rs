@@ -36,8 +36,8 @@ impl FromStr for OwnId {
             return Ok(Self(id));
         }
         Err(format!(
-            "{id} is not one component: choose a subsystem from 1 to 65534, a node and a component \
-             from 1 to 254"
+            "{id} is not a single component: choose a subsystem from 1 to 65534, a node and a \
+             component from 1 to 254"
         ))
     }
 }
@@ -50,11 +50,11 @@ impl TryFrom<String> for OwnId {
     }
 }
 
-/// The kinds of subsystems, as flags and files name them.
+/// Kinds of subsystems, as written in flags and files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SubsystemKind {
-    /// Something that moves or acts
+    /// A vehicle or another acting system
     Vehicle,
     /// An operator control unit
     Ocu,

@@ -51,7 +51,7 @@ struct Program<F: Args> {
     #[command(flatten)]
     flags: F,
 
-    /// What the subsystem is called, the same for all its components
+    /// The subsystem's name, the same for all its components
     #[arg(long)]
     name: Option<String>,
 
@@ -145,7 +145,7 @@ impl<F: Ready> Program<F> {
 /// Prints the id and the node.
 fn tell_place(id: JausId, node: Option<&Node>) {
     let Some(node) = node else {
-        tracing::info!("{id} on the node of this host");
+        tracing::info!("{id} attached to the node of this host");
         return;
     };
     for link in node.links() {
@@ -197,17 +197,17 @@ fn command<F: Ready>() -> Command {
 
 fn id_help(usual: JausId) -> String {
     format!(
-        "Our id, SUBSYSTEM.NODE.COMPONENT; on the node of the host (--attach) its subsystem and node \
-         are ours [default: {usual}; on the node of the host component {}]",
+        "Our id, SUBSYSTEM.NODE.COMPONENT; with --attach, subsystem and node are those of the \
+         host's node [default: {usual}; with --attach component {}]",
         usual.component()
     )
 }
 
-const FILE_HELP: &str = "Take the settings from a TOML file; flags come on top";
+const FILE_HELP: &str = "Read settings from a TOML file; flags take precedence";
 
 const FILE_EXAMPLE: &str = r#"For example:
-  id = "101.1.1"                  # who we are
-  name = "Rover"                  # what the subsystem is called
+  id = "101.1.1"                  # our id
+  name = "Rover"                  # the subsystem's name
   interfaces = ["eth0"]           # or "all", or "loopback"
   port = 3794
   group = "239.255.0.1:3794"      # or "off"
@@ -233,7 +233,7 @@ fn in_file(file: &Path, error: &clap::Error) -> Failure {
         .filter(|line| !line.is_empty())
         .collect();
     Failure::new(format!(
-        "{}: in [component], which holds flags by their long names: {}",
+        "{}: in [component], which takes flags by their long names: {}",
         file.display(),
         told.join("; ")
     ))

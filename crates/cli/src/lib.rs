@@ -5,7 +5,7 @@
 #![warn(
     clippy::print_stdout,
     clippy::print_stderr,
-    reason = "they panic when the reader has gone; see `output`"
+    reason = "they panic when the reader is gone; see `output`"
 )]
 
 pub mod failure;

@@ -8,12 +8,13 @@ use tracing_subscriber::util::SubscriberInitExt as _;
 use super::Failure;
 use super::output::colours_wanted;
 
-/// The flag of every program that says how much is told.
+/// The verbosity flag of every program.
 #[derive(Args, Debug, Clone, Copy)]
 pub struct Logging {
-    /// Say more about what happens inside, on standard error; -vv and -vvv for details
+    /// Log more to standard error; -vv and -vvv for details
     ///
-    /// The environment variable JAUS_LOG chooses by module, for example JAUS_LOG=jaus::endpoint=trace.
+    /// The environment variable JAUS_LOG sets levels by module, for example
+    /// JAUS_LOG=jaus::endpoint=trace.
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
 }

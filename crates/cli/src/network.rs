@@ -22,11 +22,11 @@ use super::settings;
 #[command(next_help_heading = "Network")]
 #[expect(
     missing_docs,
-    reason = "it would become the help text of whoever flattens it"
+    reason = "it would become the help text of the struct that flattens it"
 )]
 pub struct Network {
     /// Our id, SUBSYSTEM.NODE.COMPONENT or SUBSYSTEM.NODE (then component 1) [default: 101.1.1 for
-    /// `jaus node`, 42.1.1 for `jaus judge`; the other commands take one from subsystem 60000 on]
+    /// `jaus node`, 42.1.1 for `jaus judge`; one from subsystem 60000 on for other commands]
     #[arg(long, value_name = "ID")]
     id: Option<OwnId>,
 
@@ -34,31 +34,31 @@ pub struct Network {
     #[arg(long, value_name = "INTERFACE", conflicts_with = "loopback")]
     interface: Vec<String>,
 
-    /// Stay on this host: no network is needed, and nothing leaves. Without --port, any free port
+    /// Use the loopback interface only; without --port, any free port
     #[arg(long)]
     loopback: bool,
 
-    /// Our UDP port; 0 takes any free one [default: 3794; if that is taken, `jaus node` says so and
-    /// the other commands take any free one]
+    /// Our UDP port; 0 for any free one [default: 3794; if that is taken, `jaus node` fails and the
+    /// other commands use any free one]
     #[arg(long)]
     port: Option<u16>,
 
-    /// The multicast group by which nodes find each other, or off [default: 239.255.0.1:3794]
+    /// The multicast group for discovery, or off [default: 239.255.0.1:3794]
     #[arg(long, value_name = "ADDRESS")]
     group: Option<Group>,
 
-    /// How many routers multicast may pass [default: 16]
+    /// The TTL of multicast [default: 16]
     #[arg(long)]
     ttl: Option<u8>,
 
-    /// Speak to this address by unicast too, where multicast does not reach (repeatable)
+    /// Also send by unicast to this address, where multicast does not reach (repeatable)
     ///
     /// ADDRESS, ADDRESS:PORT or ID@ADDRESS:PORT, for example 192.168.7.2 or 102.255.255@192.168.7.2
     #[arg(long, value_name = "PEER")]
     peer: Vec<Peer>,
 
-    /// Use the node of this host that serves components (`jaus node --local`) instead of a node of
-    /// our own; ADDRESS is where it does [default: the usual place]
+    /// Attach to this host's node (`jaus node --local`) instead of running our own; ADDRESS is its
+    /// local link's [default: the usual place]
     #[arg(
         long,
         value_name = "ADDRESS",
@@ -69,8 +69,8 @@ pub struct Network {
     )]
     attach: Option<Address>,
 
-    /// Go through the node manager of a Junior on this host, in the place of UDP of our own; FOLDER
-    /// is where Junior has its sockets [default: /tmp]
+    /// Connect through a Junior node manager on this host instead of our own UDP; FOLDER holds
+    /// Junior's sockets [default: /tmp]
     #[cfg(unix)]
     #[arg(
         long,
@@ -82,10 +82,10 @@ pub struct Network {
     )]
     junior: Option<PathBuf>,
 
-    /// Take the settings from a TOML file; flags come on top
+    /// Read settings from a TOML file; flags take precedence
     ///
     /// For example:
-    ///   id = "101.1.1"                  # who we are: for `jaus node` only
+    ///   id = "101.1.1"                  # our id: for `jaus node` only
     ///   name = "Rover"
     ///   kind = "vehicle"
     ///   interfaces = ["eth0"]           # or "all", or "loopback"
@@ -143,7 +143,7 @@ impl Network {
         Ok((id, node))
     }
 
-    /// The same, for a command that reads the counters of its node, and so needs a node of its own.
+    /// The same, for a command that reads its node's counters and therefore runs its own node.
     pub fn for_own_node(&self, command: &str) -> Result<(JausId, Config), Failure> {
         self.for_own_node_as(passing_id(), command)
     }
@@ -156,7 +156,7 @@ impl Network {
     ) -> Result<(JausId, Config), Failure> {
         if self.attach.is_some() {
             return Err(Failure::new(format!(
-                "`{command}` runs a node of its own: leave --attach out"
+                "`{command}` runs its own node: omit --attach"
             )));
         }
         self.for_a_moment_as(usual)
@@ -168,8 +168,8 @@ impl Network {
         self.config.as_deref()
     }
 
-    /// Attaches a permanent component: to the host's node, or to a node of its own. `usual` is the
-    /// id if none is chosen; on the host's node only its component number counts.
+    /// Attaches a permanent component: to the host's node or to its own. `usual` is the id if none
+    /// is chosen; on the host's node only its component number counts.
     ///
     /// `for_node` changes the settings of a node of our own.
     ///
@@ -208,7 +208,7 @@ impl Network {
         })
     }
 
-    /// Attaches a component for a short-lived command, to the host's node or to a node of its own.
+    /// Attaches a component for a short-lived command, to the host's node or to its own.
     pub async fn join_for_a_moment(&self) -> Result<(Port, Stay), Failure> {
         let Some(address) = &self.attach else {
             let (id, config) = self.for_a_moment()?;
@@ -272,7 +272,10 @@ pub struct Place {
 
 /// Attaches to the host's node as soon as it exists and the id is free: a crashed predecessor may
 /// still be attached for a moment.
-#[expect(clippy::disallowed_methods, reason = "processes start in real time")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "waits for processes in real time"
+)]
 async fn wait_for_host(host: &Host, id: Option<JausId>, usual: u8) -> Result<Port, Failure> {
     const PAUSE: Duration = Duration::from_millis(100);
     const LONGEST_PAUSE: Duration = Duration::from_secs(1);
@@ -328,7 +331,7 @@ impl Stay {
     }
 
     /// Ends it, once the component is dropped.
-    #[expect(clippy::disallowed_methods, reason = "a farewell in real time")]
+    #[expect(clippy::disallowed_methods, reason = "ends in real time")]
     pub async fn end(self) {
         match self {
             Self::OnOurs(node) => node.shutdown().await,

@@ -67,7 +67,7 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
         .map_err(|_| "write a number of seconds such as 2 or 0.5".to_owned())?;
     match Duration::try_from_secs_f64(seconds) {
         Ok(duration) if !duration.is_zero() && duration < MOST => Ok(duration),
-        _ => Err("more than 0 and less than a year, please".to_owned()),
+        _ => Err("write more than 0 and less than a year".to_owned()),
     }
 }
 

@@ -77,7 +77,7 @@ pub fn flag(
             DeValue::Float(number) => flags.push(format!("--{name}={number}")),
             DeValue::Datetime(_) | DeValue::Array(_) | DeValue::Table(_) => {
                 let problem =
-                    "a flag's value is a text, a number, true or false, or a list of them";
+                    "a flag's value is a string, a number, true or false, or a list of them";
                 return Err((value.span(), problem));
             }
         }
@@ -153,7 +153,7 @@ fn remedy(problem: &str) -> Option<&'static str> {
         "u16" => "write a whole number from 0 to 65535",
         "u32" | "u64" | "usize" => "write a whole number, 0 or more",
         "a boolean" => "write true or false",
-        "a string" | "a borrowed string" => "write a text in double quotes",
+        "a string" | "a borrowed string" => "write a string in double quotes",
         "a sequence" => "write a list in brackets, such as [\"…\", \"…\"]",
         _ if expected.starts_with("struct ") => "write a section, with its name in brackets",
         _ => return None,
@@ -225,7 +225,7 @@ pub fn unknown_words<'k>(
         None => {
             let all: Vec<&str> = names.collect();
             format!(
-                "there is no setting `{section}{key}`; there are {}",
+                "there is no setting `{section}{key}`; choose from {}",
                 all.join(", ")
             )
         }

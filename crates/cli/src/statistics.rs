@@ -41,12 +41,12 @@ fn links(node: &Node) -> Vec<String> {
             counters.sent_octets
         );
         for (count, what) in [
-            (counters.receive_errors, "errors receiving"),
-            (counters.send_errors, "refused to send"),
-            (counters.send_overflows, "dropped, network too slow"),
+            (counters.receive_errors, "receive errors"),
+            (counters.send_errors, "send errors"),
+            (counters.send_overflows, "dropped: network too slow"),
             (
                 link.kernel_drops.unwrap_or(0),
-                "dropped by the kernel, read too slowly",
+                "dropped by the kernel: read too slowly",
             ),
         ] {
             if count > 0 {
@@ -65,7 +65,7 @@ fn mailboxes(node: &Node) -> Vec<String> {
     let line = |component: jaus::node::ComponentReport| {
         let mailbox = component.mailbox;
         format!(
-            "component {}: {} delivered, {} dropped unread, {} waiting",
+            "component {}: {} delivered, {} dropped unread, {} queued",
             component.id, mailbox.delivered, mailbox.dropped, mailbox.waiting
         )
     };

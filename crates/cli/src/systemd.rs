@@ -61,7 +61,7 @@ impl Systemd {
         if let Some(socket) = &self.socket
             && let Err(error) = socket.send(state.as_bytes())
         {
-            tracing::debug!(%error, state, "the service manager does not listen");
+            tracing::debug!(%error, state, "cannot notify the service manager");
         }
     }
 
@@ -88,6 +88,6 @@ fn connect(name: &OsStr) -> Option<UnixDatagram> {
     };
     let connected: std::io::Result<UnixDatagram> = connect();
     connected
-        .inspect_err(|error| tracing::warn!(%error, "NOTIFY_SOCKET cannot be used"))
+        .inspect_err(|error| tracing::warn!(%error, "cannot use NOTIFY_SOCKET"))
         .ok()
 }

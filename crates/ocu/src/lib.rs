@@ -16,12 +16,12 @@ mod role;
 mod sample_clock;
 #[expect(
     clippy::disallowed_methods,
-    reason = "the server's clock, tasks and pauses"
+    reason = "the server's clock, tasks and delays"
 )]
 mod server;
 #[expect(
     clippy::disallowed_methods,
-    reason = "the session's clock, tasks and pauses"
+    reason = "the session's clock, tasks and delays"
 )]
 mod session;
 pub mod state;

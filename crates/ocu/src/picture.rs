@@ -205,7 +205,7 @@ impl Picture {
     pub(super) fn select(&mut self, now: Instant, subsystem: u16) -> Result<(), String> {
         if !role::is_vehicle(&self.directory, subsystem) || subsystem == self.own.subsystem() {
             return Err(format!(
-                "subsystem {subsystem} is not known as a vehicle; choose one of the tree"
+                "subsystem {subsystem} is not a known vehicle; choose one from the tree"
             ));
         }
         if self.vehicle != Some(subsystem) {
@@ -537,6 +537,6 @@ fn state_name(status: u8) -> &'static str {
 #[cfg(test)]
 #[expect(
     clippy::disallowed_methods,
-    reason = "the tests' time begins somewhere"
+    reason = "virtual time starts at any instant"
 )]
 mod tests;

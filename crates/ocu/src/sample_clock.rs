@@ -82,7 +82,7 @@ impl SampleClock {
 #[cfg(test)]
 #[expect(
     clippy::disallowed_methods,
-    reason = "the tests' time begins somewhere"
+    reason = "virtual time starts at any instant"
 )]
 mod tests {
     use super::*;

@@ -142,7 +142,7 @@ impl Part for OpenStation {
         tokio::select! {
             error = session.run() => Err(error),
             error = server.run(listener) => {
-                Err(PartError::Broken(format!("the page can not be offered any more: {error}")))
+                Err(PartError::Broken(format!("the page's server failed: {error}")))
             }
         }
     }
@@ -151,8 +151,7 @@ impl Part for OpenStation {
 async fn listen(listen: Listen) -> Result<TcpListener, PartError> {
     let broken = |address: SocketAddr, error: std::io::Error| {
         PartError::Broken(format!(
-            "the page can not be offered at {address} (--listen): {error}; choose another address \
-             or port"
+            "cannot serve the page at {address} (--listen): {error}; choose another address or port"
         ))
     };
     match listen {

@@ -14,7 +14,7 @@ pub struct Push {
 
 /// Error: another page is driving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("another page drives now; it has to let go first")]
+#[error("another page is driving; it must let go first")]
 pub struct Busy;
 
 /// One stick for all pages. The first page to push holds it until it releases it or falls silent.
@@ -156,7 +156,7 @@ impl Stick {
 #[cfg(test)]
 #[expect(
     clippy::disallowed_methods,
-    reason = "the tests' time begins somewhere"
+    reason = "virtual time starts at any instant"
 )]
 mod tests {
     use super::*;

@@ -13,7 +13,7 @@ pub struct Token(String);
 #[non_exhaustive]
 pub enum TokenError {
     /// The file cannot be read.
-    #[error("the token file {file} can not be read: {source}")]
+    #[error("cannot read the token file {file}: {source}")]
     Unreadable {
         /// The file.
         file: String,
@@ -23,7 +23,7 @@ pub enum TokenError {
     /// The content is unsuitable as a token.
     #[error(
         "the token file {file} holds {length} characters: write one line of {} to {} letters and \
-         digits into it, such as `openssl rand -hex 16` prints",
+         digits, such as from `openssl rand -hex 16`",
         Token::SHORTEST,
         Token::LONGEST
     )]
@@ -34,7 +34,7 @@ pub enum TokenError {
         length: usize,
     },
     /// The system provides no random numbers.
-    #[error("no token can be made up, because the system gives no random numbers: {0}")]
+    #[error("cannot generate a token, because the system has no random numbers: {0}")]
     NoRandomness(getrandom::Error),
 }
 

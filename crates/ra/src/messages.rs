@@ -2,7 +2,7 @@
 //!
 //! A command code is in the header there; here it stands before the data, as in a
 //! [`Frame`](jaus::wire::Frame). Some codes are those of other layouts in the SAE sets, so these
-//! messages have a registry of their own.
+//! messages have their own registry.
 
 use bytes::Bytes;
 use jaus::codec::{AnyMessage, DecodeError, MessageInfo, Registry, ServiceSet};
@@ -10,7 +10,7 @@ use jaus::codec::{AnyMessage, DecodeError, MessageInfo, Registry, ServiceSet};
 pub use crate::forgiving::forgiving;
 
 /// Version 3.3, which OpenJAUS 3.3 speaks.
-#[allow(missing_docs, reason = "what the definitions do not describe")]
+#[allow(missing_docs, reason = "the definitions lack descriptions")]
 pub mod ra33 {
     include!(concat!(env!("OUT_DIR"), "/ra33.rs"));
 }

@@ -1,7 +1,7 @@
 //! A multicast group per test, so that simultaneous tests do not discover each other.
 #![allow(
     clippy::disallowed_types,
-    reason = "the operating system knows which ports are free"
+    reason = "asks the operating system for free ports"
 )]
 
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};

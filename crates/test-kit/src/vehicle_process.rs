@@ -1,4 +1,4 @@
-//! `jaus vehicle` as a process of its own.
+//! `jaus vehicle` as a separate process.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};

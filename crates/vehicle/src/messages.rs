@@ -3,7 +3,7 @@
 use jaus::codec::{Registry, ServiceSet};
 
 /// World model, missions, stages, odometry.
-#[allow(missing_docs, reason = "what the definitions do not describe")]
+#[allow(missing_docs, reason = "the definitions lack descriptions")]
 pub mod ground {
     include!(concat!(env!("OUT_DIR"), "/ground.rs"));
 }

@@ -5,9 +5,9 @@
 //! | `/messages` | a WebSocket that sends every message as a JSON object, one a frame; the [`Filter`]'s terms are its parameters: `/messages?message=Velocity&field=velocity_x>1` |
 //! | `/tree` | what discovery has found, as JSON |
 //!
-//! It can only be looked at: what a viewer sends is not read. A viewer that is too slow loses
-//! messages and is told how many by `{"lost":N}`; the traffic never waits. Since a page of any web site
-//! can ask a browser to connect to this host, requests of other sites' pages are refused.
+//! It is read-only: input from viewers is ignored. A viewer that is too slow loses messages and
+//! receives their number in `{"lost":N}`; the traffic never waits. Requests from other sites' pages
+//! are refused, because any web page can ask a browser to connect to this host.
 
 use std::convert::Infallible;
 use std::net::SocketAddr;
@@ -107,7 +107,7 @@ async fn messages(
         }
     }
     let Ok(place) = view.viewers.clone().try_acquire_owned() else {
-        let words = format!("{MOST_VIEWERS} viewers look on already");
+        let words = format!("the limit of {MOST_VIEWERS} viewers is reached: close one");
         return (StatusCode::SERVICE_UNAVAILABLE, words).into_response();
     };
     let upgrade = upgrade.max_message_size(LONGEST).max_frame_size(LONGEST);
@@ -139,7 +139,7 @@ async fn show(view: &Inner, filter: Filter, mut sender: SplitSink<WebSocket, Mes
             }
             sender.flush().await
         };
-        #[expect(clippy::disallowed_methods, reason = "viewers live in real time")]
+        #[expect(clippy::disallowed_methods, reason = "viewers run in real time")]
         let sent = tokio::time::timeout(PATIENCE, send).await;
         if !matches!(sent, Ok(Ok(()))) {
             return;
@@ -203,7 +203,7 @@ fn check_site(headers: &HeaderMap) -> Result<(), (StatusCode, &'static str)> {
     } else {
         Err((
             StatusCode::FORBIDDEN,
-            "this is not for pages of other sites",
+            "requests from other sites' pages are refused",
         ))
     }
 }

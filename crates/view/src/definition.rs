@@ -93,7 +93,10 @@ pub(super) fn parse_version(text: &str) -> Result<Version, Unreadable> {
         })
     });
     parsed.ok_or_else(|| {
-        Unreadable::new(format!("\"{text}\" is not a version; write it like 1.0"), 0)
+        Unreadable::new(
+            format!("\"{text}\" is not a version; write MAJOR.MINOR such as 1.0"),
+            0,
+        )
     })
 }
 

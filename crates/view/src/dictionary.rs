@@ -223,7 +223,7 @@ impl Dictionary {
         Err(Unreadable::new(
             match similar {
                 Some(similar) => format!(
-                    "there is no service {service}; perhaps {}@{} is meant",
+                    "there is no service {service}; did you mean {}@{}?",
                     similar.urn, similar.version
                 ),
                 None => format!("there is no service {service}"),
@@ -254,8 +254,9 @@ impl Dictionary {
     pub fn read(&self, octets: &Bytes) -> Reading<'_> {
         let Some(code) = octets.first_chunk().map(|&code| u16::from_le_bytes(code)) else {
             let count = octets.len();
-            let problem =
-                format!("a message begins with the two octets of its code, here are {count}");
+            let problem = format!(
+                "a message starts with the two octets of its code, but there are only {count}"
+            );
             return Reading::unknown(None, Unreadable::new(problem, 0));
         };
         if let Some(definition) = self.preferred_ra(code) {
@@ -274,7 +275,7 @@ impl Dictionary {
             Some((definition, unreadable)) => self.reading(code, 0, definition, Err(unreadable)),
             None => {
                 let problem = format!(
-                    "no definition here has the message code {code:04X}h; load one that has it"
+                    "no loaded definition has the message code {code:04X}h; load one that has it"
                 );
                 Reading::unknown(Some(code), Unreadable::new(problem, 0))
             }
@@ -392,7 +393,7 @@ impl Dictionary {
                 .map(|s| format!("{}@{}", s.urn, s.version))
                 .collect();
             let problem = format!(
-                "{service} does not define {request}; it is in {}",
+                "{service} does not define {request}; it is defined in {}",
                 services.join(", ")
             );
             return Err(Unreadable::new(problem, 0));
@@ -421,7 +422,7 @@ impl Dictionary {
     fn advice(&self, request: &Request) -> String {
         let all = || self.by_code.values().flatten();
         let Some(name) = request.message.as_deref() else {
-            return format!("no definition here has {request}");
+            return format!("no loaded definition has {request}");
         };
         if let Some(known) = all().find(|d| d.name() == name) {
             return format!("{name} has the code {:04X}h", known.code());
@@ -434,10 +435,10 @@ impl Dictionary {
             alike.then_some((likeness, definition.name()))
         });
         match similar.max_by(|(one, _), (other, _)| one.total_cmp(other)) {
-            Some((_, similar)) => format!("there is no message {name}; perhaps {similar} is meant"),
+            Some((_, similar)) => format!("there is no message {name}; did you mean {similar}?"),
             None => format!(
-                "there is no message {name} here; if a service of your own defines it, \
-                 that definition must be loaded too"
+                "there is no message {name}; if your own service defines it, load that definition \
+                 too"
             ),
         }
     }

@@ -32,7 +32,7 @@ pub fn from_hex(text: &str) -> Result<Vec<u8>, Unreadable> {
             }
             (Some(_), None) if character.is_whitespace() => {
                 return Err(Unreadable::new(
-                    "an octet has two digits, here is one",
+                    "an octet has two digits, but one is missing",
                     octets.len(),
                 ));
             }
@@ -44,7 +44,7 @@ pub fn from_hex(text: &str) -> Result<Vec<u8>, Unreadable> {
     }
     match half {
         Some(_) => Err(Unreadable::new(
-            "an octet has two digits, here is one",
+            "an octet has two digits, but one is missing",
             octets.len(),
         )),
         None => Ok(octets),

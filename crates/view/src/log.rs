@@ -50,7 +50,7 @@ impl<'d> MessageLog<'d> {
             let envelope = Envelope { time, header: None };
             let sentence = match datagram.missing {
                 0 => error.to_string(),
-                missing => format!("{error}; the capture left out {missing} octets"),
+                missing => format!("{error}; the capture truncated {missing} octets"),
             };
             let offset = error.offset as u64;
             lines.push(Line::of_error(Some(envelope), &sentence, offset));

@@ -61,7 +61,7 @@ impl Request {
             Unreadable::new(format!("not a JSON object: {sentence}"), column)
         })?;
         if let Some(error) = object.get("error") {
-            let problem = format!("there is no message here, but the error {error}");
+            let problem = format!("this line is an error, not a message: {error}");
             return Err(Unreadable::new(problem, 0));
         }
         let version = match object.remove("version") {
@@ -92,13 +92,13 @@ impl Request {
             .find(|key| !PASSED_OVER.contains(&key.as_str()))
         {
             let problem = format!(
-                "the key \"{key}\" is not known here; \
-                 a line has message or code, body, and perhaps service and version"
+                "unknown key \"{key}\"; a line has message or code, body, and optionally service \
+                 and version"
             );
             return Err(Unreadable::new(problem, 0));
         }
         if request.message.is_none() && request.code.is_none() {
-            let problem = "which message is meant? give \"message\" or \"code\"";
+            let problem = "no message named: give \"message\" or \"code\"";
             return Err(Unreadable::new(problem, 0));
         }
         Ok(request)

@@ -66,7 +66,7 @@ pub fn introduction(Identification { kind, name }: &Identification) -> String {
 /// One line per service, with its versions aligned in a column.
 fn services(component: &Component) -> Vec<String> {
     let Some(offers) = &component.services else {
-        return vec!["(has not told its services yet)".to_owned()];
+        return vec!["(services not yet reported)".to_owned()];
     };
     let services = by_urn(offers);
     let width = services.keys().map(|urn| urn.len()).max().unwrap_or(0);
@@ -142,7 +142,7 @@ fn named_json(key: &str, id: Json, identification: Option<&Identification>) -> M
 pub fn in_words(change: Change, directory: &Directory) -> Option<String> {
     Some(match change {
         Change::SubsystemFound(_) => return None,
-        Change::Found(id) => format!("{id} has come"),
+        Change::Found(id) => format!("{id} appeared"),
         Change::Identified(level, id) => {
             let who = level_name(level, id);
             format!(
@@ -158,8 +158,8 @@ pub fn in_words(change: Change, directory: &Directory) -> Option<String> {
             });
             format!("{id} offers {}", names.collect::<Vec<_>>().join(", "))
         }
-        Change::Lost(id, loss) => format!("{id} is gone: {}", reason(loss)),
-        Change::SubsystemLost(number) => format!("subsystem {number} is gone"),
+        Change::Lost(id, loss) => format!("{id} is lost: {}", reason(loss)),
+        Change::SubsystemLost(number) => format!("subsystem {number} is lost"),
     })
 }
 
@@ -211,9 +211,9 @@ fn level_name(level: Level, id: JausId) -> String {
 
 const fn reason(loss: Loss) -> &'static str {
     match loss {
-        Loss::Silent => "it does not answer any more",
-        Loss::Unlisted => "its subsystem does not list it any more",
-        Loss::WithItsReporter => "the component that spoke for it is gone",
-        Loss::NoRoom => "it never spoke, and its place is needed for one that does",
+        Loss::Silent => "it stopped answering",
+        Loss::Unlisted => "its subsystem no longer lists it",
+        Loss::WithItsReporter => "the component that reported it is lost",
+        Loss::NoRoom => "it never sent a message, and its entry is needed for another",
     }
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
 
 use jaus::component::Handlers;
 
-/// What the build makes of the definition.
+/// Generated from the definition at build time.
 pub mod messages {
     include!(concat!(env!("OUT_DIR"), "/messages.rs"));
 }
@@ -18,8 +18,8 @@ pub fn service() -> Handlers {
     let brightness = Arc::new(AtomicU8::new(0));
     let shown = brightness.clone();
     Handlers::new(lamp::LATEST)
-        // Here a real one would dim its lamp. A command that moves something is taken with `command`
-        // instead, and stopped with `on_stop`.
+        // A real lamp would be dimmed here. Register a command that moves something with `command`
+        // instead, and stop it with `on_stop`.
         .configure(move |set: SetLamp, _, _| brightness.store(set.brightness.raw(), Relaxed))
         .answer(move |_: QueryLamp| ReportLamp {
             brightness: Brightness::from_raw(shown.load(Relaxed)),

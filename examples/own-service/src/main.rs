@@ -1,4 +1,4 @@
-//! A component that offers the service. Ask it with
+//! A component that offers the service. Query it with
 //! `jaus query --loopback --jsidl services 101.1.40 QueryLamp`.
 
 use jaus::component::{AccessControl, Component, Kind};

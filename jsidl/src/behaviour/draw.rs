@@ -224,8 +224,8 @@ fn label(transition: &Transition) -> String {
         let _ = write!(label, " / {}", actions.join(", "));
     }
     label.push_str(match transition.kind {
-        TransitionKind::Push(_) => ", to come back",
-        TransitionKind::Pop => ", then back",
+        TransitionKind::Push(_) => ", with return",
+        TransitionKind::Pop => ", then return",
         _ => "",
     });
     label

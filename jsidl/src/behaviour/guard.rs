@@ -197,10 +197,10 @@ fn whole<'a, T>(text: &'a str, rule: impl Fn(&'a str) -> IResult<&'a str, T>) ->
     let read = all_consuming(delimited(multispace0, rule, multispace0)).parse(text);
     match read.finish() {
         Ok((_, read)) => Ok(read),
-        Err(error) if error.input.is_empty() => Err("it ends too early".into()),
+        Err(error) if error.input.is_empty() => Err("it is incomplete".into()),
         Err(error) => {
             let rest: String = error.input.chars().take(40).collect();
-            Err(format!("`{rest}` is not understood"))
+            Err(format!("`{rest}` is not recognised"))
         }
     }
 }
@@ -358,7 +358,7 @@ mod tests {
 
     #[test]
     fn what_is_no_guard_is_refused_with_the_place() {
-        assert_eq!(shown("a() &&"), Err("it ends too early".into()));
+        assert_eq!(shown("a() &&"), Err("it is incomplete".into()));
         assert_eq!(shown("a() & b()"), Err("`& b()` is not understood".into()));
         assert_eq!(shown("a(!b)"), Err("`!b)` is not understood".into()));
         assert!(shown(&"(".repeat(500)).is_err());

@@ -29,8 +29,8 @@ pub(crate) fn behaviour(
     let lineage = library.lineage(service).flat_map(|base| &base.behaviour);
     let states: usize = lineage.map(|machine| machine.all_states().count()).sum();
     let Some(left) = states_left.checked_sub(states) else {
-        let message = "the services inherit too many states from each other: the state machines \
-                       from here on are not checked";
+        let message = "the services inherit too many states: this and the following state \
+            machines are not checked";
         if *states_left > 0 {
             report.warning(first.span, message);
         }
@@ -96,7 +96,7 @@ impl Check<'_> {
         if !self.triggers.know(event) {
             let message = format!(
                 "nothing triggers this transition: `{event}` is neither an event nor a message of \
-                 the service or of one that it inherits from, so declare it in the \
+                 the service or a service it inherits from: declare it in the \
                  `internal_events_set`, or correct the name"
             );
             self.report.error(transition.span, message);
@@ -120,7 +120,7 @@ impl Check<'_> {
                 continue;
             };
             let message = format!(
-                "the transition `{}` is there twice, with the same parameters and guard, and this \
+                "the transition `{}` appears twice with the same parameters and guard, so this \
                  one is never taken: remove it, or change the guard",
                 transition.trigger.event
             );
@@ -147,15 +147,13 @@ impl Check<'_> {
         }
         if own.children.len() > 1 {
             let message = format!(
-                "the state `{path}` has {} others inside: say with `initial_state` in which of \
-                 them it begins",
+                "the state `{path}` has {} inner states: choose its first one with `initial_state`",
                 own.children.len()
             );
             self.report.error(own.span, message);
         } else {
             let message = format!(
-                "the state `{path}` has others inside, but no `initial_state`: it is taken to \
-                 begin in `{}`",
+                "the state `{path}` has inner states, but no `initial_state`: `{}` is assumed",
                 first.name
             );
             self.report.warning(own.span, message);
@@ -172,11 +170,11 @@ impl Check<'_> {
         let children = merged.map_or(&[][..], |merged| &merged.children);
         let message = match children.first() {
             None => format!(
-                "the `initial_state` `{path}` does not exist, nor any other inside: remove the \
-                 attribute"
+                "the `initial_state` `{path}` does not exist, nor any other inner state: remove \
+                 the attribute"
             ),
             Some(first) => format!(
-                "the `initial_state` `{path}` does not exist: it is taken to begin in `{}`",
+                "the `initial_state` `{path}` does not exist: `{}` is assumed",
                 self.machine.state(*first).path.last()
             ),
         };
@@ -191,8 +189,8 @@ impl Check<'_> {
         };
         if !wanted.eq_ignore_ascii_case(initial) {
             let message = format!(
-                "the `initial_state` of `{path}` is `{wanted}` in the service that is inherited \
-                 from: write the same"
+                "the `initial_state` of `{path}` is `{wanted}` in the inherited service: write \
+                 the same"
             );
             self.report.warning(own.span, message);
         }
@@ -208,8 +206,8 @@ impl Check<'_> {
             && promised.parts().iter().zip(start.parts()).all(same);
         if !within {
             let message = format!(
-                "`{}` starts in `{start}`, but the machine that it extends starts in \
-                 `{promised}`: start there, or in a state within",
+                "`{}` starts in `{start}`, but the machine it extends starts in `{promised}`: \
+                 start there, or in one of its inner states",
                 own.name
             );
             self.report.warning(own.span, message);
@@ -223,7 +221,7 @@ impl Check<'_> {
                 let name = self.machine.name();
                 let message = format!(
                     "{what} `{path}` is not a state of `{name}`: add the state, or name one by \
-                     its whole path"
+                     its full path"
                 );
                 self.report.error(span, message);
             }

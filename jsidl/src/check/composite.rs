@@ -15,8 +15,8 @@ const LARGEST: u32 = 1 << 20;
 /// # Errors
 /// A sentence, if the message does not begin with its code.
 pub(crate) fn header(header: Option<&Item>) -> Result<Option<Item>, String> {
-    let advice = "a message begins with its code, so the header must be a `record` whose first \
-         field is an `unsigned short integer`";
+    let advice = "a message starts with its code, so the header must be a `record` whose first \
+        field is an `unsigned short integer`";
     let Some(item) = header else {
         return Err(format!("the header is empty: {advice}"));
     };
@@ -25,7 +25,7 @@ pub(crate) fn header(header: Option<&Item>) -> Result<Option<Item>, String> {
     };
     if group.presence.is_some() {
         return Err(format!(
-            "the header begins with a presence vector: {advice}"
+            "the header starts with a presence vector: {advice}"
         ));
     }
     match group.members.split_first() {
@@ -38,7 +38,7 @@ pub(crate) fn header(header: Option<&Item>) -> Result<Option<Item>, String> {
             ..item.clone()
         })),
         _ => Err(format!(
-            "the header does not begin with the message code: {advice}"
+            "the header does not start with the message code: {advice}"
         )),
     }
 }

@@ -34,8 +34,8 @@ pub(crate) fn scale(
         Number::Unsigned(_) if range.centred => {
             report.error(
                 span,
-                "only the range of a signed integer has its zero in the centre: change the \
-                 `field_type`, or remove the attribute `bias`",
+                "only a signed integer's range is centred on zero: change the `field_type`, or \
+                 remove the attribute `bias`",
             );
             return None;
         }
@@ -55,7 +55,7 @@ pub(crate) fn scale(
         report.error(
             span,
             format!(
-                "a real number cannot tell the steps of a scaled `{name}` apart: use `{}`",
+                "a floating-point number cannot resolve the steps of a scaled `{name}`: use `{}`",
                 name.replace("long ", "")
             ),
         );
@@ -221,7 +221,7 @@ pub(crate) fn bits(
     if from > to {
         report.error(
             field.from.span,
-            format!("the bits of `{name}` go from {from} to {to}: exchange them"),
+            format!("the bits of `{name}` range from {from} to {to}: swap them"),
         );
         return None;
     }
@@ -230,8 +230,8 @@ pub(crate) fn bits(
         report.error(
             field.from.span,
             format!(
-                "the bits {from} to {to} of `{name}` do not lie within the `bit_field`, \
-                 whose bits are 0 to {last}"
+                "the bits {from} to {to} of `{name}` are outside the `bit_field`, whose bits are \
+                 0 to {last}"
             ),
         );
         return None;

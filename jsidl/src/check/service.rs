@@ -14,7 +14,7 @@ pub(crate) fn left_out(report: &mut Report, service: &ServiceDef, message: &Decl
     report.error(
         message.span,
         format!(
-            "`{}` is left out of `{}`, because what it refers to is missing or has errors",
+            "`{}` is omitted from `{}`, because a definition it refers to is missing or has errors",
             message.name, service.id
         ),
     );
@@ -37,8 +37,8 @@ pub(crate) fn same_service(
         report.warning(
             definition.span,
             format!(
-                "`{}` is declared with other messages at {}, which counts because it was loaded \
-                 first",
+                "`{}` is declared with other messages at {}, which takes precedence because it \
+                 was loaded first",
                 definition.id, first.location
             ),
         );

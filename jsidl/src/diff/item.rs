@@ -10,11 +10,11 @@ impl Walk<'_> {
         let places = (Some(&old.location), Some(&new.location));
         self.inside(new.name.clone(), places.0, places.1, |walk| {
             if old.name != new.name {
-                walk.report(false, format!("it is renamed, was `{}`", old.name));
+                walk.report(false, format!("renamed, was `{}`", old.name));
             }
             if old.optional != new.optional {
                 let message = if new.optional {
-                    "it is optional now"
+                    "it is now optional"
                 } else {
                     "it is no longer optional"
                 };
@@ -35,7 +35,7 @@ impl Walk<'_> {
             match new_position {
                 Some(position) => self.item(old, &new[*position]),
                 None => self.inside(old.name.clone(), Some(&old.location), None, |walk| {
-                    walk.report(true, format!("the {what} is gone"));
+                    walk.report(true, format!("the {what} was removed"));
                 }),
             }
         }
@@ -46,13 +46,13 @@ impl Walk<'_> {
             let at_end = kept.iter().all(|kept| *kept < position);
             let wire = appending || !at_end;
             self.inside(item.name.clone(), None, Some(&item.location), |walk| {
-                walk.report(wire, format!("the {what} is new"));
+                walk.report(wire, format!("the {what} was added"));
             });
         }
         if moved {
             self.report(
                 true,
-                format!("the {what}s stand in another order: {}", names(new)),
+                format!("the order of the {what}s changed: {}", names(new)),
             );
         }
     }

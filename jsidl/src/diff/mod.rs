@@ -68,11 +68,11 @@ pub fn compare(old: &Library, new: &Library, included: impl Fn(&Service) -> bool
     for (old, new) in pairs {
         match new {
             Some(new) => service::compare(old, new, &mut changes),
-            None => changes.push(whole(old, "the service is gone", true)),
+            None => changes.push(whole(old, "the service was removed", true)),
         }
     }
     let added = added.into_iter();
-    changes.extend(added.map(|service| whole(service, "the service is new", false)));
+    changes.extend(added.map(|service| whole(service, "the service was added", false)));
     changes
 }
 

@@ -41,7 +41,7 @@ impl Walk<'_> {
         };
         let urn = |reference: Option<&Reference>| reference.map(|r| r.id.urn.clone());
         let wire = old.is_some() && urn(old) != urn(new);
-        self.value(wire, "what the service inherits from", &id(old), &id(new));
+        self.value(wire, "the base service", &id(old), &id(new));
     }
 
     fn vocabulary(&mut self, old: &Vocabulary<'_>, new: &Vocabulary<'_>) {
@@ -76,7 +76,7 @@ impl Walk<'_> {
             self.inside(named(message), Some(&message.location), None, |walk| {
                 walk.report(
                     true,
-                    format!("the message is gone: the service {direction} it no longer"),
+                    format!("the message was removed: the service no longer {direction} it"),
                 );
             });
         }
@@ -84,7 +84,7 @@ impl Walk<'_> {
             self.inside(named(message), None, Some(&message.location), |walk| {
                 walk.report(
                     false,
-                    format!("the message is new: the service {direction} it"),
+                    format!("the message was added: the service {direction} it"),
                 );
             });
         }

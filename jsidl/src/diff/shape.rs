@@ -43,7 +43,7 @@ impl Walk<'_> {
                 self.choices(old, new);
             }
             _ => {
-                let message = format!("it is {} now, was {}", shape_name(new), shape_name(old));
+                let message = format!("it is now {}, was {}", shape_name(new), shape_name(old));
                 self.report(true, message);
             }
         }
@@ -70,10 +70,10 @@ impl Walk<'_> {
     /// The limits are not on the wire.
     pub(super) fn count(&mut self, old: Count, new: Count) {
         self.unsigned("the type of the count", old.unsigned, new.unsigned);
-        self.value(false, "the least count", &old.min, &new.min);
+        self.value(false, "the minimum count", &old.min, &new.min);
         let whole = |count: Count| count.max == count.unsigned.max();
         if !(whole(old) && whole(new)) {
-            self.value(false, "the greatest count", &old.max, &new.max);
+            self.value(false, "the maximum count", &old.max, &new.max);
         }
     }
 
@@ -118,7 +118,10 @@ impl Walk<'_> {
                 let message = format!("the value {index} is `{}`, was `{name}`", same.name);
                 self.report(false, message);
             } else {
-                self.report(false, format!("the value {} `{name}` is gone", value.index));
+                self.report(
+                    false,
+                    format!("the value {} `{name}` was removed", value.index),
+                );
             }
         }
         for value in &new.values {
@@ -126,7 +129,7 @@ impl Walk<'_> {
             if !old.values.iter().any(known) {
                 self.report(
                     false,
-                    format!("the value {} `{}` is new", value.index, value.name),
+                    format!("the value {} `{}` was added", value.index, value.name),
                 );
             }
         }
@@ -139,7 +142,7 @@ impl Walk<'_> {
         for field in &old.fields {
             let name = &field.name;
             let Some(same) = new.fields.iter().find(|other| other.name == *name) else {
-                self.report(true, format!("the sub-field `{name}` is gone"));
+                self.report(true, format!("the sub-field `{name}` was removed"));
                 continue;
             };
             let place = |from: u8, to: u8| format!("{from} to {to}");
@@ -152,7 +155,7 @@ impl Walk<'_> {
         }
         for field in &new.fields {
             if !old.fields.iter().any(|other| other.name == field.name) {
-                self.report(true, format!("the sub-field `{}` is new", field.name));
+                self.report(true, format!("the sub-field `{}` was added", field.name));
             }
         }
     }
@@ -167,13 +170,13 @@ impl Walk<'_> {
                 }
                 None => self.report(
                     true,
-                    format!("the format {index} `{}` is gone", format.name),
+                    format!("the format {index} `{}` was removed", format.name),
                 ),
             }
         }
         for format in new {
             if !old.iter().any(|other| other.index == format.index) {
-                let message = format!("the format {} `{}` is new", format.index, format.name);
+                let message = format!("the format {} `{}` was added", format.index, format.name);
                 self.report(false, message);
             }
         }
@@ -188,12 +191,12 @@ impl Walk<'_> {
                         walk.scalar(&choice.scalar, &same.scalar);
                     });
                 }
-                None => self.report(true, format!("the {name} is gone")),
+                None => self.report(true, format!("the {name} was removed")),
             }
         }
         for choice in new {
             if !old.iter().any(|other| other.index == choice.index) {
-                self.report(false, format!("the choice {} is new", choice.index));
+                self.report(false, format!("the choice {} was added", choice.index));
             }
         }
     }

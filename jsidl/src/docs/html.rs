@@ -28,8 +28,8 @@ pub(super) fn page(page: &Page) -> String {
     out.push_str("</ul>\n</nav>\n<main>\n");
     if page.searchable {
         out.push_str(
-            "<p class=\"search\" hidden=\"hidden\"><input type=\"search\" placeholder=\"Search: a name, a code, a word\" \
-             aria-label=\"Search\"/></p>\n",
+            "<p class=\"search\" hidden=\"hidden\"><input type=\"search\" placeholder=\"Search for \
+             a name, code or word\" aria-label=\"Search\"/></p>\n",
         );
     }
     blocks(&mut out, &page.blocks);

@@ -63,7 +63,7 @@ fn of_set(names: &Names, services: &[&Service]) -> Block {
     });
     Block::Table(Table {
         class: "index",
-        head: &["Service", "Version", "What it does"],
+        head: &["Service", "Version", "Description"],
         rows: rows.collect(),
     })
 }

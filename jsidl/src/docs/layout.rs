@@ -215,7 +215,7 @@ impl Layout {
         let element = format!("{path}[]");
         self.title(
             depth,
-            vec![muted("each element, as often as the count says")],
+            vec![muted("each element, repeated as the count says")],
         );
         let start = Offset::Within(0);
         self.offset = start;
@@ -271,7 +271,7 @@ impl Layout {
                 Entry {
                     octets: Octets::Fixed(u64::from(*length)),
                     kind: "text",
-                    values: vec![vec![text("zeros behind it")]],
+                    values: vec![vec![text("zeros after it")]],
                     ..entry
                 },
             ),

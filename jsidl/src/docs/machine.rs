@@ -16,8 +16,8 @@ pub(super) fn blocks(library: &Library, service: &Service) -> Vec<Block> {
     let mut blocks = vec![
         heading(2, "Behaviour", Some("behaviour".to_owned())),
         Block::Paragraph(vec![text(
-            "What is inherited is included. Transitions of a state count for the states within it; \
-             the first whose condition holds is taken.",
+            "Includes inherited states and transitions. A state's transitions also apply to its \
+             inner states; the first whose condition holds is taken.",
         )]),
     ];
     for machine in &machines {
@@ -96,7 +96,7 @@ fn transition(
         TransitionKind::Internal => {}
         TransitionKind::To(_) => line.push(text(format!(" → {target}"))),
         TransitionKind::Again => line.push(text(" → again")),
-        TransitionKind::Push(_) => line.push(text(format!(" → {target}, to come back"))),
+        TransitionKind::Push(_) => line.push(text(format!(" → {target}, with return"))),
         TransitionKind::Pop => line.push(text(" → back")),
     }
     let actions: Vec<_> = transition.actions.iter().map(shown).collect();

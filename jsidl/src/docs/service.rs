@@ -6,7 +6,7 @@ use super::{layout, machine};
 use crate::library::Library;
 use crate::model::{Id, Message, Service};
 
-const HEAD: [&str; 3] = ["Code", "Message", "What it is"];
+const HEAD: [&str; 3] = ["Code", "Message", "Description"];
 
 /// The page of a service.
 pub(super) fn page(library: &Library, names: &Names, service: &Service) -> Page {

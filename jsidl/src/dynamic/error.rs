@@ -69,7 +69,7 @@ impl std::error::Error for DecodeError {}
 #[non_exhaustive]
 pub enum DecodeProblem {
     /// The code of another message.
-    #[error("message code {found:04X}h where {expected:04X}h is expected")]
+    #[error("message code {found:04X}h, expected {expected:04X}h")]
     Code {
         /// The definition's code.
         expected: u16,
@@ -91,7 +91,7 @@ pub enum DecodeProblem {
         left: usize,
     },
     /// The presence vector has bits that belong to no member.
-    #[error("presence vector {vector:#x} has bits {undefined:#x}, which no member owns")]
+    #[error("presence vector {vector:#x} has undefined bits {undefined:#x}")]
     Presence {
         /// The whole vector.
         vector: u64,
@@ -109,7 +109,7 @@ pub enum DecodeProblem {
         max: u64,
     },
     /// The tag of a variant names no alternative.
-    #[error("tag {tag} where the variant has {alternatives} alternatives")]
+    #[error("tag {tag} selects none of the variant's {alternatives} alternatives")]
     Tag {
         /// The tag in the octets.
         tag: u64,
@@ -117,7 +117,7 @@ pub enum DecodeProblem {
         alternatives: usize,
     },
     /// The index of a `variable_field` names no type.
-    #[error("index {index} names none of the types and units of the field")]
+    #[error("index {index} selects none of the field's types and units")]
     Index {
         /// The index in the octets.
         index: u8,
@@ -155,7 +155,7 @@ impl std::error::Error for EncodeError {}
 #[non_exhaustive]
 pub enum EncodeProblem {
     /// A value of another kind than the definition requires.
-    #[error("{found} where the definition has {expected}")]
+    #[error("{found}, but the definition has {expected}")]
     Kind {
         /// The required kind.
         expected: &'static str,
@@ -163,7 +163,7 @@ pub enum EncodeProblem {
         found: &'static str,
     },
     /// A group or array with a wrong number of slots or elements.
-    #[error("{found} slots where the definition has {expected}")]
+    #[error("{found} slots, but the definition has {expected}")]
     Slots {
         /// The number in the definition.
         expected: u64,
@@ -203,7 +203,7 @@ pub enum EncodeProblem {
         field: u32,
     },
     /// The tag of a variant names no alternative, or its value is absent.
-    #[error("tag {tag} where the variant has {alternatives} alternatives")]
+    #[error("tag {tag} selects none of the variant's {alternatives} alternatives")]
     Tag {
         /// The tag.
         tag: u64,
@@ -211,7 +211,7 @@ pub enum EncodeProblem {
         alternatives: usize,
     },
     /// The index of a `variable_field` names no type.
-    #[error("index {index} names none of the types and units of the field")]
+    #[error("index {index} selects none of the field's types and units")]
     Index {
         /// The index.
         index: u8,
@@ -223,7 +223,7 @@ pub enum EncodeProblem {
     )]
     EmptyElements,
     /// Two members of one group have the same name, so that JSON cannot tell them apart.
-    #[error("the definition has two members of this name, which JSON cannot tell apart")]
+    #[error("the definition has two members of this name, which JSON cannot distinguish")]
     SameName,
 }
 

@@ -72,19 +72,19 @@ impl fmt::Display for ServiceName {
 #[non_exhaustive]
 pub enum Unexplained {
     /// Fewer octets than a message code.
-    #[error("a message begins with the two octets of its code, here are {length}")]
+    #[error("a message starts with the two octets of its code, but there are only {length}")]
     TooShort {
         /// Number of octets.
         length: usize,
     },
     /// No definition has this code.
-    #[error("no definition here has the message code {code:04X}h; name the file that has it")]
+    #[error("no loaded definition has the message code {code:04X}h; name the file that has it")]
     UnknownCode {
         /// The code.
         code: u16,
     },
     /// No service has this name.
-    #[error("there is no service {name}{}", .similar.as_ref().map_or_else(String::new, |id| format!("; perhaps {id} is meant")))]
+    #[error("there is no service {name}{}", .similar.as_ref().map_or_else(String::new, |id| format!("; did you mean {id}?")))]
     UnknownService {
         /// The requested name.
         name: ServiceName,
@@ -92,7 +92,7 @@ pub enum Unexplained {
         similar: Option<Id>,
     },
     /// The service has no message with this code.
-    #[error("{name} has no message {code:04X}h; it is in {}", listed(.services))]
+    #[error("{name} has no message {code:04X}h; it is defined in {}", listed(.services))]
     NotInService {
         /// The requested name.
         name: ServiceName,
@@ -102,7 +102,7 @@ pub enum Unexplained {
         services: Vec<Id>,
     },
     /// An invalid version.
-    #[error("`{text}` is not a version; write it like 1.0")]
+    #[error("`{text}` is not a version; write MAJOR.MINOR such as 1.0")]
     Version {
         /// The given text.
         text: String,
@@ -156,7 +156,7 @@ fn opened(library: &Library, rows: Vec<Row>, depth: usize) -> Vec<Row> {
             Ok(inner) => {
                 row.note = inner
                     .stop
-                    .map(|stop| format!("a message that cannot be read: {stop}"));
+                    .map(|stop| format!("an undecodable message: {stop}"));
                 all.push(row);
             }
             Err(_) => all.push(row),

@@ -56,7 +56,7 @@ impl<'a> Recorder<'_, 'a> {
         }
         if reserved != 0 {
             let row = Row::new(Kind::SubField, joined(&self.path, "_reserved"), start, &[]);
-            let note = "bits that no sub-field owns, in place";
+            let note = "bits outside all sub-fields, in place";
             self.rows.push(row.with_number(reserved).with_note(note));
         }
     }
@@ -85,7 +85,7 @@ impl<'m> Trace<'m> for Recorder<'m, '_> {
             Part::Bits(_, raw) => row(Kind::Bits).with_number(raw),
             Part::Text => text(row(Kind::Value), octets),
             Part::Octets("JAUS MESSAGE") if !octets.is_empty() => {
-                row(Kind::Message).with_note("not known here")
+                row(Kind::Message).with_note("unknown message")
             }
             Part::Octets(_) => row(Kind::Value).with_note(match octets.len() {
                 0 => "empty".to_owned(),
@@ -260,7 +260,7 @@ fn text(row: Row, octets: &[u8]) -> Row {
     };
     match padding {
         0 => row,
-        1 => row.noting("1 zero behind it".to_owned()),
-        n => row.noting(format!("{n} zeros behind it")),
+        1 => row.noting("1 zero after it".to_owned()),
+        n => row.noting(format!("{n} zeros after it")),
     }
 }

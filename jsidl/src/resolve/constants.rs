@@ -57,7 +57,7 @@ impl Resolver<'_> {
             Err(None) => None,
             Err(Some(reason)) => {
                 self.report
-                    .error(span, format!("this cannot be computed: {reason}"));
+                    .error(span, format!("cannot evaluate this: {reason}"));
                 None
             }
         }

@@ -120,7 +120,7 @@ impl<'a> Identities<'a> {
         if versions.is_empty() {
             "load the file that declares it as well".into()
         } else {
-            format!("of it only version {} is loaded", versions.join(", "))
+            format!("only its version {} is loaded", versions.join(", "))
         }
     }
 
@@ -137,8 +137,8 @@ impl<'a> Identities<'a> {
                     continue;
                 };
                 let message = format!(
-                    "the {what} `{urn} {version}` is declared twice in this directory, and the \
-                     first one counts: remove one, or give it another id or version"
+                    "the {what} `{urn} {version}` is declared twice in this directory; the first \
+                     one is used: remove one, or give it another id or version"
                 );
                 report.warning(*span, message).note(first, "the other one");
             }

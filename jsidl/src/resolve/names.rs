@@ -37,9 +37,7 @@ impl<'a> Resolver<'a> {
             self.report
                 .error(
                     target.path.span,
-                    format!(
-                        "`{path}` contains itself: a message must have an end, so break the circle"
-                    ),
+                    format!("`{path}` contains itself, which makes it infinite: break the cycle"),
                 )
                 .note(declaration.span, "declared here");
             return None;
@@ -99,10 +97,7 @@ impl<'a> Resolver<'a> {
         let set = &self.program.type_sets[set];
         self.report
             .error(span, format!("`{path}` is not declared: {advice}"))
-            .note(
-                set.span,
-                format!("the type set in which `{name}` was looked for"),
-            );
+            .note(set.span, format!("the type set searched for `{name}`"));
         None
     }
 
@@ -124,7 +119,7 @@ impl<'a> Resolver<'a> {
                          named `{alias}`"
                     ),
                 )
-                .note(own.span, "the type set in which it was looked for");
+                .note(own.span, "the type set searched");
             return None;
         };
         let found = self.referenced(reference);
@@ -148,8 +143,8 @@ impl<'a> Resolver<'a> {
                 .warning(
                     own.span,
                     format!(
-                        "the alias `{alias}` is used, but only declared by a set that this \
-                         one refers to: add a `declared_type_set_ref` for it here"
+                        "the alias `{alias}` is declared only in a referenced set: add a \
+                         `declared_type_set_ref` for it here"
                     ),
                 )
                 .note(reference.span, "declared here");

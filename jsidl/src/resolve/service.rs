@@ -152,7 +152,7 @@ impl Resolver<'_> {
                 let id = &client.id;
                 self.report.warning(
                     client.span,
-                    format!("the service `{id}`, of which this one is a client, is not loaded"),
+                    format!("this service is a client of `{id}`, which is not loaded"),
                 );
             }
         }
@@ -170,7 +170,7 @@ impl Resolver<'_> {
                 return true;
             };
             if base.id == heir.id {
-                let message = format!("`{}` inherits from itself: break the circle", heir.id);
+                let message = format!("`{}` inherits from itself: break the cycle", heir.id);
                 self.report.error(own.span, message);
                 return false;
             }
@@ -183,8 +183,8 @@ impl Resolver<'_> {
         self.report.error(
             own.span,
             format!(
-                "`{}` is left out: it inherits from more than {LONGEST_LINEAGE} services, \
-                 or from a circle of them",
+                "`{}` is omitted: it inherits from more than {LONGEST_LINEAGE} services, or from \
+                 a cycle of them",
                 heir.id
             ),
         );
@@ -201,18 +201,15 @@ impl Resolver<'_> {
     ) {
         let message = if self.lost.contains(&base.id) {
             format!(
-                "`{}` is left out: it inherits from `{}`, which has errors",
+                "`{}` is omitted: it inherits from `{}`, which has errors",
                 heir.id, base.id
             )
         } else if heir.id == service.id {
             let advice = self.index.services.advice(&base.id);
-            format!(
-                "the service `{}` to inherit from is not loaded: {advice}",
-                base.id
-            )
+            format!("the base service `{}` is not loaded: {advice}", base.id)
         } else {
             format!(
-                "`{}` is left out: it inherits from `{}`, which needs `{}`, which is not loaded",
+                "`{}` is omitted: it inherits from `{}`, which needs `{}`, which is not loaded",
                 heir.id, service.id, base.id
             )
         };

@@ -102,10 +102,7 @@ impl Reader<'_> {
         };
         let span = self.span(xml);
         if let Some(first) = starts.iter().find(|start| start.machine == machine.value) {
-            let message = format!(
-                "it is said twice where `{}` starts: keep one `start`",
-                machine.value
-            );
+            let message = format!("`{}` has two `start` elements: keep one", machine.value);
             self.report
                 .error(span, message)
                 .note(first.span, "the other one");
@@ -124,7 +121,7 @@ impl Reader<'_> {
             let named = |xml: &Xml<'_, '_>| xml.attribute("name").is_some_and(|n| n.trim() == name);
             if !definitions.iter().any(named) {
                 let message = format!(
-                    "there is no `state_machine` named `{name}` here to start: add it, or correct \
+                    "there is no `state_machine` named `{name}` to start: add it, or correct \
                      `state_machine_name`"
                 );
                 self.report.error(start.span, message);
@@ -153,10 +150,8 @@ impl Reader<'_> {
             self.report.error(span, message);
         }
         if start.is_none() {
-            let message = format!(
-                "it is not said where `{name}` starts: add a `start` with this \
-                 `state_machine_name`"
-            );
+            let message =
+                format!("`{name}` has no `start`: add one with this `state_machine_name`");
             self.report.error(span, message);
         }
         let start = start.filter(|_| self.report.errors() == before)?;
@@ -227,8 +222,8 @@ impl Reader<'_> {
     fn initial_state(&mut self, xml: Xml<'_, '_>) -> Option<String> {
         let initial = self.attribute(xml, "initial_state")?;
         if initial.value.is_empty() {
-            let message = "the attribute `initial_state` is empty: name the state inside in which \
-                           this one begins, or remove it";
+            let message = "the attribute `initial_state` is empty: name the first inner state, or \
+                remove it";
             self.report.error(initial.span, message);
             return None;
         }
@@ -293,8 +288,8 @@ impl Reader<'_> {
                 "guard" => self.once(&mut guard, child, xml),
                 "internal" | "simple" | "push" | "pop" if kind.is_some() => {
                     let at = self.span(child);
-                    let message = "a transition leads to one place: keep one of `internal`, \
-                                   `simple`, `push` and `pop`";
+                    let message = "a transition has one target: keep one of `internal`, `simple`, \
+                        `push` and `pop`";
                     self.report.error(at, message);
                 }
                 "internal" | "simple" | "push" | "pop" => kind = Some(child),
@@ -368,7 +363,7 @@ impl Reader<'_> {
     fn pop(&mut self, xml: Xml<'_, '_>) -> TransitionKind {
         self.only(xml, &["transition", "interpretation"]);
         if let Some(transition) = self.attribute(xml, "transition") {
-            let message = "passed over: the `transition` of a `pop` is not understood yet";
+            let message = "ignored: the `transition` of a `pop` is not supported";
             self.report.warning(transition.span, message);
         }
         for child in self.children(xml) {
@@ -422,7 +417,7 @@ impl Reader<'_> {
         let quotes = text.value.strip_prefix('‘');
         let curly = quotes.and_then(|rest| rest.strip_suffix('’'));
         if let Some(quoted) = curly.map(|inner| format!("'{inner}'")) {
-            let message = format!("the quotes of `{}` are curly: write `{quoted}`", text.value);
+            let message = format!("`{}` has curly quotes: write `{quoted}`", text.value);
             self.report.warning(text.span, message);
             text.value = quoted;
         }
@@ -440,8 +435,8 @@ impl Reader<'_> {
         let parts = self.transition_parts(xml, "default_transition");
         if let Some(parameter) = parts.parameters.first() {
             let at = parameter.0;
-            let message = "a `default_transition` reacts to anything, so it has no parameters: \
-                           remove them, or write a `transition`";
+            let message = "a `default_transition` matches every event, so it has no parameters: \
+                remove them, or write a `transition`";
             self.report.error(at, message);
         }
         let variable = parts.actions.iter().flat_map(|action| &action.arguments);
@@ -469,9 +464,8 @@ impl Reader<'_> {
     /// Elements of the standard without support, as no published definition uses them.
     fn not_understood(&mut self, xml: Xml<'_, '_>) {
         let name = xml.tag_name().name();
-        let message = format!(
-            "passed over: `{name}` is not understood yet; write a `transition` with `action`s"
-        );
+        let message =
+            format!("ignored: `{name}` is not supported; write a `transition` with `action`s");
         let at = self.span(xml);
         self.report.warning(at, message);
     }

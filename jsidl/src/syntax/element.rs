@@ -116,7 +116,7 @@ impl Reader<'_> {
         let at = self.span(xml);
         self.report.error(
             at,
-            format!("`{name}` may not stand in `{parent}`, which holds {allowed}"),
+            format!("`{name}` is not allowed in `{parent}`, which holds {allowed}"),
         );
     }
 
@@ -196,7 +196,7 @@ impl Reader<'_> {
         } else if !begins_like_a_name(text)
             || !text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
         {
-            "use letters, digits and underscores, not beginning with a digit".to_owned()
+            "use letters, digits and underscores, not starting with a digit".to_owned()
         } else {
             return Some(name.value);
         };
@@ -291,10 +291,7 @@ impl Reader<'_> {
         {
             self.report.warning(
                 urn.span,
-                format!(
-                    "the id `{}` is written with blanks around it: remove them",
-                    urn.value
-                ),
+                format!("the id `{}` has surrounding spaces: remove them", urn.value),
             );
         }
         let urn = urn.and_then(|urn| self.urn(urn));
@@ -336,7 +333,7 @@ impl Reader<'_> {
         });
         if parsed.is_none() {
             let advice = if text.value.contains('*') {
-                "a wild card does not say which definition is meant, so write the version"
+                "a wildcard does not select a definition: write the version"
             } else {
                 "write two numbers from 0 to 255, for example `1.0`"
             };

@@ -38,7 +38,7 @@ pub(super) fn excess(text: &str) -> Option<(usize, String)> {
         let tag = Tag::scan(rest);
         if tag.attributes > MOST_ATTRIBUTES {
             let message = format!(
-                "the element has more than {MOST_ATTRIBUTES} attributes: JSIDL knows at most seven"
+                "the element has more than {MOST_ATTRIBUTES} attributes: JSIDL allows at most seven"
             );
             return Some((start, message));
         }

@@ -67,7 +67,7 @@ fn parse<'s>(source: &'s Source, report: &mut Report) -> Option<Document<'s>> {
 fn malformed(error: &roxmltree::Error) -> String {
     match error {
         roxmltree::Error::DtdDetected => {
-            "a document type declaration is not needed in JSIDL and not read: remove it".into()
+            "a document type declaration is ignored and not needed in JSIDL: remove it".into()
         }
         error => {
             // The parser's message ends with the position, which the diagnostic has already.
@@ -76,7 +76,7 @@ fn malformed(error: &roxmltree::Error) -> String {
             let text = text
                 .strip_suffix(&format!(" at {}:{}", pos.row, pos.col))
                 .unwrap_or(&text);
-            format!("this is not well-formed XML: {text}")
+            format!("not well-formed XML: {text}")
         }
     }
 }
@@ -174,12 +174,13 @@ impl Reader<'_> {
             );
             self.report.error(at, message);
         } else if foreign && strictness == Strictness::Found {
-            let message = format!("passed over: `{name}` is not the root of a JSIDL file");
+            let message = format!("ignored: `{name}` is not the root element of a JSIDL file");
             self.report.warning(at, message);
         } else {
             let roots = ROOTS.join("`, `");
-            let message =
-                format!("`{name}` is not the root of a JSIDL file: expected one of `{roots}`");
+            let message = format!(
+                "`{name}` is not the root element of a JSIDL file: expected one of `{roots}`"
+            );
             self.report.error(at, message);
         }
     }

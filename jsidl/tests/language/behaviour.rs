@@ -92,7 +92,7 @@ fn every_published_guard_reads_back_as_it_is_shown() {
     assert!(guards > 300, "{guards}");
 }
 
-/// They are inherited by nobody who could say it better.
+/// No service that inherits them could correct it.
 #[test]
 fn published_states_without_a_usable_initial_state_are_warned_of() {
     let Some(loaded) = corpus(&["fkie"]) else {
@@ -414,8 +414,8 @@ fn what_is_wrong_in_a_machine_is_reported_and_leaves_the_service_as_it_is() {
     assert_eq!(
         findings(&[BASE, HEIR], Severity::Warning),
         [
-            "1.xml:6:1: warning: `base.FSM` starts in `On.Busy.Deep`, but the machine that it extends starts in `On.Idle`: start there, or in a state within",
-            "1.xml:6:49: warning: the state `On.Busy` has others inside, but no `initial_state`: it is taken to begin in `Deep`",
+            "1.xml:6:1: warning: `base.FSM` starts in `On.Busy.Deep`, but the machine it extends starts in `On.Idle`: start there, or in one of its inner states",
+            "1.xml:6:49: warning: the state `On.Busy` has inner states, but no `initial_state`: `Deep` is assumed",
             "1.xml:9:9: warning: the `end_state` `on.idle` is spelled `On.Idle` elsewhere",
         ]
     );
@@ -423,22 +423,22 @@ fn what_is_wrong_in_a_machine_is_reported_and_leaves_the_service_as_it_is() {
         (
             "On.Busy\"/></simple>",
             "On.Lost\"/></simple>",
-            "0.xml:7:1: error: the `end_state` `On.Lost` is not a state of `FSM`: add the state, or name one by its whole path",
+            "0.xml:7:1: error: the `end_state` `On.Lost` is not a state of `FSM`: add the state, or name one by its full path",
         ),
         (
             "state_name=\"On\"",
             "state_name=\"Off\"",
-            "0.xml:5:1: error: the start `Off` is not a state of `FSM`: add the state, or name one by its whole path",
+            "0.xml:5:1: error: the start `Off` is not a state of `FSM`: add the state, or name one by its full path",
         ),
         (
             "may( msg )",
             "may( msg",
-            "0.xml:7:136: error: `condition` must be made of calls, `!`, `&&` and `||`: `&& ! late('x')` is not understood",
+            "0.xml:7:136: error: `condition` must be made of calls, `!`, `&&` and `||`: `&& ! late('x')` is not recognised",
         ),
         (
             "\"'Told'\"",
             "\"'Told\"",
-            "0.xml:9:124: error: `value` must be a parameter's name or a text in `'`: `'Told` is not understood",
+            "0.xml:9:124: error: `value` must be a parameter's name or a text in `'`: `'Told` is not recognised",
         ),
         (
             "<simple/>",
@@ -453,7 +453,7 @@ fn what_is_wrong_in_a_machine_is_reported_and_leaves_the_service_as_it_is() {
         (
             "<start state_machine_name=\"FSM\"",
             "<start state_machine_name=\"Other\"",
-            "0.xml:4:1: error: there is no `state_machine` named `Other` here to start: add it, or correct `state_machine_name`",
+            "0.xml:4:1: error: there is no `state_machine` named `Other` to start: add it, or correct `state_machine_name`",
         ),
         (
             "name=\"Busy\"",
@@ -466,7 +466,7 @@ fn what_is_wrong_in_a_machine_is_reported_and_leaves_the_service_as_it_is() {
         let found: Vec<_> = loaded.diagnostics.iter().map(ToString::to_string).collect();
         assert_eq!(found.first().map(String::as_str), Some(expected));
         let service = loaded.library.services().next().expect("the service stays");
-        // A machine that could be read stays: others extend it.
+        // A machine that was parsed stays, because others extend it.
         let read = expected.contains("is not a state");
         assert_eq!(service.behaviour.is_empty(), !read);
     }

@@ -44,9 +44,9 @@ fn every_definition_of_jts_resolves() {
     let loaded = load(&corpus, &["jts"]);
     assert_eq!(counts(&loaded), (97, 506));
     assert_eq!(findings(&loaded, Severity::Error), Vec::<String>::new());
-    let alias = "the alias `basicTypes` is used, but only declared by a set that this one refers to: add a `declared_type_set_ref` for it here";
+    let alias = "the alias `basicTypes` is declared only in a referenced set: add a `declared_type_set_ref` for it here";
     let blanks = |service: &str| {
-        format!("the id `urn:jaus:jss:HMI:{service}` is written with blanks around it: remove them")
+        format!("the id `urn:jaus:jss:HMI:{service}` has surrounding spaces: remove them")
     };
     assert_eq!(
         findings(&loaded, Severity::Warning),
@@ -82,13 +82,13 @@ fn every_example_resolves_beside_the_core_services() {
     assert_eq!(
         findings(&alone, Severity::Error),
         [
-            "SkidSteerVehicleSim.xml: the service `urn:jaus:jss:core:Management 1.0` to inherit from is not loaded: load the file that declares it as well"
+            "SkidSteerVehicleSim.xml: the base service `urn:jaus:jss:core:Management 1.0` is not loaded: load the file that declares it as well"
         ]
     );
 }
 
 /// `CBRNDetection` cannot be encoded: 14 optional members and 8 presence bits. `Management` 1.0 has
-/// a transition on an event that nobody declares.
+/// a transition on an undeclared event.
 #[test]
 fn of_fkie_only_what_cannot_be_is_an_error() {
     let Some(corpus) = corpus() else { return };
@@ -97,12 +97,14 @@ fn of_fkie_only_what_cannot_be_is_an_error() {
     assert_eq!(
         findings(&loaded, Severity::Error),
         [
-            "Management.xml: nothing triggers this transition: `Ready` is neither an event nor a message of the service or of one that it inherits from, so declare it in the `internal_events_set`, or correct the name",
-            "CBRNSensor.xml: `CBRNDetection` is left out of `urn:jaus:jss:iop:CBRNSensor 1.1`, because what it refers to is missing or has errors",
+            "Management.xml: nothing triggers this transition: `Ready` is neither an event nor a \
+             message of the service or a service it inherits from: declare it in the \
+             `internal_events_set`, or correct the name",
+            "CBRNSensor.xml: `CBRNDetection` is omitted from `urn:jaus:jss:iop:CBRNSensor 1.1`, because a definition it refers to is missing or has errors",
             "CBRNSensorClass.xml: the record `CBRNRec` has 14 optional members, but its `presence_vector` has only 8 bits: use a wider `field_type_unsigned`",
         ]
     );
-    // What is said about state machines is counted elsewhere.
+    // Findings about state machines are counted elsewhere.
     let mut warnings = findings(&loaded, Severity::Warning);
     warnings.retain(|w| !w.contains("`initial_state`") && !w.contains(": start there"));
     warnings.retain(|w| !w.contains("`is_stateless`"));
@@ -110,8 +112,8 @@ fn of_fkie_only_what_cannot_be_is_an_error() {
         warnings,
         [
             "CBRNSensor.xml: `CBDetailedMeasurement` has the code F932, which is also that of `RNDetailedMeasurement`: a receiver cannot tell them apart, so change one `message_id`",
-            "HealthMonitor_V1.4.xml: the service `urn:jaus:jss:exp:aeodrs:HealthReporter 1.4`, of which this one is a client, is not loaded",
-            "PlatformState_V1.xml: the service `urn:jaus:jss:iop:RenderUseless 1.1`, of which this one is a client, is not loaded",
+            "HealthMonitor_V1.4.xml: this service is a client of `urn:jaus:jss:exp:aeodrs:HealthReporter 1.4`, which is not loaded",
+            "PlatformState_V1.xml: this service is a client of `urn:jaus:jss:iop:RenderUseless 1.1`, which is not loaded",
         ]
     );
 }

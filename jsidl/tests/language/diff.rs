@@ -67,12 +67,12 @@ fn names_and_limits_leave_the_wire_as_it_is() {
     check(
         "name=\"Front\"",
         "name=\"Head\"",
-        &["same SetLights D001.LightsRec.Head: it is renamed, was `Front`"],
+        &["same SetLights D001.LightsRec.Head: renamed, was `Front`"],
     );
     check(
         "max_count=\"20\"",
         "max_count=\"30\"",
-        &["same SetLights D001.LightsRec.Label: the greatest count is 30, was 20"],
+        &["same SetLights D001.LightsRec.Label: the maximum count is 30, was 20"],
     );
     check(
         "is_command=\"true\"",
@@ -84,7 +84,7 @@ fn names_and_limits_leave_the_wire_as_it_is() {
         "enum_const=\"Bright\"/><value_enum enum_index=\"2\" enum_const=\"Blink\"/>",
         &[
             "same SetLights D001.LightsRec.Mode: the value 1 is `Bright`, was `On`",
-            "same SetLights D001.LightsRec.Mode: the value 2 `Blink` is new",
+            "same SetLights D001.LightsRec.Mode: the value 2 `Blink` was added",
         ],
     );
     check(
@@ -142,14 +142,14 @@ fn members_that_come_go_or_move_affect_the_wire() {
     check(
         "<fixed_field name=\"Mode\"",
         "<fixed_field name=\"Rear\" optional=\"true\" field_type=\"byte\" field_units=\"one\"/><fixed_field name=\"Mode\"",
-        &["wire SetLights D001.LightsRec.Rear: the member is new"],
+        &["wire SetLights D001.LightsRec.Rear: the member was added"],
     );
     let gone = BEFORE.find("<variable_length_string").expect("is there");
     let end = BEFORE.find("</record>\n</body>").expect("is there");
     check(
         &BEFORE[gone..end],
         "",
-        &["wire SetLights D001.LightsRec.Label: the member is gone"],
+        &["wire SetLights D001.LightsRec.Label: the member was removed"],
     );
     let (label, rest) = (&BEFORE[gone..end], BEFORE.replace(&BEFORE[gone..end], ""));
     let moved = rest.replacen(
@@ -160,7 +160,7 @@ fn members_that_come_go_or_move_affect_the_wire() {
     assert_eq!(
         changes(BEFORE, &moved),
         [
-            "wire SetLights D001.LightsRec: the members stand in another order: `Label`, `Front`, `Mode`"
+            "wire SetLights D001.LightsRec: the order of the members changed: `Label`, `Front`, `Mode`"
         ]
     );
 }
@@ -173,11 +173,11 @@ fn messages_and_services_that_go_affect_the_wire_and_new_ones_do_not() {
     let none = BEFORE.replace(message, "");
     assert_eq!(
         changes(BEFORE, &none),
-        ["wire SetLights D001: the message is gone: the service receives it no longer"]
+        ["wire SetLights D001: the message was removed: the service no longer receives it"]
     );
     assert_eq!(
         changes(&none, BEFORE),
-        ["same SetLights D001: the message is new: the service receives it"]
+        ["same SetLights D001: the message was added: the service receives it"]
     );
     let sent = none.replace(
         "<output_set/>",
@@ -190,7 +190,10 @@ fn messages_and_services_that_go_affect_the_wire_and_new_ones_do_not() {
     let other = BEFORE.replace("urn:me:Lights", "urn:me:Lamps");
     assert_eq!(
         changes(BEFORE, &other),
-        ["wire : the service is gone", "same : the service is new"]
+        [
+            "wire : the service was removed",
+            "same : the service was added"
+        ]
     );
 }
 

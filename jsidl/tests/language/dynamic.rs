@@ -106,7 +106,9 @@ fn errors_name_message_field_and_octet() {
     let error = decode(&definition, &octets).unwrap_err();
     assert_eq!(
         error.to_string(),
-        format!("Everything: Choice: tag 9 where the variant has 2 alternatives at octet {tag}")
+        format!(
+            "Everything: Choice: tag 9 selects none of the variant's 2 alternatives at octet {tag}"
+        )
     );
     let octets = &sample_octets()[..tag - 1];
     let error = decode(&definition, octets).unwrap_err();
@@ -278,7 +280,7 @@ fn json_errors_say_where_and_what_is_expected() {
         (
             "/Points/0",
             json!({ "X": 1, "Y": 2, "Z": 3 }),
-            "Points[0]: unknown key \"Z\"; known here: X, Y",
+            "Points[0]: unknown key \"Z\"; known keys: X, Y",
         ),
         (
             "/Points/0",
@@ -328,7 +330,7 @@ fn json_errors_say_where_and_what_is_expected() {
         (
             "/Choice",
             json!({ "Two": 1 }),
-            "Choice: unknown key \"Two\"; known here: One, Other",
+            "Choice: unknown key \"Two\"; known keys: One, Other",
         ),
         (
             "/Measured/Joint/index",
@@ -410,7 +412,7 @@ fn values_that_do_not_fit_the_definition_are_errors() {
     let cases = [
         (
             Value::Bits(0),
-            "Limited: a bit field where the definition has a list",
+            "Limited: a bit field, but the definition has a list",
         ),
         (
             Value::List(vec![number(Raw::Unsigned(256)); 2]),
@@ -422,7 +424,7 @@ fn values_that_do_not_fit_the_definition_are_errors() {
         ),
         (
             Value::List(vec![Value::Group(Vec::new()); 2]),
-            "Limited: [0]: 0 slots where the definition has 1",
+            "Limited: [0]: 0 slots, but the definition has 1",
         ),
         (
             Value::List(vec![Value::Group(vec![None]); 2]),

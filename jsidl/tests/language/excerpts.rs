@@ -27,7 +27,8 @@ fn a_directory_without_services_is_shown() {
     let (said, place) = text.split_once('\n').unwrap_or_default();
     assert_eq!(
         said,
-        "error: there is no `.xml` file in this directory: service definitions are XML files whose names end so"
+        "error: this directory has no `.xml` files: service definitions are files with that \
+         extension"
     );
     assert!(place.contains("no-services"), "{place}");
 }
@@ -102,7 +103,7 @@ error: `Speeed` is not declared: declare it, or correct the name
  --> t.xml:4:68
   |
 2 | <declared_type_set name="T">
-  | ------------------ the type set in which `Speeed` was looked for
+  | ------------------ the type set searched for `Speeed`
 3 | <record name="R" optional="false">
 4 | <declared_fixed_field name="A" optional="false" declared_type_ref="Speeed"/>
   |                                                                    ^^^^^^
@@ -121,7 +122,7 @@ fn a_circle_of_references_is_shown() {
 <message_set><input_set/><output_set/></message_set>
 </service_def>"#,
         r#"
-error: `A` contains itself: a message must have an end, so break the circle
+error: `A` contains itself, which makes it infinite: break the cycle
  --> t.xml:4:101
   |
 3 | <sequence name="A" optional="false"><declared_sequence name="B" optional="false" declared_type_ref="B"/></sequence>
@@ -137,7 +138,7 @@ fn a_text_that_is_not_xml_is_shown() {
     check(
         r#"hello"#,
         r#"
-error: this is not well-formed XML: unknown token
+error: not well-formed XML: unknown token
  --> t.xml:1:1
   |
 1 | hello
@@ -158,7 +159,7 @@ fn an_end_state_that_does_not_exist_is_shown() {
 </state></state_machine></protocol_behavior>
 </service_def>"#,
         r#"
-error: the `end_state` `Off` is not a state of `FSM`: add the state, or name one by its whole path
+error: the `end_state` `Off` is not a state of `FSM`: add the state, or name one by its full path
  --> t.xml:6:1
   |
 6 | <transition name="Go"><simple><end_state state="Off"/></simple></transition>
@@ -179,7 +180,7 @@ fn a_guard_that_cannot_be_read_is_shown() {
 </state></state_machine></protocol_behavior>
 </service_def>"#,
         r#"
-error: `condition` must be made of calls, `!`, `&&` and `||`: `&& x` is not understood
+error: `condition` must be made of calls, `!`, `&&` and `||`: `&& x` is not recognised
  --> t.xml:6:41
   |
 6 | <transition name="Go"><guard condition="may( &amp;&amp; x"/><internal/></transition>
@@ -200,7 +201,7 @@ fn a_trigger_that_nobody_declares_is_shown() {
 </state></state_machine></protocol_behavior>
 </service_def>"#,
         r#"
-error: nothing triggers this transition: `Goo` is neither an event nor a message of the service or of one that it inherits from, so declare it in the `internal_events_set`, or correct the name
+error: nothing triggers this transition: `Goo` is neither an event nor a message of the service or a service it inherits from: declare it in the `internal_events_set`, or correct the name
  --> t.xml:6:1
   |
 6 | <transition name="Goo"><internal/></transition>
@@ -221,7 +222,7 @@ fn a_start_that_does_not_exist_is_shown() {
 </state></state_machine></protocol_behavior>
 </service_def>"#,
         r#"
-error: the start `Off` is not a state of `FSM`: add the state, or name one by its whole path
+error: the start `Off` is not a state of `FSM`: add the state, or name one by its full path
  --> t.xml:5:1
   |
 5 | <state_machine name="FSM"><state name="On">

@@ -157,19 +157,19 @@ fn what_cannot_be_looked_up_is_refused_with_advice() {
     };
     assert_eq!(
         said(&[7], None),
-        "a message begins with the two octets of its code, here are 1"
+        "a message starts with the two octets of its code, but there are only 1"
     );
     assert_eq!(
         said(&[0xFE, 0xCA], None),
-        "no definition here has the message code CAFEh; name the file that has it"
+        "no loaded definition has the message code CAFEh; name the file that has it"
     );
     assert_eq!(
         said(&[0x00, 0x2B], Some("urn:jaus:jss:core:Discover")),
-        "there is no service urn:jaus:jss:core:Discover; perhaps urn:jaus:jss:core:Discovery 1.1 is meant"
+        "there is no service urn:jaus:jss:core:Discover; did you mean urn:jaus:jss:core:Discovery 1.1?"
     );
     assert_eq!(
         said(&[0x00, 0x2B], Some("Time 1.0")),
-        "Time 1.0 has no message 2B00h; it is in urn:jaus:jss:core:Discovery 1.0, urn:jaus:jss:core:Discovery 1.1"
+        "Time 1.0 has no message 2B00h; it is defined in urn:jaus:jss:core:Discovery 1.0, urn:jaus:jss:core:Discovery 1.1"
     );
     assert_eq!(
         "Time 1".parse::<jsidl::explain::ServiceName>(),

@@ -160,10 +160,10 @@ fn what_is_no_definition_is_not_laid_out() {
     };
     assert_eq!(
         said("<a>"),
-        "t.xml:1:1: error: this is not well-formed XML: the root node was opened but never closed\n"
+        "t.xml:1:1: error: not well-formed XML: the root node was opened but never closed\n"
     );
     assert_eq!(
         said("<project/>"),
-        "t.xml:1:1: error: `project` is not the root of a JSIDL file: expected one of `service_def`, `declared_type_set`, `declared_const_set`, `service_set`\n"
+        "t.xml:1:1: error: `project` is not the root element of a JSIDL file: expected one of `service_def`, `declared_type_set`, `declared_const_set`, `service_set`\n"
     );
 }

@@ -228,7 +228,7 @@ fn every_golden_message_is_read_shown_and_written_as_it_is() {
 /// Messages that are laid out otherwise in our definitions than in those the vectors were made
 /// from; `services.rs` says why.
 const LAID_OUT_OTHERWISE: &[(&str, &str)] = &[
-    // A code of its own, which its query names; theirs has that of another message.
+    // Its own code, which its query names; theirs has that of another message.
     ("fkie-iop", "CBDetailedMeasurement"),
     // The singular of a name.
     ("fkie-manipulator", "ReportJointPosition"),
@@ -236,7 +236,7 @@ const LAID_OUT_OTHERWISE: &[(&str, &str)] = &[
     ("fkie-mobility", "SetLocalVector"),
     ("jts-mobility", "ReportGlobalVector"),
     ("jts-mobility", "SetGlobalVector"),
-    // Names with a small letter at the beginning.
+    // Names that start with a lower-case letter.
     ("jts-ugv", "ReportPlatformSpecifications"),
 ];
 

@@ -58,7 +58,7 @@ fn members(message: &Message) -> &[Item] {
     }
 }
 
-/// A directory of its own for one test, removed at the end.
+/// A directory for one test, removed at the end.
 struct Directory(PathBuf);
 
 impl Directory {
@@ -231,7 +231,9 @@ fn of_several_copies_of_a_type_set_the_nearest_counts() {
     let twice = load(&[("a/1.xml", &set("\"A\"")), ("a/2.xml", &set("\"B\""))]);
     assert_eq!(
         twice.diagnostics.to_string(),
-        "a/2.xml:1:1: warning: the type set `urn:types 1.0` is declared twice in this directory, and the first one counts: remove one, or give it another id or version\n  a/1.xml:1:1: note: the other one\n"
+        "a/2.xml:1:1: warning: the type set `urn:types 1.0` is declared twice in this directory; \
+         the first one is used: remove one, or give it another id or version\n  a/1.xml:1:1: \
+         note: the other one\n"
     );
 }
 
@@ -250,7 +252,7 @@ fn what_a_user_declares_counts_before_the_catalogue() {
     assert_eq!(
         found,
         [
-            "`urn:jaus:jss:core:Liveness 1.0` is declared with other messages at mine.xml:1:1, which counts because it was loaded first"
+            "`urn:jaus:jss:core:Liveness 1.0` is declared with other messages at mine.xml:1:1, which takes precedence because it was loaded first"
         ]
     );
     let liveness = loaded.library.versions("urn:jaus:jss:core:Liveness").next();
@@ -294,7 +296,7 @@ fn directories_are_read_recursively_and_strangers_in_them_are_passed_over() {
     assert_eq!(
         loaded.diagnostics.to_string(),
         format!(
-            "{}:1:1: warning: passed over: `project` is not the root of a JSIDL file\n",
+            "{}:1:1: warning: ignored: `project` is not the root element of a JSIDL file\n",
             stranger.display()
         )
     );
@@ -315,15 +317,12 @@ fn what_cannot_be_read_is_a_finding() {
         .errors()
         .map(|d| d.message.as_str())
         .collect();
-    assert!(
-        found[0].starts_with("the file cannot be read: "),
-        "{found:?}"
-    );
+    assert!(found[0].starts_with("cannot read the file: "), "{found:?}");
     assert_eq!(
         found[1..],
         [
             "the file is not UTF-8 at octet 3: convert it",
-            "there is no `.xml` file in this directory: service definitions are XML files whose names end so"
+            "this directory has no `.xml` files: service definitions are files with that extension"
         ]
     );
 }

@@ -42,8 +42,8 @@ fn a_machine_is_drawn_with_all_that_it_does() {
             state "Dark" as s1
             state "Lit" as s2
         }
-        s1 --> s2 : Test, to come back
-        s2 --> s2 : Test, to come back
+        s1 --> s2 : Test, with return
+        s2 --> s2 : Test, with return
         s1 --> s2 : Switch [may() && !late('x')] / Send('Gone')
         s2 --> s2 : Flash / click()
         note right of s1
@@ -52,7 +52,7 @@ fn a_machine_is_drawn_with_all_that_it_does() {
         note right of s2
             entry / warm()
             exit / fade()
-            Back, then back
+            Back, then return
             Tick / glow()
         end note
     "#);
@@ -68,11 +68,11 @@ fn a_machine_is_drawn_with_all_that_it_does() {
         subgraph cluster_s0 {
             label="Up\n";
             s1 [label="Dark\nentry / cool()\l"];
-            s2 [label="Lit\nentry / warm()\lexit / fade()\lBack, then back\lTick / glow()\l"];
+            s2 [label="Lit\nentry / warm()\lexit / fade()\lBack, then return\lTick / glow()\l"];
         }
         start -> s1;
-        s1 -> s2 [label="Test, to come back"];
-        s2 -> s2 [label="Test, to come back"];
+        s1 -> s2 [label="Test, with return"];
+        s2 -> s2 [label="Test, with return"];
         s1 -> s2 [label="Switch [may() && !late('x')] / Send('Gone')"];
         s2 -> s2 [label="Flash / click()"];
     }

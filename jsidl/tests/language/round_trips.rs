@@ -33,7 +33,7 @@ fn values_come_back(message: &Message, entropy: &[u8]) -> Result<(), TestCaseErr
     let json = to_json(message, &value).unwrap();
     let text = json.to_string();
     let again = from_json(message, &serde_json::from_str(&text).unwrap()).unwrap();
-    // A NaN has many patterns of bits and one name.
+    // A NaN has many bit patterns but one name.
     if !text.contains("\"NaN\"") {
         prop_assert_eq!(&again, &value);
     }
@@ -46,7 +46,7 @@ fn body() -> impl Strategy<Value = Vec<u8>> {
     prop::collection::vec(prop_oneof![0_u8..4, any::<u8>()], 0..300)
 }
 
-/// Puts a definition to both tests, with so many random inputs.
+/// Runs both tests on a definition, with this many random inputs.
 fn check(message: &Message, cases: u32) {
     let config = ProptestConfig {
         cases,
@@ -55,7 +55,7 @@ fn check(message: &Message, cases: u32) {
     };
     let result = TestRunner::new(config).run(&body(), |body| {
         values_come_back(message, &body)?;
-        // Octets of a value with one of them changed go deeper than octets at random.
+        // An encoded value with one octet changed reaches deeper than random octets.
         let mut octets = encode(message, &arbitrary(message, &body)).unwrap();
         let index = body
             .first()

@@ -32,7 +32,7 @@ fn public(corpus: &Path) -> [(&'static str, Library); 3] {
     ["ffi", "jts", "fkie"].map(|source| {
         let mut loader = Loader::new();
         loader.path(corpus.join(source));
-        // Some of them are wrong; what is right in them counts.
+        // Some of them have errors; their valid parts count.
         (source, loader.load().library)
     })
 }
@@ -110,7 +110,7 @@ fn every_message_and_field_says_what_it_is_for() {
 /// services, and all the messages that differ in each of them. Ours is as the others have it, or as
 /// the comment says.
 const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
-    // Whether the speed of a vector is optional: two sources, two readings, one version.
+    // Two sources of one version disagree whether a vector's speed is optional.
     (
         "jts",
         &["mobility:GlobalVectorDriver 1.0"],
@@ -121,7 +121,7 @@ const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
         &["mobility:LocalVectorDriver 1.0"],
         &["0408 SetLocalVector", "4408 ReportLocalVector"],
     ),
-    // The greatest force of a prismatic joint has the unit of a torque there.
+    // The maximum force of a prismatic joint has the unit of a torque there.
     (
         "fkie",
         &[
@@ -141,7 +141,7 @@ const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
         ],
         &["4600 ReportManipulatorSpecifications"],
     ),
-    // Names in the singular, among others in the plural: all of 1.0 is in the plural here.
+    // Names in the singular among others in the plural: all of 1.0 is plural here.
     (
         "fkie",
         &["manipulator:ManipulatorJointPositionSensor 1.0"],
@@ -182,14 +182,14 @@ const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
         &["manipulator:PrimitiveEndEffector 1.0"],
         &["4632 ReportEndEffectorSpecification"],
     ),
-    // The lights are not in the order of their bits; the newest has them so.
+    // The lights are not in bit order; in the newest version they are.
     (
         "jts",
         &["ugv:IlluminationService 1.0"],
         &["0513 SetIlluminationState", "4513 ReportIlluminationState"],
     ),
     // It cannot be encoded as published: fourteen optional members, eight presence bits. Theirs is
-    // left out of the service, ours has a wider presence vector.
+    // omitted from the service, ours has a wider presence vector.
     ("fkie", &["iop:CBRNSensor 1.1"], &["F931 CBRNDetection"]),
     // Two messages of one service with one code: ours has it for one of them, and for the other the
     // code that its query names.
@@ -208,7 +208,7 @@ const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
         &["ugv:IlluminationService 1.0"],
         &["0513 SetIlluminationState", "4513 ReportIlluminationState"],
     ),
-    // Small letters at the beginning of names, capital ones in the newest.
+    // Names start with lower-case letters, in the newest version with capitals.
     (
         "jts",
         &["ugv:PlatformSpecifications 1.0"],
@@ -220,7 +220,7 @@ const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
         &["4502 ReportPlatformSpecifications"],
     ),
     // Other capitals, one position instead of two, dimensions from 0 and without a unit, and an
-    // older base: a draft, it seems, as the others agree.
+    // older base: apparently a draft, because the others agree.
     (
         "fkie",
         &["ugv:StabilizerDriver 1.0"],
@@ -285,9 +285,9 @@ fn differences(ours: &Service, theirs: &Service) -> Vec<String> {
     different
 }
 
-/// Whether a public service is not kept: those of clients have no messages of their own, the first
-/// version of mobility has nothing on the wire that the second has not, and a name that is
-/// misspelt has its service under the right one.
+/// Whether a public service is omitted: client services have no messages, the first version of
+/// mobility has nothing on the wire that the second lacks, and a misspelt name has its service
+/// under the correct one.
 fn is_left_out(id: &str) -> bool {
     let is_client = id
         .rsplit_once(' ')

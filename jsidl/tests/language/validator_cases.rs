@@ -129,14 +129,14 @@ fn cases(kind: &str, folder: &str) -> Vec<PathBuf> {
 fn tolerated(finding: &Diagnostic) -> bool {
     let message = &finding.message;
     [
-        // A message that does not begin with its code cannot be told from others.
+        // A message that does not start with its code cannot be distinguished from others.
         "the header is empty",
-        "the header does not begin with the message code",
-        // Whether such a vector stands on the wire is said nowhere.
+        "the header does not start with the message code",
+        // The standard does not say whether such a vector is on the wire.
         "has a `presence_vector` but no optional member",
         // The case stands alone, without the files that it refers to.
         "is not loaded",
-        "is left out of",
+        "is omitted from",
     ]
     .iter()
     .any(|known| message.contains(known))
@@ -145,7 +145,7 @@ fn tolerated(finding: &Diagnostic) -> bool {
 /// What a fragment speaks of is not there, because it stands alone.
 fn lonely(finding: &Diagnostic) -> bool {
     let message = &finding.message;
-    ["is not a state of", "here to start", "where `FSM"]
+    ["is not a state of", "to start: add it", "has no `start`"]
         .iter()
         .any(|known| message.contains(known))
 }
@@ -161,8 +161,8 @@ fn valid_definitions_have_no_errors() {
         for file in cases("valid", folder) {
             let found = findings(&file);
             let known = |finding: &&Diagnostic| {
-                // Tests of a code generator name end states from within the state around them; the
-                // standard and all published definitions use whole paths.
+                // Tests of a code generator name end states relative to the enclosing state; the
+                // standard and all published definitions use full paths.
                 let relative = folder == "gui-test" && name(&file).starts_with("FSM");
                 tolerated(finding) || ((folder == "validator" || relative) && lonely(finding))
             };
@@ -193,7 +193,7 @@ const REJECTED: &[(&str, &str)] = &[
         "`QueryMessage` is optional, but the element of an array",
     ),
     ("BitField1", "belongs to `Milliseconds` already"),
-    ("BitRange1", "go from 10 to 9"),
+    ("BitRange1", "range from 10 to 9"),
     (
         "Body2",
         "`HeaderRec` is optional, but the composite at the top",
@@ -201,7 +201,7 @@ const REJECTED: &[(&str, &str)] = &[
     ("Body3", "`List2` is optional, but the composite at the top"),
     ("ClientOf1", "`2 WaypointDriver` cannot be a name"),
     ("CountField1", "`min_count` is -100"),
-    ("DefaultState1", "the transition `Run` is there twice"),
+    ("DefaultState1", "the transition `Run` appears twice"),
     (
         "DefaultTransition4",
         "`default_transition` lacks the element `internal`",
@@ -243,7 +243,7 @@ const REJECTED: &[(&str, &str)] = &[
     ),
     (
         "ProtocolBehavior5",
-        "no `state_machine` named `FSM_C` here to start",
+        "no `state_machine` named `FSM_C` to start",
     ),
     ("Record1", "two members named `RequestID`"),
     ("ScaleRange1", "the limits of the scale are 2 and 1"),
@@ -256,16 +256,13 @@ const REJECTED: &[(&str, &str)] = &[
     ("StateMachine2", "two states `Init`"),
     ("StateMachine3", "the machine `FSM_A` has no states"),
     ("StateMachineTest1", "two state machines named `FSM`"),
-    (
-        "StateTest2",
-        "say with `initial_state` in which of them it begins",
-    ),
+    ("StateTest2", "choose its first one with `initial_state`"),
     ("StateTest5", "two states `StateA`"),
     (
         "Transition3",
         "`test` is not a parameter of this transition",
     ),
-    ("Transition4", "a transition leads to one place"),
+    ("Transition4", "a transition has one target"),
     (
         "TransitionTest2",
         "`Timeout2` is neither an event nor a message",
@@ -307,14 +304,11 @@ const WARNED: &[(&str, &str)] = &[
         "`is_stateless` is `true`, but the machine `FSM_A` has 2 states",
     ),
     // A vocabulary is complete without the services that offer it.
-    (
-        "ServiceSet4",
-        "of which this one is a client, is not loaded",
-    ),
-    // Published services begin elsewhere than their bases do.
+    ("ServiceSet4", "this service is a client of"),
+    // Published services start in other states than their bases.
     (
         "ProtocolBehaviorTest2b",
-        "is `StateAA` in the service that is inherited from",
+        "is `StateAA` in the inherited service",
     ),
 ];
 

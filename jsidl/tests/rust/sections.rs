@@ -40,7 +40,7 @@ pub static MESSAGES: &[codec::MessageInfo] = &[
 
 /// `ReportSections` (F071h).
 ///
-/// A message with a header and a footer of its own.
+/// A message with its own header and footer.
 ///
 /// Declared by `urn:example:Sections 1.0`.
 #[derive(Debug, Clone, Default, PartialEq)]

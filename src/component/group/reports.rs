@@ -24,8 +24,8 @@ use crate::service::{Outage, Topic};
 ///
 /// A member that restarts under the same id is `Down` and then `Up` again, as in a single
 /// [`Subscription`]. A member that Discovery loses, or that withdraws its service, is `Gone`, and
-/// is subscribed to again when it returns. A member that refuses is asked again, at growing
-/// intervals. All this happens only while [`next`](Self::next) is awaited.
+/// is subscribed to again when it returns. A member that refuses is retried at growing intervals.
+/// All this happens only while [`next`](Self::next) is awaited.
 pub struct GroupSubscription<R> {
     component: Component,
     audience: Audience,
@@ -53,7 +53,7 @@ pub enum GroupUpdate<R> {
     Report(R),
     /// It is up: for the first time, or after an outage.
     Up,
-    /// No reports arrive at present.
+    /// Reports have stopped.
     Down {
         /// Time of the last sign of the event.
         since: Instant,
@@ -109,9 +109,9 @@ impl<R: Message> GroupSubscription<R> {
     pub async fn next(&mut self) -> Option<(JausId, GroupUpdate<R>)> {
         loop {
             if std::mem::take(&mut self.is_stale) {
-                self.call_the_roll();
+                self.update_members();
             }
-            self.ask_who_is_due();
+            self.subscribe_due_members();
             if let Some(news) = self.news.pop_front() {
                 return Some(news);
             }
@@ -151,7 +151,7 @@ impl<R: Message> GroupSubscription<R> {
     }
 
     /// Adds new members, and drops those that have left.
-    fn call_the_roll(&mut self) {
+    fn update_members(&mut self) {
         self.directories.mark_unchanged();
         let directory = self.component.directory();
         let present = self.audience.members(&directory, self.component.id());
@@ -162,7 +162,7 @@ impl<R: Message> GroupSubscription<R> {
         }
     }
 
-    fn ask_who_is_due(&mut self) {
+    fn subscribe_due_members(&mut self) {
         while let Some(peer) = self.member_table.poll_ask(Instant::now()) {
             let component = self.component.clone();
             let topic = Topic {

@@ -8,7 +8,7 @@ use crate::address::JausId;
 
 /// The result at each member of a group, in order of their ids.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[must_use = "a group does not fail as a whole: see who has it and who has not"]
+#[must_use = "a group does not fail as a whole: check each member's result"]
 pub struct Results<T, E>(Vec<(JausId, Result<T, E>)>);
 
 impl<T, E> Results<T, E> {

@@ -60,7 +60,7 @@ fn datagrams_that_nobody_polls_are_refused() {
     }
     assert_eq!(
         rig.send(to_peer()).unwrap_err().to_string(),
-        "4 messages of this priority wait already"
+        "the limit of 4 queued messages of this priority is reached"
     );
     assert_eq!(
         (rig.transmits().len(), rig.count(Counter::TransmitQueueFull)),

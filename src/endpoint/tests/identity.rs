@@ -24,12 +24,12 @@ fn only_an_id_of_one_component_can_be_attached_and_only_once() {
     endpoint.attach(US).unwrap();
     assert_eq!(
         endpoint.attach(US).unwrap_err().to_string(),
-        "101.1.1 is attached already: give each component an id of its own"
+        "101.1.1 is attached already: give each component its own id"
     );
     endpoint.attach(SIBLING).unwrap();
     assert_eq!(
         endpoint.attach(PEER).unwrap_err().to_string(),
-        "2 components are attached already, and more are not allowed"
+        "the limit of 2 attached components is reached"
     );
     endpoint.detach(US);
     assert_eq!(endpoint.attach(PEER), Ok(()));

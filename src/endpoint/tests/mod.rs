@@ -82,7 +82,7 @@ impl Rig {
 
     #[expect(
         clippy::disallowed_methods,
-        reason = "an arbitrary beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     fn with(config: Config) -> Self {
         let mut endpoint = Endpoint::new(config);

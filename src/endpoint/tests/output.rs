@@ -99,7 +99,7 @@ fn a_large_message_to_an_unknown_address_waits_for_it_though_nobody_asked_for_ac
     assert_eq!(wire.datagrams[0], 1);
     wire.run_for(Duration::from_secs(9));
     assert!(wire.delivered() == [payload]);
-    assert_eq!(wire.results(), [], "nobody wanted to know");
+    assert_eq!(wire.results(), [], "no result was requested");
 }
 
 #[test]
@@ -388,7 +388,7 @@ fn messages_on_a_connection_are_not_joined() {
         .unwrap();
     }
     let sent = rig.transmits();
-    assert_eq!(sent.len(), 3, "each is a message of its own, and at once");
+    assert_eq!(sent.len(), 3, "each in its own message, and at once");
 }
 
 #[test]

@@ -275,7 +275,7 @@ fn a_message_that_cannot_be_sent_is_told_why() {
                 ..message.clone()
             }
         ),
-        "42.0.1 names nobody: a subsystem, node or component of 0 does not exist"
+        "42.0.1 is not a valid destination: subsystem, node and component start at 1"
     );
     assert_eq!(
         error(
@@ -285,7 +285,7 @@ fn a_message_that_cannot_be_sent_is_told_why() {
                 ..message
             }
         ),
-        "a message begins with two code octets, this one has 1 octets"
+        "a message starts with two code octets, but this one has 1 octets"
     );
     assert_eq!(
         error(
@@ -296,7 +296,8 @@ fn a_message_that_cannot_be_sent_is_told_why() {
                 ..message.clone()
             }
         ),
-        "a message to 65535.255.255 goes to many, and only a message to one component can be acknowledged"
+        "65535.255.255 is not a single component, and only messages to one component can be \
+         acknowledged"
     );
     assert_eq!(
         error(
@@ -306,7 +307,7 @@ fn a_message_that_cannot_be_sent_is_told_why() {
                 ..message
             }
         ),
-        "the message has 16777217 octets, and at most 16777216 can be sent to this receiver"
+        "the message has 16777217 octets, but the limit for this receiver is 16777216"
     );
     assert_eq!(
         (rig.transmits(), rig.count(Counter::MessagesSent)),

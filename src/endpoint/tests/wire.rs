@@ -53,7 +53,7 @@ impl Wire {
 
     #[expect(
         clippy::disallowed_methods,
-        reason = "an arbitrary beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     pub(super) fn with(seed: u64, conditions: Conditions, config: &Config) -> Self {
         let end = |host, id| {

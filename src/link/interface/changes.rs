@@ -33,7 +33,7 @@ mod linux {
         pub(crate) fn open() -> Self {
             let socket = listen();
             if let Err(error) = &socket {
-                tracing::info!(%error, "no word of changes of interfaces; they are polled");
+                tracing::info!(%error, "no interface notifications; polling instead");
             }
             Self(socket.ok())
         }

@@ -21,13 +21,13 @@ pub const DEFAULT_FOLDER: &str = "/tmp";
 pub enum Error {
     /// The folder cannot contain sockets.
     #[error(
-        "`{}` cannot be the folder of Junior's sockets: it must be a folder whose path has at most \
-         90 octets. Junior uses /tmp, fkie's what its `SockPath` says", .0.display()
+        "`{}` cannot hold Junior's sockets: choose a folder whose path has at most 90 octets. \
+         Junior uses /tmp, fkie's the value of its `SockPath`", .0.display()
     )]
     Folder(PathBuf),
     /// The node manager cannot be reached.
     #[error(
-        "Junior's node manager cannot be reached at {} ({source}): {}", .path.display(),
+        "cannot reach Junior's node manager at {} ({source}): {}", .path.display(),
         remedy(source, path, "start it (JuniorRTE, or NodeManager of the JAUS Tool Set)")
     )]
     Manager {
@@ -38,8 +38,8 @@ pub enum Error {
     },
     /// Another client has the id.
     #[error(
-        "{id} is held by another client of Junior's node manager, which reads {}: choose another \
-         id, or end that program", .path.display()
+        "{id} is used by another client of Junior's node manager, which reads {}: choose another \
+         id, or stop that program", .path.display()
     )]
     Taken {
         /// The id.
@@ -49,8 +49,8 @@ pub enum Error {
     },
     /// The socket for an id cannot be created.
     #[error(
-        "{id} cannot be a client of Junior's node manager: its socket {} cannot be made ({source}): \
-         {}", .path.display(), remedy(source, path, "see to that path")
+        "{id} cannot connect to Junior's node manager: cannot create its socket {} ({source}): \
+         {}", .path.display(), remedy(source, path, "check that path")
     )]
     Socket {
         /// The id.
@@ -196,7 +196,7 @@ mod tests {
         let other = UnixDatagram::bind(&path).unwrap();
         let error = Claim::new(&folder, ID).unwrap_err().to_string();
         assert!(
-            error.contains("101.1.33 is held by another client"),
+            error.contains("101.1.33 is used by another client"),
             "{error}"
         );
         assert!(error.contains(path.to_str().unwrap()), "{error}");

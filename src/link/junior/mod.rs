@@ -167,7 +167,8 @@ impl JuniorLink {
         let dropped = self.outbox.push(priority, datagram.len(), datagram);
         self.counters.send_overflows += dropped;
         if dropped > 0 && !std::mem::replace(&mut self.is_stuck, true) {
-            tracing::warn!(folder = %self.folder.display(), "Junior's node manager does not keep up: messages to it are dropped");
+            tracing::warn!(folder = %self.folder.display(), "Junior's node manager is too slow: \
+                messages to it are dropped");
         }
     }
 
@@ -191,7 +192,7 @@ impl JuniorLink {
                     cx.waker().wake_by_ref();
                 }
                 Poll::Ready(Err(error)) => {
-                    tracing::debug!(%error, "a datagram to Junior's node manager is lost");
+                    tracing::debug!(%error, "lost a datagram to Junior's node manager");
                     self.counters.send_errors += 1;
                 }
             }
@@ -222,7 +223,7 @@ impl JuniorLink {
                 match claim.poll_recv(cx, &mut buffer) {
                     Poll::Pending => break,
                     Poll::Ready(Err(error)) => {
-                        tracing::debug!(%id, %error, "nothing received through Junior");
+                        tracing::debug!(%id, %error, "cannot receive through Junior");
                         self.counters.receive_errors += 1;
                         more = true;
                         break;
@@ -267,7 +268,7 @@ impl JuniorLink {
                 let path = manager_in(&self.folder);
                 let error = Error::Manager { path, source };
                 if is_news {
-                    tracing::warn!(%error, "Junior is tried again and again");
+                    tracing::warn!(%error, "cannot connect to Junior; retrying");
                 } else {
                     tracing::debug!(%error, "still no node manager");
                 }
@@ -297,7 +298,7 @@ impl JuniorLink {
     }
 
     fn lose(&mut self, error: &io::Error) {
-        tracing::warn!(folder = %self.folder.display(), %error, "Junior's node manager has gone");
+        tracing::warn!(folder = %self.folder.display(), %error, "lost Junior's node manager");
         self.counters.failures += 1;
         let lost = self.outbox.len() + usize::from(self.leaving.is_some());
         self.counters.manager_away += lost as u64;

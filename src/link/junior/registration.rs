@@ -93,7 +93,7 @@ fn is_due(at: Option<Instant>, now: Instant) -> bool {
 #[cfg(test)]
 #[expect(
     clippy::disallowed_methods,
-    reason = "a first instant, from which the tests count"
+    reason = "virtual time starts at any instant"
 )]
 mod tests {
     use super::*;

@@ -46,8 +46,8 @@ pub enum Local {
 /// Not the address of a local link.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no address of a local link: write `default`, the path of a socket such as \
-     /run/jaus/node.sock or ./node.sock, or a port of loopback such as 127.0.0.1:37940"
+    "`{0}` is not an address of a local link: write `default`, a socket path such as \
+     /run/jaus/node.sock or ./node.sock, or a loopback port such as 127.0.0.1:37940"
 )]
 pub struct InvalidAddress(String);
 

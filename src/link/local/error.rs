@@ -13,7 +13,7 @@ pub enum Error {
     /// No node listens there.
     #[error(
         "no node serves components at {place}: start one with `jaus node --local` (or `local = …` \
-         in its settings), or give the component a node of its own"
+         in its settings), or give the component its own node"
     )]
     NoNode {
         /// The address.
@@ -21,7 +21,7 @@ pub enum Error {
     },
     /// Another node is using the socket.
     #[error(
-        "another node{} serves the components at {}: end it, or choose another path for one of \
+        "another node{} serves the components at {}: stop it, or choose another path for one of \
          the two", process(*pid), path.display()
     )]
     Served {
@@ -35,13 +35,13 @@ pub enum Error {
     PortTaken(SocketAddr),
     /// A file of another kind has the socket's path.
     #[error(
-        "{} is in the way of the local link's socket and is no socket: choose another path, or \
-         move it", .0.display()
+        "cannot create the local link's socket: {} exists and is not a socket. Choose another \
+         path, or move it", .0.display()
     )]
     NoSocket(PathBuf),
     /// Other users could replace the socket by their own.
     #[error(
-        "the directory {} of the local link's socket is not safe: {why}. {remedy}",
+        "the directory {} of the local link's socket is unsafe: {why}. {remedy}",
         directory.display()
     )]
     UnsafeDirectory {
@@ -66,22 +66,22 @@ pub enum Error {
         own: u32,
     },
     /// The other side violated the protocol.
-    #[error("the other side of the local link cannot be understood: {0}")]
+    #[error("protocol error on the local link: {0}")]
     Record(#[from] RecordError),
     /// The other side is gone.
     #[error("the connection was closed by the other side")]
     Closed,
     /// The other side did not answer.
     #[error(
-        "what listens at {place} does not greet: it hangs, or it is no node; look who it is \
-         (`ss -xlp`, `ss -tlp`)"
+        "no greeting from {place}: the program there hangs or is not a node; find it with `ss \
+         -xlp` or `ss -tlp`"
     )]
     Mute {
         /// The address.
         place: String,
     },
     /// This system has no Unix sockets.
-    #[error("this system has no Unix sockets: use a port of loopback such as 127.0.0.1:37940")]
+    #[error("this system has no Unix sockets: use a loopback port such as 127.0.0.1:37940")]
     NoUnixSockets,
     /// Any other error of the operating system.
     #[error("{doing} failed: {source}")]

@@ -147,7 +147,7 @@ pub enum Reason {
 #[non_exhaustive]
 pub enum RecordError {
     /// A record is longer than the limit.
-    #[error("a record of {length} octets, where at most {limit} are allowed")]
+    #[error("a record of {length} octets; the limit is {limit}")]
     TooLong {
         /// Its length in octets.
         length: usize,
@@ -155,7 +155,7 @@ pub enum RecordError {
         limit: usize,
     },
     /// The kind or the fields are invalid.
-    #[error("a record of kind {kind} and {length} octets that cannot be read")]
+    #[error("an undecodable record of kind {kind} and {length} octets")]
     Malformed {
         /// Its kind, 0 if it has none.
         kind: u8,
@@ -163,7 +163,7 @@ pub enum RecordError {
         length: usize,
     },
     /// A record that is not valid at this point.
-    #[error("a record that is not expected here")]
+    #[error("an unexpected record")]
     Unexpected,
 }
 

@@ -138,23 +138,26 @@ fn check_directory(directory: &Path, own: u32, forbidden: u32) -> Result<(), Err
     };
     let metadata = match metadata {
         Err(error) if error.kind() == ErrorKind::NotFound => {
-            let remedy = format!("Make it: `mkdir -m 700 {}`", directory.display());
+            let remedy = format!("Create it: `mkdir -m 700 {}`", directory.display());
             return unsafe_because("it does not exist".into(), remedy);
         }
         other => other.map_err(Error::io(doing()))?,
     };
     let (uid, mode) = (metadata.uid(), metadata.mode() & 0o7777);
     if !metadata.is_dir() {
-        return unsafe_because("it is no directory".into(), "Choose another path.".into());
+        return unsafe_because(
+            "it is not a directory".into(),
+            "Choose another path.".into(),
+        );
     }
     if uid != own && uid != 0 {
-        let why = format!("it belongs to user {uid}, and we are user {own}");
+        let why = format!("it belongs to user {uid}, but this process runs as user {own}");
         return unsafe_because(why, "Choose a directory of your own.".into());
     }
     let only_owners_remove = forbidden == 0o022 && mode & 0o1000 != 0;
     if mode & forbidden != 0 && !only_owners_remove {
-        let why = format!("its mode is {mode:o}, so that others can change what is in it");
-        let remedy = format!("Close it: `chmod 700 {}`", directory.display());
+        let why = format!("its mode is {mode:o}, so others can change its contents");
+        let remedy = format!("Restrict it: `chmod 700 {}`", directory.display());
         return unsafe_because(why, remedy);
     }
     Ok(())

@@ -50,13 +50,13 @@ fn remedy(error: &io::Error) -> &'static str {
     match error.kind() {
         NotFound => "plug it in or choose another",
         PermissionDenied => {
-            "its user must belong to the group that owns it, usually `dialout` \
-             (`sudo usermod -aG dialout $USER`, then log in again)"
+            "add the user to the group that owns it, usually `dialout` (`sudo usermod -aG dialout \
+             $USER`, then log in again)"
         }
-        ResourceBusy => "end the other program that uses it (`sudo fuser -v` on it shows which)",
+        ResourceBusy => "stop the other program that uses it (find it with `sudo fuser -v`)",
         InvalidInput => "choose a baud rate, parity and stop bits that it supports",
         _ if cfg!(unix) && error.raw_os_error() == Some(ENOTTY) => {
-            "it is no serial port, choose another"
+            "it is not a serial port, choose another"
         }
         _ => "check the device, or choose another",
     }

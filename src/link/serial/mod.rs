@@ -226,7 +226,7 @@ impl SerialLink {
 
     /// Handles the loss of the port.
     fn lose(&mut self, error: &io::Error) {
-        tracing::warn!(device = self.settings.device, %error, "serial port lost; it is tried again");
+        tracing::warn!(device = self.settings.device, %error, "serial port lost; retrying");
         self.counters.failures += 1;
         self.counters.port_away += self.outbox.len() as u64 + u64::from(!self.leaving.is_empty());
         self.outbox = Backlog::new(OUTBOX);

@@ -86,7 +86,10 @@ fn longest_silent<'a>(places: impl Iterator<Item = &'a Place>, now: Instant) -> 
 }
 
 #[cfg(test)]
-#[expect(clippy::disallowed_methods, reason = "a test needs some instant")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the test starts at an arbitrary instant"
+)]
 mod tests {
     use std::time::Duration;
 

@@ -37,14 +37,14 @@ pub enum Closed {
     #[error("{0}")]
     Malformed(wire::Error),
     /// The other side has taken nothing for [`STUCK`] while messages for it were dropped.
-    #[error("the other side took nothing for {} s while messages for it were lost", STUCK.as_secs())]
+    #[error("the other side read nothing for {} s, and messages to it were lost", STUCK.as_secs())]
     Stuck,
     /// It had sent nothing valid, and its place was needed.
-    #[error("it had said nothing valid and its place was needed")]
+    #[error("it had sent nothing valid and its slot was needed")]
     Silent,
     /// It was idle the longest at the network address with the most connections, and its place was
     /// needed.
-    #[error("it was idle, others from its address hold the most places, and its place was needed")]
+    #[error("it was idle, its address held the most slots, and a slot was needed")]
     Idle,
     /// An error of the operating system.
     #[error("{0}")]

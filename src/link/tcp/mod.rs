@@ -367,7 +367,7 @@ impl TcpLink {
                 Poll::Ready(Ok((stream, remote))) => self.admit(stream, remote, now),
                 Poll::Ready(Err(error)) if is_of_the_peer(&error) => {}
                 Poll::Ready(Err(error)) => {
-                    tracing::warn!(%error, "connections cannot be accepted just now");
+                    tracing::warn!(%error, "cannot accept connections");
                     self.accept_after = Some(now + ACCEPT_PAUSE);
                     return false;
                 }
@@ -467,7 +467,7 @@ impl TcpLink {
                 self.connections.insert(remote, connection);
             }
             Err(error) => {
-                tracing::warn!(%remote, %error, "a connection cannot be set up");
+                tracing::warn!(%remote, %error, "cannot set up a connection");
                 if dialed && let Some(dial) = self.dial(remote) {
                     dial.redial.lost(now, false);
                 }

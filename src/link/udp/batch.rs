@@ -31,7 +31,7 @@ const FETCHED: usize = 8;
 pub(super) fn prepare(socket: &UdpSocket) {
     if let Err(error) = setsockopt(socket, sockopt::UdpGroSegment, &true) {
         // Linux before 5.0. They come one by one then.
-        tracing::debug!(%error, "no batches of datagrams are received");
+        tracing::debug!(%error, "batched receive is unavailable");
     }
 }
 

@@ -137,7 +137,8 @@ fn finish(socket: Socket, receive_buffer: usize) -> Result<Opened, Error> {
         tracing::info!(
             wanted = receive_buffer,
             granted,
-            "the kernel limits the receive buffer; raise net.core.rmem_max against losses in bursts"
+            "the kernel limits the receive buffer; raise net.core.rmem_max to avoid losses in \
+             bursts"
         );
     } else {
         tracing::debug!(granted, "receive buffer");

@@ -149,7 +149,7 @@ mod tests {
             pace_burst: 100,
             ..usual()
         };
-        assert!(refused(short.clone()).starts_with("delivery.pace_burst 100 cannot be"));
+        assert!(refused(short.clone()).starts_with("delivery.pace_burst 100 is out of range"));
         let unpaced = Delivery {
             pace_rate: 0,
             ..short

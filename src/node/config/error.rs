@@ -22,12 +22,12 @@ pub enum ConfigError {
     },
     /// Junior delivers only to its own clients.
     #[error(
-        "routing.forward and junior exclude each other: Junior delivers nothing for components \
-         behind its clients. Leave one of them out"
+        "routing.forward and junior exclude each other: Junior does not deliver to components \
+         behind its clients. Remove one of them"
     )]
     JuniorForward,
     /// Two lines on one device.
-    #[error("the serial port {0} is named twice: leave one out")]
+    #[error("the serial port {0} appears twice: remove one entry")]
     SerialTwice(String),
     /// Not a multicast group.
     #[error(transparent)]
@@ -37,9 +37,9 @@ pub enum ConfigError {
     PeerId(ParseIdError),
     /// Not the address of a peer.
     #[error(
-        "`{0}` is no peer's address: write an address of one host, with a port if it is not 3794, \
-         such as 192.168.7.2, 192.168.7.2:3795, [fd00::2]:3795 or (IPv6's link-local addresses \
-         need the interface) [fe80::2%eth0]:3794"
+        "`{0}` is not a peer's address: write the address of one host, with a port if it is not \
+         3794, such as 192.168.7.2, 192.168.7.2:3795, [fd00::2]:3795 or (IPv6's link-local \
+         addresses need the interface) [fe80::2%eth0]:3794"
     )]
     Peer(String),
     /// Not an address to listen on.

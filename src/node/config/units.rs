@@ -11,13 +11,13 @@ use std::time::Duration;
 pub enum InvalidUnit {
     /// Not a size.
     #[error(
-        "`{0}` is no size: write a number of octets, or a number with one of the units B, kB, \
+        "`{0}` is not a size: write a number of octets, or a number with one of the units B, kB, \
          KiB, MB, MiB, GB and GiB, such as 1500, \"64 KiB\" or \"4MiB\""
     )]
     Size(String),
     /// Not a time.
     #[error(
-        "`{0}` is no time: write a number with one of the units us, ms, s, min and h, such as \
+        "`{0}` is not a time: write a number with one of the units us, ms, s, min and h, such as \
          \"5ms\", \"1.5s\" or \"2 min\""
     )]
     Duration(String),
@@ -172,7 +172,7 @@ mod tests {
         ] {
             let error = size(text).unwrap_err().to_string();
             assert!(
-                error.starts_with(&format!("`{text}` is no size")),
+                error.starts_with(&format!("`{text}` is not a size")),
                 "{error}"
             );
             assert!(error.contains("4MiB"), "{error}");
@@ -182,7 +182,7 @@ mod tests {
         ] {
             let error = duration(text).unwrap_err().to_string();
             assert!(
-                error.starts_with(&format!("`{text}` is no time")),
+                error.starts_with(&format!("`{text}` is not a time")),
                 "{error}"
             );
             assert!(error.contains("1.5s"), "{error}");
@@ -203,13 +203,17 @@ mod tests {
         assert_eq!(read("buffer = 7").unwrap().buffer, 7);
         assert_eq!(read("buffer = \"2 KiB\"").unwrap().buffer, 2048);
         assert_eq!(read("every = \"5ms\"").unwrap().every.as_millis(), 5);
-        assert!(read("buffer = -1").unwrap_err().contains("`-1` is no size"));
+        assert!(
+            read("buffer = -1")
+                .unwrap_err()
+                .contains("`-1` is not a size")
+        );
         assert!(read("buffer = true").unwrap_err().contains("\"4MiB\""));
-        assert!(read("every = 5").unwrap_err().contains("`5` is no time"));
+        assert!(read("every = 5").unwrap_err().contains("`5` is not a time"));
         assert!(
             read("every = \"5\"")
                 .unwrap_err()
-                .contains("`5` is no time")
+                .contains("`5` is not a time")
         );
     }
 }

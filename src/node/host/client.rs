@@ -200,7 +200,7 @@ impl Client {
                 () = late => None,
             };
             let Some(error) = end else { break };
-            tracing::warn!(id = %self.id, %error, "the node of this host is lost");
+            tracing::warn!(id = %self.id, %error, "lost the node of this host");
             self.handle_lost(Status::Lost);
             self.events.send(HostEvent::Lost {
                 why: error.to_string(),
@@ -250,11 +250,11 @@ impl Client {
                     return attached.reader;
                 }
                 Err(HostError::Refused { words: why, .. }) if refused.as_ref() != Some(&why) => {
-                    tracing::warn!(id = %self.id, why, "not attached again");
+                    tracing::warn!(id = %self.id, why, "cannot reattach");
                     refused = Some(why.clone());
                     self.events.send(HostEvent::Refused { why });
                 }
-                Err(error) => tracing::debug!(%error, "no node yet"),
+                Err(error) => tracing::debug!(%error, "the node is still unavailable"),
             }
         }
     }

@@ -5,7 +5,7 @@
 //! one does not delay others. To the endpoint they are like components of the node's own process.
 #![expect(
     clippy::disallowed_methods,
-    reason = "sessions get tasks, and components little time for their first record"
+    reason = "sessions have tasks, and the first record has a timeout"
 )]
 
 mod session;
@@ -77,7 +77,7 @@ impl Server {
                     });
                 }
                 Err(error) => {
-                    tracing::warn!(%error, "a component could not be accepted");
+                    tracing::warn!(%error, "cannot accept a component");
                     // For instance too many open files: do not retry at once.
                     if matches!(error, Error::Io { .. }) {
                         tokio::time::sleep(OVERLAP).await;
@@ -188,7 +188,7 @@ fn refusal(error: &AttachError, holder: Option<Process>) -> Refusal {
                 Some(process) => process.to_string(),
                 None => format!("the node itself (process {})", std::process::id()),
             };
-            let why = format!("{id} is held by {holder}: choose another component number");
+            let why = format!("{id} is used by {holder}: choose another component number");
             return (Reason::Taken, why);
         }
         AttachError::TooMany { .. } => Reason::TooMany,

@@ -82,7 +82,7 @@ impl Session {
             if let Err(error) = self.flush().await {
                 // The component reads no more. Its earlier records are still read, and reading
                 // detects the end.
-                tracing::debug!(id = %self.id, %error, "nothing more can be written");
+                tracing::debug!(id = %self.id, %error, "cannot write any more");
                 self.answers.lock().close();
                 return pending().await;
             }
@@ -123,7 +123,8 @@ impl Session {
                 Err(_) => {
                     is_stuck = true;
                     let (id, process) = (self.id, self.process.clone());
-                    tracing::warn!(%id, %process, "component reads nothing; its messages will be dropped");
+                    tracing::warn!(%id, %process, "component stopped reading; its messages will \
+                        be dropped");
                     self.announce(ComponentEvent::Stuck { id, process });
                 }
             }

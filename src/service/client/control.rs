@@ -38,25 +38,25 @@ pub enum ControlNews {
 #[non_exhaustive]
 pub enum ControlRefused {
     /// Confirm Control with NOT_AVAILABLE.
-    #[error("it cannot be controlled now, for instance because of an emergency")]
+    #[error("it refuses control, for example because of an emergency")]
     NotAvailable,
     /// Confirm Control with INSUFFICIENT_AUTHORITY.
-    #[error("the authority {0} is too low for it, or no greater than that of who controls it")]
+    #[error("the authority {0} is below its minimum, or not above that of the client in control")]
     InsufficientAuthority(u8),
     /// Confirm Control with an undefined code.
-    #[error("it answered ConfirmControl with the code {0}, which has no meaning")]
+    #[error("it answered ConfirmControl with the undefined code {0}")]
     Code(u8),
     /// The peer has not answered.
     #[error(
-        "it did not answer RequestControl with ConfirmControl: asked {} times in {:.1} s",
+        "it did not answer RequestControl with ConfirmControl: {} attempts in {:.1} s",
         .0.tries, .0.waited.as_secs_f64()
     )]
     NoAnswer(NoAnswer),
     /// The application already controls this peer.
-    #[error("this component controls it already, or is asking for it")]
+    #[error("this component already controls it or has requested control")]
     Already,
     /// The id has a wildcard or a zero.
-    #[error("it is not one component")]
+    #[error("it is not a single component")]
     NotOneComponent,
 }
 
@@ -66,19 +66,19 @@ pub enum ControlRefused {
 pub enum ControlLost {
     /// Reject Control with CONTROL_RELEASED: a client with a greater authority has it, or the peer
     /// has reset it or timed it out.
-    #[error("the peer took it back, for another client or because it was not renewed in time")]
+    #[error("the peer rejected control, for another client or because renewal was late")]
     TakenBack,
     /// The peer has become unavailable, for instance because of an emergency.
-    #[error("the peer cannot be controlled any more, for instance because of an emergency")]
+    #[error("the peer no longer accepts control, for example because of an emergency")]
     NotAvailable,
     /// Another client with a greater authority has it: the renewal was refused.
-    #[error("another client with a greater authority has it")]
+    #[error("another client with a higher authority has control")]
     Outranked,
     /// The peer has restarted and lost the control.
-    #[error("the peer was started again, or has dropped control without notice")]
+    #[error("the peer restarted, or dropped control without notice")]
     Restarted,
     /// The peer has not confirmed it within its lifetime.
-    #[error("the peer has not confirmed it since {:.1} s", .0.as_secs_f64())]
+    #[error("the peer has not confirmed control for {:.1} s", .0.as_secs_f64())]
     Silent(Duration),
 }
 

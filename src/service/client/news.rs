@@ -52,8 +52,8 @@ impl fmt::Display for Outage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Silent => f.write_str("the reports have stopped"),
-            Self::Unconfirmed => f.write_str("the peer does not confirm the event any more"),
-            Self::PeerLost => f.write_str("the peer is gone"),
+            Self::Unconfirmed => f.write_str("the peer no longer confirms the event"),
+            Self::PeerLost => f.write_str("the peer is lost"),
             Self::Refused(reason) => write!(f, "the peer refuses the event: {reason}"),
         }
     }
@@ -68,12 +68,13 @@ pub enum SubscriptionEnd {
     Rejected(Rejection),
     /// The peer neither confirmed nor refused it.
     #[error(
-        "CreateEvent was answered with neither ConfirmEventRequest nor RejectEventRequest: asked {} times in {:.1} s",
+        "CreateEvent was answered with neither ConfirmEventRequest nor RejectEventRequest: {} \
+         attempts in {:.1} s",
         .0.tries, .0.waited.as_secs_f64()
     )]
     NoAnswer(NoAnswer),
     /// The peer confirmed a lower rate than required.
-    #[error("only {hz:.2} Hz were confirmed, and at least {least_hz:.2} Hz are wanted")]
+    #[error("the peer confirmed only {hz:.2} Hz, but at least {least_hz:.2} Hz are required")]
     TooSlow {
         /// The confirmed rate in hertz.
         hz: f64,

@@ -49,10 +49,10 @@ impl Rejection {
             Some(1) => "it has no periodic events",
             Some(2) => "it has no events on change",
             Some(3) => "it refuses the connection",
-            Some(4) => "it cannot set such an event up",
+            Some(4) => "it cannot set up such an event",
             Some(5) => "it has no events for this message",
-            Some(6) => "it knows no event with this number",
-            Some(_) => "it gives a code without a meaning",
+            Some(6) => "it has no event with this number",
+            Some(_) => "its reason code is undefined",
             None => "it gives no reason",
         }
     }
@@ -65,7 +65,7 @@ impl fmt::Display for Rejection {
             write!(f, " (code {code})")?;
         }
         match &self.text {
-            Some(text) => write!(f, ", and says \"{text}\""),
+            Some(text) => write!(f, ": \"{text}\""),
             None => Ok(()),
         }
     }

@@ -230,7 +230,7 @@ impl Subscriptions {
         // If two events share the number, this may cancel the wrong one: see `has_left`.
         if may && !self.leaving.iter().any(leaving) {
             self.next_stray = Some(now + Self::STRAY_PAUSE);
-            tracing::debug!(%source, event = event.event_id, "event that nobody subscribed to");
+            tracing::debug!(%source, event = event.event_id, "event without a subscription");
             self.leave(now, source, event.event_id, out);
         }
     }

@@ -86,10 +86,10 @@ impl Topic {
 #[non_exhaustive]
 pub enum CannotSubscribe {
     /// A subscription is to exactly one component.
-    #[error("{0} is not one component, and an event is one component's")]
+    #[error("{0} is not a single component: subscribe to one")]
     NotOneComponent(JausId),
     /// The wire carries rates up to 1092 Hz in steps of 1/60 Hz.
-    #[error("{hz} Hz cannot be asked for: a rate is from 1/60 to 1092 Hz")]
+    #[error("{hz} Hz is out of range: choose from 1/60 to 1092 Hz")]
     Rate {
         /// The requested rate in hertz.
         hz: f64,
@@ -98,9 +98,9 @@ pub enum CannotSubscribe {
     #[error(transparent)]
     Encode(#[from] EncodeError),
     /// The peer would treat both as one event.
-    #[error("this component subscribes to it already: use that subscription, or drop it first")]
+    #[error("this component is already subscribed: use that subscription, or drop it first")]
     Already,
     /// The limit of subscriptions is reached.
-    #[error("there are {0} subscriptions already, and no more are possible: drop some")]
+    #[error("the limit of {0} subscriptions is reached: drop some")]
     TooMany(usize),
 }

@@ -53,7 +53,7 @@ impl Control {
             return;
         }
         if condition == Condition::Safe && self.standing.state == State::Emergency {
-            tracing::warn!(id = %out.source(), "the emergency is cleared on the vehicle itself");
+            tracing::warn!(id = %out.source(), "emergency cleared by the vehicle");
             self.emergencies.clear();
             self.more_emergencies = false;
             self.end_emergency(out);

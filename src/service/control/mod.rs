@@ -269,7 +269,7 @@ impl Control {
         self.beneath_emergency() == State::Initialize
     }
 
-    /// Whether the component has failed, including during an emergency.
+    /// Whether the component failed, including during an emergency.
     pub(super) fn has_failed(&self) -> bool {
         self.beneath_emergency() == State::Failure
     }
@@ -281,7 +281,7 @@ impl Control {
         }
     }
 
-    /// Ends all control because the component ends. With Management nobody can get it again.
+    /// Ends all control because the component ends. With Management no client can regain it.
     pub(super) fn end(&mut self, out: &mut Outbox) {
         self.drop_controller(out);
         if self.management.is_some() {

@@ -28,7 +28,7 @@ impl Discovery {
         let source = received.source;
         let may = source.is_unicast() && source != self.own && self.answers.take(now);
         if !may {
-            tracing::debug!(%source, "query not answered: too many, or from nobody");
+            tracing::debug!(%source, "query not answered: too many, or an invalid source");
         }
         may
     }

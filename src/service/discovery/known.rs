@@ -206,7 +206,7 @@ impl Known {
                 too_long,
                 cut,
                 too_often,
-                "discovery leaves out what a peer says: it exceeds the limits"
+                "discovery truncates a peer's report: it exceeds the limits"
             );
         }
     }

@@ -84,7 +84,7 @@ impl Budget {
 #[cfg(test)]
 #[expect(
     clippy::disallowed_methods,
-    reason = "a test needs some instant to begin with"
+    reason = "the test starts at an arbitrary instant"
 )]
 mod tests {
     use super::*;

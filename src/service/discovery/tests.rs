@@ -33,7 +33,7 @@ struct Rig {
 impl Rig {
     #[expect(
         clippy::disallowed_methods,
-        reason = "any moment will do as the beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     fn new() -> Self {
         let profile = Profile::new(Kind::Vehicle, "Rover");

@@ -33,10 +33,10 @@ pub(super) fn rejection(request_id: u8, why: ResponseCode) -> RejectEventRequest
 /// Text for people, up to 80 octets.
 const fn in_words(why: ResponseCode) -> &'static str {
     match why {
-        ResponseCode::CONNECTION_REFUSED => "no room for another event, or not for so fast a one",
-        ResponseCode::INVALID_EVENT_SETUP => "an event of this type, rate or query cannot be",
-        ResponseCode::MESSAGE_NOT_SUPPORTED => "nobody here answers this query",
-        INVALID_EVENT => "no event of yours has this number",
+        ResponseCode::CONNECTION_REFUSED => "no room for another event, or for one this fast",
+        ResponseCode::INVALID_EVENT_SETUP => "invalid event type, rate or query",
+        ResponseCode::MESSAGE_NOT_SUPPORTED => "this component does not answer this query",
+        INVALID_EVENT => "you have no event with this number",
         _ => "refused",
     }
 }

@@ -87,7 +87,7 @@ impl Stack {
         let last = self.called.replace(now).unwrap_or(now);
         let gap = now.saturating_duration_since(last);
         if gap > Self::HUNG && self.is_moving() {
-            tracing::error!(id = %self.out.source(), ?gap, "stopped: the component was held up");
+            tracing::error!(id = %self.out.source(), ?gap, "stopped: the component was delayed");
             self.stop(&StopCause::Hung(gap));
             self.control.drop_controller(&mut self.out);
         }
@@ -111,7 +111,7 @@ impl Stack {
         };
         self.life.handle_timeout(now, rank, &mut self.out);
         while let Some(client) = self.life.poll_dead() {
-            tracing::info!(id = %self.out.source(), %client, "a client is dead: it answers no more");
+            tracing::info!(id = %self.out.source(), %client, "client lost: it no longer answers");
             self.control.forget(client, &mut self.out);
             self.subscribers.forget(client);
         }
@@ -126,8 +126,8 @@ impl Stack {
         if let Some(client) = mute.filter(|_| self.mute != mute) {
             tracing::warn!(
                 id = %self.out.source(), %client,
-                "the client in control answers no Query Heartbeat Pulse, and control has no \
-                 timeout: only standby, release or an emergency will stop what it has set in motion"
+                "the client in control does not answer Query Heartbeat Pulse, and control has no \
+                 timeout: only standby, release or an emergency will stop its motion"
             );
         }
         self.mute = mute;
@@ -163,7 +163,7 @@ impl Stack {
                 Ok(()) => {
                     self.faults.of_services = before.saturating_sub(1);
                     if before == 1 && !self.faults.of_application && self.control.has_failed() {
-                        tracing::warn!(%id, "the failure is over");
+                        tracing::warn!(%id, "failure cleared");
                         self.control
                             .handle_condition(Condition::Initialized, &mut self.out);
                     }
@@ -183,7 +183,7 @@ impl Drop for Stack {
             // panic end the process before the last one.
             let stop = || service.handle_stop(&StopCause::Ended, &mut context);
             if catch_unwind(AssertUnwindSafe(stop)).is_err() {
-                tracing::error!("a stop action has panicked");
+                tracing::error!("a stop action panicked");
             }
         }
     }

@@ -124,7 +124,7 @@ fn what_is_written_begins_with_the_version_octet_that_a_connection_leaves_out() 
 fn what_cannot_be_is_said_with_its_place_in_the_stream() {
     assert_eq!(
         error("00 1100"),
-        "octet 0: no JAUS transport begins with 00h (AS5669A: 02h, AS5669: 01h, RA: \"JAUS01.0\")"
+        "octet 0: no JAUS transport starts with 00h (AS5669A: 02h, AS5669: 01h, RA: \"JAUS01.0\")"
     );
     assert_eq!(
         error(&format!("02 {JUNIOR} 00 0d00")),
@@ -136,7 +136,7 @@ fn what_cannot_be_is_said_with_its_place_in_the_stream() {
     );
     assert_eq!(
         error("01 2000 1602 014b 01010200 01010100 1000 0100"),
-        "octet 1: the size field says 8192 octets, the header behind it 32"
+        "octet 1: the size field says 8192 octets, but the header after it 32"
     );
     assert_eq!(
         error("01 0010 1602 014b 01010200 01010100 0030 0100"),

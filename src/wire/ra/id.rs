@@ -119,10 +119,10 @@ impl fmt::Display for RaId {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BadId {
     /// A field is zero, so that the id names no component.
-    #[error("{0} has a field of 0, which names nobody: use 1 to 254")]
+    #[error("{0} has a field of 0, which is not an address: use 1 to 254")]
     Zero(RaId),
     /// A source, or the destination of a message that wants an answer, must be one component.
-    #[error("{0} has a field of 255, which stands for all: name one component with 1 to 254")]
+    #[error("{0} has a field of 255, the wildcard: name one component with 1 to 254")]
     Wildcard(RaId),
 }
 
@@ -138,8 +138,8 @@ pub enum Recipients {
 /// The text is not an id of the Reference Architecture.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is not an RA id: write subsystem.node.component.instance, each from 0 to 255, for \
-     instance 20.1.33.1"
+    "`{0}` is not an RA id: write subsystem.node.component.instance, each from 0 to 255, such as \
+     20.1.33.1"
 )]
 pub struct InvalidRaId(String);
 
@@ -208,7 +208,7 @@ mod tests {
             "1.1..1",
         ] {
             let error = wrong.parse::<RaId>().expect_err(wrong).to_string();
-            assert!(error.contains("for instance 20.1.33.1"), "{error}");
+            assert!(error.contains("such as 20.1.33.1"), "{error}");
         }
     }
 }

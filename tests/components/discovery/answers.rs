@@ -20,7 +20,7 @@ use crate::discovery::world::{Place, World, stack};
 const OWN: JausId = JausId::new(101, 1, 33);
 const ASKER: JausId = JausId::new(42, 1, 1);
 
-/// A component called "rover" and somebody who asks it; what it asks back is of no interest.
+/// A component named "rover" and a client that queries it; the component's own queries are ignored.
 fn asked(to: JausId, query: &[u8]) -> Vec<Received> {
     let mut world = World::new();
     world.start(stack(OWN, "rover", Vec::new()));

@@ -160,7 +160,7 @@ fn newcomers_are_found_at_once_while_many_others_have_fallen_silent() {
     for dead in fleet {
         world.kill(dead);
     }
-    // From before anybody notices until all are given up.
+    // From before the first notices until all are given up.
     for newcomer in 1..=12 {
         world.run(seconds(4));
         let id = JausId::new(100 + newcomer, 1, 1);
@@ -355,7 +355,7 @@ fn three_components_agree_on_who_is_there() {
     }
 }
 
-/// A subsystem whose manager lists a component that has no Discovery service of its own.
+/// A subsystem whose manager lists a component without Discovery service.
 #[test]
 fn a_component_that_is_only_listed_is_in_the_tree_as_long_as_it_is_listed() {
     let manager = JausId::new(7, 1, 1);

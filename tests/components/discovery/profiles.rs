@@ -81,8 +81,8 @@ fn a_registration_from_another_subsystem_is_learned_and_not_answered() {
     assert_eq!(known.services.as_ref().map(|it| it.len()), Some(2));
 }
 
-/// JAUS++ sends no heartbeats: whoever answers the question who it is, is there. Calls to everybody
-/// are left out here, so that nothing comes but what is asked for.
+/// JAUS++ sends no heartbeats: an answer to Query Identification is its sign of life. Multicasts
+/// are omitted here, so only requested messages arrive.
 #[test]
 fn a_peer_that_only_answers_is_not_lost() {
     let (mut world, us, peer) = met();

@@ -10,7 +10,7 @@ use jaus::wire::{Broadcast, Priority};
 use proptest::prelude::*;
 
 const OWN: JausId = JausId::new(101, 1, 33);
-/// Queries and reports of Discovery, a heartbeat, and a code that nobody knows.
+/// Queries and reports of Discovery, a heartbeat, and an unknown code.
 const CODES: [u16; 12] = [
     0x2B00, 0x2B01, 0x2B02, 0x2B03, 0x2B04, 0x0B00, 0x4B00, 0x4B01, 0x4B02, 0x4B03, 0x2202, 0xFFFF,
 ];
@@ -47,7 +47,7 @@ fn message() -> impl Strategy<Value = Received> {
 
 proptest! {
     #[test]
-    #[expect(clippy::disallowed_methods, reason = "virtual time begins at some instant")]
+    #[expect(clippy::disallowed_methods, reason = "virtual time starts at any instant")]
     fn nothing_that_arrives_upsets_a_component(
         messages in prop::collection::vec((message(), 0..20_000_u64), 0..200),
     ) {
@@ -73,8 +73,8 @@ proptest! {
             prop_assert!(stack.directory().len() <= 1 + 8);
             prop_assert!(stack.directory().component(OWN).is_some());
         }
-        // A burst of questions and one a second, the calls, and the answers that were asked for,
-        // each of at most nine reports.
+        // A burst of queries and one per second, the multicasts, and the requested answers of at
+        // most nine reports each.
         let seconds = now.duration_since(start).as_secs();
         prop_assert!(said <= 64 + 2 * seconds + 9 * messages.len() as u64, "{said} messages");
     }

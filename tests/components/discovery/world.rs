@@ -62,7 +62,7 @@ pub(crate) fn stack(id: JausId, name: &str, services: Vec<Box<dyn Service>>) -> 
 impl World {
     #[expect(
         clippy::disallowed_methods,
-        reason = "virtual time begins at some instant"
+        reason = "virtual time starts at any instant"
     )]
     pub(crate) fn new() -> Self {
         Self {
@@ -74,7 +74,7 @@ impl World {
         }
     }
 
-    /// Starts a component on a node of its own.
+    /// Starts a component on its own node.
     pub(crate) fn start(&mut self, mut stack: Stack) -> Place {
         stack.start(self.now);
         self.add(stack.id(), Some(stack))

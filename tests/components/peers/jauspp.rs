@@ -32,7 +32,7 @@ struct Stream {
     is_running: bool,
 }
 
-/// A replay: who is asked, by what is recorded.
+/// A replay: the queried component and the recording.
 struct Replay {
     stand_in: StandIn,
     dictionary: Dictionary,
@@ -120,7 +120,7 @@ impl Replay {
         );
         assert!(answer.is_to(asked.source), "{:?}: {shown}", answer.to);
         assert!(question.destination.matches(answer.frame.source), "{shown}");
-        // One packet, uncut, uncompressed, that JAUS++ reads.
+        // One packet, unfragmented and uncompressed, that JAUS++ decodes.
         assert!(octets.len() <= 1425, "{shown}");
         assert_eq!(
             (answer.frame.kind.0, answer.frame.flags.0),
@@ -298,7 +298,7 @@ fn the_client_of_the_vehicle_simulation_gets_every_answer_from_a_vehicle_of_ours
     assert_eq!(replay.unanswered, NOTHING);
     let asked: usize = replay.asked.values().sum();
     assert_eq!(asked, 108, "{:?}", replay.asked);
-    // Two streams, without gaps and without a second copy; both are cancelled in the end.
+    // Two streams, without gaps or duplicates; both are cancelled at the end.
     let events = replay.events();
     assert_eq!(events.len(), 2, "{events:?}");
     for numbers in events.values() {

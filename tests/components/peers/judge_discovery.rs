@@ -63,7 +63,7 @@ fn requests(capture: &Path) -> Vec<Vec<u8>> {
     requests
 }
 
-/// A group that belongs to one test, so that tests beside it are not heard.
+/// A multicast group for one test, isolated from other tests.
 fn own_group() -> SocketAddrV4 {
     let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
     SocketAddrV4::new(

@@ -139,7 +139,7 @@ fn a_node_in_the_place_of_a_calls_as_a_does_and_understands_the_answer() {
         stand_in.hear(of_b[0].source, of_b[0].payload.clone());
         let told = |event: &Event| matches!(event, Event::Acknowledged { by: B, .. });
         assert_eq!(stand_in.news.iter().any(told), acknowledge, "{file}");
-        // From now on it is spoken to alone, with the octets that A used.
+        // From now on it is addressed by unicast, with the octets that A used.
         for next in &of_a[1..] {
             let before = stand_in.said.len();
             let payload = next.frames().0[0].payload.clone();

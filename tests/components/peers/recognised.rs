@@ -52,7 +52,7 @@ fn jauspp_is_recognised_for_sure_and_a_plain_vehicle_beside_it_is_not() {
         "jauspp/02-rawvehicle-client.pcap",
         &[
             ("1000.1.7", JausPlusPlus, Certain),
-            // Python, written after JAUS++: its numbers begin with 0.
+            // Python, modelled on JAUS++: its numbers start with 0.
             ("77.1.1", JausPlusPlus, Certainty::Guess),
         ],
     );

@@ -59,7 +59,7 @@ impl StandIn {
     /// A node with this address.
     #[expect(
         clippy::disallowed_methods,
-        reason = "an arbitrary beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     pub(crate) fn new(address: SocketAddr, config: Config) -> Self {
         let mut endpoint = Endpoint::new(config);

@@ -136,13 +136,13 @@ async fn a_second_claimant_is_told_who_has_the_id() {
         other => panic!("{other}"),
     };
     let words = refused(place.host().attach(33).await.unwrap_err());
-    assert!(words.contains("101.1.33 is held by \"planner\""), "{words}");
+    assert!(words.contains("101.1.33 is used by \"planner\""), "{words}");
     assert!(words.contains(&format!("process {pid}")), "{words}");
     let words = refused(place.host().attach(1).await.unwrap_err());
-    assert!(words.contains("held by the node itself"), "{words}");
+    assert!(words.contains("used by the node itself"), "{words}");
     let words = refused(place.host().attach(255).await.unwrap_err());
     assert!(
-        words.contains("101.1.255 does not name one component"),
+        words.contains("101.1.255 is not a single component"),
         "{words}"
     );
     assert!(node.attach(33).is_err());
@@ -213,7 +213,7 @@ async fn what_is_to_be_acknowledged_is_refused_where_there_is_no_room_for_it() {
     for _ in 0..limit {
         here.send(message(&here, full.id(), b"x")).unwrap();
     }
-    // Behind all of these, since components are served in the order of their messages.
+    // After all of these, because components are served in the order of their messages.
     assert_eq!(
         within_limit(here.deliver(message(&here, there.id(), b"x"))).await,
         Ok(())
@@ -233,7 +233,7 @@ async fn a_flush_ends_also_when_another_sender_writes_what_waits() {
     let _node = place.node();
     let port = place.host().attach(33).await.unwrap();
     let nobody = JausId::new(101, 1, 200);
-    // Written at once; the second waits for the task's turn.
+    // Written at once; the second waits until the task runs.
     port.send(message(&port, nobody, b"one")).unwrap();
     port.send(message(&port, nobody, b"two")).unwrap();
     let sender = port.sender();
@@ -243,7 +243,7 @@ async fn a_flush_ends_also_when_another_sender_writes_what_waits() {
         flushed.as_mut().poll(&mut look).is_pending(),
         "the second still waits"
     );
-    // So much that its sender writes all that waits, before the task has had its turn.
+    // So much that the sender writes the whole backlog before the task runs.
     port.send(message(&port, nobody, [0; 20_000])).unwrap();
     assert!(
         flushed.as_mut().poll(&mut look).is_ready(),

@@ -35,7 +35,7 @@ async fn a_directory_that_others_can_change_is_refused_with_the_remedy() {
         error.contains("mode is 775") && error.contains("chmod 700"),
         "{error}"
     );
-    // Where only owners can remove what is theirs, nobody can put a socket in the place of ours.
+    // In a sticky directory, no other user can replace our socket.
     fs::set_permissions(&directory, Permissions::from_mode(0o1777)).unwrap();
     place.node();
 }
@@ -76,7 +76,7 @@ async fn a_file_in_the_sockets_place_is_left_alone() {
     let place = Place::new();
     fs::write(place.path(), "precious").unwrap();
     let error = error(&place);
-    assert!(error.contains("is no socket"), "{error}");
+    assert!(error.contains("is not a socket"), "{error}");
     assert_eq!(fs::read_to_string(place.path()).unwrap(), "precious");
 }
 

@@ -38,7 +38,7 @@ impl Place {
         Host::at(self.address())
     }
 
-    /// A node that stays on this host and hears nobody by multicast.
+    /// A node that stays on this host, without multicast.
     pub(crate) fn config(&self) -> Config {
         Config::loopback(101, 1)
             .group(Group::Off)
@@ -77,7 +77,7 @@ pub(crate) async fn component_event(
     .await
 }
 
-/// A message from a port, with code 4D00h, which belongs to nobody.
+/// A message from a port, with the unassigned code 4D00h.
 pub(crate) fn message(from: &Port, to: JausId, body: impl AsRef<[u8]>) -> Outgoing {
     let payload = [&[0x00, 0x4D], body.as_ref()].concat();
     Outgoing::new(from.id(), to, Bytes::from(payload))

@@ -52,7 +52,8 @@ impl Actor {
         self.child.id().expect("it runs")
     }
 
-    /// Sends a signal, by its name. The shell has `kill` built in, even where nobody else has it.
+    /// Sends a signal, by its name. The shell has a built-in `kill`, even where no program is
+    /// installed.
     async fn signal(&self, name: &str) {
         let command = format!("kill -{name} {}", self.pid());
         let status = Command::new("sh").args(["-c", &command]).status().await;
@@ -64,7 +65,7 @@ impl Actor {
     }
 }
 
-/// Not a test of its own: does nothing unless another test starts it in a role.
+/// Not a test by itself: does nothing unless another test starts it in a role.
 #[tokio::test]
 async fn a_process_that_plays_a_part() {
     let (Ok(role), Some(socket)) = (std::env::var(ROLE.0), std::env::var_os(ROLE.1)) else {
@@ -72,7 +73,7 @@ async fn a_process_that_plays_a_part() {
     };
     let socket = std::path::PathBuf::from(socket);
     let address = jaus::node::Address::Path(socket);
-    // Not for ever, should the test that waits for this process be killed.
+    // With a limit, in case the test that waits for this process is killed.
     let play = async {
         match role.as_str() {
             "node" => run_node(address).await,
@@ -96,7 +97,7 @@ async fn echo(host: Host) {
     while let Some(heard) = port.recv().await {
         let answer = message(&port, heard.source, &heard.payload[2..]);
         match port.send(answer) {
-            // The node has gone; the library connects again.
+            // The node is gone; the library reconnects.
             Ok(_) | Err(SendError::NotConnected(_)) => {}
             Err(error) => panic!("{error}"),
         }
@@ -274,14 +275,14 @@ async fn a_component_whose_id_was_taken_meanwhile_is_told_and_gets_it_when_it_is
 
     let node = place.node();
     let Ok(thief) = node.attach(33) else {
-        // The component was back first.
+        // The component reattached first.
         return;
     };
     let refused = |event: &HostEvent| matches!(event, HostEvent::Refused { .. });
     let HostEvent::Refused { why } = host_event(&mut events, refused).await else {
         panic!()
     };
-    assert!(why.contains("101.1.33 is held by the node itself"), "{why}");
+    assert!(why.contains("101.1.33 is used by the node itself"), "{why}");
     drop(thief);
     host_event(&mut events, |event| *event == HostEvent::Back).await;
     assert!(port.is_connected());

@@ -37,7 +37,7 @@ fn read(stream: &mut UnixStream) -> Record {
     Record::decode(octets.into()).unwrap()
 }
 
-/// Does what blocks in a thread of its own, so that the node goes on.
+/// Runs a blocking function in its own thread, so the node keeps running.
 async fn blocking<T: Send + 'static>(what: impl FnOnce() -> T + Send + 'static) -> T {
     within_limit(tokio::task::spawn_blocking(what))
         .await
@@ -97,7 +97,7 @@ async fn a_component_of_an_older_release_is_refused_with_the_reason() {
     assert_eq!(refused.head, Head::Refused(Reason::Version));
     let why = refused.text();
     assert!(
-        why.contains("speaks version 1") && why.contains("same release"),
+        why.contains("uses version 1") && why.contains("same release"),
         "{why}"
     );
 }
@@ -136,7 +136,7 @@ async fn a_connection_that_begins_with_something_else_is_closed() {
     .await;
     assert_eq!(read, 0);
     assert!(node.components().is_empty());
-    // A message before the first record is one, too.
+    // A message before the first record is one too.
     let path = place.path();
     let read = blocking(move || {
         let mut stream = UnixStream::connect(path).unwrap();

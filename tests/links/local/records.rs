@@ -23,7 +23,7 @@ fn flags() -> impl Strategy<Value = Flags> {
     any::<u8>().prop_map(Flags).prop_filter("a scope", known)
 }
 
-/// Mostly short, sometimes long enough for a buffer of its own.
+/// Mostly short, sometimes long enough for its own buffer.
 fn payload() -> impl Strategy<Value = Bytes> {
     let length = prop_oneof![8 => 0..100_usize, 2 => 4000..4200_usize, 1 => 8000..LIMIT - 100];
     (length, any::<u8>()).prop_map(|(length, octet)| vec![octet; length].into())

@@ -10,7 +10,7 @@
 #![expect(
     clippy::expect_used,
     clippy::disallowed_methods,
-    reason = "a benchmark: it owns the clock, and ends at the first surprise"
+    reason = "a benchmark owns the clock and panics on failure"
 )]
 
 use std::fs;

@@ -16,37 +16,38 @@ use jaus_view::{JournalFormat, JournalSettings};
 
 #[derive(Args)]
 struct Flags {
-    /// Pass nothing on between links; otherwise what comes by one of them (an interface, a
-    /// connection, a serial line) goes on to where it belongs
+    /// Do not route between links; by default messages are routed between interfaces, connections
+    /// and serial lines
     #[arg(long)]
     no_forward: bool,
 
-    /// A serial line, such as a radio's; baud is 115200 unless it is said (repeatable)
+    /// A serial line, such as a radio modem; BAUD defaults to 115200 (repeatable)
     #[arg(long, value_name = "DEVICE[:BAUD]", value_parser = line)]
     serial: Vec<serial::Settings>,
 
-    /// Let component processes of this host attach to the node; ADDRESS is a socket's path, or a
-    /// port of loopback such as 127.0.0.1:37940 [default: the usual place]
+    /// Let component processes of this host attach to the node; ADDRESS is a socket path or a
+    /// loopback port such as 127.0.0.1:37940 [default: the usual place]
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "default")]
     local: Option<Local>,
 
-    /// Where `jaus watch` and others may look on, or off [default: 127.0.0.1:8794, if that is free]
+    /// Where to serve the debug view for `jaus watch` and others, or off [default: 127.0.0.1:8794
+    /// if free]
     #[arg(long, value_name = "ADDRESS")]
     debug: Option<Debug>,
 
-    /// Keep a log of everything that passes in this directory, for `jaus watch` and Wireshark
+    /// Record all traffic in this directory, for `jaus watch` and Wireshark
     #[arg(long, value_name = "DIRECTORY")]
     log: Option<PathBuf>,
 
-    /// All files of the log together; the oldest go first
+    /// Limit on the size of all log files together; the oldest are deleted first
     #[arg(long, value_name = "SIZE", default_value = "1GiB", value_parser = units::size)]
     log_limit: usize,
 
-    /// Begin another file after this time at the latest
+    /// Start a new log file after this time at the latest
     #[arg(long, value_name = "TIME", default_value = "1h", value_parser = units::duration)]
     log_age: Duration,
 
-    /// Log whole messages as lines of JSON instead of packets
+    /// Log whole messages as JSON lines instead of packets
     #[arg(long)]
     log_json: bool,
 }
@@ -76,7 +77,7 @@ fn line(text: &str) -> Result<serial::Settings, String> {
     let (device, baud) = match text.rsplit_once(':') {
         Some((device, baud)) => {
             let baud = baud.parse().map_err(|_| {
-                format!("`{baud}` is no baud rate: write for example /dev/ttyUSB0:57600")
+                format!("`{baud}` is not a baud rate: write for example /dev/ttyUSB0:57600")
             })?;
             (device, Some(baud))
         }
@@ -90,7 +91,7 @@ fn line(text: &str) -> Result<serial::Settings, String> {
 impl Ready for Flags {
     const PROGRAM: &'static str = "jaus-communicator";
     const ABOUT: &'static str =
-        "The vehicle's node: routes, tells who is there, keeps the log, lets others look on";
+        "The vehicle's node: routing, discovery, traffic log and debug view";
     const EXAMPLES: &'static str = "Examples:\n  \
         jaus-communicator\n  \
         jaus-communicator --interface eth0 --interface wlan0\n  \
@@ -98,7 +99,7 @@ impl Ready for Flags {
         jaus-communicator --local                 components of this host attach (--attach)\n  \
         jaus-communicator --log /var/log/jaus --log-limit 200MiB\n  \
         jaus-communicator --config communicator.toml\n  \
-        jaus watch                                shows what passes";
+        jaus watch                                shows the traffic";
     const ID: JausId = JausId::new(101, 1, 35);
 
     fn for_node(&self) -> impl FnOnce(&mut Config) + 'static {

@@ -13,27 +13,27 @@ use jaus_vehicle::parts::{Part, PathDriver};
 
 #[derive(Args)]
 struct Flags {
-    /// The greatest speed in m/s, from 0.05 to 20, whatever is asked for
+    /// The maximum speed in m/s, from 0.05 to 20, whatever the path asks for
     #[arg(long, value_name = "M/S", default_value = "2", value_parser = |text: &str| between(text, 0.05, 20.0))]
     speed: f64,
 
-    /// The greatest turn rate in rad/s, from 0.05 to 10: slower in curves that need more
+    /// The maximum turn rate in rad/s, from 0.05 to 10; the vehicle slows down in tighter curves
     #[arg(long, value_name = "RAD/S", default_value = "1.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
     yaw_rate: f64,
 
-    /// How well the vehicle slows down before the end of the path, in m/s² from 0.05 to 20
+    /// Deceleration before the end of the path in m/s², from 0.05 to 20
     #[arg(long, value_name = "M/S²", default_value = "1", value_parser = |text: &str| between(text, 0.05, 20.0))]
     deceleration: f64,
 
-    /// Stop when the pose is older than this many seconds
+    /// Stop when the pose is older than this, in seconds
     #[arg(long, value_name = "SECONDS", default_value = "0.6", value_parser = seconds)]
     stale: Duration,
 
-    /// The authority with which the vector driver is controlled
+    /// The authority used to control the vector driver
     #[arg(long, value_name = "CODE", default_value = "100")]
     authority: u8,
 
-    /// After how many seconds control ends unless its client asks for it again; 0 for never
+    /// Control timeout in seconds: control ends unless the client renews it; 0 for never
     #[arg(long, value_name = "SECONDS", default_value = "3")]
     control_timeout: u8,
 }
@@ -41,10 +41,11 @@ struct Flags {
 impl Ready for Flags {
     const PROGRAM: &'static str = "jaus-local-path-segment-driver";
     const ABOUT: &'static str =
-        "Drive a vehicle along the path segments of a list by commanding its vector driver";
-    const EXAMPLES: &'static str = "Vector driver and local pose sensor are found by Discovery in the same subsystem, in any \
-        order of start. Clients set the list (List Manager) and execute it.\n\nExamples:\n  \
-        jaus-local-path-segment-driver --loopback   for trying things out on one computer\n  \
+        "Drive a vehicle along a list of path segments by commanding its vector driver";
+    const EXAMPLES: &'static str = "Discovery finds the vector driver and the local pose sensor \
+        in the same subsystem; they may start in any order. Clients set the list (List Manager) \
+        and execute it.\n\nExamples:\n  \
+        jaus-local-path-segment-driver --loopback   for trying it on one computer\n  \
         jaus-local-path-segment-driver --attach     on the node of this host";
     const ID: JausId = JausId::new(101, 48, 48);
 

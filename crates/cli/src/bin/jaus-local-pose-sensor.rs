@@ -14,31 +14,32 @@ use jaus_vehicle::parts::{Part, PoseSensor};
 
 #[derive(Args)]
 struct Flags {
-    /// Keep the pose in this file, and go on from there when started again
+    /// Save the pose to this file and restore it at the next start
     #[arg(long, value_name = "FILE")]
     state: Option<PathBuf>,
 
-    /// Where the vehicle is if nothing is kept: metres along X (north) and Y (east), and degrees
-    /// clockwise from X
+    /// The initial pose if none was saved: X (north) and Y (east) in metres, and degrees clockwise
+    /// from X
     #[arg(long, value_name = "X,Y,HEADING", default_value = "0,0,0", value_parser = pose, allow_hyphen_values = true)]
     at: Pose,
 
-    /// How often to ask for the travel of the wheels, in hertz from 1 to 100
+    /// How often to query wheel odometry, in hertz from 1 to 100
     #[arg(long, value_name = "HZ", default_value = "25", value_parser = |text: &str| between(text, 1.0, 100.0))]
     rate: f64,
 
-    /// Tell no pose any more when the wheels have not been heard for so many seconds
+    /// Stop reporting the pose after this many seconds without wheel odometry
     #[arg(long, value_name = "SECONDS", default_value = "0.3", value_parser = seconds)]
     silence: Duration,
 }
 
 impl Ready for Flags {
     const PROGRAM: &'static str = "jaus-local-pose-sensor";
-    const ABOUT: &'static str = "Tell where a vehicle is, reckoned from the travel of its wheels";
-    const EXAMPLES: &'static str = "The wheels are found by Discovery: whoever offers Wheel Odometry in the same \
-        subsystem, such as jaus-primitive-driver. A client that controls the sensor may tell it the pose.\n\nExamples:\n  \
-        jaus-local-pose-sensor --loopback --state pose.toml   goes on where it was when started again\n  \
-        jaus-local-pose-sensor --attach --at 10,-5,90         begins at x 10 m, y -5 m, looking east";
+    const ABOUT: &'static str = "Report a vehicle's local pose from wheel odometry";
+    const EXAMPLES: &'static str = "Discovery finds a component with Wheel Odometry in the same \
+        subsystem, such as jaus-primitive-driver. The client in control of the sensor may set the \
+        pose.\n\nExamples:\n  \
+        jaus-local-pose-sensor --loopback --state pose.toml   restores the pose after a restart\n  \
+        jaus-local-pose-sensor --attach --at 10,-5,90         x 10 m, y -5 m, heading east";
     const ID: JausId = JausId::new(101, 41, 41);
 
     fn part(self) -> Result<impl Part, Failure> {

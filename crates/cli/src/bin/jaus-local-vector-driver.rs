@@ -13,7 +13,7 @@ use jaus_vehicle::parts::{Part, VectorDriver};
 
 #[derive(Args)]
 struct Flags {
-    /// The vehicle's speed at full effort in m/s, from 0.05 to 20; half of it backwards
+    /// The vehicle's speed at full effort in m/s, from 0.05 to 20; half of that in reverse
     #[arg(long, value_name = "M/S", default_value = "2", value_parser = |text: &str| between(text, 0.05, 20.0))]
     speed: f64,
 
@@ -21,23 +21,23 @@ struct Flags {
     #[arg(long, value_name = "RAD/S", default_value = "1.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
     yaw_rate: f64,
 
-    /// The greatest acceleration in m/s², from 0.05 to 20; it slows down twice as well
+    /// The maximum acceleration in m/s², from 0.05 to 20; it brakes twice as hard
     #[arg(long, value_name = "M/S²", default_value = "1", value_parser = |text: &str| between(text, 0.05, 20.0))]
     acceleration: f64,
 
-    /// Stop when it has not been commanded for so many seconds
+    /// Command timeout in seconds: stop when no command arrives for this long
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
     silence: Duration,
 
-    /// Stop when pose or velocity are older than this many seconds
+    /// Stop when pose or velocity is older than this, in seconds
     #[arg(long, value_name = "SECONDS", default_value = "0.6", value_parser = seconds)]
     stale: Duration,
 
-    /// The authority with which the primitive driver is controlled
+    /// The authority used to control the primitive driver
     #[arg(long, value_name = "CODE", default_value = "100")]
     authority: u8,
 
-    /// After how many seconds control ends unless its client asks for it again; 0 for never
+    /// Control timeout in seconds: control ends unless the client renews it; 0 for never
     #[arg(long, value_name = "SECONDS", default_value = "3")]
     control_timeout: u8,
 }
@@ -45,10 +45,11 @@ struct Flags {
 impl Ready for Flags {
     const PROGRAM: &'static str = "jaus-local-vector-driver";
     const ABOUT: &'static str =
-        "Keep a vehicle's speed and heading by commanding its primitive driver";
-    const EXAMPLES: &'static str = "Primitive driver, local pose sensor and velocity state sensor are found by Discovery in \
-        the same subsystem, in any order of start.\n\nExamples:\n  \
-        jaus-local-vector-driver --loopback            for trying things out on one computer\n  \
+        "Control a vehicle's speed and heading by commanding its primitive driver";
+    const EXAMPLES: &'static str = "Discovery finds the primitive driver, the local pose sensor \
+        and the velocity state sensor in the same subsystem; they may start in any \
+        order.\n\nExamples:\n  \
+        jaus-local-vector-driver --loopback            for trying it on one computer\n  \
         jaus-local-vector-driver --attach              on the node of this host\n  \
         jaus-local-vector-driver --speed 1 --stale 1   a slow vehicle with slow sensors";
     const ID: JausId = JausId::new(101, 44, 44);

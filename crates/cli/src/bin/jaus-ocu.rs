@@ -13,29 +13,29 @@ use jaus_vehicle::parts::Part;
 
 #[derive(Args)]
 struct Flags {
-    /// The subsystem of the vehicle to look at [default: the first that is discovered]
+    /// The vehicle's subsystem [default: the first one discovered]
     #[arg(long, value_name = "SUBSYSTEM", value_parser = clap::value_parser!(u16).range(1..=65534))]
     vehicle: Option<u16>,
 
-    /// The authority to ask for control with; the greater one wins
+    /// The authority used to request control; the higher authority wins
     #[arg(long, value_name = "CODE", default_value = "200")]
     authority: u8,
 
-    /// Where the page is, ADDRESS:PORT; other than at a loopback address, whoever changes the
-    /// vehicle needs a token [default: 127.0.0.1:8080 or the next port that is free]
+    /// Where to serve the page, ADDRESS:PORT; on any other than a loopback address, changing the
+    /// vehicle requires a token [default: 127.0.0.1:8080 or the next free port]
     #[arg(long, value_name = "ADDRESS")]
     listen: Option<SocketAddr>,
 
-    /// Take the token from this file of one line, and ask for it on the loopback interface, too
-    /// [default: made up and printed if one is needed]
+    /// Read the token from this one-line file and require it on the loopback interface too
+    /// [default: a generated token, printed if one is needed]
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
 
-    /// Ask for the token before anything is shown, not only before something is changed
+    /// Require the token for viewing too, not only for changes
     #[arg(long)]
     token_to_read: bool,
 
-    /// A name under which browsers reach this machine, beside its addresses; may be repeated
+    /// A host name by which browsers reach this machine, besides its addresses (repeatable)
     #[arg(long, value_name = "NAME")]
     host: Vec<String>,
 }
@@ -43,7 +43,7 @@ struct Flags {
 impl Ready for Flags {
     const PROGRAM: &'static str = "jaus-ocu";
     const ABOUT: &'static str =
-        "The operator's station: watch, control and drive a vehicle from a browser";
+        "Operator control unit: watch, control and drive a vehicle from a browser";
     const EXAMPLES: &'static str = "Examples:\n  \
         jaus-ocu --loopback                        for a vehicle on this computer\n  \
         jaus-ocu --listen 0.0.0.0:8080             for tablets; prints the address with a token\n  \
@@ -60,8 +60,8 @@ impl Ready for Flags {
         let is_loopback = self.listen.is_none_or(|it| it.ip().is_loopback());
         if self.token_to_read && token.is_none() && is_loopback {
             return Err(Failure::new(
-                "--token-to-read: on the loopback interface there is no token without --token-file; \
-                 name a file that holds one",
+                "--token-to-read: the loopback interface has no token without --token-file; name \
+                 a file that holds one",
             ));
         }
         Ok(Station {

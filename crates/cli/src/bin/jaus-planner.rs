@@ -12,65 +12,67 @@ use jaus_vehicle::parts::{Part, Planner};
 
 #[derive(Args)]
 struct Flags {
-    /// How wide the vehicle is, in metres, from 0 to 100
+    /// The vehicle's width in metres, from 0 to 100
     #[arg(long, value_name = "METRES", default_value = "0.6", value_parser = |text: &str| between(text, 0.0, 100.0))]
     width: f64,
 
-    /// How much room it is to have on both sides, in metres, from 0 to 100
+    /// Clearance to keep on each side, in metres, from 0 to 100
     #[arg(long, value_name = "METRES", default_value = "0.1", value_parser = |text: &str| between(text, 0.0, 100.0))]
     margin: f64,
 
-    /// The greatest speed in m/s, from 0.01 to 100, of missions that choose none
+    /// The maximum speed in m/s, from 0.01 to 100, for missions that set none
     #[arg(long, value_name = "M/S", default_value = "1", value_parser = |text: &str| between(text, 0.01, 100.0))]
     speed: f64,
 
-    /// How far from the straight line of a segment the vehicle may be, in metres, from 0.01 to 10
+    /// Cross-track tolerance: the allowed distance from a segment's line, in metres, from 0.01 to
+    /// 10
     #[arg(long, value_name = "METRES", default_value = "0.3", value_parser = |text: &str| between(text, 0.01, 10.0))]
     tolerance: f64,
 
-    /// What the map is called that is planned on; if the store has only one, it is taken anyway
+    /// The name of the map to plan on; if the store has only one map, that one is used
     #[arg(long, value_name = "NAME", default_value = "traversability")]
     map: String,
 
-    /// How often a mission is begun at most, when a stage is blocked
+    /// The maximum number of attempts at a mission when a stage is blocked
     #[arg(long, value_name = "COUNT", default_value = "3", value_parser = clap::value_parser!(u8).range(1..))]
     attempts: u8,
 
-    /// Seconds from a blocked attempt to the next
+    /// Seconds to wait after a blocked attempt
     #[arg(long, value_name = "SECONDS", default_value = "3", value_parser = runtime::seconds)]
     pause: Duration,
 
-    /// Seconds that a stage may take to begin, or to come back
+    /// Seconds a stage may take to start or to recover
     #[arg(long, value_name = "SECONDS", default_value = "15", value_parser = runtime::seconds)]
     patience: Duration,
 
-    /// Seconds that the vehicle may drive without getting on
+    /// Seconds the vehicle may drive without progress
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = runtime::seconds)]
     stall: Duration,
 
-    /// What the vehicle does when the operator's link is lost: stop; hold its position, and keep the
-    /// mission for a new operator's approval; or return along the driven path
+    /// What to do when the operator's link is lost: stop; hold position and keep the mission for a
+    /// new operator's approval; or return along the driven path
     #[arg(long, value_name = "POLICY", default_value = "stop", value_parser = lost_link)]
     lost_link: LostLink,
 
-    /// With which authority the path segment driver is controlled; an operator with a greater one
-    /// can take over
+    /// The authority used to control the path segment driver; an operator with a higher one can
+    /// take over
     #[arg(long, value_name = "CODE", default_value = "100")]
     authority: u8,
 
-    /// The least authority that an operator needs to control the planner
+    /// The minimum authority an operator needs to control the planner
     #[arg(long, value_name = "CODE", default_value = "1")]
     least_authority: u8,
 }
 
 impl Ready for Flags {
     const PROGRAM: &'static str = "jaus-planner";
-    const ABOUT: &'static str = "Plan missions over the map, and have them driven";
+    const ABOUT: &'static str = "Plan missions on the map and execute them";
     const EXAMPLES: &'static str = "\
-        It finds the knowledge store, the pose sensor and the drivers in its own subsystem, in any \
-        order of start.\nAn operator takes control of it, sets a destination and approves the path.\n\n\
+        It finds the knowledge store, the pose sensor and the drivers in its own subsystem; they \
+        may start in any order.\nAn operator takes control of it, sets a destination and approves \
+        the path.\n\n\
         Examples:\n  \
-        jaus-planner --loopback               for trying things out on one computer\n  \
+        jaus-planner --loopback               for trying it on one computer\n  \
         jaus-planner --attach                 on the node of this host (jaus-communicator --local)\n  \
         jaus-planner --width 1.2 --margin 0.3 for a larger vehicle\n  \
         jaus-planner --config planner.toml    flags from a file: in [component], width = 1.2";

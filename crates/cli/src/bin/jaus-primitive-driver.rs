@@ -15,7 +15,7 @@ use jaus_vehicle::parts::{Motors, Part, PrimitiveDriver, Stop};
 
 #[derive(Args)]
 struct Flags {
-    /// The speed at full effort in m/s, from 0.05 to 20; half of it backwards
+    /// The speed at full effort in m/s, from 0.05 to 20; half of that in reverse
     #[arg(long, value_name = "M/S", default_value = "2", value_parser = |text: &str| between(text, 0.05, 20.0))]
     speed: f64,
 
@@ -23,20 +23,20 @@ struct Flags {
     #[arg(long, value_name = "RAD/S", default_value = "1.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
     yaw_rate: f64,
 
-    /// Metres between the left and the right wheels, as it counts in turns, from 0.05 to 10
+    /// The effective track width between left and right wheels in metres, from 0.05 to 10
     #[arg(long, value_name = "M", default_value = "0.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
     track: f64,
 
-    /// Stop the motors when no effort has come for so many seconds
+    /// Command timeout in seconds: stop the motors when no effort arrives for this long
     #[arg(long, value_name = "SECONDS", default_value = "0.5", value_parser = seconds)]
     silence: Duration,
 
-    /// The motors brake by themselves when the program has not repeated its command for so many
-    /// seconds, because it hangs
+    /// Motor watchdog in seconds: the motors brake if the program hangs and stops repeating its
+    /// command
     #[arg(long, value_name = "SECONDS", default_value = "0.2", value_parser = seconds)]
     deadline: Duration,
 
-    /// After how many seconds control ends unless its client asks for it again; 0 for never
+    /// Control timeout in seconds: control ends unless the client renews it; 0 for never
     #[arg(long, value_name = "SECONDS", default_value = "3")]
     control_timeout: u8,
 
@@ -55,26 +55,27 @@ struct Flags {
 #[derive(Args)]
 #[command(next_help_heading = "Simulated motors")]
 struct Simulation {
-    /// After how many seconds a motor has come within a third of its speed, from 0.01 to 10
+    /// The motors' time constant in seconds, from 0.01 to 10
     #[arg(long, value_name = "SECONDS", default_value = "0.25", value_parser = |text: &str| between(text, 0.01, 10.0))]
     response: f64,
 
-    /// How uneven the motors are, as a share of their strength from 0 to 0.5
+    /// How unequal the motors are, as a fraction of their strength from 0 to 0.5
     #[arg(long, value_name = "SHARE", default_value = "0", value_parser = |text: &str| between(text, 0.0, 0.5))]
     noise: f64,
 
-    /// Which unevenness it is: the same number gives the same one
+    /// Random seed of --noise: the same seed gives the same motors
     #[arg(long, default_value = "1")]
     seed: u64,
 }
 
 impl Ready for Flags {
     const PROGRAM: &'static str = "jaus-primitive-driver";
-    const ABOUT: &'static str = "Drive the wheels of a vehicle with the efforts that its controller sets, and count their travel";
+    const ABOUT: &'static str = "Drive a vehicle's wheels with the efforts its client sets, and \
+        report wheel odometry";
     const EXAMPLES: &'static str = "Examples:\n  \
-        jaus-primitive-driver --loopback            simulated wheels, for trying things out\n  \
+        jaus-primitive-driver --loopback            simulated wheels, for trying it\n  \
         jaus-primitive-driver --attach              on the node of this host\n  \
-        jaus-primitive-driver --noise 0.1 --seed 7  with motors that are uneven";
+        jaus-primitive-driver --noise 0.1 --seed 7  with unequal motors";
     const ID: JausId = JausId::new(101, 33, 33);
 
     fn part(self) -> Result<impl Part, Failure> {
@@ -135,30 +136,30 @@ mod gpio {
     #[derive(Args)]
     #[command(next_help_heading = "Stepper motors on GPIO lines")]
     pub(super) struct Gpio {
-        /// The chip that the motors' drivers are on, such as /dev/gpiochip0; simulated motors without it
+        /// The GPIO chip of the motor drivers, such as /dev/gpiochip0 [default: simulated motors]
         #[arg(long, value_name = "CHIP", requires_all = ["left", "right"])]
         gpio: Option<PathBuf>,
 
-        /// Lines of the left motor: pulses, direction
+        /// The left motor's lines: step, direction
         #[arg(long, value_name = "STEP,DIRECTION", value_parser = lines, requires = "gpio")]
         left: Option<(u32, u32)>,
 
-        /// Lines of the right motor, which is mounted the other way round
+        /// The right motor's lines; that motor is mounted mirrored
         #[arg(long, value_name = "STEP,DIRECTION", value_parser = lines, requires = "gpio")]
         right: Option<(u32, u32)>,
 
         /// A stop input: a normally closed contact between this line and ground, such as
-        /// /dev/gpiochip0:5. An open contact or a cut wire stops the motors; closed again, it ends all
-        /// emergencies
+        /// /dev/gpiochip0:5. An open contact or a broken wire stops the motors; closing it again
+        /// clears all emergencies
         #[arg(long, value_name = "CHIP:LINE", value_parser = chip_and_line, conflicts_with = "stop_file")]
         pub(super) stop_line: Option<(PathBuf, u32)>,
 
-        /// Pulses for a metre of travel, from 1 to 1000000
+        /// Step pulses per metre of travel, from 1 to 1000000
         #[arg(long, value_name = "PULSES", default_value = "2546", value_parser = |text: &str| between(text, 1.0, 1e6))]
         steps_per_metre: f64,
 
-        /// Metres per second squared that the motors do without losing steps, from 0.01 to 100; twice
-        /// as much when they get slower
+        /// The maximum acceleration without lost steps in m/s², from 0.01 to 100; twice that when
+        /// braking
         #[arg(long, value_name = "M/S²", default_value = "1", value_parser = |text: &str| between(text, 0.01, 100.0))]
         ramp: f64,
     }
@@ -183,9 +184,7 @@ mod gpio {
     fn chip_and_line(text: &str) -> Result<(PathBuf, u32), String> {
         let pair = text.rsplit_once(':').filter(|(chip, _)| !chip.is_empty());
         pair.and_then(|(chip, line)| Some((PathBuf::from(chip), line.parse().ok()?)))
-            .ok_or_else(|| {
-                "write a chip and the number of a line such as /dev/gpiochip0:5".to_owned()
-            })
+            .ok_or_else(|| "write a chip and a line number such as /dev/gpiochip0:5".to_owned())
     }
 
     fn lines(text: &str) -> Result<(u32, u32), String> {

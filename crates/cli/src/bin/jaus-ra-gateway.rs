@@ -22,26 +22,26 @@ use jaus_vehicle::parts::Part;
 
 #[derive(Args)]
 struct Flags {
-    /// How long a client waits for an answer from the other side, in seconds
+    /// The answer timeout from the other side, in seconds
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
     patience: Duration,
 
-    /// The most authority that is claimed of RA components, whatever the JAUS client has
+    /// The maximum authority used to control RA components, even if the JAUS client's is higher
     #[arg(long, value_name = "CODE", default_value = "255")]
     authority: u8,
 
-    /// Seconds without a Request Control after which a JAUS client's control of an RA component ends,
-    /// with a quarter's grace; 0 never ends it
+    /// Control timeout for JAUS clients of RA components in seconds, plus a grace of a quarter; 0
+    /// for never
     #[arg(long, value_name = "SECONDS", default_value = "4")]
     control_timeout: u8,
 
-    /// Show only this JAUS subsystem to RA systems (repeatable) [default: all that have a number
-    /// there]
+    /// Expose only this JAUS subsystem to RA systems (repeatable) [default: all that map to an RA
+    /// number]
     #[arg(long, value_name = "SUBSYSTEM", value_parser = clap::value_parser!(u16).range(1..=65534))]
     show: Vec<u16>,
 
-    /// When it ends, print who sees whom, and what was carried across and refused; with =TIME, such
-    /// as =10s, also each time that has passed
+    /// Print the address mapping and the counters of converted and refused messages at the end;
+    /// with =TIME, such as =10s, also at that interval
     #[arg(
         long,
         value_name = "TIME",
@@ -52,7 +52,7 @@ struct Flags {
     )]
     stats: Option<Duration>,
 
-    /// Print that as JSON, one object a line
+    /// Print --stats as JSON, one object a line
     #[arg(long, requires = "stats")]
     json: bool,
 
@@ -70,7 +70,7 @@ struct RaNetwork {
     #[arg(long, value_name = "INTERFACE")]
     ra_interface: Option<String>,
 
-    /// How messages for everybody are put into datagrams; those for one go the way that it speaks
+    /// The framing of multicast messages; unicast ones use the receiver's framing
     #[arg(long, value_enum, default_value = "auto")]
     framing: Framing,
 
@@ -78,23 +78,23 @@ struct RaNetwork {
     #[arg(long, value_name = "ADDRESS", default_value = "224.1.0.1:3794")]
     ra_group: Group,
 
-    /// A host of the RA network that multicast does not reach, by its IPv4 address: heartbeats and what
-    /// else goes to the group go to it, too (repeatable)
+    /// The IPv4 address of an RA host that multicast does not reach; it receives heartbeats and
+    /// other multicast messages by unicast (repeatable)
     #[arg(long, value_name = "ADDRESS")]
     ra_peer: Vec<Ipv4Addr>,
 
-    /// Our UDP port there. RA systems answer to 3794, whatever it is
+    /// Our UDP port there; RA systems always answer to 3794
     #[arg(long, value_name = "PORT", default_value_t = STANDARD_PORT)]
     ra_port: u16,
 
-    /// How many routers multicast may pass there
+    /// The TTL of multicast there
     #[arg(long, value_name = "HOPS", default_value = "32")]
     ra_ttl: u8,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Framing {
-    /// In all framings that are heard, and nothing before the first is heard
+    /// All framings received so far; nothing is sent before the first is received
     Auto,
     /// "JAUS01.0", JAUS_OPC_UDP_Interface of OpenJAUS
     Opc,
@@ -103,9 +103,9 @@ enum Framing {
 }
 
 #[derive(Args)]
-#[command(next_help_heading = "Who is who")]
+#[command(next_help_heading = "Address mapping")]
 struct Ids {
-    /// Add this to RA subsystems' numbers to get those by which JAUS sees them
+    /// Offset from an RA subsystem's number to its JAUS number
     #[arg(
         long,
         value_name = "NUMBER",
@@ -114,7 +114,7 @@ struct Ids {
     )]
     ra_offset: i32,
 
-    /// Add this to JAUS subsystems' numbers to get those by which RA systems see them
+    /// Offset from a JAUS subsystem's number to its RA number
     #[arg(
         long,
         value_name = "NUMBER",
@@ -123,20 +123,19 @@ struct Ids {
     )]
     jaus_offset: i32,
 
-    /// An RA subsystem that JAUS sees by another number, such as 20=1200 (repeatable)
+    /// Map an RA subsystem to a JAUS number, such as 20=1200 (repeatable)
     #[arg(long, value_name = "RA=JAUS", value_parser = pair::<u8, u16>)]
     ra_subsystem: Vec<(u8, u16)>,
 
-    /// A JAUS subsystem that RA systems see by another number, such as 4711=101 (repeatable)
+    /// Map a JAUS subsystem to an RA number, such as 4711=101 (repeatable)
     #[arg(long, value_name = "JAUS=RA", value_parser = pair::<u16, u8>)]
     jaus_subsystem: Vec<(u16, u8)>,
 
-    /// An RA component that JAUS sees by another id, such as 20.1.70.1=20.1.200 (repeatable)
+    /// Map an RA component to a JAUS id, such as 20.1.70.1=20.1.200 (repeatable)
     #[arg(long, value_name = "RA=JAUS", value_parser = pair::<RaId, JausId>)]
     ra_component: Vec<(RaId, JausId)>,
 
-    /// A JAUS component that RA systems see as another instance, such as 101.1.9=101.1.33.1
-    /// (repeatable)
+    /// Map a JAUS component to an RA instance, such as 101.1.9=101.1.33.1 (repeatable)
     #[arg(long, value_name = "JAUS=RA", value_parser = pair::<JausId, RaId>)]
     jaus_component: Vec<(JausId, RaId)>,
 }
@@ -149,7 +148,7 @@ where
 {
     let (from, to) = text
         .split_once('=')
-        .ok_or("write two numbers or ids with an equals sign between them, such as 20=1200")?;
+        .ok_or("write two numbers or ids separated by an equals sign, such as 20=1200")?;
     let from = from.parse();
     let to = to.parse();
     Ok((
@@ -160,14 +159,13 @@ where
 
 impl Ready for Flags {
     const PROGRAM: &'static str = "jaus-ra-gateway";
-    const ABOUT: &'static str =
-        "Show OpenJAUS 3.3 and other RA 3.x systems to JAUS, and JAUS components to them";
+    const ABOUT: &'static str = "Gateway between JAUS and OpenJAUS 3.3 or other RA 3.x systems";
     const EXAMPLES: &'static str = "Examples:\n  \
         jaus-ra-gateway --interface eth0                  both networks on one cable\n  \
         jaus-ra-gateway --interface eth0 --ra-interface eth1\n  \
         jaus-ra-gateway --interface eth0 --framing judp   for JUDP_Interface: true\n  \
         jaus-ra-gateway --interface eth0 --ra-peer 10.1.2.3   beyond a router\n  \
-        jaus-ra-gateway --interface eth0 --ra-offset 1000 RA subsystem 20 is 1020 among JAUS\n  \
+        jaus-ra-gateway --interface eth0 --ra-offset 1000 RA subsystem 20 becomes 1020\n  \
         jaus-ra-gateway --interface eth0 --show 101 --stats=10s";
     const ID: JausId = JausId::new(250, 1, 1);
     const KIND: Kind = Kind::OtherSubsystem;

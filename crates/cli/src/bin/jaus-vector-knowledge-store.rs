@@ -14,20 +14,20 @@ use jaus_vehicle::world::{Picture, Raster};
 
 #[derive(Args)]
 struct Flags {
-    /// The file that everything is kept in [default: knowledge-store.redb in $STATE_DIRECTORY,
-    /// $XDG_STATE_HOME/jaus or ~/.local/state/jaus]
+    /// The store's file [default: knowledge-store.redb in $STATE_DIRECTORY, $XDG_STATE_HOME/jaus or
+    /// ~/.local/state/jaus]
     #[arg(long, value_name = "FILE")]
     store: Option<PathBuf>,
 
-    /// If the file is damaged, keep it under another name and begin anew
+    /// If the file is damaged, rename it and start with an empty store
     #[arg(long)]
     set_broken_aside: bool,
 
-    /// Degrees of latitude of the local frame's origin, north positive
+    /// Latitude of the local frame's origin in degrees, north positive
     #[arg(long, value_name = "DEGREES", default_value = "0", allow_negative_numbers = true, value_parser = |text: &str| between(text, -90.0, 90.0))]
     latitude: f64,
 
-    /// Degrees of longitude of the local frame's origin, east positive
+    /// Longitude of the local frame's origin in degrees, east positive
     #[arg(long, value_name = "DEGREES", default_value = "0", allow_negative_numbers = true, value_parser = |text: &str| between(text, -180.0, 180.0))]
     longitude: f64,
 
@@ -35,20 +35,20 @@ struct Flags {
     map: Map,
 }
 
-/// A map to begin with, unless there is one of its name already
+/// Initial map, unless a map of that name exists
 #[derive(Args)]
-#[command(next_help_heading = "A map to begin with, unless there is one of its name already")]
+#[command(next_help_heading = "Initial map, unless a map of that name exists")]
 struct Map {
-    /// A map of 16 x 16 cells around the origin, for trying things out
+    /// A demo map of 16 x 16 cells around the origin
     #[arg(long, conflicts_with = "import")]
     demo_map: bool,
 
-    /// A PGM picture (black is impassable), or text (# impassable, . free, 0 to 9 in between); north
-    /// at the top
+    /// Import a PGM image (black is impassable) or text (# impassable, . free, 0 to 9 in between),
+    /// north at the top
     #[arg(long, value_name = "FILE")]
     import: Option<PathBuf>,
 
-    /// What the imported map is called
+    /// The imported map's name
     #[arg(
         long,
         value_name = "NAME",
@@ -57,24 +57,24 @@ struct Map {
     )]
     map_name: String,
 
-    /// Metres of a side of its cells, from 0.001 to 1000
+    /// The side of a cell in metres, from 0.001 to 1000
     #[arg(long, value_name = "M", default_value = "1", requires = "import", value_parser = |text: &str| between(text, 0.001, 1000.0))]
     cell: f64,
 
-    /// X of its south-western corner in metres, to the north [default: its middle is the origin]
+    /// X (north) of its south-western corner in metres [default: the map is centred on the origin]
     #[arg(long, value_name = "M", requires = "import", allow_negative_numbers = true, value_parser = |text: &str| between(text, -1e7, 1e7))]
     x: Option<f64>,
 
-    /// Y of its south-western corner in metres, to the east [default: its middle is the origin]
+    /// Y (east) of its south-western corner in metres [default: the map is centred on the origin]
     #[arg(long, value_name = "M", requires = "import", allow_negative_numbers = true, value_parser = |text: &str| between(text, -1e7, 1e7))]
     y: Option<f64>,
 }
 
 impl Ready for Flags {
     const PROGRAM: &'static str = "jaus-vector-knowledge-store";
-    const ABOUT: &'static str = "Keep the objects and maps of a vehicle, and tell of them";
+    const ABOUT: &'static str = "Store a vehicle's objects and maps, and serve queries on them";
     const EXAMPLES: &'static str = "Examples:\n  \
-        jaus-vector-knowledge-store --loopback --demo-map     for trying things out\n  \
+        jaus-vector-knowledge-store --loopback --demo-map     for trying it\n  \
         jaus-vector-knowledge-store --import yard.pgm --cell 0.25\n  \
         jaus-vector-knowledge-store --attach --store /var/lib/jaus/world.redb";
     const ID: JausId = JausId::new(101, 61, 61);
@@ -103,7 +103,7 @@ impl Map {
         };
         if self.map_name.len() > Raster::MOST_NAME {
             return Err(Failure::new(
-                "--map-name has more than 255 octets; shorten it",
+                "--map-name is longer than 255 octets; shorten it",
             ));
         }
         let octets = std::fs::read(&file).map_err(|error| Failure::file(&file, &error))?;

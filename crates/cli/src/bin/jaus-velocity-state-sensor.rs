@@ -12,21 +12,21 @@ use jaus_vehicle::parts::{Part, VelocitySensor};
 
 #[derive(Args)]
 struct Flags {
-    /// How often to ask for the travel of the wheels, in hertz from 1 to 100
+    /// How often to query wheel odometry, in hertz from 1 to 100
     #[arg(long, value_name = "HZ", default_value = "25", value_parser = |text: &str| between(text, 1.0, 100.0))]
     rate: f64,
 
-    /// Tell no velocity any more when the wheels have not been heard for so many seconds
+    /// Stop reporting the velocity after this many seconds without wheel odometry
     #[arg(long, value_name = "SECONDS", default_value = "0.3", value_parser = seconds)]
     silence: Duration,
 }
 
 impl Ready for Flags {
     const PROGRAM: &'static str = "jaus-velocity-state-sensor";
-    const ABOUT: &'static str = "Tell how fast a vehicle moves, as the travel of its wheels says";
-    const EXAMPLES: &'static str = "The wheels are found by Discovery: whoever offers Wheel Odometry in the same \
+    const ABOUT: &'static str = "Report a vehicle's velocity from wheel odometry";
+    const EXAMPLES: &'static str = "Discovery finds a component with Wheel Odometry in the same \
         subsystem, such as jaus-primitive-driver.\n\nExamples:\n  \
-        jaus-velocity-state-sensor --loopback   for trying things out on one computer\n  \
+        jaus-velocity-state-sensor --loopback   for trying it on one computer\n  \
         jaus-velocity-state-sensor --attach     on the node of this host";
     const ID: JausId = JausId::new(101, 42, 42);
 

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-/// Browsers so far: each has a profile of its own.
+/// Browsers so far: each has its own profile.
 static BROWSERS: AtomicU32 = AtomicU32::new(0);
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(60);
@@ -369,7 +369,7 @@ impl Browser {
 
     /// Keeps a picture of the page in `target/e2e-screenshots`.
     pub(crate) fn screenshot(&mut self, name: &str) {
-        // While the page takes another size there is nothing to take a picture of.
+        // While the page resizes, no screenshot is possible.
         let png = json!({ "format": "png" });
         let mut shots = (0..20).map(|_| {
             std::thread::sleep(PERIOD);

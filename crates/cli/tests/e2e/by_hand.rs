@@ -28,7 +28,7 @@ impl Running {
         let read = |source: Box<dyn std::io::Read + Send>| {
             let sender = sender.clone();
             std::thread::spawn(move || {
-                // The program may go on talking when nobody listens any more.
+                // The program may keep printing after the reader is gone.
                 for line in BufReader::new(source).lines().map_while(Result::ok) {
                     let _ = sender.send(line);
                 }

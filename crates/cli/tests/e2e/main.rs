@@ -102,8 +102,8 @@ fn plan(page: &mut Browser, north: f64, east: f64) {
     page.wait("document.querySelector('#destination-x').value !== ''");
     page.write("#destination-x", &north.to_string());
     page.write("#destination-y", &east.to_string());
-    // Right after control was taken the planner may not be ready yet; then the page says so, and
-    // whoever wants a route presses again.
+    // Right after control is taken the planner may not be ready; the page then says so, and the
+    // operator presses again.
     let planned = "!document.querySelector('#approve').disabled";
     page.press("#plan");
     if !page.holds_within(Duration::from_secs(5), planned) {
@@ -124,7 +124,7 @@ fn says_that_the_planner_is_gone(system: &System, page: &mut Browser) {
     system.kill("jaus-planner");
     let line = "document.querySelector('#mission-line').textContent";
     page.wait(&format!("/planner [0-9.]+ is (gone|silent)/.test({line})"));
-    page.wait(&format!("{line}.includes('was told to stop')"));
+    page.wait(&format!("{line}.includes('was stopped')"));
     page.wait("document.querySelector('#missing').textContent.includes('Planner')");
     look_from_all_screens(page, "3-planner-gone");
     page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
@@ -137,7 +137,7 @@ fn take_over_by_keyboard(page: &mut Browser) {
     page.press("[data-show=drive]");
     page.key_down("KeyW", "w");
     page.wait(
-        "document.querySelector('#drive-line').textContent.includes('the vehicle is driven')",
+        "document.querySelector('#drive-line').textContent.includes('commands are being sent')",
     );
     page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
     page.screenshot("4-keyboard");

@@ -6,7 +6,7 @@ use crate::browser::{Browser, SCREENS};
 
 /// Takes control unless it is held already, and has the vehicle ready.
 pub(crate) fn take_control(page: &mut Browser) {
-    // What is asked for already comes by itself; the button would take that back.
+    // The request is pending; the button would cancel it.
     if page.value("document.body.dataset.control") == "none" {
         page.press("#control-button");
     }

@@ -215,7 +215,7 @@ impl Drop for System {
             let _ = child.wait();
         }
         for name in &self.names {
-            // Not there if setting up failed half-way.
+            // Missing if the setup failed halfway.
             let _ = ip(&["netns", "delete", name]);
         }
         let _ = std::fs::remove_dir_all(&self.directory);

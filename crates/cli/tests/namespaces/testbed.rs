@@ -101,7 +101,7 @@ impl Testbed {
 impl Drop for Testbed {
     fn drop(&mut self) {
         for host in Host::ALL {
-            // Not there if setting up failed half-way.
+            // Missing if the setup failed halfway.
             let _ = ip(&["netns", "delete", &self.name(host)]);
         }
     }

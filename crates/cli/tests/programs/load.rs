@@ -11,7 +11,7 @@ use serde_json::Value;
 /// A directory for one test, which is also the temporary directory of its programs.
 fn directory(name: &str) -> PathBuf {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    // That of an earlier run.
+    // Left from an earlier run.
     let _ = fs::remove_dir_all(&directory);
     fs::create_dir_all(&directory).unwrap();
     directory
@@ -91,7 +91,7 @@ fn a_killed_load_leaves_neither_processes_nor_sockets() {
     parent.wait().unwrap();
     block_until(|| {
         let mut paths = children.iter().map(|id| format!("/proc/{id}/stat"));
-        // What has ended waits as a zombie if nobody collects it.
+        // An ended process stays a zombie until it is reaped.
         paths.all(|path| fs::read_to_string(path).map_or(true, |stat| stat.contains(") Z ")))
     });
     block_until(|| sockets(&directory) == 0);
@@ -108,7 +108,7 @@ fn settings_that_cannot_be_are_refused_with_a_reason() {
         ),
         ("--rates 0", "from 1 to 10000000, or max"),
         ("--beside missing.json", "missing.json"),
-        ("--seconds 4000", "an hour at most"),
+        ("--seconds 4000", "write at most one hour"),
     ] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_jaus-tester"));
         command.arg("load").args(arguments.split(' '));

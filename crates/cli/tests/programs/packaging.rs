@@ -65,7 +65,7 @@ fn every_settings_file_is_understood_by_its_program() {
         let file = packaging(&format!("etc/{part}.toml"));
         let settings = jaus_cli::settings::read(&file);
         assert!(settings.is_ok(), "{}", settings.unwrap_err());
-        // The flags of the file, as the program sees them, and then its help instead of a start.
+        // The file's flags as the program receives them, then its help instead of a start.
         let tool = Path::new(env!("CARGO_BIN_EXE_jaus"));
         let mut program = Command::new(tool.with_file_name(format!("jaus-{part}")));
         let flags = jaus_cli::settings::flags(&file).unwrap();
@@ -93,7 +93,7 @@ fn no_unit_may_do_more_than_it_must() {
         let folder = packaging(&format!("systemd/jaus@{part}.service.d"));
         for file in std::fs::read_dir(folder).unwrap() {
             let text = std::fs::read_to_string(file.unwrap().path()).unwrap();
-            // Who sees devices sees those that are named, and no others.
+            // A unit with device access sees only the named devices.
             let opened = text.contains("PrivateDevices=no");
             assert_eq!(opened, text.contains("DevicePolicy=closed"), "{text}");
             for rights in [

@@ -101,7 +101,7 @@ fn a_program_reports_to_systemd_that_it_is_ready_alive_and_stopping() {
     for _ in 0..5 {
         assert_eq!(hear(LIMIT).as_deref(), Some("WATCHDOG=1"));
     }
-    // A program that hangs says nothing any more.
+    // A hung program prints nothing.
     program.signal("STOP");
     while hear(Duration::from_secs(2)).is_some() {}
     program.signal("CONT");

@@ -134,7 +134,7 @@ fn parts_find_each_other_and_one_that_is_killed_is_started_again() {
         found.starts_with("first  | ") || found.starts_with("second | "),
         "{found}"
     );
-    system.expect("Ctrl-C ends it");
+    system.expect("Press Ctrl-C to end");
 
     let second = &read_status(&status)["parts"][1];
     assert_eq!(
@@ -151,7 +151,7 @@ fn parts_find_each_other_and_one_that_is_killed_is_started_again() {
     );
     let told = system.expect("second ended after");
     assert!(
-        told.contains("SIGKILL") && told.contains("starts again in 0.5 s"),
+        told.contains("SIGKILL") && told.contains("restarts in 0.5 s"),
         "{told}"
     );
     system.expect("second | on lo");
@@ -178,7 +178,7 @@ fn wrong_flags_are_given_up_and_the_others_go_on() {
     let wrong = "[parts.wrong]\nprogram = \"jaus\"\narguments = [\"node\"]\nflags = { prot = 1 }\n";
     let file = folder.system(&(wrong.to_owned() + &shell("right", "echo here; exec sleep 60", "")));
     let mut system = System::start(&file, &[]);
-    system.expect("wrong says that it cannot begin (status 2)");
+    system.expect("wrong cannot start (status 2)");
     assert!(
         system
             .seen
@@ -192,7 +192,7 @@ fn wrong_flags_are_given_up_and_the_others_go_on() {
     system.signal("-INT");
     let (output, code) = system.end();
     assert_eq!(code, Some(1), "{output}");
-    assert!(!output.contains("starts again"), "{output}");
+    assert!(!output.contains("and restarts in"), "{output}");
 }
 
 #[test]
@@ -314,7 +314,7 @@ fn a_part_runs_where_and_with_what_the_file_says_and_drives_no_terminal() {
         "'--name=it'\\''s me' --speed=2",
         "a/b\n",
         "with COLOUR=blue green",
-        "1 part, nothing is wrong",
+        "1 part, no errors",
     ] {
         assert!(checked.stdout.contains(part), "{part}: {}", checked.stdout);
     }
@@ -344,7 +344,7 @@ fn what_is_wrong_is_told_before_anything_starts() {
             &format!("jaus: {file}:2: `progam = \"sh\"`: there is no setting `parts.a.progam`"),
             "did you mean `parts.a.program`?",
             &format!("jaus: {file}:4: "),
-            "there is no program `jaus-nothing`, neither beside jaus",
+            "there is no program `jaus-nothing`, neither in the directory of jaus",
         ] {
             assert!(run.stderr.contains(part), "{part}: {}", run.stderr);
         }

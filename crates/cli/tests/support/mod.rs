@@ -9,7 +9,7 @@
     clippy::unwrap_used,
     clippy::expect_used,
     clippy::panic,
-    reason = "these helpers are tests as well"
+    reason = "these helpers contain tests"
 )]
 
 use std::io::{BufRead, BufReader, Write};
@@ -83,7 +83,7 @@ pub fn run(arguments: &[&str], input: &[u8]) -> Run {
     }
 }
 
-/// A `jaus node`, or another command that runs until it is told to end.
+/// A `jaus node`, or another command that runs until it is stopped.
 pub struct Running {
     child: Child,
     stdout: BufReader<ChildStdout>,

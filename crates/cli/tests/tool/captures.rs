@@ -76,7 +76,7 @@ fn pcapng_blocks_that_are_not_packets_are_stepped_over() {
         section_header(),
         block(4, &[0; 8]),
         interface(RAW, &[]),
-        // Nanoseconds, and an option that nobody knows.
+        // Nanoseconds, and an unknown option.
         interface(
             RAW,
             &[9, 0, 1, 0, 9, 0, 0, 0, 99, 0, 2, 0, 1, 1, 0, 0, 0, 0, 0, 0],
@@ -85,7 +85,7 @@ fn pcapng_blocks_that_are_not_packets_are_stepped_over() {
         enhanced_packet(0, 1_433_781_418_436_918, &frame),
         enhanced_packet(1, 1_433_781_418_436_918_001, &frame),
         simple,
-        // A new section numbers its interfaces anew; this one counts in 1/1024 seconds.
+        // A new section restarts the interface numbers; this one counts in 1/1024 seconds.
         section_header(),
         interface(RAW, &[9, 0, 1, 0, 0x8a, 0, 0, 0]),
         enhanced_packet(0, 1_433_781_418 << 10 | 512, &frame),
@@ -108,7 +108,7 @@ fn a_damaged_pcapng_block_costs_no_other() {
         interface(RAW, &[]),
         enhanced_packet(7, 0, &frame),
         enhanced_packet(0, 0, &frame),
-        // Names that are not there.
+        // Names that do not exist.
         block(4, &[1, 0, 0xFF, 0xFF]),
         // Interface 0, no time, and 100 octets of which there are 8.
         block(
@@ -145,7 +145,7 @@ fn a_capture_cut_short_anywhere_gives_what_it_holds_and_then_an_error() {
         assert_eq!(lines[0]["message"], "QueryIdentification");
         assert_eq!(lines[1]["offset"], second);
         assert!(
-            lines[1]["error"].as_str().unwrap().contains("cut short"),
+            lines[1]["error"].as_str().unwrap().contains("truncated"),
             "{run:?}"
         );
         assert_eq!(run.status, 1);
@@ -157,10 +157,10 @@ fn a_capture_cut_short_anywhere_gives_what_it_holds_and_then_an_error() {
 #[test]
 fn what_is_no_capture_is_refused_with_advice() {
     for (input, advice) in [
-        (&b""[..], "it is empty"),
+        (&b""[..], "the file is empty"),
         (b"\x1f\x8b\x08\x00", "gunzip"),
         (b"hello, world", "pcap or pcapng"),
-        (&[0xd4, 0xc3, 0xb2, 0xa1, 2, 0], "cut short"),
+        (&[0xd4, 0xc3, 0xb2, 0xa1, 2, 0], "truncated"),
     ] {
         let run = decode(input);
         assert!(run.stderr.contains(advice), "{run:?}");
@@ -267,7 +267,7 @@ fn an_acknowledgement_has_no_message() {
 
 #[test]
 fn a_large_message_is_shown_in_parts_and_then_whole_in_both_styles() {
-    // Report Identification of a vehicle with a name of 30 letters, cut into three.
+    // Report Identification of a vehicle with a name of 30 letters, in three fragments.
     let whole = [&[0x00, 0x4B, 2, 0x11, 0x27, 30][..], &[b'v'; 30]].concat();
     let fragments = |code: &[u8]| {
         [

@@ -40,10 +40,10 @@ fn a_sound_network_is_found_sound_and_the_neighbours_are_named() {
         "{report}"
     );
     let ids = of(&report, "ids");
-    assert_eq!(ids[0]["what"], "nobody else has the id 108.1.1");
+    assert_eq!(ids[0]["what"], "no other node has the id 108.1.1");
 }
 
-/// Nobody who speaks AS5669A hears OpenJAUS: it has a group of its own.
+/// No AS5669A program receives OpenJAUS, which has its own multicast group.
 #[test]
 fn a_system_of_the_reference_architecture_is_named_with_the_way_to_it() {
     // Report Heartbeat Pulse of 20.1.35.1 to all node managers, as OpenJAUS sends it each second.
@@ -96,7 +96,7 @@ fn two_nodes_with_one_id_are_found() {
         ids[0]["what"]
             .as_str()
             .unwrap()
-            .starts_with("109.1.1 was heard from")
+            .starts_with("109.1.1 sends from")
     );
     assert!(
         ids[0]["advice"]

@@ -58,7 +58,7 @@ fn a_port_at_which_nobody_listens_is_told_at_once() {
     assert_eq!(run.status, 2, "{run:?}");
     let words = run.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
     let port = free.port();
-    let told = format!("127.0.0.1 says that nobody listens at UDP {port}");
+    let told = format!("127.0.0.1 reports UDP port {port} as closed");
     assert!(words.contains(&told), "{words}");
     assert!(
         words.ends_with("or it is bound to another address or port of that host."),

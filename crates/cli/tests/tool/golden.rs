@@ -119,7 +119,7 @@ fn a_json_line_that_cannot_be_written_gives_an_error_that_helps() {
         ),
         (
             "{\"message\":\"queryidentification\"}",
-            "perhaps QueryIdentification is meant",
+            "did you mean QueryIdentification?",
         ),
         (
             "{\"message\":\"QueryIdentification\",\"code\":\"4B00\"}",
@@ -143,7 +143,7 @@ fn a_json_line_that_cannot_be_written_gives_an_error_that_helps() {
         ("{\"code\":\"D001\"}", "D001h"),
         (
             "{\"error\":\"cut\",\"offset\":1}",
-            "there is no message here",
+            "this line is an error, not a message",
         ),
         ("[]", "not a JSON object"),
         ("{", "not a JSON object"),
@@ -195,7 +195,7 @@ fn a_service_that_is_named_must_exist() {
         b"",
     );
     assert!(
-        run.stderr.contains("perhaps urn:jaus:jss:core:Events"),
+        run.stderr.contains("did you mean urn:jaus:jss:core:Events"),
         "{}",
         run.stderr
     );

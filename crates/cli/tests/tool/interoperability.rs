@@ -23,7 +23,7 @@ fn every_settings_block_can_be_read_by_a_node() {
     for (number, block) in blocks.iter().enumerate() {
         let name = format!("jaus-interoperability-{}-{number}.toml", std::process::id());
         let file = std::env::temp_dir().join(name);
-        // Who has no id in a block gets one, as by a flag.
+        // A block without an id gets one, as by a flag.
         std::fs::write(&file, block).unwrap();
         let read = settings::read(&file);
         std::fs::remove_file(&file).unwrap();
@@ -48,7 +48,7 @@ fn every_command_and_flag_is_there() {
         let words: Vec<&str> = command
             .split_whitespace()
             .skip(1)
-            // Placeholders that are no values.
+            // Placeholders, not values.
             .filter(|word| *word != "…")
             .map(|word| {
                 if word == "ADDRESS" {

@@ -96,7 +96,7 @@ fn messages_of_openjaus_are_explained_by_the_definitions_of_the_reference_archit
         let octets = rows.iter().map(|row| row["octets"].as_str().unwrap());
         assert_eq!(octets.collect::<String>(), input.replace(' ', ""));
         let vector = rows.iter().find(|row| row["kind"] == "presence vector");
-        let note = "bits without a field are passed over";
+        let note = "bits without a field are ignored";
         assert_eq!(vector.unwrap()["note"], note);
     }
     let run = run(&["jsidl", "explain", "--ra", message], b"");
@@ -115,8 +115,7 @@ fn a_message_that_only_the_reference_architecture_can_read_has_a_hint() {
     let name = format!("004b 02 0000 00 {}", "4f".repeat(80));
     let run_it = run(&["jsidl", "explain", &name], b"");
     assert_eq!(run_it.status, 1);
-    let hint =
-        "as a message of the Reference Architecture (OpenJAUS 3.x) all of it can be read: --ra";
+    let hint = "it is a valid message of the Reference Architecture (OpenJAUS 3.x): add --ra";
     assert!(run_it.stdout.contains(hint), "{}", run_it.stdout);
     assert_eq!(run(&["jsidl", "explain", "--ra", &name], b"").status, 0);
 }
@@ -127,14 +126,14 @@ fn what_is_wrong_is_said_with_the_place_and_the_status() {
     assert_eq!(short.status, 1);
     assert!(
         short.stdout.contains(
-            "Reading stopped: ReportGlobalPose: Latitude: octets needed: 4, left: 2 at octet 4"
+            "Decoding stopped: ReportGlobalPose: Latitude: octets needed: 4, left: 2 at octet 4"
         ),
         "{}",
         short.stdout
     );
     for (input, said) in [
         ("nonsense", "neither a file nor hexadecimal digits"),
-        ("FECA", "no definition here has the message code CAFEh"),
+        ("FECA", "no loaded definition has the message code CAFEh"),
     ] {
         let run = run(&["jsidl", "explain", input], b"");
         assert_eq!((run.status, run.stdout.as_str()), (2, ""));

@@ -5,7 +5,7 @@
     clippy::expect_used,
     clippy::panic,
     clippy::unwrap_used,
-    reason = "tests with processes and sockets of their own"
+    reason = "tests with their own processes and sockets"
 )]
 
 mod captures;

@@ -47,10 +47,7 @@ fn one_table_fits_a_terminal_and_says_whether_somebody_is_there() {
     let network: Vec<&str> = group.iter().map(String::as_str).collect();
     let once = [&["monitor", "--once", "--interval", "0.3"], &*network].concat();
     let alone = run(&once, b"");
-    assert!(
-        alone.stdout.contains("nobody was heard so far"),
-        "{alone:?}"
-    );
+    assert!(alone.stdout.contains("no peers yet"), "{alone:?}");
     assert_eq!(alone.status, 1);
 
     let mut node = Running::node(
@@ -89,5 +86,5 @@ fn a_node_tells_its_statistics_now_and_then() {
         assert!(told.contains("link lo 127.0.0.1:"), "{told}");
     }
     let wrong = run(&[&["node", "--stats=5"], &*network].concat(), b"");
-    assert!(wrong.stderr.contains("`5` is no time"), "{wrong:?}");
+    assert!(wrong.stderr.contains("`5` is not a time"), "{wrong:?}");
 }

@@ -13,8 +13,8 @@ fn the_demo_drives_a_mission_to_its_end_or_says_why_it_can_not() {
         "system    starts 101.1.35, the communicator",
         "starts 101.3.36, the planner",
         "operator  takes control of the planner 101.3.36 with authority 150",
-        "operator  wants the vehicle at x 0 m, y 2 m",
-        "planner   all stages obey: under way",
+        "operator  sets the destination x 0 m, y 2 m",
+        "planner   all stages are ready: under way",
         "planner   arrived",
         "vehicle   at x",
         "the vehicle has arrived",
@@ -98,7 +98,7 @@ fn whoever_comes_is_watched() {
     watcher.read_until("Ctrl-C");
     let _comer = Running::node(&[&["--id", "105.1.1", "--name", "Latecomer"], &*network].concat());
     let seen = watcher.read_until("105.1.1 offers");
-    assert!(seen.contains("105.1.1 has come"), "{seen}");
+    assert!(seen.contains("105.1.1 appeared"), "{seen}");
     assert!(seen.contains("Latecomer"), "{seen}");
 }
 
@@ -121,10 +121,7 @@ fn silence_is_told_with_who_did_not_answer_and_what_to_do() {
         &[&["discover", "--seconds", "0.2"], &*network].concat(),
         b"",
     );
-    assert!(
-        found.stderr.contains("nobody answered within 0.2 s"),
-        "{found:?}"
-    );
+    assert!(found.stderr.contains("no answer within 0.2 s"), "{found:?}");
     assert_eq!((found.status, &*found.stdout), (1, ""));
 }
 
@@ -147,7 +144,7 @@ fn a_wrong_flag_is_refused_with_what_would_be_right() {
         ),
         (
             &["node", "--peer", "nobody"],
-            "write an address of one host",
+            "write the address of one host",
         ),
         (&["node", "--kind", "ship"], "vehicle, ocu, other"),
         (&["node", "--config", "no/such.toml"], "no/such.toml"),
@@ -163,9 +160,12 @@ fn a_wrong_flag_is_refused_with_what_would_be_right() {
         ),
         (
             &["query", "103.1.1", "QueryStatsu"],
-            "perhaps QueryStatus is meant",
+            "did you mean QueryStatus?",
         ),
-        (&["query", "103.1.1", "QueryFoo"], "must be loaded"),
+        (
+            &["query", "103.1.1", "QueryFoo"],
+            "load that definition too",
+        ),
         (
             &["query", "103.1.1", "QueryIdentification"],
             "'{\"QueryType\":2}'",

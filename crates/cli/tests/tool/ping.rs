@@ -29,7 +29,7 @@ fn a_component_that_is_there_answers_and_its_round_trips_are_summed_up() {
     assert!(
         asked
             .stdout
-            .contains("asked 3 times, 3 answers, 0 % lost; least "),
+            .contains("3 queries, 3 answers, 0 % lost; min "),
         "{asked:?}"
     );
     assert_eq!((asked.status, &*asked.stderr), (0, ""));
@@ -52,19 +52,19 @@ fn silence_is_told_with_what_to_do_about_it() {
     let flags = ["ping", "103.1.99", "--count", "1", "--timeout", "0.05"];
     let asked = run(&[&flags, &*network].concat(), b"");
     assert!(
-        asked
-            .stdout
-            .contains("asked 1 times, 0 answers, 100 % lost"),
+        asked.stdout.contains("1 queries, 0 answers, 100 % lost"),
         "{asked:?}"
     );
     assert!(
-        asked.stderr.contains("103.1.99 gave no sign of life"),
+        asked.stderr.contains("103.1.99 did not answer"),
         "{asked:?}"
     );
     assert_eq!(asked.status, 1);
     let everybody = run(&["ping", "103.1.255"], b"");
     assert!(
-        everybody.stderr.contains("103.1.255 is not one component"),
+        everybody
+            .stderr
+            .contains("103.1.255 is not a single component"),
         "{everybody:?}"
     );
     assert_eq!(everybody.status, 2);

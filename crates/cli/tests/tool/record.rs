@@ -51,7 +51,7 @@ fn what_goes_to_the_group_is_recorded_and_can_be_decoded() {
         let recording: Vec<_> = recording.iter().map(String::as_str).collect();
         run(&recording, b"")
     });
-    // Whatever is said while the recorder listens; a node asks who is there at its beginning.
+    // Any traffic during the recording; a node sends discovery queries at its start.
     while !recorder.is_finished() {
         run(
             &[&["discover", "--seconds", "0.3"], &*network].concat(),
@@ -87,7 +87,7 @@ fn an_existing_file_is_not_written_over_unless_told_so() {
         ],
         b"",
     );
-    assert!(refused.stderr.contains("say --overwrite"), "{refused:?}");
+    assert!(refused.stderr.contains("add --overwrite"), "{refused:?}");
     assert_eq!(refused.status, 2);
     assert_eq!(fs::read(file.path()).unwrap(), b"precious");
 }

@@ -48,14 +48,14 @@ fn two_networks() -> (Node, Port, Port) {
     (vehicle, ports.0, ports.1)
 }
 
-/// Says something until it is heard: there may be no connection yet.
+/// Sends until received: there may be no connection yet.
 async fn say_until_heard(from: &Port, payload: &'static [u8], to: &mut Port) {
     let say = async {
         loop {
             let said = Outgoing::new(from.id(), to.id(), Bytes::from_static(payload));
             from.send(said).unwrap();
             let heard = timeout(Duration::from_millis(50), to.recv()).await;
-            // Others may have said something before.
+            // Others may have sent something before.
             if heard.is_ok_and(|m| m.is_some_and(|m| m.payload == payload)) {
                 return;
             }
@@ -192,7 +192,7 @@ async fn a_slow_viewer_loses_messages_and_is_told_how_many_while_the_traffic_goe
         }
     }
     let last = [&[0xEE, 0xEE][..], &COUNT.to_le_bytes()].concat();
-    // Now the viewer reads: all that it was sent, and how many were lost.
+    // Now the viewer reads everything sent to it, and the number of lost lines.
     let (mut seen, mut lost, mut before) = (0, 0, None);
     loop {
         one.send(Outgoing::new(one.id(), other.id(), last.clone().into()))
@@ -254,7 +254,7 @@ async fn a_viewer_can_only_look_and_mistakes_and_crowds_are_refused() {
         .await
         .unwrap();
     let giant = Message::binary(vec![0; 100_000]);
-    // It may be closed on the way.
+    // It may be closed in between.
     let _ = talker.send(giant).await;
     let closed = async { while let Some(Ok(_)) = talker.next().await {} };
     timeout(LIMIT, closed)
@@ -274,7 +274,7 @@ async fn a_viewer_can_only_look_and_mistakes_and_crowds_are_refused() {
         }
     };
     assert_eq!(status, 503);
-    assert!(words.contains("look on already"), "{words}");
+    assert!(words.contains("viewers is reached"), "{words}");
     assert!(viewers.len() <= MOST_VIEWERS);
 }
 
@@ -293,7 +293,7 @@ async fn the_communicator_logs_what_passes_and_its_log_is_read_back_with_filters
         name: "Rover".to_owned(),
     };
     let running = tokio::spawn(part.run(slot));
-    // It is running when its component answers.
+    // It runs once its component answers.
     let ask = async {
         loop {
             let query = Bytes::from_static(&[0x00, 0x2B, 0x02]);

@@ -5,7 +5,7 @@
 //! | record, sequence | object of the members that are present, in the order of the definition |
 //! | list, array | array |
 //! | variant | object with one key, the alternative's name |
-//! | integers, value sets | integer; reading takes the value's name as well |
+//! | integers, value sets | integer; when read, also the value's name |
 //! | floating point | shortest decimal; `"NaN"`, `"Infinity"`, `"-Infinity"` |
 //! | scaled integers | the decimal with the fewest digits that gives the same integer |
 //! | bit fields | object of the sub-fields, and `"_reserved"` for other bits that are set |
@@ -73,7 +73,7 @@ impl Error {
         } else {
             known.join(", ")
         };
-        Self::new(format!("unknown key \"{key}\"; known here: {known}"))
+        Self::new(format!("unknown key \"{key}\"; known keys: {known}"))
     }
 
     /// Adds the enclosing member to the path.

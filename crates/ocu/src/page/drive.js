@@ -27,7 +27,7 @@ export class Drive {
   #timer = 0;
   /** Whether all must be let go before driving may begin. */
   #locked = false;
-  #obstacle = "Nothing is known of the vehicle yet.";
+  #obstacle = "No reports from the vehicle yet.";
   #confirmed = null;
   /** Why the station ended driving although nothing was let go. */
   #halt = "";
@@ -51,7 +51,7 @@ export class Drive {
     this.#obstacle = obstacle;
     this.#confirmed = state?.drive ?? null;
     const halt = plain(state?.drive?.reason, 200);
-    if (halt && halt !== this.#halt) toast("bad", `Driving has ended: ${halt}`);
+    if (halt && halt !== this.#halt) toast("bad", `Driving ended: ${halt}`);
     this.#halt = halt;
     mark(get("stick"), "aria-disabled", String(Boolean(obstacle)));
     if (obstacle && this.#timer) this.release();
@@ -191,7 +191,7 @@ export class Drive {
   }
 
   #line(source) {
-    if (source) return this.#confirmed?.active ? "Sending: the vehicle is driven" : "Sending";
+    if (source) return this.#confirmed?.active ? "Driving: commands are being sent" : "Sending";
     if (this.#obstacle) return this.#obstacle;
     return this.#halt ? `Stopped: ${this.#halt}` : "Ready: nothing is sent until you hold something";
   }

@@ -162,7 +162,7 @@ export class Link extends EventTarget {
     const socket = this.#socket;
     this.#socket = null;
     if (socket && socket.readyState !== WebSocket.CLOSED) socket.close();
-    for (const id of [...this.#waiting.keys()]) this.#answer(id, "The connection broke before an answer came.");
+    for (const id of [...this.#waiting.keys()]) this.#answer(id, "The connection was lost before an answer arrived.");
     this.#retryAt = performance.now() + this.#pause;
     this.#retryTimer = setTimeout(() => this.#connect(), this.#pause);
     this.#pause = Math.min(this.#pause * 1.7, LONGEST_PAUSE);

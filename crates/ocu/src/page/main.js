@@ -118,7 +118,7 @@ async function offer(token) {
   trusted = reason === null;
   show(get("token-sheet"), !trusted);
   if (!trusted) {
-    say(get("token-text"), `The token was not taken: ${plain(reason, 200)}`);
+    say(get("token-text"), `The token was rejected: ${plain(reason, 200)}`);
     get("token").focus();
   }
   render();

@@ -91,7 +91,7 @@ export class Messages {
   #note() {
     const empty = !get("message-list").children.length;
     show(get("messages-note"), empty);
-    say(get("messages-note"), this.#on ? "Nothing has passed the filter yet." : "Press Listen to see what the vehicle's parts say to each other.");
+    say(get("messages-note"), this.#on ? "No message has matched the filter yet." : "Press Listen to see the messages between the vehicle's components.");
   }
 }
 

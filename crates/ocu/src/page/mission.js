@@ -23,7 +23,7 @@ const OLD = 2_000;
 function lostPlanner({ id, how, told_to_stop: stopped }) {
   const loss = `The planner ${plain(id, 16)} is ${plain(how, 10)}`;
   return stopped
-    ? `${loss}. The vehicle was told to stop: press Emergency stop if it still moves.`
+    ? `${loss}. The vehicle was stopped: press Emergency stop if it still moves.`
     : `${loss}. This station does not control the drivers: press Emergency stop if the vehicle still moves.`;
 }
 
@@ -122,10 +122,10 @@ export class Mission {
     if (planner) return say(line, `The planner ${plain(planner.id, 16)} is ${plain(planner.how, 10)}: no mission can be planned`);
     if (!mission || stage === "idle") return say(line, plain(mission?.reason, 255) || "No mission");
     const what = {
-      map: "Asking for the map",
-      planning: "Looking for a way",
+      map: "Fetching the map",
+      planning: "Planning a path",
       awaiting_approval: "A route is planned: approve it to drive",
-      path: "Handing the path to the path driver",
+      path: "Sending the path to the path driver",
       vector: "The path driver engages the vector driver",
       primitive: "The vector driver engages the primitive driver",
       driving: "Driving",
@@ -153,8 +153,8 @@ export class Mission {
       : passable === null
         ? "This place is outside the map."
         : passable === false
-          ? "The map says that this place is blocked."
-          : "Plan a route to look at it before anything moves.";
+          ? "This place is blocked on the map."
+          : "Plan a route to see it before the vehicle moves.";
     say(get("destination-hint"), text);
     mark(get("destination-hint"), "data-warn", place && !passable ? "yes" : null);
   }

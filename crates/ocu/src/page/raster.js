@@ -22,7 +22,7 @@ export class Raster {
   /** Takes the description of a state; calls `changed` when there is a new picture. */
   update(info, token, changed) {
     if (!valid(info)) {
-      this.problem = info ? "The map cannot be shown: its size is not sound." : "No map from the vehicle yet";
+      this.problem = info ? "The map cannot be shown: its size is invalid." : "No map from the vehicle yet";
       return;
     }
     const wanted = `${info.id}/${info.revision}/${info.rows}x${info.columns}`;
@@ -87,10 +87,10 @@ function valid(info) {
 async function load({ id, revision, rows, columns }, token) {
   const headers = token ? { Authorization: `Bearer ${token}` } : {};
   const answer = await fetch(`/map/${id}?revision=${revision}`, { headers, cache: "no-store" });
-  if (!answer.ok) throw new Error(`the server says ${answer.status}`);
+  if (!answer.ok) throw new Error(`the server answered ${answer.status}`);
   const cells = new Uint8Array(await answer.arrayBuffer());
   if (cells.length !== rows * columns) {
-    throw new Error(`${cells.length} cells came instead of ${rows} × ${columns}`);
+    throw new Error(`received ${cells.length} cells instead of ${rows} × ${columns}`);
   }
   return cells;
 }

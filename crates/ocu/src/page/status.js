@@ -23,8 +23,8 @@ export function showLink(link, state) {
   say(get("link-detail"), detail);
   const banner = get("banner");
   const text = {
-    stale: `No news for ${age}: what you see is old.`,
-    lost: state ? `No connection: what you see is ${age} old.` : "No connection to the operator's node.",
+    stale: `No update for ${age}: this picture is old.`,
+    lost: state ? `No connection: this picture is ${age} old.` : "No connection to the operator's node.",
   }[condition];
   show(banner, Boolean(text));
   if (text) say(banner, text);
@@ -93,7 +93,7 @@ export function showControl(state, authority, operable) {
 
 function holder(driver) {
   if (!driver) return "";
-  return driver.controller ? `${plain(driver.controller, 16)} drives` : "nobody drives";
+  return driver.controller ? `${plain(driver.controller, 16)} drives` : "not controlled";
 }
 
 /** Shows state, velocity and pose; what is old is said to be. `late` is the age of the state itself. */

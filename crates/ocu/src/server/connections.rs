@@ -54,7 +54,7 @@ impl Listener for Connections {
             let (stream, address) = match self.listener.accept().await {
                 Ok(accepted) => accepted,
                 Err(error) => {
-                    tracing::warn!(%error, "no connection can be accepted");
+                    tracing::warn!(%error, "cannot accept connections");
                     sleep(Self::PAUSE).await;
                     continue;
                 }

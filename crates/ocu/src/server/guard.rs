@@ -8,14 +8,14 @@ use axum::http::{HeaderMap, StatusCode, header};
 /// Why a request is rejected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Refusal {
-    #[error("a request without the header Host, or with more than one, is not answered")]
+    #[error("a request needs exactly one Host header")]
     NoHost,
     #[error(
-        "this page is not known as {0:?}: use its address or localhost, or start jaus-ocu with \
-         --host for this name"
+        "unknown host name {0:?}: use the address or localhost, or start jaus-ocu with --host for \
+         this name"
     )]
     UnknownHost(String),
-    #[error("requests from other sites' pages are not answered")]
+    #[error("requests from other sites' pages are refused")]
     OtherSite,
 }
 

@@ -109,7 +109,7 @@ impl Server {
             .layer(middleware::from_fn_with_state(self.shared.clone(), admit))
             .with_state(self.shared);
         match axum::serve(Connections::new(listener), router).await {
-            Ok(()) => std::io::Error::other("the listener has ended"),
+            Ok(()) => std::io::Error::other("the listener failed"),
             Err(error) => error,
         }
     }
@@ -161,7 +161,7 @@ async fn serve_map(
     headers: HeaderMap,
 ) -> Response {
     if !shared.lets_read(&headers) {
-        let words = "the map needs the token, as Authorization: Bearer TOKEN\n";
+        let words = "the map requires the token: send Authorization: Bearer TOKEN\n";
         return (StatusCode::UNAUTHORIZED, words).into_response();
     }
     let (reply, cells) = oneshot::channel();
@@ -185,7 +185,7 @@ async fn serve_page(State(shared): State<Arc<Shared>>, upgrade: WebSocketUpgrade
     let Ok(place) = shared.places.clone().try_acquire_owned() else {
         shared.counters.no_place.fetch_add(1, Relaxed);
         let words = format!(
-            "{} pages are open already; close one of them\n",
+            "the limit of {} pages is reached; close one of them\n",
             Server::PAGES
         );
         return (StatusCode::SERVICE_UNAVAILABLE, words).into_response();

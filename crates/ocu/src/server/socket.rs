@@ -95,19 +95,19 @@ impl Reader<'_> {
                     // Usually an oversized frame. If the connection is broken, nobody receives the
                     // reason.
                     self.shared.counters.too_much.fetch_add(1, Relaxed);
-                    return Some((close_code::SIZE, "frames have up to 4096 octets"));
+                    return Some((close_code::SIZE, "frames are limited to 4096 octets"));
                 }
             };
             if !self.rate.allows(Instant::now()) {
                 self.shared.counters.too_much.fetch_add(1, Relaxed);
                 return Some((
                     close_code::POLICY,
-                    "too many frames; up to 50 a second are read",
+                    "too many frames; the limit is 50 per second",
                 ));
             }
             let parting = match message {
                 Message::Text(text) => self.handle(&text).await,
-                Message::Binary(_) => Some((close_code::UNSUPPORTED, "frames are JSON text")),
+                Message::Binary(_) => Some((close_code::UNSUPPORTED, "frames must be JSON text")),
                 Message::Close(_) => return None,
                 Message::Ping(_) | Message::Pong(_) => None,
             };
@@ -122,7 +122,7 @@ impl Reader<'_> {
         let frame: Frame = match serde_json::from_str(text) {
             Ok(frame) => frame,
             Err(error) => {
-                self.refuse(None, &format!("this is not a request: {error}"));
+                self.refuse(None, &format!("not a request: {error}"));
                 return None;
             }
         };
@@ -132,7 +132,7 @@ impl Reader<'_> {
             Said::OperatorRequest(_) if !self.trusted.load(Relaxed) => {
                 self.refuse(
                     frame.id,
-                    "this needs the token that jaus-ocu printed or read from its file",
+                    "this requires the token that jaus-ocu printed or read from its file",
                 );
             }
             Said::OperatorRequest(request) => self.request(frame.id, request).await,
@@ -150,20 +150,17 @@ impl Reader<'_> {
         self.wrong_tokens += 1;
         tracing::warn!(page = self.page.0, "wrong token");
         sleep(WRONG_TOKEN).await;
-        self.refuse(id, "this is not the token");
+        self.refuse(id, "wrong token");
         (self.wrong_tokens >= WRONG_TOKENS).then_some((close_code::POLICY, "too many wrong tokens"))
     }
 
     /// Starts or ends the message view.
     async fn choose(&mut self, id: Option<u64>, on: bool, filter: &MessageFilter) {
         if !self.may_read() {
-            return self.refuse(id, "looking needs the token, too");
+            return self.refuse(id, "viewing requires the token too");
         }
         if on && self.shared.admission.node.is_none() {
-            return self.refuse(
-                id,
-                "the station's node runs in another process: look at its debug view",
-            );
+            return self.refuse(id, "the node runs in another process: see its debug view");
         }
         let chosen = match on.then(|| view::filter(filter)).transpose() {
             Ok(chosen) => chosen,

@@ -66,7 +66,7 @@ impl Alarm {
         reply: Reply,
     ) {
         if self.wanted {
-            tracing::info!("emergency: over for {}", vehicle(picture));
+            tracing::info!("emergency: cleared for {}", vehicle(picture));
         }
         self.wanted = false;
         self.clearing = Some(now + Self::PATIENCE);
@@ -80,7 +80,7 @@ impl Alarm {
             self.waiting.push(Waiting { on, until, reply });
         } else {
             reply(Err(
-                "too many wait for the emergency; it is being told".to_owned()
+                "too many pending requests; the emergency is being sent".to_owned(),
             ));
         }
     }
@@ -114,7 +114,7 @@ impl Alarm {
                 (true, true) => picture.not_in_emergency(now).collect(),
                 (false, false) => picture.in_emergency().collect(),
                 _ => {
-                    (waiting.reply)(Err("the emergency was wanted otherwise since".to_owned()));
+                    (waiting.reply)(Err("a later request changed the emergency".to_owned()));
                     continue;
                 }
             };
@@ -138,11 +138,11 @@ fn in_words(on: bool, left: &[JausId]) -> String {
     let left: Vec<_> = left.iter().map(ToString::to_string).collect();
     let left = left.join(", ");
     if on {
-        format!("{left} has not confirmed the emergency yet and is told again and again")
+        format!("{left} has not confirmed the emergency yet; it is sent repeatedly")
     } else {
         format!(
-            "{left} is still in emergency: another client has set one, too, and has to clear it, or \
-             it does not answer"
+            "{left} is still in emergency: it does not answer, or another client set an emergency \
+             and must clear it"
         )
     }
 }

@@ -168,7 +168,7 @@ impl Client {
     /// Sends an emergency without waiting for an acknowledgement.
     pub(super) fn shout(&self, peer: JausId) {
         if let Err(error) = emergency::send(&self.component, peer) {
-            tracing::warn!(%peer, %error, "emergency could not be sent");
+            tracing::warn!(%peer, %error, "cannot send the emergency");
         }
     }
 }

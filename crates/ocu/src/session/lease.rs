@@ -150,13 +150,13 @@ impl Lease {
     ) {
         self.wanted = wanted;
         self.go_on_ready(now, picture, client);
-        // Repeat refused requests, whoever is in control.
+        // Repeat refused requests, regardless of the controller.
         self.holds
             .retain(|_, hold| !matches!(hold, Hold::Not { .. }));
         if self.waiting.len() < Self::MOST_WAITING {
             self.waiting.push(reply);
         } else {
-            reply(Err("too many ask for control".to_owned()));
+            reply(Err("too many pending requests for control".to_owned()));
         }
         let wanted = self.wanted_parts(picture);
         for (part, _) in wanted {
@@ -305,7 +305,7 @@ impl Lease {
             reply(if state.held {
                 Ok(())
             } else if self.wanted == Wanted::Nothing {
-                Err("control was released meanwhile".to_owned())
+                Err("control was released in the meantime".to_owned())
             } else {
                 Err(state.reason.clone())
             });
@@ -328,7 +328,7 @@ impl Lease {
         let held = principal.is_some_and(|part| self.held(part).is_some());
         let wanted = self.wanted != Wanted::Nothing;
         let reason = if wanted && principal.is_none() {
-            "the vehicle has no primitive driver and no planner at present".to_owned()
+            "the vehicle has no primitive driver and no planner".to_owned()
         } else {
             self.reasons(picture)
         };
@@ -361,12 +361,10 @@ fn look_after(now: Instant, own: JausId, part: &Part, hold: &mut Hold) {
         *hold = not(now, &error);
     } else if let Some(controller) = part.disowns(own, *since + Lease::SETTLED) {
         let why = match controller {
-            Some(id) => format!("{id} controls it now"),
-            None => {
-                "it has forgotten who controls it, probably because it was started again".into()
-            }
+            Some(id) => format!("{id} is in control now"),
+            None => "it no longer knows its controller, probably after a restart".into(),
         };
-        tracing::info!("control over {} is lost: {why}", control.peer());
+        tracing::info!("control of {} is lost: {why}", control.peer());
         *hold = Hold::Not { why, again: now };
     }
 }
@@ -379,7 +377,7 @@ fn keep_ready(now: Instant, part: &Part, hold: &mut Hold, client: &mut Client) {
     } = hold
         && part.stands_by(*resumed + Lease::SETTLED)
     {
-        tracing::info!("{} stands by, and is made ready again", control.peer());
+        tracing::info!("{} is in standby; resuming", control.peer());
         *resumed = now;
         resume(control, client);
     }

@@ -33,7 +33,7 @@ impl Maps {
         reply: CellsReply,
     ) {
         let (Some(store), Some(map)) = (store, map) else {
-            return reply(Err("no such map is known".to_owned()));
+            return reply(Err("unknown map".to_owned()));
         };
         let edition = map.edition();
         if let Some((kept, cells)) = &self.kept
@@ -42,7 +42,9 @@ impl Maps {
             return reply(Ok(cells.clone()));
         }
         if self.waiting.len() >= Self::MOST_WAITING {
-            return reply(Err("too many wait for the map; try again".to_owned()));
+            return reply(Err(
+                "too many pending requests for the map; try again".to_owned()
+            ));
         }
         self.waiting.push(reply);
         if self.wanted.is_none() {

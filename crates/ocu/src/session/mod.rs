@@ -203,7 +203,7 @@ impl Session {
             return;
         }
         if let Some(why) = self.picture.stale(now) {
-            tracing::warn!("manual drive ends: {why}");
+            tracing::warn!("manual drive ended: {why}");
             self.stick.stop(now);
             self.halted = Some(why);
         }
@@ -228,9 +228,7 @@ impl Session {
     fn halt_reason(&self) -> String {
         if self.stick.fell_silent() {
             let limit = Stick::DEAD_MAN.as_millis();
-            return format!(
-                "nothing came from the page for {limit} ms: the vehicle was told to stop"
-            );
+            return format!("no command from the page for {limit} ms: the vehicle was stopped");
         }
         self.halted.clone().unwrap_or_default()
     }

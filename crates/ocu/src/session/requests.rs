@@ -64,7 +64,7 @@ impl Session {
             return Ok(());
         }
         if self.alarm.is_wanted() {
-            return Err("clear the emergency of this vehicle before you choose another".to_owned());
+            return Err("clear this vehicle's emergency before choosing another".to_owned());
         }
         self.picture.select(now, subsystem)?;
         self.stick.stop(now);
@@ -135,12 +135,12 @@ impl Session {
 
     fn drive(&mut self, now: Instant, page: PageId, forward: f64, turn: f64) -> Outcome {
         let push = Push::new(forward, turn)
-            .ok_or("forward and turn go from -1 to 1; nothing is driven")?;
+            .ok_or("forward and turn range from -1 to 1; the command is ignored")?;
         if self.lease.wanted() == Wanted::Nothing {
             return Err(NO_CONTROL.to_owned());
         }
         let driver = self.picture.find(Role::PrimitiveDriver);
-        let driver = driver.ok_or("the vehicle has no primitive driver at present")?;
+        let driver = driver.ok_or("the vehicle has no primitive driver")?;
         if self.alarm.is_wanted() || self.is(driver, State::Emergency) {
             return Err("the vehicle is in emergency; clear it first".to_owned());
         }
@@ -214,17 +214,17 @@ impl Session {
             Some(it) => {
                 let (known, stage) = (it.number, it.stage.name().replace('_', " "));
                 return reply(Err(format!(
-                    "mission {number} does not await approval: the planner has mission {known}, \
+                    "mission {number} is not awaiting approval: the planner has mission {known}, \
                      which is {stage}"
                 )));
             }
-            None => return reply(Err("the planner has told of no mission yet".to_owned())),
+            None => return reply(Err("the planner has not reported a mission yet".to_owned())),
         }
         if let Some(why) = self.picture.stale(now) {
             return reply(Err(why));
         }
         if !self.picture.is_position_known() {
-            return reply(Err("the vehicle does not know where it is".to_owned()));
+            return reply(Err("the vehicle's pose is unknown".to_owned()));
         }
         self.stick.stop(now);
         let drivers = self.lease.want(Wanted::Planner, &self.picture);
@@ -252,7 +252,7 @@ impl Session {
     /// The control over the planner, if it is held and ready.
     fn ready_planner(&self) -> Result<Arc<Control>, String> {
         let planner = self.picture.find(Role::Planner);
-        let planner = planner.ok_or("the vehicle has no planner at present")?;
+        let planner = planner.ok_or("the vehicle has no planner")?;
         if self.alarm.is_wanted() || self.is(planner, State::Emergency) {
             return Err("the vehicle is in emergency; clear it first".to_owned());
         }

@@ -43,10 +43,7 @@ async fn who_has_not_taken_control_is_told_so_and_moves_nothing() {
     let refused = page
         .ask(json!({"type": "destination", "x": 1, "y": 1}))
         .await;
-    assert_eq!(
-        refused.unwrap_err(),
-        "the vehicle has no planner at present"
-    );
+    assert_eq!(refused.unwrap_err(), "the vehicle has no planner");
     assert_eq!(scene.speed(), 0.0);
 }
 
@@ -58,7 +55,7 @@ async fn a_vehicle_is_driven_while_the_page_says_so_and_stops_300_ms_after_its_l
     page.until(|state| state["drive"]["active"] == true).await;
     let state = page.until(|state| driver_of(state)["ours"] == true).await;
     assert_eq!(driver_of(&state)["authority"], 200);
-    // Not a word any more.
+    // Silence from now on.
     scene.until(|scene| scene.speed() == 0.0).await;
     page.until(|state| state["drive"]["active"] == false).await;
 }
@@ -143,7 +140,7 @@ async fn of_two_pages_one_drives_and_the_other_is_told_so() {
         .drive_until(&scene, |scene| scene.speed() > 0.3)
         .await;
     let request = json!({"type": "drive", "forward": 0.5, "turn": 0});
-    // On a machine that is busy for 300 ms the first has let go before the second comes.
+    // On a busy machine the first command expires (300 ms) before the second arrives.
     let refused = loop {
         driver.ask(request.clone()).await.unwrap();
         if let Err(refused) = other.ask(request.clone()).await {
@@ -151,7 +148,7 @@ async fn of_two_pages_one_drives_and_the_other_is_told_so() {
         }
         other.ask(json!({"type": "drive_end"})).await.unwrap();
     };
-    assert_eq!(refused, "another page drives now; it has to let go first");
+    assert_eq!(refused, "another page is driving; it must let go first");
     driver.ask(json!({"type": "drive_end"})).await.unwrap();
     let taken = other.ask(json!({"type": "drive", "forward": 0.5, "turn": 0}));
     taken.await.unwrap();
@@ -173,7 +170,7 @@ async fn of_two_stations_with_the_same_authority_the_second_is_told_who_is_in_co
         .until(|state| state["control"]["wanted"] == true)
         .await;
     assert_eq!(state["control"]["held"], false);
-    // Stopping needs nobody's leave; taking it back is up to who did it.
+    // Any client may stop; only the one that did may clear it.
     other
         .ask(json!({"type": "emergency", "on": true}))
         .await
@@ -196,7 +193,7 @@ async fn of_two_stations_with_the_same_authority_the_second_is_told_who_is_in_co
 
 #[tokio::test]
 async fn a_vehicle_that_starts_again_is_taken_and_made_ready_again() {
-    // With control that outlives the vehicle because it is renewed, and without.
+    // With control that is renewed past the vehicle's end, and without.
     for timeout in [0, 2] {
         let mut scene = Scene::with(Station::default(), timeout).await;
         let mut page = scene.driver().await;
@@ -218,7 +215,7 @@ async fn another_vehicle_can_be_chosen_if_there_is_one() {
         let refused = page
             .ask(json!({"type": "select", "subsystem": nobody}))
             .await;
-        assert!(refused.unwrap_err().contains("not known as a vehicle"));
+        assert!(refused.unwrap_err().contains("not a known vehicle"));
     }
     assert_eq!(page.state().await["vehicle"]["subsystem"], 101);
 }

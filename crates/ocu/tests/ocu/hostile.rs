@@ -68,7 +68,7 @@ async fn without_the_token_a_page_may_look_and_change_nothing_not_even_by_guessi
         assert!(refused.contains("token"), "{refused}");
     }
     let wrong = json!({"type": "token", "token": "correct-horse-batterz"});
-    assert_eq!(page.ask(wrong).await.unwrap_err(), "this is not the token");
+    assert_eq!(page.ask(wrong).await.unwrap_err(), "wrong token");
     page.ask(json!({"type": "control", "on": true}))
         .await
         .unwrap_err();
@@ -150,7 +150,7 @@ async fn a_page_that_never_stops_talking_is_shown_the_door() {
     let reason = parting(&mut page).await.reason;
     assert_eq!(
         reason.as_str(),
-        "too many frames; up to 50 a second are read"
+        "too many frames; the limit is 50 per second"
     );
 }
 
@@ -175,7 +175,7 @@ async fn what_is_no_wish_is_refused_in_words_and_the_page_goes_on() {
                 said["reason"]
                     .as_str()
                     .unwrap()
-                    .starts_with("this is not a request")
+                    .starts_with("not a request")
             );
             break;
         }
@@ -213,7 +213,7 @@ async fn of_a_thousand_sockets_most_are_refused_and_the_pages_that_stand_keep_wo
         .drive_until(&scene, |scene| scene.speed() > 0.3)
         .await;
     driver.ask(json!({"type": "drive_end"})).await.unwrap();
-    // None of them reads anything, and there is place again when they are gone.
+    // None of them reads, and there is room again when they are gone.
     drop(taken);
     within_limit(async {
         while Page::try_open(scene.address, &[]).await.is_err() {

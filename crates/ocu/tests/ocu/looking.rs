@@ -15,7 +15,7 @@ use crate::scene::Scene;
 async fn the_map_of_the_store_is_shown_with_all_its_cells() {
     let scene = Scene::with(Station::default(), 0).await;
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ocu-map.redb");
-    // Of an earlier run.
+    // Left from an earlier run.
     let _ = std::fs::remove_file(&file);
     let (raster, picture) = KnowledgeStore::demo_map();
     let store = KnowledgeStore {

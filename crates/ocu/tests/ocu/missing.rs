@@ -22,7 +22,7 @@ async fn a_driver_that_ends_is_named_and_nobody_drives_until_it_is_back() {
     let mut page = scene.driver().await;
     page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
     scene.end_rover();
-    // Before Discovery has lost it, it is silent.
+    // It is silent before Discovery reports it lost.
     let is_gone = |state: &Value| missing(state).iter().any(|it| it["how"] == "gone");
     let state = page.until(is_gone).await;
     let part = missing(&state)[0];
@@ -72,11 +72,11 @@ async fn a_page_that_falls_silent_while_it_drives_is_told_why_the_vehicle_stoppe
     let scene = Scene::new().await;
     let mut page = scene.driver().await;
     page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
-    // The page says nothing any more.
+    // The page is silent from now on.
     let silent = |state: &Value| state["drive"]["reason"] != "";
     let state = page.until(silent).await;
     let reason = state["drive"]["reason"].as_str().unwrap();
-    assert!(reason.contains("nothing came from the page"), "{reason}");
+    assert!(reason.contains("no command from the page"), "{reason}");
     assert_eq!(state["drive"]["active"], false);
     scene.until(|scene| scene.speed() == 0.0).await;
 

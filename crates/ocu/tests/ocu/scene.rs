@@ -46,7 +46,7 @@ impl Scene {
         Self::start(Station::default(), 0, Some(switch)).await
     }
 
-    /// With a vehicle whose control has to be renewed after so many seconds; 0 for never.
+    /// With a vehicle whose control times out after this many seconds; 0 for never.
     pub(crate) async fn with(station: Station, timeout: u8) -> Self {
         Self::start(station, timeout, None).await
     }
@@ -88,7 +88,7 @@ impl Scene {
         Page::open(self.address).await
     }
 
-    /// A page of an operator who has the vehicle under control, and ready.
+    /// The page of an operator in control of a vehicle that is ready.
     pub(crate) async fn driver(&self) -> Page {
         let mut page = self.page().await;
         page.until(|state| !state["vehicle"]["pose"].is_null())

@@ -11,7 +11,7 @@ const PEER: RaId = RaId::new(10, 1, 35, 1);
 
 #[expect(
     clippy::disallowed_methods,
-    reason = "an arbitrary beginning of virtual time"
+    reason = "virtual time starts at any instant"
 )]
 fn start() -> Instant {
     Instant::now()

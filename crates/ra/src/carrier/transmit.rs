@@ -33,18 +33,16 @@ pub struct Transmit {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SendError {
     /// The source is not one of our components.
-    #[error("the source {0} is not announced: announce its subsystem with it first")]
+    #[error("the source {0} is not announced: announce it with its subsystem first")]
     NotOurs(RaId),
     /// The source or destination is invalid.
     #[error("{0}")]
     BadId(#[from] BadId),
     /// The address of the destination's subsystem is unknown.
-    #[error("subsystem {0} was not heard, so its address is not known: wait until it appears")]
+    #[error("the address of subsystem {0} is unknown: wait until it appears")]
     Unknown(u8),
     /// The data is above [`Settings::max_message`](super::Settings::max_message).
-    #[error(
-        "{length} octets of data are above the limit of {limit}: send less, or raise the limit"
-    )]
+    #[error("{length} octets of data exceed the limit of {limit}: send less, or raise the limit")]
     TooLong {
         /// Octets of data.
         length: usize,
@@ -52,10 +50,10 @@ pub enum SendError {
         limit: usize,
     },
     /// The priority is invalid.
-    #[error("{0} is no priority: use 0 to 15")]
+    #[error("{0} is not a priority: use 0 to 15")]
     Priority(u8),
     /// The transmit queue is full.
-    #[error("too many datagrams wait to be sent: poll them, or send less")]
+    #[error("the transmit queue is full: poll it, or send less")]
     QueueFull,
 }
 

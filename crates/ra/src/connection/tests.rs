@@ -11,7 +11,7 @@ const US: RaId = RaId::new(30, 1, 40, 1);
 
 #[expect(
     clippy::disallowed_methods,
-    reason = "an arbitrary beginning of virtual time"
+    reason = "virtual time starts at any instant"
 )]
 fn start() -> Instant {
     Instant::now()

@@ -23,13 +23,13 @@ pub enum Refusal {
     OutOfRange(#[from] OutOfRange),
     /// A field that is set but does not exist on the other side, where leaving it out would change
     /// the meaning.
-    #[error("{field} cannot be said on the other side")]
+    #[error("{field} cannot be expressed on the other side")]
     Inexpressible {
         /// The field's name in the source definition.
         field: &'static str,
     },
     /// A field that is not set but mandatory on the other side.
-    #[error("{field} is missing, which the other side must have")]
+    #[error("{field} is missing, but the other side requires it")]
     Missing {
         /// The field's name in the target definition.
         field: &'static str,
@@ -43,7 +43,7 @@ pub enum Refusal {
         value: u32,
     },
     /// A component id without mapping on the other side.
-    #[error("{field} names a component that is not seen on the other side")]
+    #[error("{field} names a component that is unknown on the other side")]
     UnknownId {
         /// The field's name in the source definition.
         field: &'static str,

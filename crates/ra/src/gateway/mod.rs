@@ -99,7 +99,7 @@ pub enum CannotBe {
     #[error(transparent)]
     Ids(#[from] InvalidIds),
     /// The gateway itself has no RA id.
-    #[error("the gateway's own id {id} has none among RA systems: {why}")]
+    #[error("the gateway's own id {id} has no RA id: {why}")]
     Unmapped {
         /// Its JAUS id.
         id: JausId,

@@ -2,7 +2,7 @@
 //! task that drives the [`Gateway`].
 #![expect(
     clippy::disallowed_methods,
-    reason = "here the gateway gets its time, and waits for it"
+    reason = "gives the gateway its clock and timer"
 )]
 
 use std::collections::BTreeMap;
@@ -71,8 +71,8 @@ impl Part for RaGateway {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let Some(node) = slot.node else {
             return Err(PartError::Broken(
-                "the gateway attaches components of many subsystems, and so runs a node of its own: \
-                 leave --attach out"
+                "the gateway attaches components of many subsystems, so it runs its own node: \
+                 omit --attach"
                     .to_owned(),
             ));
         };
@@ -82,7 +82,7 @@ impl Part for RaGateway {
         settings.name = slot.name;
         let gateway = Gateway::new(slot.port.id(), settings).map_err(|error| broken(&error))?;
         let (id, ra) = (gateway.id(), gateway.ra_id());
-        tracing::info!("{id} is {ra} among RA systems, UDP {}", link.local());
+        tracing::info!("{id} is {ra} to RA systems, UDP {}", link.local());
         let resident = slot.port.reside();
         let mut running = Leaver(Some(Running {
             gateway,
@@ -270,7 +270,7 @@ impl Running {
         }
         match self.node.attach_as(id) {
             Ok(port) => drop(self.ports.insert(id, port)),
-            Err(error) => tracing::warn!(%error, "an RA component cannot be shown"),
+            Err(error) => tracing::warn!(%error, "cannot expose an RA component"),
         }
     }
 }

@@ -70,7 +70,7 @@ impl fmt::Display for Side {
 pub enum InvalidIds {
     /// An invalid subsystem number.
     #[error(
-        "{side} subsystem {number} in {} cannot be: choose from {} to {}",
+        "{side} subsystem {number} in {} is out of range: choose from {} to {}",
         home.entries(), side.subsystems().start(), side.subsystems().end()
     )]
     Subsystem {
@@ -82,7 +82,8 @@ pub enum InvalidIds {
         number: u16,
     },
     /// Two entries for one subsystem, or with one number.
-    #[error("{side} subsystem {number} is twice in {}: leave one entry out, or give it another number", home.entries())]
+    #[error("{side} subsystem {number} appears twice in {}: remove one entry, or give it another \
+        number", home.entries())]
     SubsystemTwice {
         /// Side of the entries.
         home: Side,
@@ -93,7 +94,8 @@ pub enum InvalidIds {
     },
     /// An offset that leaves no subsystem with a valid number.
     #[error(
-        "{} {offset} gives no {home} subsystem a number from {} to {}: choose a smaller one, or leave it out",
+        "{} {offset} maps no {home} subsystem to a number from {} to {}: choose a smaller one, or \
+         remove it",
         home.offset(), home.other().subsystems().start(), home.other().subsystems().end()
     )]
     Offset {
@@ -103,7 +105,8 @@ pub enum InvalidIds {
         offset: i32,
     },
     /// An id with 0 or with a wildcard number.
-    #[error("{ra} = {jaus} in {} cannot be: an entry names one component, with no field that is 0 or stands for all", home.components())]
+    #[error("{ra} = {jaus} in {} is invalid: an entry names one component, without zeros or \
+        wildcards", home.components())]
     NotUnicast {
         /// Side of the entry.
         home: Side,
@@ -114,7 +117,7 @@ pub enum InvalidIds {
     },
     /// An entry that moves a component to another node.
     #[error(
-        "{ra} = {jaus} in {} cannot be, for a component stays in its node: {expected}",
+        "{ra} = {jaus} in {} is invalid, because a component stays in its node: {expected}",
         home.components()
     )]
     LeavesNode {
@@ -129,12 +132,12 @@ pub enum InvalidIds {
     },
     /// An entry for the node manager or the communicator, which represent the node itself.
     #[error(
-        "{0} in jaus_components cannot be: components 1 (node manager) and 35 (communicator) stand for \
-         the node itself; name the type of a service, such as 33"
+        "{0} in jaus_components is invalid: components 1 (node manager) and 35 (communicator) \
+         represent the node itself; name the type of a service, such as 33"
     )]
     Reserved(RaId),
     /// Two entries for one component.
-    #[error("{ra} = {jaus} in {} names an id that another entry has: leave one out", home.components())]
+    #[error("{ra} = {jaus} in {} repeats an id of another entry: remove one", home.components())]
     ComponentTwice {
         /// Side of the entry.
         home: Side,
@@ -150,10 +153,11 @@ pub enum InvalidIds {
 #[non_exhaustive]
 pub enum Unmapped {
     /// A field is 0 or a wildcard.
-    #[error("the id does not name one component")]
+    #[error("the id does not name a single component")]
     NotUnicast,
     /// The other side has no such subsystem number.
-    #[error("{side} subsystem {number} has no number on the other side: give it one in {} (or choose another {})", side.entries(), side.offset())]
+    #[error("{side} subsystem {number} has no number on the other side: assign one in {} (or \
+        choose another {})", side.entries(), side.offset())]
     Subsystem {
         /// Side of the subsystem.
         side: Side,
@@ -161,7 +165,8 @@ pub enum Unmapped {
         number: u16,
     },
     /// An entry assigns the number to another subsystem.
-    #[error("{side} subsystem {number} would get the number that {} gives to {by}: add an entry for it", side.entries())]
+    #[error("{side} subsystem {number} would get the number that {} assigns to {by}: add an entry \
+        for it", side.entries())]
     SubsystemTaken {
         /// Side of the subsystem.
         side: Side,
@@ -172,22 +177,23 @@ pub enum Unmapped {
     },
     /// A component or instance outside the default rule.
     #[error(
-        "RA component {0} is out of what the rule covers (components 1 to 63, instances 1 to 3): give it a number in ra_components, best 64, 128 or 192 to 254"
+        "RA component {0} is outside the default mapping (components 1 to 63, instances 1 to 3): \
+         assign a number in ra_components, preferably 64, 128 or 192 to 254"
     )]
     Component(RaId),
     /// An entry assigns the number to another component.
-    #[error("another component of the node got that number in {}: add an entry for this one", .0.components())]
+    #[error("another component of the node has that number in {}: add an entry for this one", .0.components())]
     ComponentTaken(Side),
     /// The node manager and the communicator represent the node itself.
-    #[error("components 1 and 35 stand for the node itself")]
+    #[error("components 1 and 35 represent the node itself")]
     Reserved,
 }
 
 /// Two subsystems with the same number on one side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{home} subsystem {number} cannot be shown: there is a {} subsystem {shown_as} already; choose a {} that keeps \
-     them apart, or add an entry to {}",
+    "cannot expose {home} subsystem {number}: there is a {} subsystem {shown_as} already; choose \
+     a {} that separates them, or add an entry to {}",
     home.other(), home.offset(), home.entries()
 )]
 pub struct Collision {

@@ -4,10 +4,10 @@
 //! [ids]
 //! ra_offset = 1000                # RA subsystem 20 appears as JAUS subsystem 1020
 //! jaus_offset = 0                 # JAUS subsystem 101 appears as RA subsystem 101
-//! # Subsystems that the offset does not suit:
+//! # Subsystems that need another number:
 //! ra_subsystems = [{ ra = 20, jaus = 1200 }]
 //! jaus_subsystems = [{ jaus = 4711, ra = 101 }]
-//! # Components that the rule does not suit:
+//! # Components that need another id:
 //! ra_components = [{ ra = "20.1.70.1", jaus = "1200.1.200" }]
 //! jaus_components = [{ jaus = "4711.1.9", ra = "101.1.33.1" }]
 //! ```
@@ -18,7 +18,7 @@ use jaus::address::JausId;
 
 use super::RaId;
 
-/// Id mapping between RA systems and ours.
+/// Id mapping between RA and JAUS systems.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 #[non_exhaustive]

@@ -42,7 +42,10 @@ fn what_no_rule_covers_says_which_setting_would_help() {
     let of_ra = |id: &str| ids.jaus_id(ra(id)).expect_err(id).to_string();
     assert!(of_ra("20.1.64.1").contains("ra_components"));
     assert!(of_ra("20.1.33.4").contains("ra_components"));
-    assert_eq!(of_ra("20.255.33.1"), "the id does not name one component");
+    assert_eq!(
+        of_ra("20.255.33.1"),
+        "the id does not name a single component"
+    );
     let of_ours = |id: &str, part| ids.ra_id(jaus(id), part).expect_err(id).to_string();
     let error = of_ours("1001.1.1", DRIVER);
     assert!(error.contains("JAUS subsystem 1001"), "{error}");
@@ -78,7 +81,7 @@ fn an_entry_overrides_the_rule_and_takes_the_number_from_whom_the_rule_would_giv
     assert_eq!(ids.jaus_of(ra("20.1.33.1")), None);
     assert_eq!(ids.jaus_of(ra("21.1.33.1")), None);
     let taken = ids.jaus_id(ra("21.1.33.1")).unwrap_err().to_string();
-    assert!(taken.contains("gives to 20"), "{taken}");
+    assert!(taken.contains("assigns to 20"), "{taken}");
     // Only the component type of the entry has another instance.
     assert_eq!(ids.ra_of(jaus("101.1.200"), DRIVER), Some(ra("101.1.33.1")));
     assert_eq!(ids.ra_of(jaus("101.1.1"), DRIVER), None);
@@ -98,11 +101,11 @@ fn settings_that_make_no_table_name_the_place_and_the_remedy() {
     };
     assert_eq!(
         error(&subsystems(&[(255, 3)])),
-        "RA subsystem 255 in ra_subsystems cannot be: choose from 1 to 254"
+        "RA subsystem 255 in ra_subsystems is out of range: choose from 1 to 254"
     );
     assert!(error(&subsystems(&[(3, 0)])).contains("choose from 1 to 65534"));
     for twice in [[(3, 300), (3, 301)], [(3, 300), (4, 300)]] {
-        assert!(error(&subsystems(&twice)).contains("is twice in ra_subsystems"));
+        assert!(error(&subsystems(&twice)).contains("appears twice in ra_subsystems"));
     }
     let offset = Settings {
         jaus_offset: 254,
@@ -110,7 +113,7 @@ fn settings_that_make_no_table_name_the_place_and_the_remedy() {
     };
     assert!(
         error(&offset)
-            .starts_with("jaus_offset 254 gives no JAUS subsystem a number from 1 to 254")
+            .starts_with("jaus_offset 254 maps no JAUS subsystem to a number from 1 to 254")
     );
     let offset = Settings {
         ra_offset: i32::MAX,
@@ -138,9 +141,9 @@ fn entries_for_components_stay_in_their_node_and_are_unique() {
     );
     let leaves = error(&components(&[("20.1.70.1", "20.2.70")]));
     assert!(leaves.ends_with("write the same node in both"), "{leaves}");
-    assert!(error(&components(&[("20.1.0.1", "20.1.70")])).contains("stands for all"));
+    assert!(error(&components(&[("20.1.0.1", "20.1.70")])).contains("zeros or wildcards"));
     let twice = [("20.1.70.1", "20.1.64"), ("20.1.71.1", "20.1.64")];
-    assert!(error(&components(&twice)).contains("leave one out"));
+    assert!(error(&components(&twice)).contains("remove one"));
     let reserved = Settings {
         jaus_components: vec![ComponentEntry {
             jaus: jaus("101.1.200"),

@@ -29,7 +29,7 @@ impl RaNode {
             ..source
         };
         let peer = self.peers.entry(source.subsystem).or_insert_with(|| {
-            tracing::info!(subsystem = source.subsystem, "RA subsystem heard");
+            tracing::info!(subsystem = source.subsystem, "RA subsystem found");
             Peer::new(now, communicator, &self.settings)
         });
         if source.component == RaId::COMMUNICATOR {
@@ -252,7 +252,7 @@ impl RaNode {
             if let Ok(message) = message
                 && let Err(error) = self.carrier.send(&message)
             {
-                tracing::debug!(?message, %error, "not asked");
+                tracing::debug!(?message, %error, "query not sent");
             }
         }
     }

@@ -82,13 +82,13 @@ pub enum BadSubsystem {
         number: u8,
     },
     /// Duplicate node or component.
-    #[error("{0} is there twice: give each component an instance of its own")]
+    #[error("{0} appears twice: give each component its own instance")]
     Twice(RaId),
     /// More than a message can hold.
-    #[error("{0} has more {1} than one message can tell: at most 255")]
+    #[error("{0} has more {1} than a message can list: at most 255")]
     TooMany(RaId, &'static str),
     /// A peer already uses the subsystem number.
-    #[error("subsystem {0} is there already{1}: give ours another number")]
+    #[error("subsystem {0} exists already{1}: give ours another number")]
     Taken(u8, Where),
 }
 

@@ -122,7 +122,7 @@ struct Replay {
 
 #[expect(
     clippy::disallowed_methods,
-    reason = "an arbitrary beginning of virtual time"
+    reason = "virtual time starts at any instant"
 )]
 fn replay(file: &str, replaced: IpAddr, ours: Subsystem) -> Replay {
     let recorded = recorded(file);
@@ -220,7 +220,7 @@ fn in_place_of_the_first_one_ours_answers_the_storm_of_questions() {
     ];
     let ours = subsystem(10, ["OJ_a", "OJNode_a", manager, communicator], &others);
     let mut replay = replay("openjaus33-opc-wire.pcap", A, ours);
-    // The vehicle came later there; ours was whole from the beginning.
+    // The vehicle joined later there; ours was complete from the start.
     replay.expected.retain(|said| said.code != 0x4B01);
     replay.check_answers();
     assert_eq!(replay.appeared().name, "OJ_b");

@@ -21,8 +21,8 @@ pub struct GpioLines {
 /// Error: GPIO lines cannot be opened.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "{lines} of {} cannot be opened: {why}; `gpioinfo` lists the lines and who uses them, and the user \
-     must be allowed to write to the chip",
+    "cannot open {lines} of {}: {why}; check their users with `gpioinfo`, and write access to the \
+     chip",
     chip.display()
 )]
 pub struct GpioError {

@@ -161,7 +161,7 @@ impl Actuator for SimulatedMotor {
 #[cfg(test)]
 #[expect(
     clippy::disallowed_methods,
-    reason = "any moment will do as the beginning of virtual time"
+    reason = "virtual time starts at any instant"
 )]
 mod tests {
     use super::*;

@@ -2,7 +2,7 @@
 //! pulses. They end with the program, and also when the program hangs and repeats no command.
 #![expect(
     clippy::disallowed_methods,
-    reason = "pulses are made in real time, on a thread of their own"
+    reason = "pulses are generated in real time, on their own thread"
 )]
 
 use std::io;
@@ -70,7 +70,7 @@ impl State {
     /// The command in force: stop, if the last command has expired.
     fn command_at(&mut self, now: Instant) -> Command {
         if self.command != Command::STOP && self.deadline.has_passed(now) {
-            tracing::warn!("the motor stops: its command was not repeated");
+            tracing::warn!("watchdog: the motor stops because its command was not repeated");
             self.command = Command::STOP;
         }
         self.command
@@ -178,7 +178,7 @@ fn run(shared: &Shared, mut stepper: Stepper, mut lines: impl Lines) {
                 let sent = pulse(&mut lines, backwards, &mut direction);
                 state = shared.lock();
                 if let Err(error) = sent {
-                    state.fault = Some(format!("the motor's lines cannot be set: {error}"));
+                    state.fault = Some(format!("cannot set the motor's lines: {error}"));
                     state = mend(shared, state, &mut lines);
                     // Restarts from rest. The failed pulse is not counted.
                     stepper = stepper.at_rest(state.steps);

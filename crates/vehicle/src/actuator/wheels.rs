@@ -226,7 +226,7 @@ impl<A: Actuator> Platform for Wheels<A> {
 #[cfg(test)]
 #[expect(
     clippy::disallowed_methods,
-    reason = "any moment will do as the beginning of virtual time"
+    reason = "virtual time starts at any instant"
 )]
 mod tests {
     use std::time::Duration;

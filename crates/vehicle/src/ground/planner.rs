@@ -90,7 +90,8 @@ impl MissionPlanner {
         carry_out: impl FnOnce(M, &mut Mission),
     ) {
         if !context.standing().acts_for(message.source) {
-            tracing::debug!(source = %message.source, message = M::NAME, "not in control");
+            tracing::debug!(source = %message.source, message = M::NAME, "ignored: sender not in \
+                control");
         } else if let Some(command) = read(message) {
             self.tell(context, |mission| carry_out(command, mission));
         }
@@ -127,7 +128,7 @@ impl Service for MissionPlanner {
             Some(ApproveMission::CODE) => {
                 self.command(message, context, |command: ApproveMission, mission| {
                     if let Err(refusal) = mission.approve(now, command.mission) {
-                        tracing::info!(%refusal, "not approved");
+                        tracing::info!(%refusal, "approval refused");
                     }
                 });
             }
@@ -164,7 +165,7 @@ impl Service for MissionPlanner {
     fn handle_stop(&mut self, cause: &StopCause, context: &mut Context<'_>) {
         // The other causes are changes of the standing, which carry more detail.
         if *cause == StopCause::Ended {
-            self.tell(context, |mission| mission.stop("the planner has ended"));
+            self.tell(context, |mission| mission.stop("the planner has shut down"));
         }
     }
 
@@ -210,7 +211,7 @@ fn why_stopped(before: &Standing, now: &Standing) -> String {
             format!("{id} has taken control of the planner")
         }
         (State::Ready | State::Standby, None) if before.controller.is_some() => {
-            "control of the planner has ended".to_owned()
+            "control of the planner has shut down".to_owned()
         }
         (state, _) => format!("the planner is in the state {state}"),
     }
@@ -366,7 +367,7 @@ mod tests {
                 Some(STRANGER),
                 "42.2.1 has taken control of the planner",
             ),
-            (State::Ready, None, "control of the planner has ended"),
+            (State::Ready, None, "control of the planner has shut down"),
         ] {
             let mut bench = Bench::new();
             bench.go(3.0);

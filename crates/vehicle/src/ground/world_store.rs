@@ -128,7 +128,8 @@ impl WorldStore {
         context: &mut Context<'_>,
     ) {
         if !context.standing().obeys(request.source) {
-            tracing::debug!(source = %request.source, "a change from a client not in control");
+            tracing::debug!(source = %request.source, "ignored a change from a client that is not \
+                in control");
             return;
         }
         let full = {
@@ -224,7 +225,7 @@ fn tell(
     context: &mut Context<'_>,
 ) {
     if let Err(refusal) = result {
-        tracing::debug!(source = %request.source, %refusal, "a change is refused");
+        tracing::debug!(source = %request.source, %refusal, "change refused");
     }
     match (answer, result) {
         (Answer::None, _) => {}

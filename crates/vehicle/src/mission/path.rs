@@ -80,8 +80,8 @@ impl Path {
 pub enum NoPath {
     /// The destination is not on the map.
     #[error(
-        "the destination at {} is not on the map, which goes from {} to {}: choose one on the map, \
-         or give the store a larger map", At(*.destination), At(.corners[0]), At(.corners[1])
+        "the destination at {} is outside the map, which extends from {} to {}: choose one on the \
+         map, or give the store a larger map", At(*.destination), At(.corners[0]), At(.corners[1])
     )]
     DestinationOutside {
         /// The destination.
@@ -91,7 +91,8 @@ pub enum NoPath {
     },
     /// The destination is in an obstacle or too close to one.
     #[error(
-        "the destination at {} is closer than {clearance:.2} m to an obstacle: choose one in the open",
+        "the destination at {} is closer than {clearance:.2} m to an obstacle: choose one with \
+         more clearance",
         At(*.destination)
     )]
     DestinationBlocked {
@@ -102,8 +103,8 @@ pub enum NoPath {
     },
     /// The vehicle is not on the map.
     #[error(
-        "the vehicle at {} is not on the map, which goes from {} to {}: drive it there by hand, or \
-         set its pose right", At(*.start), At(.corners[0]), At(.corners[1])
+        "the vehicle at {} is outside the map, which extends from {} to {}: drive it there \
+         manually, or correct its pose", At(*.start), At(.corners[0]), At(.corners[1])
     )]
     StartOutside {
         /// The vehicle's position.
@@ -113,8 +114,8 @@ pub enum NoPath {
     },
     /// The vehicle is in an obstacle according to the map.
     #[error(
-        "the vehicle at {} is in an obstacle, as the map has it: drive it out by hand, or set its \
-         pose or the map right", At(*.start)
+        "the vehicle at {} is in an obstacle of the map: drive it out manually, or correct its \
+         pose or the map", At(*.start)
     )]
     StartBlocked {
         /// The vehicle's position.
@@ -122,8 +123,8 @@ pub enum NoPath {
     },
     /// No path to the destination exists for a vehicle of this size.
     #[error(
-        "no way leads from {} to {} for a vehicle that keeps {clearance:.2} m from obstacles: clear \
-         one, correct the map, or choose another destination", At(*.start), At(*.destination)
+        "there is no path from {} to {} with {clearance:.2} m of clearance: clear obstacles, \
+         correct the map, or choose another destination", At(*.start), At(*.destination)
     )]
     Unreachable {
         /// The vehicle's position.
@@ -135,8 +136,8 @@ pub enum NoPath {
     },
     /// The path has more segments than a driver's list holds.
     #[error(
-        "the way to {} has {segments} segments, and a driver takes {} at most: choose a destination \
-         on the way", At(*.destination), Path::MAX_SEGMENTS
+        "the path to {} has {segments} segments, and a driver accepts at most {}: choose a closer \
+         destination", At(*.destination), Path::MAX_SEGMENTS
     )]
     TooLong {
         /// The destination.

@@ -19,7 +19,7 @@ pub struct Terrain {
 pub enum TerrainError {
     /// The map has no cells, or too many.
     #[error(
-        "a map of {rows} x {columns} cells can not be planned on; from 1 to {} rows and columns can",
+        "cannot plan on a map of {rows} x {columns} cells: give it from 1 to {} rows and columns",
         Terrain::MAX_SIDE
     )]
     Size {
@@ -29,7 +29,7 @@ pub enum TerrainError {
         columns: u16,
     },
     /// The number of cells does not match the dimensions.
-    #[error("the map has {found} cells instead of {rows} x {columns}; ask for it once more")]
+    #[error("the map has {found} cells instead of {rows} x {columns}; query it again")]
     Cells {
         /// Number of rows.
         rows: u16,
@@ -40,8 +40,8 @@ pub enum TerrainError {
     },
     /// The cell size or the position is invalid.
     #[error(
-        "the map's cells are {cell} m wide and it begins at x {x} m, y {y} m, which is no place; \
-         create it with cells from 0.001 to 1000 m"
+        "the map has invalid geometry: cells of {cell} m, origin at x {x} m, y {y} m; create it \
+         with cells from 0.001 to 1000 m"
     )]
     Place {
         /// Cell size in metres.

@@ -68,12 +68,12 @@ impl Destination {
         let Self { x, y, speed } = *self;
         if !x.is_finite() || !y.is_finite() {
             return Some(format!(
-                "the destination at x {x} m, y {y} m is no place: set finite numbers of metres"
+                "the destination x {x} m, y {y} m is invalid: set finite numbers of metres"
             ));
         }
         let speed = speed.filter(|&speed| !(speed > 0.0 && speed <= Self::MAX_SPEED))?;
         Some(format!(
-            "a speed of {speed} m/s can not be driven: set one above 0 and up to {} m/s",
+            "a speed of {speed} m/s is out of range: set one above 0 and up to {} m/s",
             Self::MAX_SPEED
         ))
     }
@@ -129,7 +129,7 @@ pub struct Report {
 #[non_exhaustive]
 pub enum Refusal {
     /// The approval concerns a mission that has been replaced.
-    #[error("mission {wanted} can not be approved: mission {current} has replaced it")]
+    #[error("cannot approve mission {wanted}: mission {current} replaced it")]
     Replaced {
         /// The mission in the approval.
         wanted: u32,
@@ -137,7 +137,7 @@ pub enum Refusal {
         current: u32,
     },
     /// The mission is over.
-    #[error("mission {mission} can not be approved: it is over ({stage})")]
+    #[error("cannot approve mission {mission}: it is over ({stage})")]
     Over {
         /// The mission in the approval.
         mission: u32,
@@ -278,7 +278,7 @@ impl Mission {
         }
         let drives = self.report.stage.is_handed_over();
         match self.settings.lost_link {
-            LostLink::Hold => self.hold(&format!("held until it is approved again: {reason}")),
+            LostLink::Hold => self.hold(&format!("held until approved again: {reason}")),
             LostLink::Return if drives && self.trail.back().is_some() => {
                 self.hold(reason);
                 self.action = Some(Action::CheckClient(self.report.run, client));
@@ -518,12 +518,12 @@ impl Mission {
     fn too_long(&self) -> String {
         match self.report.stage {
             Stage::Driving => format!(
-                "the vehicle has not got on for {} s at {} % of the path",
+                "the vehicle made no progress for {} s at {} % of the path",
                 self.settings.stall.as_secs(),
                 self.report.progress
             ),
             stage => format!(
-                "the stage \"{stage}\" has taken longer than {} s",
+                "the stage \"{stage}\" took longer than {} s",
                 self.settings.patience.as_secs()
             ),
         }

@@ -257,7 +257,7 @@ impl Controls {
             return;
         }
         if place.is_some() {
-            tracing::warn!(?place, "out of reach");
+            tracing::warn!(?place, "waypoint rejected: out of reach");
             self.travel.active = None;
         }
         if let Some(ticket) = self.travel.ticket.take() {
@@ -296,7 +296,7 @@ impl Controls {
         };
         // The list may have changed in the meantime.
         let Some(element) = self.elements.get(active) else {
-            tracing::warn!(active, "the element that was driven to has been deleted");
+            tracing::warn!(active, "the active element was deleted");
             self.pilot.give_up(ticket);
             self.abandon(context);
             return;

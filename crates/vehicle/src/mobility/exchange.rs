@@ -91,7 +91,8 @@ impl Exchange<'_, '_> {
             return read(self.message);
         }
         let state = standing.state;
-        tracing::debug!(%source, message = M::NAME, %state, "ignored: not in control or not ready");
+        tracing::debug!(%source, message = M::NAME, %state, "ignored: sender not in control, or \
+            not ready");
         None
     }
 
@@ -104,7 +105,7 @@ impl Exchange<'_, '_> {
     pub(super) fn reply_if<R: Message>(&mut self, report: Result<R, OutOfRange>) {
         match report {
             Ok(report) => self.reply(&report),
-            Err(error) => tracing::debug!(report = R::NAME, %error, "cannot be reported"),
+            Err(error) => tracing::debug!(report = R::NAME, %error, "cannot encode the report"),
         }
     }
 

@@ -87,7 +87,7 @@ fn set_speed(speed: f64, acts: bool, exchange: &mut Exchange<'_, '_>) {
         accept(exchange);
         changed(exchange.context);
     } else {
-        tracing::info!(%source, "travel speed ignored: there is no waypoint yet");
+        tracing::info!(%source, "travel speed ignored: no waypoint is set");
     }
 }
 
@@ -96,7 +96,7 @@ fn execute(code: u16, uid: Option<u16>, speed: f64, acts: bool, exchange: &mut E
     let source = exchange.message.source;
     match uid {
         Some(uid) if !exchange.controls.execute(uid, speed, acts) => {
-            tracing::info!(%source, uid, "list not executed: there is no such element");
+            tracing::info!(%source, uid, "list not executed: no such element");
             return;
         }
         Some(uid) => {
@@ -107,7 +107,7 @@ fn execute(code: u16, uid: Option<u16>, speed: f64, acts: bool, exchange: &mut E
             tracing::info!(%source, speed, "travel speed of the list set");
             exchange.controls.set_speed(speed, acts);
         }
-        None => tracing::info!(%source, "travel speed ignored: no list is executed"),
+        None => tracing::info!(%source, "travel speed ignored: no list is executing"),
     }
     accept(exchange);
     changed(exchange.context);

@@ -168,7 +168,7 @@ impl DeadReckoning {
         };
         let Some(seconds) = count.seconds_since(&last) else {
             if count.start != last.start {
-                tracing::info!("the wheels are counted from 0 again; the pose stays");
+                tracing::info!("wheel odometry restarted from 0; the pose is kept");
                 self.last = Some(count);
             }
             return Gone::default();
@@ -180,7 +180,11 @@ impl DeadReckoning {
                 gone
             }
             None => {
-                tracing::warn!(?count, ?last, "wheels can not turn so fast; the pose stays");
+                tracing::warn!(
+                    ?count,
+                    ?last,
+                    "implausible wheel odometry ignored; the pose is kept"
+                );
                 Gone::default()
             }
         }

@@ -20,7 +20,7 @@ impl Track {
 
     #[expect(
         clippy::disallowed_methods,
-        reason = "any moment will do as the beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     fn with(config: SkidSteerConfig) -> Self {
         let now = Instant::now();

@@ -81,7 +81,7 @@ fn approach(value: f64, goal: f64, most: f64) -> f64 {
 #[cfg(test)]
 #[expect(
     clippy::disallowed_methods,
-    reason = "any moment will do as the beginning of virtual time"
+    reason = "virtual time starts at any instant"
 )]
 mod tests {
     use super::*;

@@ -39,8 +39,8 @@ pub struct Communicator {
 impl Part for Communicator {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let Some(node) = slot.node.clone() else {
-            let words = "the communicator is the host's node itself: leave --attach out, and say \
-                         --local for others to attach";
+            let words = "the communicator is the host's node itself: omit --attach, and add \
+                --local for others to attach";
             return Err(PartError::Broken(words.to_owned()));
         };
         let news = (node.events(), node.component_events());
@@ -51,7 +51,7 @@ impl Part for Communicator {
         tokio::pin!(view);
         let told = tell(&component, news);
         tokio::select! {
-            error = &mut view => Err(PartError::Broken(format!("the debug view has ended: {error}"))),
+            error = &mut view => Err(PartError::Broken(format!("the debug view failed: {error}"))),
             end = told => Err(end),
         }
     }
@@ -112,7 +112,7 @@ fn dictionary() -> Dictionary {
 fn tell_place(node: &Node, log: Option<&JournalSettings>) {
     let config = node.config();
     if config.routing.forward {
-        tracing::info!("messages are passed on between all links");
+        tracing::info!("routing between all links");
     }
     #[cfg(feature = "serial")]
     for line in node.serial_lines() {
@@ -126,10 +126,7 @@ fn tell_place(node: &Node, log: Option<&JournalSettings>) {
         tracing::info!("components of this host may attach at {place}");
     }
     if let Some(log) = log {
-        tracing::info!(
-            "everything that passes is logged in {}",
-            log.directory.display()
-        );
+        tracing::info!("traffic log in {}", log.directory.display());
     }
 }
 
@@ -146,7 +143,7 @@ async fn tell(component: &Component, news: (Events, ComponentEvents)) -> PartErr
                 Event::IdConflict { id, path } => {
                     let is_new = conflicts.len() < MOST_CONFLICTS && conflicts.insert(path.peer);
                     is_new.then(|| format!(
-                        "somebody at {} has our id {id} too: one of us must choose another",
+                        "the node at {} also has our id {id}: choose another for one of them",
                         path.peer
                     ))
                 }

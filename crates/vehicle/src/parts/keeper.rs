@@ -33,7 +33,7 @@ impl<T: Clone> Kept<T> {
     /// vehicle.
     #[expect(
         clippy::disallowed_methods,
-        reason = "the pause spares the disk, and delays nothing else"
+        reason = "the pause spares the disk and delays nothing else"
     )]
     pub(super) async fn write<E: Display, F: Future<Output = Result<(), E>>>(
         mut self,

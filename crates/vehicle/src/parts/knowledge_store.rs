@@ -110,7 +110,7 @@ async fn gone(component: &Component) {
 fn import(world: &mut World, raster: &Raster, picture: &Picture) -> Result<(), PartError> {
     let name = &raster.name;
     if world.rasters().values().any(|it| it.name == *name) {
-        tracing::info!("there is a map \"{name}\" already, which stays as it is");
+        tracing::info!("the map \"{name}\" exists already and is kept");
         return Ok(());
     }
     let cells = Bytes::copy_from_slice(&picture.cells);
@@ -140,8 +140,8 @@ fn tell(file: &Path, world: &World) {
 fn advice(error: &OpenError) -> String {
     match error {
         OpenError::Broken { .. } => format!(
-            "{error}; the file is left as it is: put a copy in its place, or begin anew with \
-             --set-broken-aside, which keeps it under another name"
+            "{error}; the file is unchanged: restore a copy, or start empty with \
+             --set-broken-aside, which renames it"
         ),
         _ => error.to_string(),
     }
@@ -157,12 +157,11 @@ fn set_aside(file: &Path, error: &OpenError) -> Result<(), PartError> {
     let free = (1..=9999).map(name).find(|it| !it.exists());
     let Some(aside) = free else {
         return Err(PartError::Broken(format!(
-            "{error}; there are 9999 files set aside already: move them away"
+            "{error}; 9999 files are set aside already: move them away"
         )));
     };
-    std::fs::rename(file, &aside).map_err(|error| {
-        PartError::Broken(format!("{}: can not be set aside: {error}", file.display()))
-    })?;
-    tracing::warn!("{error}; it is kept as {}", aside.display());
+    std::fs::rename(file, &aside)
+        .map_err(|error| PartError::Broken(format!("cannot rename {}: {error}", file.display())))?;
+    tracing::warn!("{error}; it was renamed to {}", aside.display());
     Ok(())
 }

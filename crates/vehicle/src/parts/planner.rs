@@ -4,7 +4,7 @@
 //! sensor, plans, takes control of the path segment driver, hands over the segments, and monitors
 //! all drivers of the chain until the vehicle has arrived. It discovers these components in its own
 //! subsystem, repeatedly if necessary.
-#![expect(clippy::disallowed_methods, reason = "here patience is counted")]
+#![expect(clippy::disallowed_methods, reason = "runs the timeouts")]
 
 pub(super) mod chain;
 mod hand_over;
@@ -113,7 +113,7 @@ async fn find_soon(component: &Component, services: &[&str], what: &str) -> Resu
         Ok(Some(found)) => Ok(found),
         Ok(None) => Err("the node has stopped".to_owned()),
         Err(_) => Err(format!(
-            "no {what} was found in subsystem {} within {} s: start one",
+            "no {what} found in subsystem {} within {} s: start one",
             component.id().subsystem(),
             PATIENCE.as_secs()
         )),

@@ -34,7 +34,7 @@ impl Kept {
 
     fn text(&self) -> String {
         let Self { pose, count } = self;
-        let mut text = String::from("# Where the vehicle is, kept by jaus-local-pose-sensor.\n");
+        let mut text = String::from("# The vehicle's pose, saved by jaus-local-pose-sensor.\n");
         let numbers = [
             ("x", pose.x),
             ("y", pose.y),
@@ -64,7 +64,7 @@ impl Kept {
                 let number: f64 = number.trim().parse().ok()?;
                 number.is_finite().then(|| (key.trim(), number))
             });
-            let (key, number) = pair.ok_or_else(|| format!("\"{line}\" is no number"))?;
+            let (key, number) = pair.ok_or_else(|| format!("\"{line}\" is not a number"))?;
             numbers.insert(key, number);
         }
         let number = |key: &str| {
@@ -95,7 +95,7 @@ impl Kept {
 pub(super) async fn read(file: &Path) -> Result<Option<Kept>, PartError> {
     let broken = |why: String| {
         PartError::Broken(format!(
-            "{}: {why}; put it right, or delete it to begin at the start pose",
+            "{}: {why}; correct it, or delete it to start at the initial pose",
             file.display()
         ))
     };
@@ -105,9 +105,7 @@ pub(super) async fn read(file: &Path) -> Result<Option<Kept>, PartError> {
         Err(error) => return Err(broken(error.to_string())),
     };
     if length > MOST {
-        return Err(broken(format!(
-            "is {length} octets long, and can not be a pose"
-        )));
+        return Err(broken(format!("has {length} octets, too many for a pose")));
     }
     let text = fs::read_to_string(file).await;
     let text = text.map_err(|error| broken(error.to_string()))?;
@@ -119,7 +117,7 @@ pub(super) async fn write(file: &Path, kept: &Kept) -> Result<(), PartError> {
     let written = replace(file, &kept.text()).await;
     written.map_err(|error| {
         PartError::Broken(format!(
-            "the pose can not be kept in {}: {error}",
+            "cannot save the pose to {}: {error}",
             file.display()
         ))
     })

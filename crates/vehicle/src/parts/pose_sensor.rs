@@ -1,7 +1,7 @@
 //! The local pose sensor: dead reckoning from wheel travel.
 #![expect(
     clippy::disallowed_methods,
-    reason = "here the sensor gets its time, and waits for it"
+    reason = "gives the sensor its clock and timer"
 )]
 
 use std::convert::Infallible;
@@ -102,7 +102,7 @@ impl PoseSensor {
         let Some(Kept { pose, count }) = kept else {
             return Ok(DeadReckoning::at(self.start));
         };
-        tracing::info!("goes on at x {:.2} m, y {:.2} m", pose.x, pose.y);
+        tracing::info!("pose restored: x {:.2} m, y {:.2} m", pose.x, pose.y);
         Ok(DeadReckoning::resume(pose, count))
     }
 }
@@ -158,7 +158,7 @@ impl Running {
         if let Some(pose) = self.observed.take_told() {
             self.reckoning.set_pose(pose);
             let pose = self.reckoning.pose();
-            tracing::info!("was told to be at x {:.2} m, y {:.2} m", pose.x, pose.y);
+            tracing::info!("pose set to x {:.2} m, y {:.2} m", pose.x, pose.y);
         }
     }
 

@@ -1,7 +1,7 @@
 //! The primitive driver: wrench efforts for two wheel drives, and wheel odometry.
 #![expect(
     clippy::disallowed_methods,
-    reason = "here the motors are looked after in real time"
+    reason = "supervises the motors in real time"
 )]
 
 use std::convert::Infallible;
@@ -154,7 +154,8 @@ impl GpioMotors {
             let lines = crate::actuator::GpioLines::open(&self.chip, step, direction, reversed);
             let lines = lines.map_err(|error| broken(error.to_string()))?;
             let motor = crate::actuator::PulseMotor::start(self.stepper, lines);
-            let motor = motor.map_err(|error| broken(format!("no thread for pulses: {error}")))?;
+            let motor =
+                motor.map_err(|error| broken(format!("cannot start the pulse thread: {error}")))?;
             Ok(Box::new(motor))
         };
         Ok([start(self.left, false)?, start(self.right, true)?])
@@ -178,9 +179,9 @@ impl PrimitiveDriver {
         let Hardware { left, right, stop } = hardware;
         let interlock = Interlock::default();
         let stop = stop.map(|input| StopLine::start(input, interlock.clone()));
-        let stop = stop
-            .transpose()
-            .map_err(|error| PartError::Broken(format!("no thread for the stop input: {error}")))?;
+        let stop = stop.transpose().map_err(|error| {
+            PartError::Broken(format!("cannot start the stop input thread: {error}"))
+        })?;
         let odometer = Odometer::new(random());
         let wheels = Wheels::new(left, right, self.wheels, odometer.clone());
         let wheels = wheels.with_interlock(interlock.clone());
@@ -281,10 +282,10 @@ impl Running {
         if self.component.standing().state != State::Emergency {
             self.vehicle.stop();
             if let Err(error) = self.component.set_emergency(self.component.id()).await {
-                tracing::warn!("the emergency is not set yet: {error}");
+                tracing::warn!("cannot set the emergency, will retry: {error}");
             }
         } else if open.is_none() {
-            tracing::warn!("the stop input is closed again: all emergencies end");
+            tracing::warn!("the stop input is closed again: all emergencies are cleared");
             self.component.set_condition(Condition::Safe).await;
             self.stopped = false;
             // The component must be resumed before anything moves.

@@ -1,7 +1,7 @@
 //! The thread that reads a stop input, independent of delays in the rest of the program.
 #![expect(
     clippy::disallowed_methods,
-    reason = "the line is read in real time, on a thread of its own"
+    reason = "reads the line in real time, on its own thread"
 )]
 
 use std::io;
@@ -69,7 +69,7 @@ impl StopLine {
         // The thread has ended or is blocked in its driver, so there are no readings.
         if self.pressed.has_changed().is_err() || self.is_stuck() {
             self.interlock.open();
-            return Some("the stop input is not read any more".to_owned());
+            return Some("the stop input is no longer read".to_owned());
         }
         self.pressed.borrow_and_update().clone()
     }
@@ -104,7 +104,7 @@ fn read(input: &mut dyn StopInput, interlock: &Interlock) -> Option<String> {
     let why = match input.is_closed() {
         Ok(true) => return None,
         Ok(false) => "the stop input is pressed".to_owned(),
-        Err(error) => format!("the stop input cannot be read: {error}"),
+        Err(error) => format!("cannot read the stop input: {error}"),
     };
     interlock.open();
     Some(why)
@@ -167,7 +167,7 @@ mod tests {
         });
         let mut line = StopLine::start(Box::new(Panics::default()), Interlock::default()).unwrap();
         until(&mut line, |pressed| {
-            pressed.is_some_and(|why| why.contains("not read any more"))
+            pressed.is_some_and(|why| why.contains("no longer read"))
         });
     }
 }

@@ -1,7 +1,7 @@
 //! The velocity state sensor: velocity from wheel travel.
 #![expect(
     clippy::disallowed_methods,
-    reason = "here the sensor gets its time, and waits for it"
+    reason = "gives the sensor its clock and timer"
 )]
 
 use std::convert::Infallible;

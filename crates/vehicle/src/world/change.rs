@@ -61,7 +61,7 @@ pub enum Refusal {
     #[error("{0}")]
     Size(String),
     /// The window extends beyond the map.
-    #[error("{window} are not all on the map, which has {rows} x {columns}")]
+    #[error("{window} extend beyond the map, which has {rows} x {columns}")]
     Outside {
         /// The requested window.
         window: Window,
@@ -74,6 +74,6 @@ pub enum Refusal {
     #[error("the store is full: {0}")]
     Full(&'static str),
     /// The region has no points or too many, or its buffer is invalid.
-    #[error("the region can not be looked for")]
+    #[error("the store cannot search for this region")]
     Region,
 }

@@ -60,10 +60,10 @@ pub enum OpenError {
         source: io::Error,
     },
     /// Another process has the file open.
-    #[error("{}: another process has this store open; end that one or use another file", .0.display())]
+    #[error("{}: another process has this store open; stop it or use another file", .0.display())]
     InUse(PathBuf),
     /// The file is damaged or not a store.
-    #[error("{}: this is no store, or it is damaged: {why}", path.display())]
+    #[error("{}: not a store, or damaged: {why}", path.display())]
     Broken {
         /// The file.
         path: PathBuf,
@@ -72,7 +72,8 @@ pub enum OpenError {
     },
     /// The file was written by a newer version of this program.
     #[error(
-        "{}: the store has format {found}, and this program knows formats up to {FORMAT}; use a newer one",
+        "{}: the store has format {found}, but this program supports up to {FORMAT}; use a newer \
+         program",
         path.display()
     )]
     Newer {
@@ -101,7 +102,7 @@ impl OpenError {
 
 /// Error: data cannot be written or read. The file is unchanged and must be opened again.
 #[derive(Debug, thiserror::Error)]
-#[error("the store can not be read or written: {0}")]
+#[error("cannot access the store: {0}")]
 pub struct KeepError(String);
 
 impl<E: Into<redb::Error>> From<E> for KeepError {
@@ -117,7 +118,7 @@ impl KeepError {
 
     /// The error for requests after the first failure.
     pub(super) fn closed() -> Self {
-        Self("it has failed before and is closed".to_owned())
+        Self("it failed before and is closed".to_owned())
     }
 }
 
@@ -211,7 +212,7 @@ impl File {
         match reading.open_table(NUMBERS) {
             Ok(numbers) => match numbers.get(KEY)? {
                 Some(format) => Ok(format.value()),
-                None => Err(KeepError::record(&"it does not say which format it has")),
+                None => Err(KeepError::record(&"its format is missing")),
             },
             Err(TableError::TableDoesNotExist(_)) => {
                 let writing = self.database.begin_write()?;

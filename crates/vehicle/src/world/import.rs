@@ -22,11 +22,12 @@ pub struct Picture {
 pub enum ImportError {
     /// The header of an image is invalid.
     #[error(
-        "the picture's head is not that of a PGM file: P2 or P5, width, height, greatest value up to 65535"
+        "the image's header is not that of a PGM file: P2 or P5, width, height, maximum value up \
+         to 65535"
     )]
     Head,
     /// The map has no cells or too many.
-    #[error("{rows} rows and {columns} columns can not be a map: 1 to 4096 of each can")]
+    #[error("a map cannot have {rows} rows and {columns} columns: use 1 to 4096 of each")]
     Size {
         /// Number of rows in the file.
         rows: usize,
@@ -34,7 +35,7 @@ pub enum ImportError {
         columns: usize,
     },
     /// The image ends early or contains an invalid value.
-    #[error("the picture has {found} values that can be read instead of {wanted}")]
+    #[error("the image has {found} readable values instead of {wanted}")]
     Cells {
         /// Width times height.
         wanted: usize,
@@ -42,9 +43,7 @@ pub enum ImportError {
         found: usize,
     },
     /// A line differs in length from the first.
-    #[error(
-        "line {line} has {found} cells instead of {wanted} as the first; make them equally long"
-    )]
+    #[error("line {line} has {found} cells, but the first has {wanted}; make them equally long")]
     Line {
         /// Line number, starting at 1.
         line: usize,
@@ -55,7 +54,8 @@ pub enum ImportError {
     },
     /// A character does not represent a cell.
     #[error(
-        "line {line}: '{found}' is no cell; write # for impassable, . for free, 0 to 9 for in between"
+        "line {line}: '{found}' is not a cell; write # for impassable, . for free, 0 to 9 for in \
+         between"
     )]
     Character {
         /// Line number, starting at 1.

@@ -64,7 +64,7 @@ impl Raster {
         let side = 1..=Self::MOST_SIDE;
         if !side.contains(&self.rows) || !side.contains(&self.columns) {
             return Some(format!(
-                "a map of {} x {} cells can not be kept: 1 to {} rows and columns can",
+                "cannot store a map of {} x {} cells: use 1 to {} rows and columns",
                 self.rows,
                 self.columns,
                 Self::MOST_SIDE
@@ -72,13 +72,13 @@ impl Raster {
         }
         if !(0.001..=1000.0).contains(&self.cell) {
             return Some(format!(
-                "cells of {} m can not be kept: 0.001 to 1000 m can",
+                "cannot store cells of {} m: use 0.001 to 1000 m",
                 self.cell
             ));
         }
         if !self.x.is_finite() || !self.y.is_finite() {
             return Some(format!(
-                "x {} m, y {} m is no place in the local frame",
+                "x {} m, y {} m is not a position in the local frame",
                 self.x, self.y
             ));
         }

@@ -372,7 +372,7 @@ fn maps_and_cells_that_can_not_be_are_refused_with_what_is_wrong() {
     let outside = set(1, window(15, 0, 2, 1), 2).unwrap_err();
     assert_eq!(
         outside.to_string(),
-        "2 x 1 cells from row 15, column 0 are not all on the map, which has 16 x 16"
+        "2 x 1 cells from row 15, column 0 extend beyond the map, which has 16 x 16"
     );
     assert!(matches!(
         set(1, window(u16::MAX, u16::MAX, 1, 1), 1),
@@ -467,7 +467,7 @@ fn pictures_and_text_become_maps_with_north_at_the_top() {
 fn files_that_are_no_map_are_refused_with_what_is_wrong() {
     let error = |octets: &[u8]| Picture::read(octets).unwrap_err().to_string();
     assert!(error(b"").contains("0 rows"));
-    assert!(error(b"...\n..\n").starts_with("line 2 has 2 cells instead of 3"));
+    assert!(error(b"...\n..\n").starts_with("line 2 has 2 cells, but the first has 3"));
     assert!(error(b"..\n.x\n").starts_with("line 2: 'x'"));
     assert!(error(b"P5 3 2 255\n\0\0").contains("2 values"));
     assert!(error(b"P2 3 2 70000\n").contains("PGM"));

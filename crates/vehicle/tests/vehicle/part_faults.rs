@@ -373,8 +373,8 @@ async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_st
     let directory = std::env::temp_dir().join(format!("jaus-stall-{}", std::process::id()));
     std::fs::create_dir_all(&directory).unwrap();
     let file: PathBuf = directory.join("pose.toml");
-    // The sensor writes a new file beside the old one. Opening this one does not return before it
-    // is opened for reading, too.
+    // The sensor writes a new file beside the old one. Opening this one blocks until it is opened
+    // for reading too.
     let stalled = directory.join("pose.toml.new");
     let made = Command::new("mkfifo").arg(&stalled).status().unwrap();
     assert!(made.success());

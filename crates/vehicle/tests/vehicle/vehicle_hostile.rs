@@ -3,7 +3,7 @@
 #![allow(
     clippy::disallowed_methods,
     clippy::unwrap_used,
-    reason = "a test begins at some time, and fails by panicking"
+    reason = "virtual time starts at any instant; a test fails by panicking"
 )]
 
 use std::time::{Duration, Instant};

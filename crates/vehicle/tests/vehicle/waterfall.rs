@@ -63,7 +63,7 @@ impl Scene {
             client: client.attach(&desk, 1).unwrap(),
             _desk: desk,
         };
-        // In an order in which nobody finds what they need at first.
+        // In an order in which no part finds its dependencies at first.
         for id in [PATH, VECTOR, POSE, VELOCITY, PRIMITIVE] {
             scene.start(id);
         }
@@ -244,7 +244,7 @@ async fn the_vehicle_gets_there_whichever_part_is_started_again() {
         .await;
     scene.restart(PATH).await;
     control.release().await;
-    // Who commands it has to say again what it is to do.
+    // The client must repeat its command.
     let _control = scene.drive(&[(4.0, 4.0)]).await;
     let stage = scene.until_stage(PATH, StageState::Done).await;
     assert_eq!(stage.progress, 100);
@@ -266,11 +266,11 @@ async fn after_an_emergency_at_the_last_stage_nothing_moves_by_itself() {
     );
     scene.client.clear_emergency(PRIMITIVE).await.unwrap();
     let before = scene.travelled().await;
-    // Longer than any of them waits before it tries again.
+    // Longer than any retry delay.
     tokio::time::sleep(Duration::from_secs(3)).await;
     let after = scene.travelled().await;
     assert!((after - before).abs() < 0.2, "{before} m, then {after} m");
-    // Told anew, it goes on.
+    // After a new command it continues.
     scene.drive_again(&control).await;
     scene.until_at("goes on", |x, _| x > 2.0).await;
 }

@@ -102,7 +102,7 @@ impl LinkType {
 #[non_exhaustive]
 pub enum CaptureError {
     /// The reader failed.
-    #[error("the capture cannot be read at octet {offset}: {source}")]
+    #[error("cannot read the capture at octet {offset}: {source}")]
     Read {
         /// Offset in the file.
         offset: u64,
@@ -110,14 +110,15 @@ pub enum CaptureError {
         source: io::Error,
     },
     /// The file is not a capture.
-    #[error("this is not a pcap or pcapng file: it begins with {}{}", hex(.begin), advice(.begin))]
+    #[error("not a pcap or pcapng file: it starts with {}{}", hex(.begin), advice(.begin))]
     NotACapture {
         /// The first octets of the file, at most four.
         begin: Vec<u8>,
     },
     /// The file ends within a packet or block.
     #[error(
-        "the capture is cut short: the {what} at octet {offset} needs {wanted} octets, {held} are left"
+        "the capture is truncated: the {what} at octet {offset} needs {wanted} octets, but {held} \
+         are left"
     )]
     CutShort {
         /// Offset of the packet or block in the file.
@@ -130,7 +131,7 @@ pub enum CaptureError {
         held: u64,
     },
     /// The content is invalid.
-    #[error("the capture is damaged: {problem} at octet {offset}")]
+    #[error("the capture is corrupt: {problem} at octet {offset}")]
     Damaged {
         /// Offset of the packet or block in the file.
         offset: u64,
@@ -240,7 +241,7 @@ impl From<CaptureError> for Fault {
 
 fn hex(octets: &[u8]) -> String {
     if octets.is_empty() {
-        return "nothing, it is empty".to_owned();
+        return "nothing, the file is empty".to_owned();
     }
     octets.iter().map(|octet| format!("{octet:02x}")).collect()
 }

@@ -1,11 +1,11 @@
-//! The log of a node on disk: everything that passes, in files that take each other's place.
+//! The log of a node on disk: all traffic, in rotated files.
 //!
-//! A [`Journal`] has a [tap](Node::tap) of the node, which is its bounded queue, and a thread that
-//! writes, so that a slow card holds up nobody. What the thread is too slow for is lost and counted,
-//! and the log itself says how much and where. A file is ended when it has its size or age, and the
-//! oldest go before the directory would hold more than it may. What is written is handed to the
-//! operating system within a second, in whole blocks or lines: after a crash everything up to there
-//! can be read.
+//! A [`Journal`] has a [tap](Node::tap) of the node, which is its bounded queue, and a writer
+//! thread, so a slow card blocks nothing. Entries that the thread is too slow for are dropped and
+//! counted, and the log records how many and where. A file is closed at its size or age limit, and
+//! the oldest files are deleted before the directory exceeds its limit. Entries reach the operating
+//! system within a second, in whole blocks or lines: after a crash everything up to there is
+//! readable.
 
 mod directory;
 mod packets;
@@ -218,7 +218,7 @@ impl Drop for Journal {
     }
 }
 
-/// The thread: writes until it is told to stop or the node has.
+/// The thread: writes until it or the node stops.
 async fn write(
     mut tap: Tap,
     mut sink: Sink,

@@ -164,7 +164,7 @@ fn words(text: &str) -> Result<Vec<String>, FilterError> {
     }
     if quoted {
         return Err(FilterError(format!(
-            "in `{text}` a double quote is missing"
+            "`{text}` lacks a closing double quote"
         )));
     }
     words.push(word);
@@ -202,7 +202,7 @@ impl Term {
             "text" => return Ok(Self::of_text(value)),
             other => {
                 return Err(FilterError(format!(
-                    "there is no `{other}` to filter by; there are {}, field and filter",
+                    "there is no filter `{other}`; choose from {}, field and filter",
                     KEYS.join(", ")
                 )));
             }
@@ -216,13 +216,13 @@ impl Term {
     fn of_field(written: &str) -> Result<Self, FilterError> {
         let field = Field::parse(written).ok_or_else(|| {
             FilterError(format!(
-                "`{written}` compares no field: write for example velocity_x>1.0, with one of = != < \
-                 <= > >= ~"
+                "`{written}` is not a comparison: write for example velocity_x>1.0, with one of = \
+                 != < <= > >= ~"
             ))
         })?;
         if field.needs_number() {
             return Err(FilterError(format!(
-                "`{written}`: behind < <= > >= there is to be a number"
+                "`{written}`: < <= > >= need a number after them"
             )));
         }
         Ok(Self {
@@ -254,7 +254,7 @@ fn directions(names: Vec<String>) -> Result<Vec<String>, FilterError> {
     const ALL: [&str; 4] = ["received", "sent", "local", "passing"];
     match names.iter().find(|name| !ALL.contains(&name.as_str())) {
         Some(unknown) => Err(FilterError(format!(
-            "`direction={unknown}`: there are {}",
+            "`direction={unknown}`: choose from {}",
             ALL.join(", ")
         ))),
         None => Ok(names),
@@ -265,8 +265,8 @@ impl Place {
     fn parse(text: &str) -> Result<Self, FilterError> {
         let wrong = || {
             FilterError(format!(
-                "`{text}` names no component: write 101.2.33, 101.2 for a node, 101 for a subsystem, \
-                 or * for any number"
+                "`{text}` is not a component: write 101.2.33, 101.2 for a node, 101 for a \
+                 subsystem, or * for any number"
             ))
         };
         let mut place = [None; 3];

@@ -95,9 +95,9 @@ fn a_mistake_in_a_filter_is_told_with_what_would_be_right() {
     for (filter, part) in [
         ("component=rover", "write 101.2.33"),
         ("component=1.2.3.4", "write 101.2.33"),
-        ("velocity_x>fast", "there is to be a number"),
+        ("velocity_x>fast", "need a number after them"),
         ("direction=up", "received, sent, local, passing"),
-        ("\"open", "a double quote is missing"),
+        ("\"open", "lacks a closing double quote"),
     ] {
         let said = filter.parse::<Filter>().unwrap_err().to_string();
         assert!(said.contains(part), "{filter}: {said}");

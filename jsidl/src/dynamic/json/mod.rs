@@ -65,7 +65,7 @@ impl std::error::Error for JsonError {}
 #[non_exhaustive]
 pub enum JsonProblem {
     /// An object has an unknown key.
-    #[error("unknown key \"{key}\"; known here: {known}")]
+    #[error("unknown key \"{key}\"; known keys: {known}")]
     UnknownKey {
         /// The key.
         key: String,

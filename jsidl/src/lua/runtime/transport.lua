@@ -181,7 +181,7 @@ local function show_payload(tree, tvb, frame, frame_number)
         return string.format("RA message %04Xh", frame.code)
     elseif not message then
         local item = tree:add(header.data, tvb:range(frame.body_at, length))
-        item:add_proto_expert_info(experts.malformed, "a message begins with the two octets of its code")
+        item:add_proto_expert_info(experts.malformed, "a message starts with the two octets of its code")
         return "no message"
     end
     show_message(tree, message)

@@ -9,8 +9,8 @@ fn names_are_identifiers_and_differ() {
 <fixed_field name="B b" field_type="unsigned byte" field_units="one"/>
 </record>"#),
         "
-t.xml:3:15: error: `1st R` cannot be a name: use letters, digits and underscores, not beginning with a digit
-t.xml:4:20: error: `B b` cannot be a name: use letters, digits and underscores, not beginning with a digit
+t.xml:3:15: error: `1st R` cannot be a name: use letters, digits and underscores, not starting with a digit
+t.xml:4:20: error: `B b` cannot be a name: use letters, digits and underscores, not starting with a digit
 ",
     );
     check(

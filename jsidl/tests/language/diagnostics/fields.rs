@@ -26,7 +26,7 @@ fn scales_need_an_unsigned_integer_and_two_limits_in_order() {
 <scale_range real_lower_limit="0" real_upper_limit="1" integer_function="round"/>
 </fixed_field>"#,
         ),
-        "t.xml:4:1: error: a real number cannot tell the steps of a scaled `unsigned long integer` apart: use `unsigned integer`",
+        "t.xml:4:1: error: a floating-point number cannot resolve the steps of a scaled `unsigned long integer`: use `unsigned integer`",
     );
     check(
         &types(
@@ -41,8 +41,8 @@ fn scales_need_an_unsigned_integer_and_two_limits_in_order() {
 <scale_range real_lower_limit="1 +" real_upper_limit="2$" integer_function="truncate"/>
 </fixed_field>"#),
         "
-t.xml:4:32: error: `real_lower_limit` must be a number or a constant expression: it ends too early
-t.xml:4:55: error: `real_upper_limit` must be a number or a constant expression: `$` is not understood
+t.xml:4:32: error: `real_lower_limit` must be a number or a constant expression: it is incomplete
+t.xml:4:55: error: `real_upper_limit` must be a number or a constant expression: `$` is not recognised
 t.xml:4:77: error: `truncate` is not a value of `integer_function`: use `round`, `floor`, `ceiling`
 ",
     );
@@ -51,7 +51,7 @@ t.xml:4:77: error: `truncate` is not a value of `integer_function`: use `round`,
 <scale_range real_lower_limit="1/0" real_upper_limit="constants.E" integer_function="round"/>
 </fixed_field>"#),
         "
-t.xml:4:32: error: this cannot be computed: the result is not a finite number
+t.xml:4:32: error: cannot evaluate this: the result is not a finite number
 t.xml:4:55: error: the constant `constants.E` is not declared: declare it in a `declared_const_set` and refer to that with `declared_const_set_ref`
 ",
     );
@@ -69,11 +69,12 @@ fn a_range_around_zero_needs_a_signed_integer_of_at_most_four_octets() {
     check(&range("short integer", "centre"), "");
     check(
         &range("unsigned short integer", "centre"),
-        "t.xml:4:1: error: only the range of a signed integer has its zero in the centre: change the `field_type`, or remove the attribute `bias`",
+        "t.xml:4:1: error: only a signed integer's range is centred on zero: change the \
+         `field_type`, or remove the attribute `bias`",
     );
     check(
         &range("long integer", "centre"),
-        "t.xml:4:1: error: a real number cannot tell the steps of a scaled `long integer` apart: use `integer`",
+        "t.xml:4:1: error: a floating-point number cannot resolve the steps of a scaled `long integer`: use `integer`",
     );
     check(
         &range("short integer", "lower"),
@@ -209,9 +210,9 @@ fn bits_lie_within_the_field_and_belong_to_one_sub_field() {
 </bit_field>"#,
         ),
         "
-t.xml:10:44: error: the bits 7 to 8 of `D` do not lie within the `bit_field`, whose bits are 0 to 7
-t.xml:13:44: error: the bits of `E` go from 2 to 1: exchange them
-t.xml:16:44: error: the bits -1 to 0 of `G` do not lie within the `bit_field`, whose bits are 0 to 7
+t.xml:10:44: error: the bits 7 to 8 of `D` are outside the `bit_field`, whose bits are 0 to 7
+t.xml:13:44: error: the bits of `E` range from 2 to 1: swap them
+t.xml:16:44: error: the bits -1 to 0 of `G` are outside the `bit_field`, whose bits are 0 to 7
 ",
     );
     check(

@@ -60,14 +60,17 @@ fn a_message_begins_with_its_code() {
             r#"<message_def name="A" message_id="2B00" is_command="false">
 <header name="H"/><body name="B"/><footer name="F"/></message_def>"#,
         ),
-        "t.xml:4:1: error: the header is empty: a message begins with its code, so the header must be a `record` whose first field is an `unsigned short integer`",
+        "t.xml:4:1: error: the header is empty: a message starts with its code, so the header \
+         must be a `record` whose first field is an `unsigned short integer`",
     );
     check(
         &messages(
             r#"<message_def name="A" message_id="2B00" is_command="false">
 <header name="H"><record name="R"><fixed_field name="A" field_type="unsigned byte" field_units="one"/></record></header><body name="B"/><footer name="F"/></message_def>"#,
         ),
-        "t.xml:4:1: error: the header does not begin with the message code: a message begins with its code, so the header must be a `record` whose first field is an `unsigned short integer`",
+        "t.xml:4:1: error: the header does not start with the message code: a message starts with \
+         its code, so the header must be a `record` whose first field is an `unsigned short \
+         integer`",
     );
     check(
         &messages(
@@ -133,7 +136,7 @@ fn references_that_lead_nowhere_are_reported_with_what_is_there() {
         ),
         "
 t.xml:5:46: error: `rec` is not declared: did you mean `Rec`?
-  t.xml:2:1: note: the type set in which `rec` was looked for
+  t.xml:2:1: note: the type set searched for `rec`
 ",
     );
     check(
@@ -143,7 +146,7 @@ t.xml:5:46: error: `rec` is not declared: did you mean `Rec`?
         ),
         "
 t.xml:4:46: error: `other.Rec` is not declared: there is no `declared_type_set_ref` named `other`
-  t.xml:2:1: note: the type set in which it was looked for
+  t.xml:2:1: note: the type set searched
 ",
     );
     check(
@@ -177,7 +180,7 @@ fn circles_of_references_are_reported() {
 <declared_list name="X" declared_type_ref="A"/></list>"#,
         ),
         "
-t.xml:6:44: error: `A` contains itself: a message must have an end, so break the circle
+t.xml:6:44: error: `A` contains itself, which makes it infinite: break the cycle
   t.xml:3:1: note: declared here
 ",
     );
@@ -206,7 +209,7 @@ fn a_message_that_is_left_out_is_named_by_the_service() {
         ),
         "
 t.xml:4:148: error: the record `R` has no members: add one, or remove the record
-t.xml:8:1: error: `A` is left out of `urn:s 1.0`, because what it refers to is missing or has errors
+t.xml:8:1: error: `A` is omitted from `urn:s 1.0`, because a definition it refers to is missing or has errors
 ",
     );
 }
@@ -226,8 +229,8 @@ fn services_inherit_from_what_is_there() {
 <message_set><input_set/><output_set/></message_set></service_def>
 </p:service_set>"#),
         "
-t.xml:3:13: error: `urn:A 1.0` is left out: it inherits from `urn:B 1.0`, which needs `urn:C 2.0`, which is not loaded
-t.xml:6:13: error: the service `urn:C 2.0` to inherit from is not loaded: of it only version 1.0 is loaded
+t.xml:3:13: error: `urn:A 1.0` is omitted: it inherits from `urn:B 1.0`, which needs `urn:C 2.0`, which is not loaded
+t.xml:6:13: error: the base service `urn:C 2.0` is not loaded: only its version 1.0 is loaded
 ",
     );
     check(
@@ -238,7 +241,7 @@ t.xml:6:13: error: the service `urn:C 2.0` to inherit from is not loaded: of it 
 <message_set><input_set/><output_set/></message_set></service_def>
 </p:service_set>"#,
         ),
-        "t.xml:3:13: error: `urn:A 1.0` inherits from itself: break the circle",
+        "t.xml:3:13: error: `urn:A 1.0` inherits from itself: break the cycle",
     );
     check(
         &text(r#"<p:service_set xmlns:p="urn:jaus:jsidl:plus" xmlns="urn:jaus:jsidl:1.1" name="Set" id="urn:set" version="1.0">
@@ -253,9 +256,9 @@ t.xml:6:13: error: the service `urn:C 2.0` to inherit from is not loaded: of it 
 <message_set><input_set/><output_set/></message_set></service_def>
 </p:service_set>"#),
         "
-t.xml:3:13: error: `urn:A 1.0` inherits from itself: break the circle
-t.xml:6:13: error: `urn:B 1.0` inherits from itself: break the circle
-t.xml:9:13: error: `urn:C 1.0` is left out: it inherits from more than 32 services, or from a circle of them
+t.xml:3:13: error: `urn:A 1.0` inherits from itself: break the cycle
+t.xml:6:13: error: `urn:B 1.0` inherits from itself: break the cycle
+t.xml:9:13: error: `urn:C 1.0` is omitted: it inherits from more than 32 services, or from a cycle of them
 ",
     );
     check(
@@ -268,7 +271,7 @@ t.xml:9:13: error: `urn:C 1.0` is left out: it inherits from more than 32 servic
 <message_set><input_set/><output_set/></message_set></service_def>
 </p:service_set>"#),
         "
-t.xml:3:13: error: the service `urn:B 1.0` to inherit from is not loaded: load the file that declares it as well
+t.xml:3:13: error: the base service `urn:B 1.0` is not loaded: load the file that declares it as well
 t.xml:5:43: error: `01.0` cannot be a version: write two numbers from 0 to 255, for example `1.0`
 ",
     );
@@ -280,7 +283,8 @@ t.xml:5:43: error: `01.0` cannot be a version: write two numbers from 0 to 255, 
 <message_set><input_set/><output_set/></message_set></service_def>
 </p:service_set>"#,
         ),
-        "t.xml:3:60: error: `*.*` cannot be a version: a wild card does not say which definition is meant, so write the version",
+        "t.xml:3:60: error: `*.*` cannot be a version: a wildcard does not select a definition: \
+         write the version",
     );
     check(
         &text(
@@ -308,7 +312,7 @@ t.xml:5:43: error: `01.0` cannot be a version: write two numbers from 0 to 255, 
 </p:service_set>"#,
         ),
         "
-t.xml:3:13: warning: the service `urn:B 1.0`, of which this one is a client, is not loaded
+t.xml:3:13: warning: this service is a client of `urn:B 1.0`, which is not loaded
 t.xml:4:1: error: there are two references named `x`: rename one
   t.xml:3:13: note: the other one
 ",
@@ -332,7 +336,7 @@ t.xml:1:69: error: `message_set` lacks the element `output_set`: add it
         &text(r#"<service_def name="S" id=" urn:s" version="1.256" xmlns="urn:jaus:jsidl:1.0"/>"#),
         "
 t.xml:1:1: error: `service_def` lacks the element `message_set`: add it
-t.xml:1:27: warning: the id `urn:s` is written with blanks around it: remove them
+t.xml:1:27: warning: the id `urn:s` has surrounding spaces: remove them
 t.xml:1:44: error: `1.256` cannot be a version: write two numbers from 0 to 255, for example `1.0`
 ",
     );

@@ -10,18 +10,19 @@ fn a_text_that_is_not_xml_is_reported_where_it_breaks() {
   <message_set>
 </service_def>",
         ),
-        "t.xml:3:1: error: this is not well-formed XML: expected 'message_set' tag, not 'service_def'",
+        "t.xml:3:1: error: not well-formed XML: expected 'message_set' tag, not 'service_def'",
     );
     check(
         &text(
             "<!DOCTYPE a>
 <a/>",
         ),
-        "t.xml:1:1: error: a document type declaration is not needed in JSIDL and not read: remove it",
+        "t.xml:1:1: error: a document type declaration is ignored and not needed in JSIDL: remove \
+         it",
     );
     check(
         &text("no definition"),
-        "t.xml:1:1: error: this is not well-formed XML: unknown token",
+        "t.xml:1:1: error: not well-formed XML: unknown token",
     );
 }
 
@@ -29,7 +30,7 @@ fn a_text_that_is_not_xml_is_reported_where_it_breaks() {
 fn a_root_that_is_no_definition_is_reported() {
     check(
         &text(r#"<project xmlns="urn:maven"/>"#),
-        "t.xml:1:1: error: `project` is not the root of a JSIDL file: expected one of `service_def`, `declared_type_set`, `declared_const_set`, `service_set`",
+        "t.xml:1:1: error: `project` is not the root element of a JSIDL file: expected one of `service_def`, `declared_type_set`, `declared_const_set`, `service_set`",
     );
     check(
         &text(r#"<service_def name="S"/>"#),
@@ -37,7 +38,7 @@ fn a_root_that_is_no_definition_is_reported() {
     );
     check(
         &text(r#"<record xmlns="urn:jaus:jsidl:1.0" name="R"/>"#),
-        "t.xml:1:1: error: `record` is not the root of a JSIDL file: expected one of `service_def`, `declared_type_set`, `declared_const_set`, `service_set`",
+        "t.xml:1:1: error: `record` is not the root element of a JSIDL file: expected one of `service_def`, `declared_type_set`, `declared_const_set`, `service_set`",
     );
 }
 
@@ -53,15 +54,15 @@ fn unknown_elements_attributes_and_text_are_reported() {
         "
 t.xml:3:18: error: `record` has no attribute `optinal`: it has `name`, `optional`, `interpretation`
 t.xml:3:33: error: text has no meaning inside `record`: remove it, or make it a comment
-t.xml:5:3: error: `fixedfield` may not stand in `record`, which holds fields: put composites into a `sequence` instead
-t.xml:6:3: error: `list` may not stand in `record`, which holds fields: put composites into a `sequence` instead
+t.xml:5:3: error: `fixedfield` is not allowed in `record`, which holds fields: put composites into a `sequence` instead
+t.xml:6:3: error: `list` is not allowed in `record`, which holds fields: put composites into a `sequence` instead
 ",
     );
     check(
         &types(
             r#"<sequence name="Q"><fixed_field name="A" field_type="unsigned byte" field_units="one"/></sequence>"#,
         ),
-        "t.xml:3:20: error: `fixed_field` may not stand in `sequence`, which holds composites: put fields into a `record`",
+        "t.xml:3:20: error: `fixed_field` is not allowed in `sequence`, which holds composites: put fields into a `record`",
     );
     check(
         &types(r#"<x:record xmlns:x="urn:else" name="R"/>"#),
@@ -123,7 +124,7 @@ t.xml:6:20: error: `A` is optional, but the record `R` has no `presence_vector`:
 t.xml:8:1: error: `message_set` lacks the element `output_set`: add it
 t.xml:9:35: error: `XYZ0` cannot be a message id: write two octets as four hexadecimal digits, for example `2B00`
 t.xml:12:51: error: `T.B` is not declared: there is no `declared_type_set_ref` named `T`
-  t.xml:2:1: note: the type set in which it was looked for
+  t.xml:2:1: note: the type set searched
 "#,
     );
 }

@@ -31,7 +31,7 @@ pub(crate) fn fields(prefix: &str, message: &Message, value: &Value) -> Vec<Fiel
         return Vec::new();
     };
     match (&body.shape, value) {
-        // What is directly in the message stands directly below it.
+        // The message's direct members are directly below it.
         (Shape::Group(group), Value::Group(slots)) => walk.members(&group.members, slots),
         _ => walk.item(body, value),
     }
@@ -169,7 +169,7 @@ pub(crate) fn agrees(item: Node<'_, '_>, (filter, content): &Field) -> bool {
             Content::Real(real) => {
                 show.parse() == Ok(*real) || show.parse() == format!("{real:.14e}").parse::<f64>()
             }
-            // Wireshark escapes and replaces what cannot be printed.
+            // Wireshark escapes and replaces unprintable characters.
             Content::Text(text) => show == text || text.contains(|c: char| !is_printed(c)),
             Content::Octets(octets) => {
                 let digits: String = octets.iter().map(|octet| format!("{octet:02x}")).collect();

@@ -1,5 +1,4 @@
-//! Datagrams and streams as peers write them, and such as nobody should: read without an error of
-//! the dissector.
+//! Valid and malformed datagrams and streams: dissected without a dissector error.
 
 use jaus_test_kit::tools::has_tshark;
 use jsidl::Library;
@@ -247,7 +246,7 @@ fn what_does_not_fit_its_definition_is_said_with_its_place() {
             b"\x00\x2B\x02\x03",
             "octet 1 of the body: octets behind the message's end: 1",
         ),
-        (b"\x02", "a message begins with the two octets of its code"),
+        (b"\x02", "a message starts with the two octets of its code"),
         // Query Velocity State with a presence vector is a plain field; its report's is not.
         (b"\x04\x44\x00\xF8", "the presence vector has bits above"),
         // Set Element: a list that is shorter than its count.

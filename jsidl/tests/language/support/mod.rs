@@ -279,7 +279,7 @@ pub(crate) fn emptiness() -> Message {
     message(0xF0A2, "Emptiness", Some(item("Elements", elements)))
 }
 
-/// A message with a header and a footer of its own.
+/// A message with its own header and footer.
 pub(crate) fn framed() -> Message {
     Message {
         header: Some(item("Head", group(vec![item("Length", byte())]))),

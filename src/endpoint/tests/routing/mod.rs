@@ -34,7 +34,7 @@ struct World {
 impl World {
     #[expect(
         clippy::disallowed_methods,
-        reason = "an arbitrary beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     fn new() -> Self {
         Self {

@@ -34,7 +34,7 @@ impl Bench {
     /// A client whose discovery searches for others.
     #[expect(
         clippy::disallowed_methods,
-        reason = "virtual time begins at some instant"
+        reason = "virtual time starts at any instant"
     )]
     fn looking_for(scope: Scope) -> Self {
         let profile = Profile::new(Kind::OperatorControlUnit, "Operator");

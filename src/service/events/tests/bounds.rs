@@ -35,7 +35,7 @@ fn a_rejection_is_one_that_jauspp_reads_too() {
     };
     assert_eq!((presence & 1, request, code), (1, 9, 6));
     assert_eq!(text.len(), 80);
-    assert!(text.starts_with(b"no event of yours"));
+    assert!(text.starts_with(b"you have no event"));
     let strict: RejectEventRequest = answer(&said);
     assert_eq!(strict.response_code, Some(ResponseCode(6)));
 }

@@ -1,7 +1,7 @@
 //! `jaus-tester mission`: a mission through all components, checked step by step.
 #![expect(
     clippy::disallowed_methods,
-    reason = "what passes is told with the time since the beginning"
+    reason = "traffic is printed with the time since the start"
 )]
 
 use std::path::PathBuf;
@@ -17,11 +17,11 @@ use jaus_cli::runtime;
 use jaus_vehicle::parts::tester::{MissionTest, figure, steps};
 use tokio::sync::mpsc;
 
-/// Drive a mission through all components of a vehicle, and check each answer
+/// Drive a mission through all components of a vehicle and check each answer
 ///
-/// Finds planner, knowledge store, sensors and drivers of a subsystem, takes control of the planner,
-/// sets a destination, approves the path, watches the stages begin one after the other, and checks
-/// where the vehicle stands in the end. Each message that passes the tester is shown as a line. Exit
+/// Finds planner, knowledge store, sensors and drivers of a subsystem, takes control of the
+/// planner, sets a destination, approves the path, checks that the stages start in order, and
+/// checks where the vehicle stops. Each message to or from the tester is printed as a line. Exit
 /// status 1 means that a step has failed.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -33,7 +33,7 @@ pub(crate) struct MissionCommand {
     #[arg(long, value_name = "NUMBER", default_value = "101", value_parser = clap::value_parser!(u16).range(1..=65534))]
     subsystem: u16,
 
-    /// Where to drive to, X,Y in metres of the local frame [default: some four metres away]
+    /// The destination X,Y in the local frame in metres [default: about four metres away]
     #[arg(long, value_name = "X,Y", value_parser = point, allow_hyphen_values = true)]
     to: Option<(f64, f64)>,
 
@@ -41,19 +41,19 @@ pub(crate) struct MissionCommand {
     #[arg(long, value_name = "M/S", default_value = "1", value_parser = speed)]
     speed: f32,
 
-    /// With which authority the planner is controlled
+    /// The authority used to control the planner
     #[arg(long, value_name = "CODE", default_value = "200")]
     authority: u8,
 
-    /// How long a step may take, but for the drive
+    /// The time limit of a step, except the drive
     #[arg(long, value_name = "SECONDS", default_value = "15", value_parser = runtime::seconds)]
     patience: Duration,
 
-    /// How long the drive may take
+    /// The time limit of the drive
     #[arg(long, value_name = "SECONDS", default_value = "120", value_parser = runtime::seconds)]
     drive: Duration,
 
-    /// Write the steps into this file, as a JUnit report
+    /// Write the steps to this file as a JUnit report
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
 
@@ -61,7 +61,7 @@ pub(crate) struct MissionCommand {
     #[arg(long)]
     quiet: bool,
 
-    /// Show the messages of discovery and events' upkeep, too
+    /// Show messages of discovery and event renewal too
     #[arg(long, conflicts_with = "quiet")]
     all: bool,
 
@@ -90,8 +90,9 @@ impl MissionCommand {
         let tap = node.as_ref().filter(|_| !self.quiet);
         let mut tap = tap.map(|node| node.tap(WAITING));
         if tap.is_none() && !self.quiet {
-            output
-                .line("the messages pass the node of another process: `jaus watch` shows them")?;
+            output.line(
+                "the messages pass through another process's node: see them with `jaus watch`",
+            )?;
         }
         let tester = Component::builder(Kind::OperatorControlUnit, "Tester");
         let tester = tester.live_on(port).map_err(Failure::of)?;
@@ -121,7 +122,7 @@ impl MissionCommand {
                     Some(tapped) = next(&mut tap) => self.show(&tapped, begin, &mut output)?,
                     Some(step) = told.recv() => output.line(step)?,
                     steps = &mut running => break steps,
-                    () = &mut until => return Err(Failure::new("interrupted before the end")),
+                    () = &mut until => return Err(Failure::new("interrupted before the last step")),
                 }
             }
         };

@@ -12,10 +12,10 @@ use jaus_view::{self, Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network}
 
 use crate::definitions::Definitions;
 
-/// Print captured messages, or lines of hex, as one JSON object a line
+/// Decode captured messages or lines of hex to JSON, one object a line
 ///
-/// A message that cannot be read gives {"error":…,"offset":…} on its line, and the run goes on;
-/// the exit status is then 1.
+/// For a message that cannot be decoded, its line holds {"error":…,"offset":…}. Decoding continues,
+/// and the exit status is 1.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus decode drive.pcapng\n  \
@@ -23,23 +23,23 @@ use crate::definitions::Definitions;
     tcpdump -i eth0 -U -w - udp port 3794 | jaus decode -\n  \
     echo '00 2B 02' | jaus decode --hex\n  \
     jaus decode --hex --jsidl my-services/ < messages.txt\n\n\
-    Offsets count octets from 0: in a message from the first octet of its code, in a datagram or a \
-    capture from its beginning.")]
+    Offsets are in octets from 0: in a message from the first octet of its code, in a datagram or \
+    capture from its start.")]
 pub(crate) struct Decode {
     /// A pcap or pcapng file, or with --hex a text file; - is standard input
     #[arg(required_unless_present = "hex", value_name = "FILE")]
     file: Option<PathBuf>,
 
-    /// Read lines of hexadecimal digits, each one message beginning with its two code octets
+    /// Read lines of hexadecimal digits: one message per line, starting with its two code octets
     #[arg(long)]
     hex: bool,
 
-    /// Read messages without their headers by the definitions of the Reference Architecture (RA 3.x,
-    /// OpenJAUS 3.x); in a capture the headers tell
+    /// Decode bare messages by the definitions of the Reference Architecture (RA 3.x, OpenJAUS
+    /// 3.x); in a capture the headers decide
     #[arg(long, requires = "hex")]
     ra: bool,
 
-    /// The UDP port that JAUS messages come from or go to (repeatable)
+    /// A UDP source or destination port of JAUS messages (repeatable)
     #[arg(long, value_name = "PORT", default_values_t = [JAUS_PORT], conflicts_with = "hex")]
     port: Vec<u16>,
 
@@ -154,19 +154,19 @@ fn report_unread(network: &Network, log: &MessageLog<'_>) {
     let notes = [
         (
             counts.tcp_segments,
-            "TCP segments passed over: JTCP is not read yet",
+            "TCP segments skipped: JTCP is not decoded",
         ),
         (
             counts.unknown_links,
-            "frames passed over: their link type is not understood",
+            "frames skipped: unsupported link type",
         ),
         (
             counts.incomplete_datagrams,
-            "datagrams left out: some of their IP fragments are missing",
+            "datagrams skipped: IP fragments are missing",
         ),
         (
             log.incomplete_messages(),
-            "large messages not shown: some of their parts are missing",
+            "large messages skipped: fragments are missing",
         ),
     ];
     for (count, note) in notes {
@@ -175,6 +175,6 @@ fn report_unread(network: &Network, log: &MessageLog<'_>) {
         }
     }
     if log.stale_octets() > 0 {
-        tracing::info!(octets = log.stale_octets(), "passed over behind messages");
+        tracing::info!(octets = log.stale_octets(), "skipped after the messages");
     }
 }

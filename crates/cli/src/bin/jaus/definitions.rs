@@ -11,19 +11,19 @@ use jaus_view::Dictionary;
 pub(crate) struct Definitions {
     /// Add the service definitions of a JSIDL file or directory (repeatable)
     ///
-    /// They come before the built-in ones. Mistakes in them are listed on standard error; what has
-    /// none is used.
+    /// They take precedence over the built-in ones. Errors are reported on standard error;
+    /// definitions without errors are used.
     #[arg(long, value_name = "PATH")]
     jsidl: Vec<PathBuf>,
 
-    /// The service meant where several define the same message code (repeatable)
+    /// The service to prefer where several define the same message code (repeatable)
     ///
     /// A URN, or a URN and version: urn:jaus:jss:core:Events or urn:jaus:jss:core:Events@1.0
     #[arg(long, value_name = "URN")]
     service: Vec<String>,
 }
 
-/// Every message definition of ours.
+/// All built-in message definitions.
 pub(crate) fn built_in() -> Dictionary {
     Dictionary::of(jaus_vehicle::messages::registry())
         .with_reference_architecture(jaus_ra::messages::registry(), jaus_ra::messages::decode)

@@ -12,18 +12,18 @@ use jaus_cli::tree;
 
 /// Show subsystems, nodes, components and their services
 ///
-/// Looks for a moment, and prints the tree of what was found. Exit status 1 means that nobody was
-/// there.
+/// Searches for a few seconds and prints the tree of what it found. Exit status 1 means that
+/// nothing was found.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus discover\n  \
     jaus discover --watch\n  \
     jaus discover --interface eth0 --seconds 10 --json | jq\n  \
-    jaus discover --peer 192.168.7.2      where multicast does not reach\n  \
-    jaus discover --attach                beside the components of this host's node\n  \
+    jaus discover --peer 192.168.7.2      for a host that multicast does not reach\n  \
+    jaus discover --attach                as a component on this host's node\n  \
     jaus discover --loopback              finds `jaus demo` in another terminal")]
 pub(crate) struct Discover {
-    /// Go on, and print who comes, changes and goes; Ctrl-C ends it
+    /// Keep running and print arrivals, changes and losses, until Ctrl-C
     #[arg(long)]
     watch: bool,
 
@@ -31,7 +31,7 @@ pub(crate) struct Discover {
     #[arg(long)]
     json: bool,
 
-    /// How long to look [default: 3; with --watch without end]
+    /// How long to search [default: 3; with --watch until Ctrl-C]
     #[arg(long, value_parser = runtime::seconds)]
     seconds: Option<Duration>,
 
@@ -76,8 +76,8 @@ impl Discover {
         if lines.is_empty() {
             let seconds = self.seconds.unwrap_or(LOOK).as_secs_f64();
             say(format_args!(
-                "nobody answered within {seconds} s. --interface chooses the network, --peer \
-                 reaches where multicast does not, --seconds looks longer"
+                "no answer within {seconds} s. Choose the network with --interface, name a host \
+                 that multicast does not reach with --peer, or search longer with --seconds"
             ));
         }
         Ok(Outcome::complete_if(!lines.is_empty()))

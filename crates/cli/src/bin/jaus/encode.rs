@@ -9,18 +9,18 @@ use jaus_view::{Dictionary, Line, Request, Unreadable, to_hex};
 
 use crate::definitions::Definitions;
 
-/// Read messages as JSON lines from standard input, and print their octets in hex
+/// Encode JSON lines from standard input to messages, printed in hex
 ///
-/// A line has "message" (the name) or "code", "body", and perhaps "service". The lines of
-/// `jaus decode` are understood as they are. A line that cannot be written gives
-/// {"error":…,"offset":…} on its line, and the run goes on; the exit status is then 1.
+/// A line has "message" (the name) or "code", "body", and optionally "service", as printed by `jaus
+/// decode`. For a line that cannot be encoded, its line holds {"error":…,"offset":…}. Encoding
+/// continues, and the exit status is 1.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     echo '{\"message\":\"QueryIdentification\",\"body\":{\"QueryType\":2}}' | jaus encode\n  \
     jaus decode --hex < messages.txt | jaus encode")]
 pub(crate) struct Encode {
-    /// Write messages by the definitions of the Reference Architecture (RA 3.x, OpenJAUS 3.x), also
-    /// those whose "service" is not given
+    /// Encode by the definitions of the Reference Architecture (RA 3.x, OpenJAUS 3.x) where no
+    /// "service" is given
     #[arg(long)]
     ra: bool,
 

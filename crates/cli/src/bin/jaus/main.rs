@@ -2,7 +2,7 @@
 #![warn(
     clippy::print_stdout,
     clippy::print_stderr,
-    reason = "they panic when the reader has gone; see `output`"
+    reason = "they panic when the reader is gone; see `output`"
 )]
 
 mod decode;
@@ -36,9 +36,10 @@ use jaus_cli::output;
 #[command(
     name = "jaus",
     version,
-    after_help = "Begin with `jaus demo`: it needs no network, no configuration and no second terminal.\n\n\
-        Exit status: 0 all went well; 1 it ran, but something could not be read or did not answer; \
-        2 it could not run (wrong flag, missing file, port in use …)."
+    after_help = "Start with `jaus demo`: it needs no network, configuration or second \
+        terminal.\n\n\
+        Exit status: 0 success; 1 it ran, but something could not be decoded or did not answer; 2 \
+        it could not run (wrong flag, missing file, port in use …)."
 )]
 struct Cli {
     #[command(subcommand)]

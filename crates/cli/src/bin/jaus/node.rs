@@ -18,19 +18,19 @@ use tokio::time::{MissedTickBehavior, interval};
 
 /// Run a node with one component that others can find
 ///
-/// It offers the core services Transport, Discovery and Liveness, and prints who comes, changes
-/// and goes.
+/// It offers the core services Transport, Discovery and Liveness, and prints the arrivals, changes
+/// and losses of others.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus node --id 101.1.1 --name Rover --kind vehicle\n  \
     jaus node --id 102.1 --interface eth0 --port 3795\n  \
     jaus node --id 101.1 --local          component processes of this host may attach\n  \
     jaus node --config node.toml --stats\n  \
-    jaus node --id 101.1 --stats=10s      tells its numbers every 10 s\n  \
-    jaus node --loopback                  for trying things out on one computer")]
+    jaus node --id 101.1 --stats=10s      prints counters every 10 s\n  \
+    jaus node --loopback                  for trying it on one computer")]
 pub(crate) struct NodeCommand {
-    /// When it ends, print how much was received, sent and dropped, and why; with =TIME, such as
-    /// =10s, also each time that has passed
+    /// Print counters of received, sent and dropped messages at the end; with =TIME, such as =10s,
+    /// also at that interval
     #[arg(
         long,
         value_name = "TIME",
@@ -45,16 +45,16 @@ pub(crate) struct NodeCommand {
     #[arg(long, value_parser = runtime::seconds)]
     seconds: Option<Duration>,
 
-    /// What our subsystem is called [default: jaus node]
+    /// Our subsystem's name [default: jaus node]
     #[arg(long)]
     name: Option<String>,
 
-    /// What our subsystem is [default: other]
+    /// Our subsystem's kind [default: other]
     #[arg(long, value_enum)]
     kind: Option<SubsystemKind>,
 
-    /// Let component processes of this host attach to the node; ADDRESS is a socket's path, or a
-    /// port of loopback such as 127.0.0.1:37940 [default: the usual place]
+    /// Let component processes of this host attach to the node; ADDRESS is a socket path or a
+    /// loopback port such as 127.0.0.1:37940 [default: the usual place]
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "default")]
     local: Option<Local>,
 
@@ -160,7 +160,7 @@ pub(crate) fn introduce(
     }
     if let Some(tcp) = node.tcp() {
         let listening = tcp.listening.map_or_else(
-            || "connecting only".to_owned(),
+            || "outgoing connections only".to_owned(),
             |address| format!("listening on {address}"),
         );
         output.line(format_args!("TCP connections: {listening}"))?;
@@ -182,7 +182,7 @@ pub(crate) fn introduce(
             "components of this host may attach at {place}"
         ))?;
     }
-    output.line("Ctrl-C ends it.\n")
+    output.line("Press Ctrl-C to end.\n")
 }
 
 /// Describes endpoint events that discovery does not report.
@@ -192,7 +192,7 @@ fn in_words(event: &Event) -> Option<String> {
             Some(format!("{id} has moved from {} to {}", from.peer, to.peer))
         }
         Event::IdConflict { id, path } => Some(format!(
-            "somebody at {} has our id {id} too: one of us must choose another (--id)",
+            "the node at {} also has our id {id}: choose another for one of them (--id)",
             path.peer
         )),
         _ => None,

@@ -1,5 +1,8 @@
 //! `jaus ping`: queries a component repeatedly and measures the round trip.
-#![expect(clippy::disallowed_methods, reason = "a round trip has its time")]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "measures round trips in real time"
+)]
 
 use std::fmt;
 use std::future::Future;
@@ -25,39 +28,39 @@ use tokio::time::{Instant, sleep_until, timeout_at};
 /// users), so that no service acts on it.
 const PADDING: u16 = 0xD7F0;
 
-/// Ask a component for a sign of life, and measure the round trip
+/// Query a component and measure the round trip
 ///
-/// Asks for a heartbeat, which the Liveness service answers; a component that does not is asked
-/// for its identification; and if it does not answer that either, its transport is asked to
-/// acknowledge a message. What answered first is what goes on to be asked. Exit status 1 means
-/// that nothing answered.
+/// Queries a heartbeat (Liveness service); if that is not answered, the identification (Discovery
+/// service); and if that is not answered either, sends a message that requests acknowledgement
+/// (transport). The first that is answered is repeated. Exit status 1 means that nothing was
+/// answered.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus ping 101.1.33\n  \
     jaus ping 101.1.33 --count 10 --interval 0.1\n  \
     jaus ping 101.1.33 --with acknowledgement --size 65536\n  \
-    jaus ping 101.1.33 --peer 192.168.7.2      where multicast does not reach")]
+    jaus ping 101.1.33 --peer 192.168.7.2      for a host that multicast does not reach")]
 pub(crate) struct Ping {
-    /// Whom to ask: SUBSYSTEM.NODE.COMPONENT
+    /// The component to query: SUBSYSTEM.NODE.COMPONENT
     address: JausId,
 
-    /// How often to ask [default: until Ctrl-C]
+    /// The number of queries [default: until Ctrl-C]
     #[arg(long, short, value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
 
-    /// Seconds from one question to the next
+    /// The interval between queries, in seconds
     #[arg(long, short, default_value = "1", value_parser = runtime::seconds)]
     interval: Duration,
 
-    /// Seconds to wait for an answer
+    /// The answer timeout, in seconds
     #[arg(long, short, default_value = "1", value_parser = runtime::seconds)]
     timeout: Duration,
 
-    /// What to ask for [default: what the component answers]
+    /// What to send [default: the first that the component answers]
     #[arg(long, value_enum)]
     with: Option<Question>,
 
-    /// Octets of the message that is to be acknowledged, 2 to 16777216; implies --with
+    /// The size of the acknowledged message in octets, 2 to 16777216; implies --with
     /// acknowledgement
     #[arg(long, value_parser = clap::value_parser!(u32).range(2..=16 << 20))]
     size: Option<u32>,
@@ -66,14 +69,14 @@ pub(crate) struct Ping {
     network: Network,
 }
 
-/// A question that shows whether somebody is there.
+/// A message that shows whether a component is reachable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Question {
     /// Query Heartbeat Pulse, which Liveness answers
     Heartbeat,
     /// Query Identification, which Discovery answers
     Identification,
-    /// A message that wants an acknowledgement, which every transport gives
+    /// A message that requests acknowledgement, which every transport answers
     Acknowledgement,
 }
 
@@ -108,7 +111,7 @@ impl Ping {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         if !self.address.is_unicast() {
             return Err(Failure::new(format!(
-                "{} is not one component: `jaus discover` shows who is there",
+                "{} is not a single component: choose one that `jaus discover` lists",
                 self.address
             )));
         }
@@ -118,8 +121,8 @@ impl Ping {
                 .is_some_and(|with| with != Question::Acknowledgement)
         {
             return Err(Failure::new(
-                "--size makes a message that is only acknowledged: leave --with out, or make it \
-                 `--with acknowledgement`",
+                "--size applies to acknowledged messages only: omit --with, or use `--with \
+                 acknowledgement`",
             ));
         }
         runtime::run(async {
@@ -144,8 +147,8 @@ impl Ping {
         output.line(format_args!("\n{}: {tally}", self.address))?;
         if tally.times.is_empty() && tally.asked > 0 {
             say(format_args!(
-                "{} gave no sign of life. `jaus discover` shows who is there; --interface chooses \
-                 the network, --peer reaches where multicast does not",
+                "{} did not answer. List components with `jaus discover`, choose the network with \
+                 --interface, or name a host that multicast does not reach with --peer",
                 self.address
             ));
         }
@@ -261,17 +264,14 @@ impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (asked, answered) = (self.asked, self.times.len());
         let lost = 100.0 * (asked as f64 - answered as f64) / (asked.max(1) as f64);
-        write!(
-            f,
-            "asked {asked} times, {answered} answers, {lost:.0} % lost"
-        )?;
+        write!(f, "{asked} queries, {answered} answers, {lost:.0} % lost")?;
         let mut times = self.times.clone();
         times.sort_unstable();
         let (Some(&least), Some(&most)) = (times.first(), times.last()) else {
             return Ok(());
         };
         let (least, median, most) = (millis(least), millis(times[times.len() / 2]), millis(most));
-        write!(f, "; least {least}, median {median}, most {most} ms")
+        write!(f, "; min {least}, median {median}, max {most} ms")
     }
 }
 

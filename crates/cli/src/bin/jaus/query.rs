@@ -1,5 +1,8 @@
 //! `jaus query`: sends a query to a component and prints the report.
-#![expect(clippy::disallowed_methods, reason = "a question has its time")]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "queries have a timeout in real time"
+)]
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -23,10 +26,10 @@ use crate::definitions::Definitions;
 /// Interval of repeated queries without an answer.
 const AGAIN: Duration = Duration::from_millis(500);
 
-/// Ask a component, and print its report as JSON
+/// Query a component and print its report as JSON
 ///
-/// With a wildcard in the address (65535 or 255) every component that answers in time is printed.
-/// Exit status 1 means that nobody answered.
+/// With a wildcard in the address (65535 or 255) all reports that arrive in time are printed. Exit
+/// status 1 means that there was no answer.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus query 101.1.1 QueryIdentification '{\"QueryType\":2}'\n  \
@@ -34,7 +37,7 @@ const AGAIN: Duration = Duration::from_millis(500);
     jaus query 65535.255.255 QueryIdentification '{\"QueryType\":2}' --seconds 1\n  \
     jaus query 101.1.1 QueryHeartbeatPulse --peer 192.168.7.2")]
 pub(crate) struct Query {
-    /// Whom to ask: SUBSYSTEM.NODE.COMPONENT
+    /// The component to query: SUBSYSTEM.NODE.COMPONENT
     address: JausId,
 
     /// The query's name
@@ -43,7 +46,7 @@ pub(crate) struct Query {
     /// The query's fields, as `jaus decode` prints a body
     json: Option<String>,
 
-    /// How long to wait for an answer
+    /// The answer timeout
     #[arg(long, default_value = "2", value_parser = runtime::seconds)]
     seconds: Duration,
 
@@ -60,7 +63,7 @@ impl Query {
         let query = self.octets(&dictionary)?;
         let report = report_to(&query).ok_or_else(|| {
             Failure::new(format!(
-                "{} is not a query: nobody reports on it. Queries have codes from 2000h to 2FFFh",
+                "{} is not a query: choose a message with a code from 2000h to 2FFFh",
                 self.message
             ))
         })?;
@@ -81,8 +84,8 @@ impl Query {
         written.map_err(|error| {
             if self.json.is_none() && dictionary.defines(&self.message) {
                 return Failure::new(format!(
-                    "{error}. Give the fields as JSON behind the name, \
-                     as in QueryIdentification '{{\"QueryType\":2}}'"
+                    "{error}. Give the fields as JSON after the name, as in QueryIdentification \
+                     '{{\"QueryType\":2}}'"
                 ));
             }
             Failure::of(error)
@@ -132,13 +135,13 @@ impl Query {
         let (address, message) = (self.address, &self.message);
         let seconds = self.seconds.as_secs_f64();
         let who = if address.has_wildcard() {
-            format!("nobody in {address} answered")
+            format!("no component in {address} answered")
         } else {
             format!("{address} did not answer")
         };
         format!(
-            "{who} {message} within {seconds} s. `jaus discover` shows who is there; \
-             --interface chooses the network, --peer reaches where multicast does not"
+            "{who} {message} within {seconds} s. List components with `jaus discover`, choose the \
+             network with --interface, or name a host that multicast does not reach with --peer"
         )
     }
 }

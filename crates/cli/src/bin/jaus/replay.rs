@@ -2,7 +2,7 @@
 #![expect(
     clippy::disallowed_methods,
     clippy::disallowed_types,
-    reason = "datagrams go out as they were recorded, at their times, past every link of ours"
+    reason = "datagrams go out as recorded, with their timing, past our own links"
 )]
 
 use std::collections::BTreeMap;
@@ -26,10 +26,10 @@ use socket2::SockRef;
 use tokio::net::UdpSocket;
 use tokio::time::{Instant, sleep_until};
 
-/// Send the UDP datagrams of a capture again, at the pace at which they were recorded
+/// Send the UDP datagrams of a capture again, with their original timing
 ///
-/// Where they go must be said: a recording that is let loose on a network commands the vehicles in
-/// it. They leave from one socket, so whoever answers answers there, and is not heard.
+/// The destination is mandatory, because a replayed recording commands the vehicles on the network.
+/// All datagrams are sent from one socket; answers to it are ignored.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus replay drive.pcapng --dry-run\n  \
@@ -37,26 +37,26 @@ use tokio::time::{Instant, sleep_until};
     jaus replay drive.pcapng --to group --interface 127.0.0.1 --speed 10\n  \
     jaus replay drive.pcapng --to 10.0.0.7 --from 101.255.255 --loop 0")]
 pub(crate) struct Replay {
-    /// The capture: pcap or pcapng, of `jaus record`, tcpdump, Wireshark …
+    /// The capture: pcap or pcapng from `jaus record`, tcpdump, Wireshark …
     file: PathBuf,
 
-    /// Send everything there: ADDRESS, ADDRESS:PORT, or `group` for 239.255.0.1:3794
+    /// The destination: ADDRESS, ADDRESS:PORT, or `group` for 239.255.0.1:3794
     #[arg(long, value_name = "ADDRESS", required_unless_present = "dry_run")]
     to: Option<Target>,
 
-    /// Send from this address of this host; chooses the network that multicast goes to
+    /// Send from this address of this host; selects the network for multicast
     #[arg(long, value_name = "ADDRESS")]
     interface: Option<IpAddr>,
 
-    /// How many times as fast as recorded; 0: without any pause
+    /// Speed factor; 0 sends without pauses
     #[arg(long, default_value = "1", value_parser = speed)]
     speed: f64,
 
-    /// How often to send the whole capture; 0: again and again until Ctrl-C
+    /// How many times to send the capture; 0 repeats it until Ctrl-C
     #[arg(long = "loop", value_name = "TIMES", default_value = "1")]
     times: u64,
 
-    /// Only datagrams whose first message comes from this id; wildcards 65535 and 255 match all
+    /// Only datagrams whose first message is from this id; 65535 and 255 are wildcards
     #[arg(long, value_name = "ID")]
     from: Option<JausId>,
 
@@ -64,7 +64,7 @@ pub(crate) struct Replay {
     #[arg(long, default_values_t = [JAUS_PORT])]
     port: Vec<u16>,
 
-    /// Only say what would be sent
+    /// Print what would be sent, and exit
     #[arg(long)]
     dry_run: bool,
 }
@@ -85,9 +85,9 @@ impl std::str::FromStr for Target {
         }
         let standard = |ip: IpAddr| SocketAddr::new(ip, STANDARD_PORT);
         let address = text.parse().or_else(|_| text.parse().map(standard));
-        address
-            .map(Self)
-            .map_err(|_| format!("`{text}` is no address: write 10.0.0.7, 10.0.0.7:3795 or group"))
+        address.map(Self).map_err(|_| {
+            format!("`{text}` is not an address: write 10.0.0.7, 10.0.0.7:3795 or group")
+        })
     }
 }
 
@@ -98,7 +98,7 @@ fn speed(text: &str) -> Result<f64, String> {
     if speed == 0.0 || (0.01..=1000.0).contains(&speed) {
         Ok(speed)
     } else {
-        Err("from 0.01 to 1000, or 0 for no pauses at all".to_owned())
+        Err("write a factor from 0.01 to 1000, or 0 for no pauses".to_owned())
     }
 }
 
@@ -156,7 +156,7 @@ impl Replay {
                 Ok(frame) => frame,
                 Err(error) => {
                     say(format_args!(
-                        "{}: {error}; what came before is used",
+                        "{}: {error}; the part before it is used",
                         self.file.display()
                     ));
                     break;
@@ -172,7 +172,7 @@ impl Replay {
         found.cut += counts.incomplete_datagrams;
         if counts.tcp_segments > 0 {
             say(format_args!(
-                "note: {} TCP segments are not sent: a replay is UDP alone",
+                "note: {} TCP segments are not sent: only UDP is replayed",
                 counts.tcp_segments
             ));
         }
@@ -209,7 +209,7 @@ impl Replay {
         let from = self.interface.unwrap_or(any);
         let socket = UdpSocket::bind((from, 0)).await.map_err(|error| {
             Failure::new(format!(
-                "cannot send from {from}: {error}; --interface takes an address of this host"
+                "cannot send from {from}: {error}; give --interface an address of this host"
             ))
         })?;
         let set_up = || {
@@ -221,7 +221,7 @@ impl Replay {
             }
             options.set_broadcast(true)
         };
-        set_up().map_err(|error| Failure::new(format!("setting up the socket failed: {error}")))?;
+        set_up().map_err(|error| Failure::new(format!("cannot set up the socket: {error}")))?;
         Ok(socket)
     }
 
@@ -243,7 +243,7 @@ impl Replay {
                 socket
                     .send_to(&datagram.payload, to)
                     .await
-                    .map_err(|error| Failure::new(format!("sending to {to} failed: {error}")))?;
+                    .map_err(|error| Failure::new(format!("cannot send to {to}: {error}")))?;
                 *sent += 1;
                 if self.speed == 0.0 && sent.is_multiple_of(32) {
                     // Yield to the receiver, which may run on this processor.
@@ -268,7 +268,7 @@ impl fmt::Display for Found {
         let left_out = [
             (self.not_jaus, "that are not JAUS"),
             (self.others, "from other ids"),
-            (self.cut, "of which the capture lacks a part"),
+            (self.cut, "that the capture truncates"),
         ];
         for (count, what) in left_out.into_iter().filter(|(count, _)| *count > 0) {
             write!(f, "\nleft out: {count} {what}")?;

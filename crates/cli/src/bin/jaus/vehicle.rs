@@ -1,7 +1,7 @@
 //! `jaus vehicle`: reference vehicle, a simulated platform with its JAUS services.
 #![expect(
     clippy::disallowed_methods,
-    reason = "the simulation runs in real time and knows the time of day"
+    reason = "the simulation runs in real time and reports the time of day"
 )]
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -27,46 +27,46 @@ use crate::node;
 
 /// Run a simulated vehicle that can be controlled and driven
 ///
-/// It offers the core services and those of mobility, prints who comes and goes, who controls it
-/// and where it drives.
+/// It offers the core and mobility services, and prints the arrivals and losses of others, the
+/// client in control and the vehicle's motion.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    jaus vehicle --loopback               for trying things out on one computer\n  \
+    jaus vehicle --loopback               for trying it on one computer\n  \
     jaus vehicle --id 105.1.1 --interface eth0\n  \
     jaus vehicle --profile contest        for clients that send once and never renew control\n  \
     jaus vehicle --split                  Platform Management and Navigation as two components\n  \
     jaus vehicle --noise 0.1 --seed 7     with wheels that slip\n  \
-    jaus -v vehicle                       also tells what clients want of it")]
+    jaus -v vehicle                       also logs clients' commands")]
 pub(crate) struct VehicleCommand {
     /// End after this time [default: at Ctrl-C]
     #[arg(long, value_parser = runtime::seconds)]
     seconds: Option<Duration>,
 
-    /// What the vehicle is called [default: Rover]
+    /// The vehicle's name [default: Rover]
     #[arg(long)]
     name: Option<String>,
 
-    /// Two components instead of one: Platform Management with the chosen id, and Navigation with
-    /// the next one, which alone can be controlled and driven
+    /// Run two components instead of one: Platform Management with the chosen id, and Navigation
+    /// with the next one, which alone can be controlled and driven
     #[arg(long)]
     split: bool,
 
-    /// The least authority that a client needs to control the vehicle
+    /// The minimum authority a client needs to control the vehicle
     #[arg(long, value_name = "CODE", default_value = "1")]
     authority: u8,
 
-    /// What clients are expected: `standard` ones renew control and repeat their efforts; those of
-    /// the public contests do neither, so that `contest` means --timeout 0 and --hold
+    /// The expected clients: `standard` clients renew control and repeat efforts; those of the
+    /// public contests do neither, so `contest` implies --timeout 0 and --hold
     #[arg(long, value_enum, default_value_t)]
     profile: Profile,
 
-    /// After how many seconds control ends unless its client requests it again, a quarter of it late;
-    /// 0 for never [default: 4]
+    /// Control timeout in seconds: control ends unless the client renews it, plus a grace of a
+    /// quarter; 0 for never [default: 4]
     #[arg(long, value_name = "SECONDS")]
     timeout: Option<u8>,
 
-    /// Keep an effort or a velocity as long as its client shows life within a second, instead of half
-    /// a second
+    /// Keep an effort or velocity while its client sends anything at least once per second, instead
+    /// of for half a second
     #[arg(long)]
     hold: bool,
 
@@ -77,7 +77,7 @@ pub(crate) struct VehicleCommand {
     network: Network,
 }
 
-/// What clients are expected to do.
+/// How clients are expected to behave.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 enum Profile {
     #[default]
@@ -88,27 +88,27 @@ enum Profile {
 #[derive(Args)]
 #[command(next_help_heading = "Simulation")]
 struct Simulation {
-    /// Where the vehicle starts on the globe, LATITUDE,LONGITUDE in degrees; it looks north
+    /// The vehicle's start position, LATITUDE,LONGITUDE in degrees; it heads north
     #[arg(long, value_name = "PLACE", default_value = "52.5,13.4", value_parser = place, allow_hyphen_values = true)]
     at: Frame,
 
-    /// The greatest speed in m/s, from 0.1 to 50; half of it backwards
+    /// The maximum speed in m/s, from 0.1 to 50; half of that in reverse
     #[arg(long, value_name = "M/S", default_value = "2", value_parser = |text: &str| between(text, 0.1, 50.0))]
     speed: f64,
 
-    /// The greatest acceleration in m/s², from 0.1 to 20; the brakes are twice as good
+    /// The maximum acceleration in m/s², from 0.1 to 20; it brakes twice as hard
     #[arg(long, value_name = "M/S²", default_value = "1", value_parser = |text: &str| between(text, 0.1, 20.0))]
     acceleration: f64,
 
-    /// The greatest turn rate in rad/s, from 0.1 to 10
+    /// The maximum turn rate in rad/s, from 0.1 to 10
     #[arg(long, value_name = "RAD/S", default_value = "1.5", value_parser = |text: &str| between(text, 0.1, 10.0))]
     yaw_rate: f64,
 
-    /// How much the wheels slip, as a share of the velocity from 0 to 0.5
+    /// Wheel slip, as a fraction of the velocity from 0 to 0.5
     #[arg(long, value_name = "SHARE", default_value = "0", value_parser = |text: &str| between(text, 0.0, 0.5))]
     noise: f64,
 
-    /// Which slip it is: the same number gives the same one
+    /// Random seed of the slip: the same seed gives the same slip
     #[arg(long, default_value = "1")]
     seed: u64,
 }
@@ -184,8 +184,8 @@ impl VehicleCommand {
             return Ok(navigation);
         }
         Err(Failure::new(format!(
-            "--split needs two components, and there is none after {id}: choose a component from 1 \
-             to 253 (--id)"
+            "--split needs two component numbers, and {id} has the last one: choose a component \
+             from 1 to 253 (--id)"
         )))
     }
 
@@ -293,7 +293,7 @@ fn standing_in_words(before: &Standing, now: &Standing) -> Option<String> {
             "{} is in control, authority {}",
             client.id, client.authority
         ),
-        None => "nobody is in control".to_owned(),
+        None => "no client is in control".to_owned(),
     });
     let state = (now.state != before.state).then(|| format!("the state is {}", now.state));
     match (client, state) {

@@ -38,7 +38,7 @@ pub(crate) fn run(
     scenarios: &[Scenario],
     directory: &Path,
 ) -> Result<Column, String> {
-    // What is left of the run before would only confuse.
+    // Remove the leftovers of the previous run.
     let _ = std::fs::remove_dir_all(directory);
     std::fs::create_dir_all(directory)
         .map_err(|error| format!("{}: {error}", directory.display()))?;
@@ -73,7 +73,7 @@ impl Encounter<'_> {
                 drop(observer);
                 match tried {
                     Ok(()) => {
-                        // Only what went wrong is looked at.
+                        // Only failures are examined.
                         let _ = std::fs::remove_file(&file);
                         Verdict::Passed
                     }
@@ -93,7 +93,7 @@ impl Encounter<'_> {
         }
     }
 
-    /// What the other has to be and what the actor is told, or why neither can be.
+    /// The other's side and the actor's arguments, or why the encounter is impossible.
     fn way(&self, scenario: Scenario) -> Result<(Side, &'static str), String> {
         let (actor, answerer) = (self.actor.party, self.answerer.party);
         let excuse = actor.excuse_of_actor(scenario);
@@ -128,7 +128,7 @@ impl Encounter<'_> {
             MEGABYTES,
         ];
         let log: PathBuf = self.directory.join("observer.log");
-        // The run is worth as much without.
+        // The run is valid without it.
         Process::start(&self.hosts.switch(), &command.map(str::to_owned), &log).ok()
     }
 
@@ -162,7 +162,7 @@ impl Encounter<'_> {
             ..Values::default()
         };
         let process = self.actor.act(act, &values, &scenario.key())?;
-        // It may need a moment to say what it waited for in vain.
+        // It may need a moment to print what it did not receive.
         let said = process.ends(patience() + Duration::from_secs(10))?;
         self.check(scenario, &said)
     }

@@ -157,7 +157,7 @@ impl Drop for Hosts {
         ];
         for name in &names {
             kill_all(name);
-            // Not there if setting up failed half-way.
+            // Missing if the setup failed halfway.
             let _ = ip(&["netns", "delete", name]);
         }
     }

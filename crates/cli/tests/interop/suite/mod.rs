@@ -21,7 +21,7 @@ use scenario::Scenario;
 use settings::Party;
 use verdict::{Column, Verdict};
 
-/// Whom the subject meets if nobody says.
+/// The default peers of the subject.
 const PEERS: &str = "ours,scripted-jauspp,scripted-junior,scripted-judge";
 /// The one test of this binary.
 const TEST: &str = "interop";
@@ -44,7 +44,7 @@ pub(crate) fn main() -> ExitCode {
     if filters.peek().is_some() && !filters.any(|filter| TEST.contains(filter.as_str())) {
         return ExitCode::SUCCESS;
     }
-    // Who plays it in another namespace says for itself whether all was right.
+    // The process in the other namespace reports its own result.
     let mut is_right = true;
     on_hosts_for(TEST, Hosts::new, |_| is_right = try_all());
     ExitCode::from(u8::from(!is_right))
@@ -99,7 +99,7 @@ fn meet(
     std::thread::scope(|scope| {
         let mut running = Vec::new();
         for peer in peers {
-            // Who meets itself need not do so twice.
+            // A peer meets itself only once.
             let directions = if peer.name == subject.name {
                 vec![true]
             } else {

@@ -110,7 +110,7 @@ impl Process {
                 Err(error) => return Err(format!("`{}`: {error}", self.name)),
             }
         };
-        // Until both ends are closed, or a child that stays holds them open.
+        // Until both ends are closed, unless a surviving child holds them open.
         while let Ok(line) = self.lines.recv_timeout(FAREWELL) {
             self.said.push(line);
         }
@@ -120,7 +120,7 @@ impl Process {
         Err(self.complaint(&in_words(status)))
     }
 
-    /// Whether it has ended, though nobody asked it to.
+    /// Whether it ended unexpectedly.
     pub(crate) fn has_ended(&mut self) -> bool {
         !matches!(self.child.try_wait(), Ok(None))
     }
@@ -151,7 +151,7 @@ impl Drop for Process {
         while !self.has_ended() && Instant::now() < deadline {
             std::thread::sleep(LOOK);
         }
-        // Children may be left in any case.
+        // Children may remain in any case.
         self.signal(Signal::SIGKILL);
         let _ = self.child.wait();
     }
@@ -163,10 +163,10 @@ fn listen(from: impl Read + Send + 'static, to: Sender<String>, log: Arc<Mutex<F
         for line in BufReader::new(from).split(b'\n').map_while(Result::ok) {
             let line = String::from_utf8_lossy(&line).into_owned();
             if let Ok(mut log) = log.lock() {
-                // The log is for people; the test goes on without.
+                // The log is for people; the test continues without it.
                 let _ = writeln!(log, "{line}");
             }
-            // Nobody listens any more, but the process must not be held up.
+            // The reader is gone, but the process must not block.
             let _ = to.send(line);
         }
     });

@@ -15,7 +15,7 @@ pub(crate) enum Scenario {
     Periodic,
     /// Have its velocity reported whenever it changes.
     OnChange,
-    /// Take control, and lose it to somebody of more authority.
+    /// Take control, and lose it to a client with more authority.
     Control,
     /// Take control, and have it move by wrench effort.
     Drive,
@@ -63,7 +63,7 @@ const SIZES: [Size; 4] = [
 pub(crate) enum Transport {
     /// By UDP, acknowledged.
     Acknowledged,
-    /// By UDP, not acknowledged: what is lost is sent again by whoever sends, a few times.
+    /// By UDP, not acknowledged: the sender repeats lost messages a few times.
     Unacknowledged,
     /// By TCP.
     Tcp,
@@ -161,7 +161,7 @@ impl Scenario {
         }
     }
 
-    /// What the acting party is told to do; `None` if it is told to keep asking.
+    /// The act of the acting party; `None` if it is to keep querying.
     pub(crate) const fn act(self) -> Option<&'static str> {
         match self {
             Self::Discover => Some("discover"),
@@ -185,8 +185,8 @@ impl Scenario {
         }
     }
 
-    /// Whether a try that failed says nothing yet: finding somebody takes as long as it takes, and
-    /// what is not acknowledged may be lost.
+    /// Whether one failed attempt is inconclusive: discovery takes an unknown time, and
+    /// unacknowledged messages may be lost.
     pub(crate) const fn may_try_again(self) -> bool {
         matches!(
             self,
@@ -198,7 +198,7 @@ impl Scenario {
     pub(crate) const fn octets(self) -> usize {
         match self {
             Self::Large(size, _) => size.octets,
-            // What mixed traffic has beside questions.
+            // Mixed traffic besides queries.
             _ => 10 << 10,
         }
     }

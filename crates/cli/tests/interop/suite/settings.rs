@@ -10,7 +10,7 @@ use serde::Deserialize;
 
 use crate::suite::scenario::Scenario;
 
-/// Who has no file of this name here is looked for as a path.
+/// A name without a file here is treated as a path.
 pub(crate) const PEERS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/interop/peers");
 
 /// One who takes part: the subject, or a peer.
@@ -22,7 +22,7 @@ pub(crate) struct Party {
     /// Whom others speak to.
     #[serde(deserialize_with = "id")]
     pub(crate) id: JausId,
-    /// Who tells the velocity, if that is somebody else.
+    /// The component that reports the velocity, if it is a different one.
     #[serde(default, deserialize_with = "some_id")]
     pub(crate) sensor: Option<JausId>,
     /// Who speaks to others.
@@ -132,7 +132,7 @@ impl Party {
             .collect();
         let excuses = self.not_answering.keys().chain(self.not_acting.keys());
         for key in excuses.chain(self.finds.keys()) {
-            // The beginning of keys stands for all of them.
+            // A prefix stands for all keys that start with it.
             if !keys.iter().any(|known| known.starts_with(key.as_str())) {
                 return Err(format!(
                     "no scenario `{key}`; there are: {}",

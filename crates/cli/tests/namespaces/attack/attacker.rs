@@ -61,7 +61,7 @@ impl Attacker {
     }
 
     pub(crate) fn send_octets(&mut self, datagram: &[u8]) {
-        // What the kernel does not take is lost.
+        // Datagrams that the kernel refuses are lost.
         let _ = self.socket.send(datagram);
         self.packets += 1;
         if let Some(echo) = &self.echo {
@@ -77,7 +77,7 @@ impl Attacker {
         }
     }
 
-    /// Does something again and again, so many times a second, and listens meanwhile.
+    /// Repeats an action at a rate per second, and receives in between.
     pub(crate) fn repeat(
         &mut self,
         time: Duration,

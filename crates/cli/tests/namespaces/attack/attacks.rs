@@ -215,7 +215,7 @@ const fn cycling(number: u32) -> JausId {
     JausId::new(2000 + (number / 250) as u16, 1, (number % 250 + 1) as u8)
 }
 
-/// Messages for ids that nobody has, and for everybody, from ids that nobody has either.
+/// Messages for unused ids, and broadcasts, from ids that are unused too.
 fn to_nobody(attacker: &mut Attacker, number: u32) {
     let nobody = JausId::new(200, 1, (number % 200 + 1) as u8);
     let (destination, flags) = match number % 4 {

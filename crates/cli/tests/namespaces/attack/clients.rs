@@ -81,7 +81,7 @@ pub(crate) async fn client() {
                 _ = beats.tick() => {
                     pings += 1;
                     let echoed = async {
-                        // Where there is none, none is lost.
+                        // No echo is requested, so none is lost.
                         if !asks_echo {
                             return true;
                         }
@@ -155,7 +155,7 @@ pub(crate) fn echo() {
     println!("\nechoes");
     let mut buffer = [0; 2048];
     while let Ok((length, from)) = socket.recv_from(&mut buffer) {
-        // What the kernel does not take is lost.
+        // Datagrams that the kernel refuses are lost.
         let _ = socket.send_to(&buffer[..length], from);
     }
 }

@@ -44,7 +44,7 @@ struct Connection {
     written: usize,
 }
 
-/// Connects from four addresses; whoever is cut off comes again.
+/// Connects from four addresses, and reconnects when closed.
 pub(crate) async fn run() {
     let mut connections: Vec<Option<Connection>> = (0..CONNECTIONS).map(|_| None).collect();
     let (begun, mut opened) = (Instant::now(), 0);
@@ -89,7 +89,7 @@ fn go_on(connection: &mut Connection, number: usize) -> bool {
         Ok(octets) => connection.written += octets,
         Err(error) => return error.kind() == ErrorKind::WouldBlock,
     }
-    // Nobody has closed it, unless there is nothing left to read.
+    // It is open unless there is nothing left to read.
     let mut octet = [0];
     let reads = !matches!(HABITS[number / 4 % HABITS.len()], Habit::NeverReads);
     !reads || !matches!(connection.stream.try_read(&mut octet), Ok(0))

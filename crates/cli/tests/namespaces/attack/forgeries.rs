@@ -16,7 +16,7 @@ fn a_forged_id_takes_nothing_from_a_client() {
             attack["packets"]
         );
         assert!(seen["lost"] <= 2 && seen["gap_ms"] < GAP, "{seen:?}");
-        // Challenges and the like, and no stream.
+        // Challenges and similar messages, but no stream.
         assert!(attack["octets"] < 40_000, "{attack:?}");
     });
 }

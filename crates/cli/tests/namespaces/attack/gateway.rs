@@ -59,7 +59,9 @@ fn a_forged_ra_controller_neither_stops_nor_releases_a_jaus_vehicle() {
         let is_news = |line: &&String| line.contains("in control") || line.contains("standby");
         let news: Vec<_> = lines.iter().filter(is_news).collect();
         println!("| Standby, Release Control in an RA controller's id | {news:?} |");
-        let losses = news.iter().filter(|it| it.contains("nobody is in control"));
+        let losses = news
+            .iter()
+            .filter(|it| it.contains("no client is in control"));
         assert_eq!(losses.count(), 0, "{lines:#?}");
         let speeds = lines.iter().filter(|line| line.ends_with(" m/s"));
         let slow = speeds.skip(4).filter(|line| line.ends_with(" 0.0 m/s"));

@@ -6,7 +6,8 @@ use crate::testbed::Host;
 
 /// A vehicle and a client with IPv6 alone.
 fn on_ip6_scene(body: impl Fn(Scene<'_>)) {
-    // By their global addresses, which strangers reach; by default a node uses the link's own.
+    // Uses global addresses, which off-link attackers reach; by default a node uses link-local
+    // ones.
     let interfaces = "[\"fd00:216:1::1\", \"fd00:216:2::1\", \"fd00:216:3::1\"]";
     let file = settings("ip6", &format!("ip = \"6\"\ninterfaces = {interfaces}\n"));
     on_testbed(|bed| {

@@ -24,7 +24,7 @@ mod talkers;
 use crate::gateway::{operator, ra_vehicle};
 use crate::testbed::Host;
 
-/// Not a test of its own: does nothing unless another test starts it in a role.
+/// Not a test by itself: does nothing unless another test starts it in a role.
 #[test]
 fn a_process_that_plays_a_node() {
     jaus_test_kit::hosts::play(async |role| match role {

@@ -15,8 +15,8 @@ fn start(bed: &Testbed, host: Host, id: &str, text: &str) -> VehicleProcess {
     VehicleProcess::start(&mut bed.jaus(host, &arguments))
 }
 
-/// The packets of the routers while strangers send to nobody, which is bounded, and soon afterwards,
-/// when there are hardly any.
+/// Checks that the routers' packets are bounded while attackers send to unused ids, and almost
+/// cease soon afterwards.
 fn is_quiet_after_an_attack(bed: &Testbed, most_copies: u64) {
     let sent = || ROUTERS.iter().map(|&it| bed.packets_sent(it)).sum::<u64>();
     std::thread::sleep(Duration::from_secs(2));
@@ -44,7 +44,7 @@ fn three_routers_in_a_circle_pass_each_message_on_once() {
         let routers: Vec<_> = (ROUTERS.iter().zip(ids))
             .map(|(&host, id)| start(bed, host, id, text))
             .collect();
-        // The first over two cables, and each of the others over the one between them. Their answers
+        // The first crosses two cables, and each of the others the one between them. Their answers
         // to every fourth message take five more.
         is_quiet_after_an_attack(bed, 6);
         routers.into_iter().for_each(|it| drop(it.terminate()));

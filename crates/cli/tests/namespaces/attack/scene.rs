@@ -73,8 +73,8 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// So often a test may begin again: what else a machine does can starve whoever is attacked as no
-/// attack would.
+/// Attempts per test: other load on the machine can starve the attacked program more than any
+/// attack.
 const ATTEMPTS: u32 = 3;
 
 /// Runs the body of a test until it passes once.

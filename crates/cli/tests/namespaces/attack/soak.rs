@@ -45,7 +45,7 @@ fn soak() {
         }
         println!("| {pings} pings | {lost} lost, KiB after each round: {rounds:?} |");
         assert!(lost * 200 <= pings, "{lost} of {pings}");
-        // Tables with bounds fill in the first half; in the second, memory must not grow any more.
+        // Bounded tables fill in the first half; in the second, memory must not grow.
         let (middle, last) = (rounds[rounds.len() / 2], rounds[rounds.len() - 1]);
         assert!(last < MEMORY && last <= middle * 102 / 100, "{rounds:?}");
     });

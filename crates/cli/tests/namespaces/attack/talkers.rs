@@ -12,7 +12,7 @@ use tokio::time::sleep;
 
 use jaus_test_kit::hosts::SETTINGS;
 
-/// What our messages begin with, which nobody else sends.
+/// The prefix of our messages, which no other component sends.
 const CODE: [u8; 2] = [0x01, 0xD7];
 /// The number of the message that says that there will be no more.
 const END: u32 = u32::MAX;

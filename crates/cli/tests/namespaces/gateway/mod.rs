@@ -165,7 +165,7 @@ fn a_jaus_vehicle_is_listed_asked_and_driven_from_ra() {
     });
 }
 
-/// Not a test of its own: does nothing unless another test starts it in a role.
+/// Not a test by itself: does nothing unless another test starts it in a role.
 #[test]
 fn a_process_that_plays_a_node() {
     jaus_test_kit::hosts::play(async |role| match role {

@@ -119,7 +119,7 @@ impl RaVehicle {
             }
         }
         for message in self.rover.take_said() {
-            // A peer that is gone is none.
+            // A lost peer does not count.
             let _ = self.node.send(now, &message);
         }
         self.tell();

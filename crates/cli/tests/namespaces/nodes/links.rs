@@ -90,7 +90,7 @@ fn nodes_that_know_addresses_need_neither_multicast_nor_broadcast() {
         }
         let _echo = hosts.start_with(0, "echo", "broadcast=off peer=10.213.77.2");
         answers(hosts, "broadcast=off peer=10.213.77.1", "10.213.77.1:3794");
-        // The caller moves; it still knows where to call.
+        // The caller moves; it still knows the other's address.
         hosts.ip(1, &["address", "flush", "dev", "jaus0"]);
         hosts.ip(1, &["address", "add", "10.213.77.9/24", "dev", "jaus0"]);
         answers(hosts, "broadcast=off peer=10.213.77.1", "10.213.77.1:3794");

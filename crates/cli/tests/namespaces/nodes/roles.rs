@@ -38,7 +38,7 @@ fn config(subsystem: u16) -> Config {
 /// Messages that the flood is made of.
 pub(crate) const FLOOD: usize = 2000;
 
-/// Answers whatever it hears, until it is killed.
+/// Answers every message, until it is killed.
 pub(crate) async fn echo() {
     let node = Node::start(config(101)).unwrap();
     let mut port = node.attach(33).unwrap();
@@ -69,7 +69,7 @@ pub(crate) async fn follow() {
     }
 }
 
-/// Asks everyone until somebody answers.
+/// Broadcasts a query until it is answered.
 pub(crate) async fn call() {
     let node = Node::start(config(102)).unwrap();
     let mut port = node.attach(1).unwrap();
@@ -130,7 +130,7 @@ pub(crate) async fn flood() {
 /// Messages that an announcer sends.
 pub(crate) const ANNOUNCEMENTS: u8 = 10;
 
-/// Prints the number of every announcement that it hears.
+/// Prints the number of every announcement received.
 pub(crate) async fn listen() {
     let node = Node::start(config(101)).unwrap();
     let mut port = node.attach(33).unwrap();

@@ -87,8 +87,8 @@ pub(crate) async fn control() {
         let mut beats = interval(BEAT);
         loop {
             beats.tick().await;
-            // Not by way of `control`, which would refuse to send when it is lost. The network may
-            // be down.
+            // Not through `control`, which refuses to send once control is lost. The network may be
+            // down.
             let _ = controller.send(VEHICLE, &effort());
         }
     }
@@ -193,7 +193,7 @@ pub(crate) fn wall_clock() -> Duration {
     since_1970.unwrap()
 }
 
-/// Asks the vehicle ten times a second where it is, how fast, and who is in control.
+/// Queries the vehicle's pose, velocity and controller ten times a second.
 pub(crate) async fn observe() {
     let node = Node::start(Config::new(103, 1)).unwrap();
     let builder = Component::builder(Kind::OtherSubsystem, "Observer");
@@ -212,7 +212,7 @@ pub(crate) async fn observe() {
         let (pose, velocity, control): (ReportLocalPose, ReportVelocityState, ReportControl) =
             match (pose, velocity, control) {
                 (Ok(pose), Ok(velocity), Ok(control)) => (pose, velocity, control),
-                // The vehicle has ended, or is about to begin.
+                // The vehicle has ended or is about to start.
                 _ => continue,
             };
         println!(
@@ -226,7 +226,7 @@ pub(crate) async fn observe() {
     }
 }
 
-/// Many components show up, each at an address of its own, and are never heard again.
+/// Many components appear, each at its own address, and then stay silent.
 pub(crate) async fn show_up() {
     const HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x22]);
     const IDENTIFICATION: Bytes = Bytes::from_static(&[0x00, 0x2B, 0x02]);

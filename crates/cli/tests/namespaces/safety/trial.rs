@@ -24,7 +24,7 @@ pub(crate) enum Fault {
     KilledAmongStrangers,
     /// SIGSTOP, and later SIGCONT.
     Suspended,
-    /// The same, and it lives on the node of another process, which goes on.
+    /// The same, attached to the node of another process, which keeps running.
     SuspendedBehindNode,
     /// Its cable is out at its own end, and later in again.
     CutAtController,
@@ -103,7 +103,7 @@ pub(crate) fn check_termination() {
     on_hosts(Testbed::new, |bed| {
         let trial = Trial::start(bed, Drive::Effort, Fault::Killed);
         let lines = trial.vehicle.terminate();
-        assert_eq!(lines.last().unwrap(), "stopped: the component has ended");
+        assert_eq!(lines.last().unwrap(), "stopped: the component ended");
     });
 }
 

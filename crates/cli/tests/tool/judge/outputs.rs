@@ -151,7 +151,7 @@ fn a_peer_that_is_not_there_is_told_with_what_to_do() {
     let network: Vec<&str> = flags.iter().map(String::as_str).collect();
     let judge = ["judge", "9.1.1", "--limit", "0.1"];
     let run = run(&[&judge, &*network].concat(), b"");
-    assert!(run.stderr.contains("9.1.1 gave no sign of life"), "{run:?}");
+    assert!(run.stderr.contains("9.1.1 did not answer"), "{run:?}");
     assert!(run.stderr.contains("--peer"), "{run:?}");
     assert_eq!(run.status, 1);
 }
@@ -160,7 +160,7 @@ fn a_peer_that_is_not_there_is_told_with_what_to_do() {
 fn a_wrong_flag_is_refused_with_what_would_be_right() {
     for (arguments, advice) in [
         (&["judge"][..], "ADDRESS"),
-        (&["judge", "105.1.255"], "only one component"),
+        (&["judge", "105.1.255"], "one component at a time"),
         (
             &["judge", "105.1.1", "--only", "D1"],
             "write A1 to A6, B1 to B36 or C1 to C5",
@@ -182,7 +182,7 @@ fn a_wrong_flag_is_refused_with_what_would_be_right() {
             &["judge", "105.1.1", "--unicast", "--multicast"],
             "cannot be used with",
         ),
-        (&["judge", "105.1.1", "--attach"], "leave --attach out"),
+        (&["judge", "105.1.1", "--attach"], "omit --attach"),
         (
             &[
                 "judge",

@@ -39,7 +39,7 @@ pub(crate) fn network() -> Vec<String> {
         .to_vec()
 }
 
-/// What a peer says to whoever asked; `None` to the asker itself.
+/// A peer's message and its receiver; `None` is the sender of the query.
 type Answer = (Option<JausId>, Bytes);
 
 /// What a peer is to do.
@@ -84,7 +84,7 @@ impl Peer {
         self
     }
 
-    /// Answers the next request of this kind to somebody else.
+    /// Answers the next request of this kind to another component.
     pub(crate) fn answers_to<Q: Message>(mut self, to: JausId, answer: &impl Message) -> Self {
         let answers = self.answers.entry(Q::CODE).or_default();
         answers.push(vec![(Some(to), answer.encode().unwrap())]);

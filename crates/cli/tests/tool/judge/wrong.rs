@@ -185,7 +185,7 @@ fn an_event_stream_that_is_confirmed_but_never_comes_is_told() {
     assert_eq!(reason("B4", peer), "of event 7 only 0 came, not 3");
 }
 
-/// A peer that answers whatever begins like a query, and then obeys who is not in control.
+/// A peer that answers truncated queries and then obeys clients that are not in control.
 fn obedient() -> Peer {
     let effort = |x| {
         let mut report = ReportWrenchEffort::default();

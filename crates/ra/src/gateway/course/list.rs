@@ -67,29 +67,28 @@ pub(in crate::gateway) enum Refused {
     Conversion(#[from] Refusal),
     #[error("no list, or no such element")]
     NoSuchElement,
-    #[error("the order of places may not be changed while they are driven along: stop first")]
+    #[error("the order of waypoints cannot change while they are driven: stop first")]
     UnderWay,
-    #[error("the order of places has been changed: execute the list from an element")]
+    #[error("the order of waypoints has changed: execute the list from an element")]
     Reordered,
     #[error(
-        "the driver holds {0} segments and forgets none, and the list is shorter: reset it first"
+        "the driver holds {0} segments and discards none, but the list is shorter: reset the \
+         driver first"
     )]
     Shorter(usize),
-    #[error("the list manager refuses: {0:?}")]
+    #[error("the list manager refused: {0:?}")]
     List(ResponseCode),
-    #[error("the place with the number {0} is not confirmed: the list is not executed")]
+    #[error("waypoint {0} was not confirmed: the list is not executed")]
     Unconfirmed(u16),
-    #[error("the driver tells no places: it gets them unconfirmed")]
+    #[error("the driver reports no waypoints: they are sent without confirmation")]
     Mute,
-    #[error(
-        "the driver keeps what it had under the number {0}: places are put behind those that it has"
-    )]
+    #[error("the driver keeps its previous waypoint {0}: new ones are appended")]
     Keeps(u16),
-    #[error("the place with the number {0} is missing: the list is not executed")]
+    #[error("waypoint {0} is missing: the list is not executed")]
     Missing(u16),
-    #[error("more places than are kept")]
+    #[error("more waypoints than the limit")]
     TooMany,
-    #[error("no answer to the places that were set")]
+    #[error("no answer to the new waypoints")]
     Unanswered,
 }
 

@@ -18,7 +18,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 #[expect(
     clippy::disallowed_methods,
-    reason = "any moment will do as the beginning of virtual time"
+    reason = "virtual time starts at any instant"
 )]
 fn start() -> Instant {
     Instant::now()

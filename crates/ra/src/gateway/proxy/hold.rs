@@ -231,7 +231,8 @@ impl RaClient {
                 held_control.request.source,
                 held_control.request.destination,
             );
-            tracing::info!(%client, %of, "control ended: the RA client is dead or the gateway stops");
+            tracing::info!(%client, %of, "control ended: the RA client is lost or the gateway is \
+                stopping");
             if held_control.held {
                 let stop = held_control.hold.stop.take();
                 stop.into_iter()

@@ -113,7 +113,7 @@ impl Proxy {
         let Motion { life, out, .. } = &mut self.motion;
         life.handle_timeout(now, rank, out);
         while let Some(dead) = self.motion.life.poll_dead() {
-            tracing::warn!(client = %dead, component = %self.ra, "the client in control is dead");
+            tracing::warn!(client = %dead, component = %self.ra, "the client in control is lost");
             self.forget(now, dead, tally);
         }
     }

@@ -3,7 +3,8 @@
 //! OpenJAUS's primitive driver moves only while its controller reports ready or standby, and opens
 //! a service connection for that as long as it considers the gateway its controller. The gateway is
 //! therefore ready for a component only while a JAUS client has control; a component that requests
-//! the status without a client in control is still held in the gateway's id and is released again.
+//! the status without a client in control is still controlled under the gateway's id and is
+//! released again.
 
 use std::time::{Duration, Instant};
 
@@ -99,7 +100,7 @@ impl Proxy {
         }
         if *releases == 0 {
             let component = self.ra;
-            tracing::warn!(%component, "still takes the gateway for its controller: released again");
+            tracing::warn!(%component, "still considers the gateway in control: released again");
         }
         *releases += 1;
         *release = Some(now + Readiness::GHOST);

@@ -203,7 +203,7 @@ fn what_cannot_be_shown_says_why() {
     rig.hear(1, peer, RaId::new(255, 255, 1, 1), 0x4202, &[]);
     assert_eq!(
         refused(&mut rig.node, vehicle(10)).to_string(),
-        "subsystem 10 is there already, at 10.77.0.1: give ours another number"
+        "subsystem 10 exists already, at 10.77.0.1: give ours another number"
     );
 }
 

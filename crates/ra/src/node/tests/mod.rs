@@ -18,7 +18,7 @@ use crate::{Counter, RaId};
 
 #[expect(
     clippy::disallowed_methods,
-    reason = "an arbitrary beginning of virtual time"
+    reason = "virtual time starts at any instant"
 )]
 fn start() -> Instant {
     Instant::now()

@@ -59,7 +59,7 @@ fn reports_come_at_the_rate_until_the_event_is_cancelled() {
     world.run(Duration::from_secs(5));
     let events = world.ra_heard(ra, 0x41F1);
     assert!((48..=52).contains(&events.len()), "{}", events.len());
-    // The event, the report, a number of its own, and the data of a report of ten octets.
+    // The event, the report, its own number, and the data of a ten-octet report.
     let first = &events[0].data;
     assert_eq!(
         (first[0], &first[1..3], first.len()),

@@ -49,9 +49,9 @@ fn rubbish_from_a_component_that_is_known_is_refused_and_counted() {
     world.run(Duration::from_secs(5));
     let driver = RaId::new(SUBSYSTEM, 1, 33, 1);
     let us = RaId::new(250, 1, 32, 1);
-    // Every code with data that is hardly right.
+    // Every code with mostly invalid data.
     for code in 0..=u16::MAX {
-        // What the nodes answer among themselves.
+        // Messages that the nodes answer among themselves.
         if matches!(code, 0x4B00..=0x4B03 | 0x4202 | 0x41F1) {
             continue;
         }

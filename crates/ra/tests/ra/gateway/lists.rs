@@ -30,7 +30,7 @@ const RA_WAYPOINTS: RaId = RaId::new(101, 1, 45, 7);
 /// The RA operator.
 const COMMANDER: RaId = RaId::new(30, 1, 32, 1);
 
-/// An element of a list with so many, which is the one with that number.
+/// The element with that number in a list of this length.
 fn element(uid: u16, count: u16, latitude: f64) -> ElementRec {
     let mut waypoint = SetGlobalWaypoint::default();
     waypoint.set_latitude_deg(latitude).unwrap();
@@ -127,7 +127,7 @@ fn an_ra_waypoint_driver_gets_the_list_of_a_jaus_client_in_order_and_its_speed()
     let query = QueryActiveElement {};
     let active: ReportActiveElement = world.ask(operator, JAUS_WAYPOINTS, &query).unwrap();
     assert_eq!(active.element_uid, 1);
-    // OpenJAUS's does not tell its speed: it has the one that it was given.
+    // OpenJAUS's driver does not report its speed, so the last one set is assumed.
     world.tell(operator, JAUS_WAYPOINTS, &execute(None, 3.0));
     let query = QueryTravelSpeed {};
     let speed: ReportTravelSpeed = world.ask(operator, JAUS_WAYPOINTS, &query).unwrap();
@@ -135,7 +135,7 @@ fn an_ra_waypoint_driver_gets_the_list_of_a_jaus_client_in_order_and_its_speed()
     let rover = world.ra[ra].rover.as_ref().unwrap();
     assert_eq!((rover.waypoints.len(), rover.speeds.len()), (3, 2));
 
-    // Nobody is there any more who could stop it.
+    // No client is left that could stop it.
     world.jaus[operator].up = false;
     world.run(Duration::from_secs(20));
     let rover = world.ra[ra].rover.as_ref().unwrap();
@@ -164,7 +164,7 @@ fn in_an_emergency_a_list_is_stopped_and_none_is_executed_until_that_is_over() {
     }
     assert_eq!(world.count(Counter::InEmergency), 2);
     world.ra[ra].rover.as_mut().unwrap().state = 1;
-    // The first finds out that the emergency is over.
+    // The first command detects that the emergency is cleared.
     world.tell(operator, JAUS_WAYPOINTS, &execute(Some(0), 2.0));
     speeds(&mut world);
     world.tell(operator, JAUS_WAYPOINTS, &Resume {});
@@ -176,7 +176,7 @@ fn in_an_emergency_a_list_is_stopped_and_none_is_executed_until_that_is_over() {
 fn an_emergency_that_somebody_else_has_set_ends_a_list_before_its_speed_is_told() {
     let (mut world, ra, operator) = driver_of_ra();
     take_control(&mut world, operator);
-    // It answers no questions for places, so that they are handed over slowly.
+    // It does not answer waypoint queries, so the hand-over is slow.
     world.ra[ra].rover.as_mut().unwrap().mute = true;
     world.tell(operator, JAUS_WAYPOINTS, &three_waypoints());
     world.tell(operator, JAUS_WAYPOINTS, &execute(Some(0), 2.0));

@@ -321,7 +321,7 @@ fn in_an_emergency_it_is_stopped_by_what_it_obeys_and_not_driven_until_that_is_o
     assert_eq!(stop[..], bytes("7f00000000000000000000000000ff"));
     assert_eq!(drive(&mut world), 2, "nobody drives it");
     assert_eq!(world.count(Counter::InEmergency), 1);
-    // Somebody else has taken the emergency back, which the next command finds out.
+    // Another client has cleared the emergency; the next command detects it.
     world.ra[ra].rover.as_mut().unwrap().state = 1;
     assert_eq!(drive(&mut world), 2);
     assert_eq!(drive(&mut world), 2, "it is in standby");

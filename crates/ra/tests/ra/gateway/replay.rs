@@ -69,7 +69,7 @@ fn read(datagram: &Bytes) -> Said {
     }
 }
 
-/// A JAUS vehicle that obeys whoever controls it.
+/// A JAUS vehicle that obeys the client in control.
 fn vehicle(id: JausId) -> Stack {
     let rover = SkidSteer::new(SkidSteerConfig::default());
     let vehicle = Vehicle::new(Pilot::new(rover, Frame::at(52.5, 13.4)));
@@ -214,7 +214,7 @@ fn what_openjaus_asks_a_newcomer_is_answered_so_that_it_can_list_all_of_it() {
         );
     }
     assert_eq!(asked, 12);
-    // And what it answers is enough for its own components to be shown.
+    // And its answers suffice to expose its components.
     assert_eq!(world.attached(), ["10.1.1", "10.1.35", "250.1.1"]);
 }
 
@@ -225,7 +225,7 @@ fn to_our_vehicle(octets: &Bytes) -> Option<(Said, Bytes)> {
     let said = read(&framed.clone().freeze());
     let client = RaId::new(10, 1, 45, 1);
     let meant = said.source == client && [33, 38, 42].contains(&said.destination.component);
-    // Instance, component, node, subsystem of the destination stand behind eight and four octets.
+    // The destination's instance, component, node and subsystem follow eight and four octets.
     framed[12] = 7;
     framed[15] = 101;
     meant.then(|| (said, framed.freeze()))

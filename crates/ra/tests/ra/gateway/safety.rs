@@ -137,7 +137,7 @@ fn a_restarted_gateway_stops_and_releases_what_it_finds_held_in_its_name() {
         assert_eq!(drive.rover().controller, Some((COMMANDER, 127)));
         drive.world.jaus[drive.operator].up = client_lives;
         drive.world.restart_gateway();
-        // The client goes on sending efforts and renewing, but not Resume.
+        // The client keeps sending efforts and renewals, but not Resume.
         assert_eq!(
             drive.push(millis(20_000)),
             None,
@@ -178,7 +178,7 @@ fn a_restarted_gateway_stops_a_driver_that_drives_on_without_a_controller() {
 fn a_component_that_is_being_reclaimed_initializes_and_is_not_available() {
     use jaus::messages::core::{QueryStatus, ReportStatus};
     let mut drive = Drive::of(33);
-    // It says nothing about control.
+    // It does not report control.
     drive.world.power = Power::Killed;
     drive.world.restart_gateway();
     while !drive.world.attached().contains(&"20.1.33".to_owned()) {
@@ -297,7 +297,7 @@ fn a_speed_of_travel_ends_with_its_client() {
 fn standby_stops_what_ignores_it_and_resume_revives_nothing() {
     let mut drive = Drive::driving();
     drive.tell(&Standby {});
-    // Efforts come all the same.
+    // Efforts keep arriving.
     let stopped = drive.push(millis(2000));
     assert!(stopped.is_none(), "{stopped:?}");
     drive.tell(&Resume {});

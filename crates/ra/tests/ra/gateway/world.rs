@@ -87,7 +87,7 @@ pub(crate) fn stack(id: JausId, kind: Kind, name: &str, services: Vec<Box<dyn Se
 impl World {
     #[expect(
         clippy::disallowed_methods,
-        reason = "any moment will do as the beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     pub(crate) fn new(settings: Settings) -> Self {
         let now = Instant::now();
@@ -251,7 +251,7 @@ impl World {
             let said = peer.rover.as_mut().map(Rover::take_said);
             for message in said.unwrap_or_default() {
                 moved = true;
-                // A peer that is gone is none.
+                // A lost peer does not count.
                 let _ = peer.node.send(now, &message);
             }
             while let Some(transmit) = peer.node.poll_transmit() {

@@ -101,7 +101,7 @@ fn shown(datagram: &Bytes) -> Value {
 
 #[test]
 fn a_pose_is_shown_in_its_units_and_unused_bits_are_passed_over() {
-    // Latitude a third of its way from the equator to the pole; the two bits on top have no field.
+    // Latitude a third of the way from the equator to the pole; the top two bits have no field.
     let line = shown(&datagram(0x4402, &[0x01, 0xC0, 0xAA, 0xAA, 0xAA, 0x2A]));
     assert_eq!(line["source"], "10.1.38.1");
     assert_eq!(line["message"], "ReportGlobalPose");

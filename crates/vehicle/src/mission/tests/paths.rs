@@ -139,19 +139,24 @@ fn each_mistake_is_told_with_what_to_do() {
         (
             inside,
             (3.5, 0.5),
-            "the destination at x 3.50 m, y 0.50 m is not on the map, which goes from x 0.00 m, y 0.00 m to x 3.00 m, y 3.00 m: choose one on the map",
+            "the destination at x 3.50 m, y 0.50 m is outside the map, which extends from x 0.00 \
+             m, y 0.00 m to x 3.00 m, y 3.00 m: choose one on the map",
         ),
-        (inside, (f64::NAN, 0.5), "is not on the map"),
-        (inside, (1.5, 1.5), "an obstacle: choose one in the open"),
+        (inside, (f64::NAN, 0.5), "is outside the map"),
+        (
+            inside,
+            (1.5, 1.5),
+            "an obstacle: choose one with more clearance",
+        ),
         (
             (-0.1, 0.5),
             inside,
-            "the vehicle at x -0.10 m, y 0.50 m is not on the map",
+            "the vehicle at x -0.10 m, y 0.50 m is outside the map",
         ),
         (
             (1.5, 1.5),
             inside,
-            "is in an obstacle, as the map has it: drive it out by hand",
+            "is in an obstacle of the map: drive it out manually",
         ),
     ] {
         let told = go(from, to);
@@ -169,7 +174,7 @@ fn a_raster_that_is_no_map_is_refused() {
     assert!(new(0, 4, 1.0, 0).contains("0 x 4 cells"));
     assert!(new(4097, 1, 1.0, 4097).contains("from 1 to 4096"));
     assert!(new(2, 2, 1.0, 3).contains("3 cells instead of 2 x 2"));
-    assert!(new(2, 2, f64::NAN, 4).contains("no place"));
+    assert!(new(2, 2, f64::NAN, 4).contains("invalid geometry"));
 }
 
 /// Walls with gaps at alternating ends: the path is much longer than the distance.

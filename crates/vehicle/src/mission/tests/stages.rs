@@ -49,7 +49,7 @@ impl World {
 
     #[expect(
         clippy::disallowed_methods,
-        reason = "any moment will do as the beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     pub(super) fn with(lost_link: LostLink) -> Self {
         Self {
@@ -290,7 +290,7 @@ fn a_stage_that_does_not_end_is_blocked() {
         }
         world.pass(SETTINGS.patience);
         assert_eq!(world.run().attempt, 2, "{approved_steps}");
-        assert!(world.reason().ends_with("has taken longer than 10 s"));
+        assert!(world.reason().ends_with("took longer than 10 s"));
     }
 }
 
@@ -305,7 +305,7 @@ fn a_driver_that_is_not_heard_is_blocked() {
     assert_eq!(world.run().attempt, 2);
     assert_eq!(
         world.reason(),
-        "the vector driver has not been heard for 10 s"
+        "the vector driver has not reported for 10 s"
     );
 }
 
@@ -320,7 +320,7 @@ fn a_vehicle_that_does_not_get_on_is_blocked() {
     assert_eq!(world.stage(), Stage::Driving);
     world.pass(SECOND);
     assert_eq!(world.run().attempt, 2);
-    assert!(world.reason().contains("has not got on for 30 s at 10 %"));
+    assert!(world.reason().contains("made no progress for 30 s at 10 %"));
 }
 
 #[test]
@@ -381,12 +381,12 @@ fn another_destination_replaces_the_mission() {
 #[test]
 fn what_is_no_destination_fails_with_what_would_do() {
     for (x, speed, says) in [
-        (f64::NAN, None, "x NaN m, y 0 m is no place"),
+        (f64::NAN, None, "x NaN m, y 0 m is invalid"),
         (f64::INFINITY, None, "set finite numbers"),
         (
             0.0,
             Some(0.0),
-            "a speed of 0 m/s can not be driven: set one above 0 and up to 100 m/s",
+            "a speed of 0 m/s is out of range: set one above 0 and up to 100 m/s",
         ),
         (0.0, Some(f64::NAN), "a speed of NaN m/s"),
     ] {
@@ -408,7 +408,7 @@ fn what_is_over_cannot_be_approved() {
     let refusal = world.mission.approve(world.now, 1).unwrap_err();
     assert_eq!(
         refusal.to_string(),
-        "mission 1 can not be approved: it is over (stopped)"
+        "cannot approve mission 1: it is over (stopped)"
     );
 }
 

@@ -104,9 +104,9 @@ impl Links {
 
 fn waiting(link: Link, state: &LinkState, settings: &Settings) -> String {
     let what = match state {
-        LinkState::Silent => "has not been heard",
-        LinkState::Engaging => "has not got the next driver under control",
-        _ => "has had nothing to do",
+        LinkState::Silent => "has not reported",
+        LinkState::Engaging => "has not got control of the next driver",
+        _ => "has been idle",
     };
     format!("the {link} {what} for {} s", settings.patience.as_secs())
 }

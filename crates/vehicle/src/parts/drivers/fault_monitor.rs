@@ -37,7 +37,7 @@ impl FaultMonitor {
     pub(in crate::parts) fn is_over(&mut self) -> Option<Condition> {
         self.since = None;
         let failure = self.failure.take()?;
-        tracing::warn!("no failure any more: {failure}");
+        tracing::warn!("failure cleared: {failure}");
         Some(Condition::Initialized)
     }
 
@@ -50,7 +50,7 @@ impl FaultMonitor {
 #[cfg(test)]
 #[expect(
     clippy::disallowed_methods,
-    reason = "any moment will do as the beginning of virtual time"
+    reason = "virtual time starts at any instant"
 )]
 mod tests {
     use super::*;

@@ -91,7 +91,7 @@ pub(in crate::parts) fn time_in_month(stamp: TimeStamp) -> Option<Duration> {
 #[cfg(test)]
 #[expect(
     clippy::disallowed_methods,
-    reason = "any moment will do as the beginning of virtual time"
+    reason = "virtual time starts at any instant"
 )]
 mod tests {
     use super::*;

@@ -7,7 +7,7 @@
 //! drops its command and waits for a new one.
 #![expect(
     clippy::disallowed_methods,
-    reason = "here the driver gets its time, and waits for it"
+    reason = "gives the driver its clock and timer"
 )]
 
 use std::convert::Infallible;
@@ -107,7 +107,7 @@ impl<L: Language> Next<L> {
                     pause = (pause * 2).min(Self::PAUSES.1);
                 }
                 End::StandDown(why) => {
-                    tracing::warn!("stands down: {why}");
+                    tracing::warn!("motion suspended: {why}");
                     self.stand_down(&mut ticks, &mut watchman, &why).await;
                     down = Some(why);
                     pause = Self::PAUSES.0;
@@ -181,7 +181,7 @@ impl<L: Language> Next<L> {
             Ok(control) => control,
             Err(end) => return end,
         };
-        tracing::info!("{peer} obeys");
+        tracing::info!("in control of {peer}");
         let component = self.component.clone();
         let end = tokio::select! {
             end = self.command(&control, ticks, watchman) => end,
@@ -211,9 +211,9 @@ impl<L: Language> Next<L> {
             }) => {
                 // A failure also refuses control, but it ends without intervention.
                 return Err(match examine(&self.component, peer).await {
-                    Ok(Verdict::Anew) => anew(format!("{peer} has failed, or was started again")),
+                    Ok(Verdict::Anew) => anew(format!("{peer} failed or was restarted")),
                     _ => End::StandDown(format!(
-                        "{peer} cannot be controlled, for instance because of an emergency"
+                        "{peer} refuses control, for example because of an emergency"
                     )),
                 });
             }
@@ -271,7 +271,7 @@ impl<L: Language> Next<L> {
             match timeout(Self::PATIENCE, control.deliver(&command)).await {
                 Ok(Ok(())) => acknowledged = Instant::now(),
                 Ok(Err(ControlError::Lost { why, .. })) => {
-                    let why = format!("control over {peer} is lost: {why}");
+                    let why = format!("control of {peer} is lost: {why}");
                     return self.after_loss(peer, why).await;
                 }
                 Ok(Err(_)) | Err(_) if acknowledged.elapsed() > Self::SILENCE => {
@@ -361,7 +361,7 @@ async fn supervise(component: &Component, peer: JausId) -> End {
             // Silence shows in missing acknowledgements.
             Ok(Verdict::GoOn) | Err(_) => {}
             Ok(Verdict::Anew) => {
-                let why = format!("{peer} has failed, or was started again");
+                let why = format!("{peer} failed or was restarted");
                 return End::Anew {
                     peer: Some(peer),
                     why,

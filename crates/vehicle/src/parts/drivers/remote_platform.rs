@@ -113,7 +113,7 @@ impl RemotePlatform {
             return Plan::Rest;
         };
         if state.deadline.has_passed(now) {
-            return Plan::Wait("the driver's control loop does not run".to_owned());
+            return Plan::Wait("the driver's control loop is not running".to_owned());
         }
         match state.lack(now) {
             Some(why) => Plan::Wait(why),
@@ -205,7 +205,7 @@ impl Platform for RemotePlatform {
 #[cfg(test)]
 #[expect(
     clippy::disallowed_methods,
-    reason = "any moment will do as the beginning of virtual time"
+    reason = "virtual time starts at any instant"
 )]
 mod tests {
     use super::*;

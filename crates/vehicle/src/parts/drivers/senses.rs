@@ -1,9 +1,6 @@
 //! Sensor input: subscriptions to a service of the own subsystem, with rediscovery after loss.
 
-#![expect(
-    clippy::disallowed_methods,
-    reason = "here it is noted when reports come"
-)]
+#![expect(clippy::disallowed_methods, reason = "stamps the arrival of reports")]
 
 use std::convert::Infallible;
 use std::time::Instant;
@@ -70,7 +67,7 @@ impl<R: Message> Sense<R> {
                     self.was_lost = true;
                 }
                 GroupUpdate::Gone if self.source == Some(source) => {
-                    tracing::info!("no {} from {source}: it is gone", self.what);
+                    tracing::info!("no {} from {source}: it is lost", self.what);
                     self.source = None;
                     self.was_lost = true;
                 }

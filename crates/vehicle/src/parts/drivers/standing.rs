@@ -42,7 +42,7 @@ impl Watchman {
                         client.authority
                     );
                 }
-                None => tracing::info!("nobody is in control"),
+                None => tracing::info!("no client is in control"),
             }
         }
         if before.state != now.state {
@@ -59,7 +59,7 @@ impl Watchman {
     pub(in crate::parts) fn emergency(&self) -> Option<&'static str> {
         match self.last.state {
             State::Emergency => Some("stopped by an emergency"),
-            _ if self.was_stopped => Some("stopped by an emergency, and not resumed since"),
+            _ if self.was_stopped => Some("stopped by an emergency and not resumed"),
             _ => None,
         }
     }

@@ -46,7 +46,10 @@ pub(in crate::parts) fn judge(own: JausId, peer: JausId, told: &DriverStatus) ->
         Some(_) if told.status == ready => Verdict::GoOn,
         None if told.status == ready || told.status == standby => Verdict::Anew,
         Some(_) if told.status == standby => Verdict::Anew,
-        _ => Verdict::StandDown(format!("{peer} can not act: its status is {}", told.status)),
+        _ => Verdict::StandDown(format!(
+            "{peer} is not operational: its status is {}",
+            told.status
+        )),
     }
 }
 
@@ -123,7 +126,7 @@ mod tests {
                 State::Shutdown,
                 None,
                 StageReport::default(),
-                "101.2.33 can not act: its status is 3",
+                "101.2.33 is not operational: its status is 3",
             ),
         ] {
             let verdict = judged(state, controller, stage);

@@ -1,8 +1,5 @@
 //! Monitoring of one driver of the chain: its stage, its controller and emergencies.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "here a lost driver is waited for"
-)]
+#![expect(clippy::disallowed_methods, reason = "waits for a lost driver")]
 
 use std::time::Duration;
 

@@ -1,9 +1,6 @@
 //! Hands a path over to the path segment driver: clears its list, fills it with the segments and
 //! executes it. Every command is acknowledged, and every change of the list is confirmed.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "here a confirmation is waited for"
-)]
+#![expect(clippy::disallowed_methods, reason = "waits for a confirmation")]
 
 use std::time::Duration;
 
@@ -41,7 +38,7 @@ pub(super) async fn hand_over(
     tolerance: f64,
 ) -> Result<(), String> {
     let elements = elements(path, tolerance).map_err(|error| {
-        format!("the path can not be told in path segments: {error}; choose a closer destination")
+        format!("cannot encode the path as path segments: {error}; choose a closer destination")
     })?;
     let mut list = List {
         messages: component.messages(),
@@ -58,7 +55,7 @@ pub(super) async fn hand_over(
     };
     execute
         .set_speed_m_per_s(speed)
-        .map_err(|error| format!("the speed can not be told: {error}"))?;
+        .map_err(|error| format!("cannot encode the speed: {error}"))?;
     list.control.deliver(&execute).await.map_err(in_words)
 }
 
@@ -170,7 +167,7 @@ impl List<'_> {
                         && answer.request_id == self.request
                     {
                         return Err(format!(
-                            "{peer} does not take the segments: {:?}",
+                            "{peer} rejects the segments: {:?}",
                             answer.response_code
                         ));
                     }

@@ -77,7 +77,7 @@ pub(in crate::parts) async fn fetch_from(
         }
     }
     Err(format!(
-        "the map of {store} has changed again and again while it was fetched"
+        "the map of {store} kept changing while it was fetched"
     ))
 }
 
@@ -91,12 +91,10 @@ fn choose(maps: Vec<MapRec>, name: &str, store: JausId) -> Result<MapRec, String
     let mut maps = maps.into_iter();
     match maps.find(|map| map.name == *name || only) {
         Some(map) => Ok(map),
-        None if names.is_empty() => Err(format!(
-            "{store} has no map: create one that is called \"{name}\""
-        )),
+        None if names.is_empty() => Err(format!("{store} has no map: create one named \"{name}\"")),
         None => Err(format!(
-            "{store} has no map that is called \"{name}\", but {}: create one, or choose one of \
-             these with --map",
+            "{store} has no map named \"{name}\", but {}: create one, or choose one of these with \
+             --map",
             names.join(", ")
         )),
     }
@@ -111,7 +109,7 @@ pub(super) async fn fetch_pose(component: &Component) -> Result<Point, String> {
     };
     let pose: ReportLocalPose = component.query(sensor, &query).await.map_err(in_words)?;
     let place = pose.x_m().zip(pose.y_m());
-    place.ok_or_else(|| format!("{sensor} does not tell where the vehicle is: set its pose"))
+    place.ok_or_else(|| format!("{sensor} reports no pose: set the vehicle's pose"))
 }
 
 const X_AND_Y: u16 = 0b11;

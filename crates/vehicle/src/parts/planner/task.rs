@@ -2,7 +2,7 @@
 //! results to it.
 #![expect(
     clippy::disallowed_methods,
-    reason = "here the mission gets its time, and planning a thread"
+    reason = "gives the mission its clock, and planning a thread"
 )]
 
 use std::future::Future;
@@ -288,7 +288,7 @@ impl<'a> PlannerTask<'a> {
                 }
             }
             News::StoodDown(link, reason) => {
-                let reason = format!("the {link}{} has stood down: {reason}", self.named(link));
+                let reason = format!("the {link}{} suspended motion: {reason}", self.named(link));
                 self.stop_if_driving(&reason).await;
             }
             News::Emergency(link) => {
@@ -378,7 +378,7 @@ async fn look(component: &Component) -> Vec<(Link, LinkState)> {
 /// Stops a driver and releases control.
 async fn halt(control: Control) {
     if let Err(error) = control.standby().await {
-        tracing::debug!(%error, "giving it back will stop it");
+        tracing::debug!(%error, "not stopped; releasing control will stop it");
     }
     control.release().await;
 }

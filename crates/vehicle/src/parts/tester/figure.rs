@@ -92,9 +92,9 @@ impl fmt::Display for Line {
             .map_or_else(|| "-".to_owned(), |number| number.to_string());
         let mark = match self.acknowledgement {
             Acknowledgement::None => "",
-            Acknowledgement::Request => "  wants acknowledgement",
+            Acknowledgement::Request => "  requests acknowledgement",
             Acknowledgement::Positive => "  acknowledges",
-            Acknowledgement::Negative => "  was not taken",
+            Acknowledgement::Negative => "  negative acknowledgement",
         };
         write!(
             f,

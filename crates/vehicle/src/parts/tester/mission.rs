@@ -2,7 +2,7 @@
 //! driver, primitive driver, and back.
 #![expect(
     clippy::disallowed_methods,
-    reason = "here steps get their time and their patience"
+    reason = "gives the steps their clock and timeouts"
 )]
 
 use std::time::{Duration, Instant};
@@ -342,7 +342,8 @@ async fn find(
         Ok(Some(id)) => Ok((id, id.to_string())),
         Ok(None) => Err("the node has stopped".to_owned()),
         Err(_) => Err(format!(
-            "nobody in subsystem {} offers {} after {} s: start it, or choose another subsystem",
+            "no component in subsystem {} offers {} after {} s: start one, or choose another \
+             subsystem",
             test.subsystem,
             services.join(" and "),
             test.patience.as_secs()
@@ -354,14 +355,14 @@ async fn pose(component: &Component, sensor: JausId) -> Result<Point, String> {
     let query = QueryLocalPose { presence_vector: 3 };
     let report: ReportLocalPose = ask(component, sensor, &query).await?;
     let place = report.x_m().zip(report.y_m());
-    place.ok_or_else(|| format!("{sensor} does not tell where the vehicle is: set its pose"))
+    place.ok_or_else(|| format!("{sensor} reports no pose: set the vehicle's pose"))
 }
 
 async fn speed(component: &Component, sensor: JausId) -> Result<f64, String> {
     let query = QueryVelocityState { presence_vector: 1 };
     let report: ReportVelocityState = ask(component, sensor, &query).await?;
     let speed = report.velocity_x_m_per_s();
-    speed.ok_or_else(|| format!("{sensor} does not tell how fast the vehicle is"))
+    speed.ok_or_else(|| format!("{sensor} reports no velocity"))
 }
 
 /// Retries a query until it succeeds, because a sensor that has just started has no data yet.
@@ -424,7 +425,7 @@ async fn set_out(
                 last.mission, to.0, to.1, last.remaining
             ),
         )),
-        _ => Err("the planner has begun no other mission".to_owned()),
+        _ => Err("the planner has not started another mission".to_owned()),
     }
 }
 
@@ -445,7 +446,8 @@ async fn choose(component: &Component, store: JausId, from: Point) -> Result<Poi
     let good = places.find(|&to| plan(&map.terrain, &room, from, to).is_ok());
     good.ok_or_else(|| {
         format!(
-            "no place some {AWAY} m from x {:.2} m, y {:.2} m can be driven to: choose one with --to",
+            "no destination about {AWAY} m from x {:.2} m, y {:.2} m is reachable: choose one \
+             with --to",
             from.0, from.1
         )
     })
@@ -498,7 +500,7 @@ async fn look_at_chain(component: &Component, cast: &Cast) -> Result<((), String
                     "{driver} is controlled by {client}, not by {commander}"
                 ));
             }
-            None => return Err(format!("nobody controls {driver}")),
+            None => return Err(format!("{driver} is not controlled")),
         }
     }
     Ok(((), told.join(", ")))
@@ -517,7 +519,7 @@ async fn arrive(
     let seen = format!("x {x:.2} m, y {y:.2} m, {off:.2} m off");
     match off {
         off if off <= NEAR => Ok(((), seen)),
-        _ => Err(format!("{seen}; at most {NEAR} m would do")),
+        _ => Err(format!("{seen}; at most {NEAR} m is allowed")),
     }
 }
 
@@ -540,7 +542,7 @@ async fn give_back(
             }
         }
         if held.is_empty() {
-            return Ok(((), "nobody controls anybody".to_owned()));
+            return Ok(((), "all drivers are released".to_owned()));
         }
         if begin.elapsed() > Duration::from_secs(10) {
             return Err(format!("still controlled: {}", held.join(", ")));

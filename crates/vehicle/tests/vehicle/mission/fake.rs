@@ -50,7 +50,7 @@ impl Switch {
             let mut report = self.0.lock().unwrap();
             report.state = state;
             report.reason = reason.into();
-            // As if it commanded the next one: else it has stood down.
+            // As if it commanded the next one; otherwise it has suspended motion.
             report.next_subsystem_id = 1;
         }
         component.changed::<QueryStage>().await;

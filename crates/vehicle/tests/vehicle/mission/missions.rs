@@ -124,7 +124,7 @@ async fn mistakes_are_told_with_what_to_do() {
     world.go(99.0, 9.5, true).await;
     let report = world.until_stage(Stage::FAILED).await;
     let reason = report.reason.to_string_lossy().into_owned();
-    assert!(reason.contains("is not on the map"), "{reason}");
+    assert!(reason.contains("is outside the map"), "{reason}");
     world.shut_down().await;
 }
 

@@ -3,13 +3,13 @@
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,
-    reason = "tests of running nodes wait in real time, and choose a port of their own"
+    reason = "tests of running nodes wait in real time and choose their own port"
 )]
 #![expect(
     clippy::unwrap_used,
     clippy::expect_used,
     clippy::panic,
-    reason = "what fails here fails the test"
+    reason = "a failure here fails the test"
 )]
 
 mod fake;

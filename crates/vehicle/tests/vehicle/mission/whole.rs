@@ -1,4 +1,4 @@
-//! The whole chain with all real parts, each on a node of its own: the tester's mission, and its
+//! The whole chain with all real parts, each on its own node: the tester's mission, and its
 //! reaction to the death of a part.
 
 use std::path::PathBuf;

@@ -52,7 +52,7 @@ fn write_until_killed(file: &Path, instant: Duration) -> u32 {
     let output = BufReader::new(child.stdout.take().unwrap());
     let reader = std::thread::spawn(move || {
         let lines = output.lines().map_while(Result::ok);
-        // What the test harness says comes first, and the last line may be cut off.
+        // The test harness's output comes first, and the last line may be truncated.
         let numbers =
             lines.filter_map(|line| line.strip_prefix("done ")?.strip_suffix('.')?.parse().ok());
         numbers.last().unwrap_or(0)

@@ -91,7 +91,7 @@ fn cells(world: &World) -> Vec<u8> {
         .expect("on the map")
 }
 
-/// The steps go around the map in so many windows, each of which is overwritten a lap later.
+/// The steps go around the map in this many windows, each overwritten a lap later.
 const LAP: u32 = 50;
 
 fn expected_cells(last: u32) -> Vec<u8> {

@@ -8,7 +8,7 @@
     clippy::expect_used,
     clippy::panic,
     clippy::disallowed_methods,
-    reason = "these are tests, with processes that are killed at random instants"
+    reason = "tests with processes that are killed at random instants"
 )]
 
 mod flipped;

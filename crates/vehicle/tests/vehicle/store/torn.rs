@@ -41,7 +41,7 @@ fn first_image() -> Vec<u8> {
 
 /// The last step that was acknowledged.
 fn write_until_cut(disk: &Disk, before: u32) -> u32 {
-    // The power may fail while the file is being put right.
+    // The power may fail during the repair.
     let Ok(mut world) = World::on(disk.clone()) else {
         return before;
     };
@@ -95,7 +95,7 @@ impl Disk {
         let mut state = self.0.lock().unwrap();
         let mut image = std::mem::take(&mut state.kept);
         let mut unsure = std::mem::take(&mut state.unsure);
-        // In half of the cuts the order is any.
+        // In half of the cuts the write order is arbitrary.
         if chance.below(2) == 0 {
             for i in (1..unsure.len()).rev() {
                 unsure.swap(i, chance.below(i + 1));
@@ -173,7 +173,7 @@ impl StorageBackend for Disk {
     fn write(&self, offset: u64, data: &[u8]) -> io::Result<()> {
         let mut state = self.0.lock().unwrap();
         let power = state.spend();
-        // The write that the power fails in may be torn, too.
+        // The write during the power failure may be torn too.
         state.unsure.push(Write::Octets(offset, data.to_vec()));
         power?;
         let begin = offset as usize;

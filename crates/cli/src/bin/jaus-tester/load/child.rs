@@ -19,7 +19,7 @@ use super::process::{Answer, NodeOrder, Order};
 /// Subsystem of the load test.
 const SUBSYSTEM: u16 = 101;
 
-/// Takes orders from the `jaus-tester load` that started it.
+/// Serves the `jaus-tester load` that started it.
 #[derive(Args)]
 pub(crate) struct LoadChild {}
 

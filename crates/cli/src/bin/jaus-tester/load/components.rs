@@ -2,7 +2,7 @@
 //! measures the time until its own messages are acknowledged.
 #![expect(
     clippy::disallowed_methods,
-    reason = "a load keeps a pace, and measures real time"
+    reason = "the load is paced and measured in real time"
 )]
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

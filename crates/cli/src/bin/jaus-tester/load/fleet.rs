@@ -2,7 +2,7 @@
 #![expect(
     clippy::disallowed_methods,
     clippy::disallowed_types,
-    reason = "finds free ports, and waits for processes"
+    reason = "finds free ports and waits for processes"
 )]
 
 use std::net::{SocketAddr, UdpSocket};
@@ -164,7 +164,7 @@ impl Fleet {
 }
 
 fn unexpected(answer: &Answer) -> Failure {
-    Failure::new(format!("a process gave another answer: {answer:?}"))
+    Failure::new(format!("a process gave an unexpected answer: {answer:?}"))
 }
 
 /// Free UDP ports on loopback, one per node.

@@ -32,34 +32,34 @@ const MOST_IN_PROCESS: u16 = 1000;
 
 /// Measure round trips of acknowledged messages between many components
 ///
-/// Starts nodes and component processes on this host. Each component has a connection of its own, a
-/// stream socket, to the process of its node. It sends to the next component, which is on the next
-/// node and sends an acknowledgement back: a message and its acknowledgement pass four processes
-/// each. The round trip ends when the sending component has the acknowledgement. One row is one step
-/// of --rates. Uses loopback only. Exit status 1 means that messages were lost or refused.
+/// Starts nodes and component processes on this host. Each component has its own stream socket to
+/// its node's process. It sends to the next component, on the next node, which acknowledges: a
+/// message and its acknowledgement pass four processes each. The round trip ends when the sending
+/// component has the acknowledgement. One row is one step of --rates. Uses loopback only. Exit
+/// status 1 means that messages were lost or refused.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus-tester load\n  \
     jaus-tester load --rates 9000,max --seconds 10 --json load.json --svg load.svg\n  \
     jaus-tester load --components 50 --attach     on a running `jaus-communicator --local`\n  \
     jaus-tester load --beside socketio.json --svg both.svg\n\n\
-    Columns: messages per second that were wanted and that were acknowledged; messages sent, lost \
-    (sent and not acknowledged within 2 s) and refused (by the sender's connection); round trips in \
-    milliseconds; processor time of all processes for each acknowledged message in microseconds \
-    (Linux). Each row has 0.5 s of warm-up that does not count.\n\n\
-    Messages leave at ticks of one millisecond. The round trip begins when the tick is handled, so \
-    that messages which leave together wait for each other.")]
+    Columns: messages per second, offered and acknowledged; messages sent, lost (not acknowledged \
+    within 2 s) and refused (by the sender's connection); round-trip times in milliseconds; CPU \
+    time of all processes per acknowledged message in microseconds (Linux). Each row starts with \
+    0.5 s of warm-up that is not counted.\n\n\
+    Messages leave at ticks of one millisecond. The round trip starts when the tick is handled, \
+    so messages of one tick wait for each other.")]
 pub(crate) struct LoadCommand {
-    /// How many components, each with a connection of its own
+    /// The number of components, each with its own connection
     #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u16).range(2..=8000))]
     components: u16,
 
-    /// How many nodes the components are spread over, each a process
+    /// The number of nodes for the components, one process each
     #[arg(long, value_name = "N", default_value = "4", value_parser = clap::value_parser!(u8).range(1..=32),
         conflicts_with = "attach")]
     nodes: u8,
 
-    /// How many processes the components are spread over
+    /// The number of processes for the components
     #[arg(long, value_name = "N", default_value = "4", value_parser = clap::value_parser!(u16).range(1..=64))]
     processes: u16,
 
@@ -72,15 +72,15 @@ pub(crate) struct LoadCommand {
     )]
     rates: Vec<Rate>,
 
-    /// In a row `max`: how many messages of each component wait for acknowledgement at a time
+    /// In a `max` row: the number of unacknowledged messages of each component
     #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u32).range(1..=256))]
     window: u32,
 
-    /// In a row with a rate: how many messages a component sends at once
+    /// In a row with a rate: the number of messages a component sends at once
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=256))]
     burst: u32,
 
-    /// How long each row is measured, at most an hour
+    /// How long to measure each row, at most an hour
     #[arg(long, default_value = "5", value_parser = row_time)]
     seconds: Duration,
 
@@ -89,12 +89,12 @@ pub(crate) struct LoadCommand {
         value_parser = clap::value_parser!(u16).range(HEAD as i64..=1400))]
     size: u16,
 
-    /// Who acknowledges a message
+    /// What acknowledges a message
     #[arg(long, value_name = "WHO", value_enum, default_value = "component")]
     acknowledged_by: Acknowledger,
 
-    /// Use a running node of this host, such as a communicator, in place of own nodes [without
-    /// ADDRESS: at the usual place]
+    /// Attach to a running node of this host, such as a communicator, instead of starting nodes
+    /// [ADDRESS defaults to the usual place]
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "default")]
     attach: Option<Address>,
 
@@ -136,7 +136,7 @@ fn row_time(text: &str) -> Result<Duration, String> {
     let is_bounded = time <= Duration::from_secs(3600);
     is_bounded
         .then_some(time)
-        .ok_or_else(|| "an hour at most".to_owned())
+        .ok_or_else(|| "write at most one hour".to_owned())
 }
 
 impl LoadCommand {
@@ -176,18 +176,21 @@ impl LoadCommand {
         let nodes = if self.attach.is_some() { 1 } else { self.nodes };
         if self.components > MOST_ON_NODE * u16::from(nodes) {
             return Err(Failure::new(format!(
-                "{} components need more than {nodes} nodes: a node has numbers for {MOST_ON_NODE}",
+                "{} components need more than {nodes} nodes: a node holds at most {MOST_ON_NODE}",
                 self.components
             )));
         }
         if self.components.div_ceil(self.processes) > MOST_IN_PROCESS {
             return Err(Failure::new(format!(
-                "{} components need more than {} processes: one holds {MOST_IN_PROCESS} connections",
+                "{} components need more than {} processes: a process has at most \
+                 {MOST_IN_PROCESS} connections",
                 self.components, self.processes
             )));
         }
         if self.processes > self.components {
-            return Err(Failure::new("there are more processes than components"));
+            return Err(Failure::new(
+                "more processes than components: lower --processes",
+            ));
         }
         Ok(())
     }

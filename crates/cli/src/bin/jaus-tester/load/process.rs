@@ -72,13 +72,13 @@ pub(super) enum Pace {
     Window(u32),
 }
 
-/// Who acknowledges a message.
+/// What acknowledges a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Acknowledger {
     /// The receiving component sends a message back
     Component,
-    /// The receiving component's node acknowledges (AS5669A), and repeats are sent as needed
+    /// The receiving component's node acknowledges (AS5669A); lost messages are retransmitted
     Node,
 }
 

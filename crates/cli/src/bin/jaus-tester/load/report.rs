@@ -102,7 +102,7 @@ impl Report {
         let text = std::fs::read_to_string(file).map_err(|error| Failure::file(file, &error))?;
         let file = file.display();
         serde_json::from_str(&text)
-            .map_err(|error| Failure::new(format!("{file}: not a report of a load: {error}")))
+            .map_err(|error| Failure::new(format!("{file} is not a load report: {error}")))
     }
 
     pub(super) fn title(&self) -> String {

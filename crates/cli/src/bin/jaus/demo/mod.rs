@@ -22,32 +22,32 @@ use operator::{Ending, Operator};
 use story::{Story, Who};
 use system::{OPERATOR, System, VEHICLE};
 
-/// Watch a whole vehicle drive a mission on this computer, with the operator's page
+/// Run a whole vehicle on this computer and watch it drive a mission on the operator's page
 ///
-/// A vehicle of nine components on three nodes and an operator's station start in this process and
-/// find each other; then the planner is asked to drive somewhere. It needs no network, no
-/// configuration and no rights.
+/// Starts a vehicle of nine components on three nodes and an operator control unit in this process.
+/// They discover each other, and the planner is sent on a mission. Needs no network, configuration
+/// or privileges.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    jaus demo                         with the page; goes on after the mission, until Ctrl-C\n  \
-    jaus demo --stay                  drives nowhere by itself: do it on the page\n  \
-    jaus demo --headless              without the page; ends when the vehicle has arrived\n  \
+    jaus demo                         with the page; runs until Ctrl-C\n  \
+    jaus demo --stay                  starts no mission: drive on the page\n  \
+    jaus demo --headless              without the page; ends when the vehicle arrives\n  \
     jaus demo --to 3,-5 --headless --seconds 60")]
 pub(crate) struct Demo {
-    /// End after this time. Without the page, a mission that has not arrived by then has failed:
-    /// exit status 1 [default: at Ctrl-C; without the page, when the mission is over]
+    /// End after this time. With --headless, an unfinished mission then counts as failed: exit
+    /// status 1 [default: at Ctrl-C; with --headless, when the mission is over]
     #[arg(long, value_parser = runtime::seconds)]
     seconds: Option<Duration>,
 
-    /// Without the operator's page
+    /// Do not serve the operator's page
     #[arg(long)]
     headless: bool,
 
-    /// Where to drive: NORTH,EAST of the start in metres
+    /// The destination: NORTH,EAST of the start in metres
     #[arg(long, value_name = "X,Y", default_value = "6,5", value_parser = place, allow_hyphen_values = true)]
     to: (f64, f64),
 
-    /// Drive nowhere by itself
+    /// Start no mission
     #[arg(long, conflicts_with = "headless")]
     stay: bool,
 }
@@ -74,14 +74,13 @@ impl Demo {
 
     fn opening(&self, story: &mut Story) -> Result<(), Failure> {
         story.line(
-            "A ground vehicle and its operator's station start on this computer. Every part is a JAUS\n\
-             component that could as well be a program on a board of its own; none knows of the others\n\
-             before Discovery finds them. They talk through real UDP sockets on the loopback\n\
-             interface, and nothing leaves this machine.\n",
+            "A ground vehicle and its operator control unit start on this computer. Every part is a\n\
+             JAUS component that could also run as a program on its own board. They find each other\n\
+             by Discovery and communicate over UDP on the loopback interface.\n",
         )?;
         let jaus = std::env::args().next().unwrap_or_else(|| "jaus".to_owned());
         story.line(format_args!(
-            "While this runs, try in another terminal:\n  \
+            "Meanwhile, try in another terminal:\n  \
              {jaus} discover --loopback\n  \
              {jaus} query {VEHICLE}.2.41 QueryLocalPose '{{\"PresenceVector\":67}}' --loopback\n  \
              {jaus} query {VEHICLE}.3.36 QueryMission --loopback\n  \
@@ -179,7 +178,7 @@ impl Demo {
         if self.stay {
             story.tell(
                 Who::Operator,
-                "leaves it to you: take control on the page; Ctrl-C ends it",
+                "leaves the vehicle to you: take control on the page; press Ctrl-C to end",
             )?;
             std::future::pending::<()>().await;
         }
@@ -187,7 +186,7 @@ impl Demo {
         if !self.headless {
             story.tell(
                 Who::Operator,
-                "the vehicle is yours on the page; Ctrl-C ends the demo",
+                "the vehicle is yours on the page; press Ctrl-C to end the demo",
             )?;
             std::future::pending::<()>().await;
         }
@@ -198,11 +197,11 @@ impl Demo {
         let words = match ending {
             Some(Ending::Arrived) => ": the vehicle has arrived",
             Some(Ending::Stopped) => ": the vehicle has not arrived",
-            None if self.headless => ": the vehicle has not arrived by then",
+            None if self.headless => ": the vehicle has not arrived in time",
             None => "",
         };
         story.line(format_args!(
-            "\nThe demo ends after {:.1} s{words}.",
+            "\nThe demo ended after {:.1} s{words}.",
             story.seconds()
         ))?;
         Ok(Outcome::complete_if(

@@ -61,7 +61,7 @@ impl<'s> Operator<'s> {
         control.deliver(&destination).await.map_err(Failure::of)?;
         self.tell(
             Who::Operator,
-            format!("wants the vehicle at x {x} m, y {y} m, and approves whatever path there is"),
+            format!("sets the destination x {x} m, y {y} m, and approves the planned path"),
         )?;
         let ending = self.watch(planner, sensor).await;
         self.leave(control).await;
@@ -86,11 +86,12 @@ impl<'s> Operator<'s> {
                 update = missions.next() => match update {
                     Some(Update::Report(report)) => report,
                     Some(Update::Down { why, .. }) => {
-                        self.tell(Who::Operator, format!("hears nothing from the planner: {why}"))?;
+                        self.tell(Who::Operator, format!("gets no reports from the planner: \
+                            {why}"))?;
                         continue;
                     }
                     Some(Update::Up) => continue,
-                    None => return Err(Failure::new("the planner has gone")),
+                    None => return Err(Failure::new("the planner is no longer available")),
                 },
                 _ = looks.tick() => {
                     if told == Some(Stage::DRIVING) {
@@ -117,21 +118,21 @@ impl<'s> Operator<'s> {
 
     async fn tell_stage(&mut self, planner: JausId, report: &ReportMission) -> Result<(), Failure> {
         let mut words = match report.stage {
-            Stage::MAP => "asks the knowledge store for the map".to_owned(),
-            Stage::PLANNING => "looks for a path on it".to_owned(),
+            Stage::MAP => "queries the map from the knowledge store".to_owned(),
+            Stage::PLANNING => "plans a path on it".to_owned(),
             Stage::AWAITING_APPROVAL => "has a path, and waits for approval".to_owned(),
             Stage::PATH => format!(
-                "hands {} to the path segment driver: {:.1} m",
+                "sends {} to the path segment driver: {:.1} m",
                 self.pieces(planner).await,
                 report.remaining
             ),
             Stage::VECTOR => {
-                "the path segment driver takes the vector driver under control".to_owned()
+                "the path segment driver takes control of the vector driver".to_owned()
             }
             Stage::PRIMITIVE => {
-                "the vector driver takes the primitive driver under control".to_owned()
+                "the vector driver takes control of the primitive driver".to_owned()
             }
-            Stage::DRIVING => "all stages obey: under way".to_owned(),
+            Stage::DRIVING => "all stages are ready: under way".to_owned(),
             Stage::ARRIVED => "arrived".to_owned(),
             Stage::FAILED => "gives up".to_owned(),
             Stage::STOPPED => "stopped".to_owned(),
@@ -176,7 +177,7 @@ impl<'s> Operator<'s> {
                         .rem_euclid(360.0)
                 ),
             ),
-            Err(error) => self.tell(Who::Vehicle, format!("does not tell where it is: {error}")),
+            Err(error) => self.tell(Who::Vehicle, format!("does not report its pose: {error}")),
         }
     }
 

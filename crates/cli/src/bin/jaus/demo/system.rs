@@ -85,8 +85,8 @@ impl System {
     /// Waits for a part to fail.
     pub(super) async fn failure(&mut self) -> Failure {
         match self.parts.join_next().await {
-            Some(Ok((name, error))) => Failure::new(format!("the {name} can not go on: {error}")),
-            Some(Err(error)) => Failure::new(format!("a part has ended: {error}")),
+            Some(Ok((name, error))) => Failure::new(format!("the {name} failed: {error}")),
+            Some(Err(error)) => Failure::new(format!("a component's task failed: {error}")),
             None => std::future::pending().await,
         }
     }

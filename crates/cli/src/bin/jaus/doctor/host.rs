@@ -1,8 +1,5 @@
 //! Checks of this host without network traffic: interfaces, buffers, clock.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "it is the clock that is looked at"
-)]
+#![expect(clippy::disallowed_methods, reason = "checks the clock itself")]
 
 use std::fs;
 use std::time::{Duration, Instant, SystemTime};
@@ -37,9 +34,9 @@ pub(super) fn interfaces(config: &Config) -> (Vec<Interface>, Vec<Finding>) {
         findings.push(
             Finding::ok(
                 CHECK,
-                "only loopback is used: nodes of other hosts are out of reach",
+                "only the loopback interface is used: nodes on other hosts are out of reach",
             )
-            .advice("if they are meant: bring a network up, or leave --loopback out"),
+            .advice("to reach other hosts, bring up a network interface or omit --loopback"),
         );
     }
     (chosen, findings)
@@ -57,18 +54,18 @@ fn carries(config: &Config, interface: &Interface) -> Finding {
     if interface.broadcast.is_some() {
         return Finding::warning(
             CHECK,
-            format_args!("{name} carries no multicast; the network's broadcast address is used"),
+            format_args!("{name} has no multicast; the subnet's broadcast address is used"),
         )
         .advice(format_args!(
-            "`ip link set {} multicast on` if others use multicast, or name them with --peer",
+            "run `ip link set {} multicast on` if others use multicast, or name them with --peer",
             interface.name
         ));
     }
     Finding::warning(
         CHECK,
-        format_args!("{name} carries neither multicast nor broadcasts: nobody is found there"),
+        format_args!("{name} has neither multicast nor broadcast: no nodes are found there"),
     )
-    .advice("name the nodes behind it with --peer ADDRESS (peers in a settings file)")
+    .advice("name the nodes on it with --peer ADDRESS (`peers` in a settings file)")
 }
 
 /// Checks whether the kernel grants the requested buffer sizes.
@@ -84,11 +81,11 @@ pub(super) fn buffers(config: &Config) -> Option<Finding> {
         ));
     }
     let what = format_args!(
-        "receive buffers are limited to {limit} octets, {wanted} are asked for: bursts and large \
-         messages may get lost"
+        "the kernel limits receive buffers to {limit} octets, but {wanted} are needed: bursts and \
+         large messages may be lost"
     );
     Some(Finding::warning(CHECK, what).advice(format_args!(
-        "`sudo sysctl -w net.core.rmem_max={wanted}`, and in /etc/sysctl.d to keep it"
+        "run `sudo sysctl -w net.core.rmem_max={wanted}`, and set it in /etc/sysctl.d to keep it"
     )))
 }
 
@@ -120,23 +117,19 @@ impl ClockWatch {
 /// `step` is the lead of the time of day over the monotonic clock, in seconds.
 fn clock(since_1970: Duration, step: f64) -> Finding {
     const CHECK: &str = "clock";
-    const NTP: &str = "let it follow a time server (`timedatectl set-ntp true`, chrony, or the \
-                       vehicle's GNSS)";
+    const NTP: &str = "synchronise it (`timedatectl set-ntp true`, chrony, or the vehicle's GNSS)";
     /// 2025-01-01, before this program was written.
     const PLAUSIBLE: Duration = Duration::from_secs(1_735_689_600);
     /// More than slewing changes within a moment.
     const STEP: f64 = 0.05;
     if since_1970 < PLAUSIBLE {
-        return Finding::warning(
-            CHECK,
-            "the clock of this host was never set: it is before 2025",
-        )
-        .advice(NTP);
+        return Finding::warning(CHECK, "this host's clock is not set: it is before 2025")
+            .advice(NTP);
     }
     if step.abs() > STEP {
-        let what = format_args!("the clock of this host was just set by {step:.2} s");
+        let what = format_args!("this host's clock was just stepped by {step:.2} s");
         return Finding::warning(CHECK, what).advice(
-            "time stamps of before and after do not fit together; wait until it is stable",
+            "timestamps from before and after the step are inconsistent; wait until it is stable",
         );
     }
     Finding::ok(CHECK, "the time of day is plausible and runs steadily")

@@ -24,22 +24,22 @@ use jaus_cli::runtime;
 
 /// Find out why nodes do not find each other
 ///
-/// Looks at this host's interfaces, port, buffers and clock, then goes on the network for a
-/// moment: does multicast come back, who is there, do two of them have one id? It needs no
-/// rights. Give it the flags or the settings file of the node that does not work. Exit status: 0
-/// all is well, 1 there are warnings, 2 there are problems.
+/// Checks this host's interfaces, port, buffers and clock, then listens on the network: does
+/// multicast loop back, which nodes are there, do two of them share an id? Needs no privileges.
+/// Give it the flags or the settings file of the node that does not work. Exit status: 0 all is
+/// well, 1 there are warnings, 2 there are problems.
 ///
-/// With --peer it examines one peer: recognises it, and tries the exchanges with it one by one, in
-/// the order in which integrations fail. Nothing is commanded. Exit status: 0 all went well, 1 some
-/// exchange failed, 2 nothing can be exchanged.
+/// With --peer it examines one peer: it recognises the stack and tries each exchange in the order
+/// in which integrations fail. It sends no commands. Exit status: 0 all exchanges passed, 1 some
+/// failed, 2 no exchange is possible.
 #[derive(Args)]
 #[command(mut_arg("peer", |peer| peer.long("unicast")))]
 #[command(after_help = "Examples:\n  \
     jaus doctor\n  \
     jaus doctor --config node.toml        with the settings of a node\n  \
-    jaus doctor --id 101.1.1              and whether somebody has that id already\n  \
+    jaus doctor --id 101.1.1              and whether that id is taken\n  \
     jaus doctor --interface eth0 --seconds 10\n  \
-    jaus doctor --peer 192.168.7.2        what works with whoever is there\n  \
+    jaus doctor --peer 192.168.7.2        tests the exchanges with that peer\n  \
     jaus doctor --peer 77.1.1             the same, found by its id\n  \
     jaus doctor --json | jq '.findings[] | select(.mark != \"ok\")'")]
 pub(crate) struct Doctor {
@@ -49,7 +49,7 @@ pub(crate) struct Doctor {
     #[arg(id = "examined", long = "peer", value_name = "ADDRESS")]
     examined: Option<Target>,
 
-    /// Take control of the peer and release it again, if nobody has it
+    /// Take control of the peer and release it, unless another client has control
     #[arg(long, requires = "examined")]
     control: bool,
 
@@ -95,7 +95,7 @@ impl Doctor {
         let (id, config) = match self.network.for_examination() {
             Ok(settings) => settings,
             Err(failure) => {
-                let advice = "correct it: nothing else can be looked at before";
+                let advice = "correct it: doctor cannot check anything else before";
                 return report.add(Finding::problem("settings", failure).advice(advice));
             }
         };
@@ -107,7 +107,7 @@ impl Doctor {
         let listen = self.seconds.unwrap_or(LISTEN);
         if !self.json {
             let seconds = listen.as_secs_f64();
-            say(format_args!("listening to the network for {seconds} s …"));
+            say(format_args!("listening on the network for {seconds} s …"));
         }
         let clock = host::ClockWatch::start();
         report.add_all(neighbours::look(config, id, listen).await)?;

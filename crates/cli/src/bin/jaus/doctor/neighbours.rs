@@ -55,7 +55,7 @@ pub(super) async fn look(config: Config, wanted: Option<JausId>, time: Duration)
     findings
 }
 
-/// Records ids that are heard from more than one place.
+/// Records ids received from more than one address.
 async fn watch(events: &mut Events, moved: &mut BTreeMap<JausId, BTreeSet<Path>>) {
     while let Some(event) = events.recv().await {
         if let Event::PeerMoved { id, from, to } = event {
@@ -72,28 +72,28 @@ fn came_back(link: &LinkReport) -> Option<Finding> {
     if link.counters.own_echo > 0 {
         return Some(Finding::ok(
             CHECK,
-            format_args!("what is sent to {group} on {name} comes back"),
+            format_args!("multicast to {group} on {name} loops back"),
         ));
     }
     let refused = match link.counters.send_errors {
         0 => String::new(),
-        errors => format!(" ({errors} times the host refused to send)"),
+        errors => format!(" (the host refused to send {errors} times)"),
     };
-    let what = format!("what is sent to {group} on {name} does not come back{refused}");
+    let what = format!("multicast to {group} on {name} does not loop back{refused}");
     Some(Finding::problem(CHECK, what).advice(
-        "a firewall or a container without multicast does that: let UDP to and from the group \
-         pass (`sudo nft list ruleset`, `sudo iptables -S`), or name the others with --peer",
+        "likely a firewall, or a container without multicast: allow UDP to and from the group \
+         (`sudo nft list ruleset`, `sudo iptables -S`), or name the other nodes with --peer",
     ))
 }
 
 fn who(peers: &[Peer], directory: &Directory) -> Vec<Finding> {
     const CHECK: &str = "neighbours";
     if peers.is_empty() {
-        return vec![Finding::ok(CHECK, "nobody else was heard").advice(
-            "if somebody should be: is it on the same network and group, does its firewall let \
-             UDP 3794 in, does the switch or access point pass multicast (IGMP snooping without \
-             a querier does not)? `jaus doctor --peer ADDRESS` looks at one host, also at one \
-             that answers no calls (Junior)",
+        return vec![Finding::ok(CHECK, "no other node was found").advice(
+            "if a node should be there: is it on the same network and group, does its firewall \
+             accept UDP 3794, does the switch or access point forward multicast (IGMP snooping \
+             without a querier does not)? `jaus doctor --peer ADDRESS` examines one host, even \
+             one that answers no multicast (Junior)",
         )];
     }
     let one = |peer: &Peer| {
@@ -103,8 +103,8 @@ fn who(peers: &[Peer], directory: &Directory) -> Vec<Finding> {
             .map_or_else(String::new, |told| format!(" of \"{}\"", told.name));
         let old = match peer.version {
             Version::As5669a => "",
-            Version::As5669 => ", speaks the older AS5669",
-            Version::Ra => ", speaks the old Reference Architecture",
+            Version::As5669 => ", uses the older AS5669",
+            Version::Ra => ", uses the old Reference Architecture",
         };
         Finding::ok(
             CHECK,
@@ -113,25 +113,25 @@ fn who(peers: &[Peer], directory: &Directory) -> Vec<Finding> {
     };
     let mut findings: Vec<Finding> = peers.iter().take(MOST).map(one).collect();
     if let Some(more) = peers.len().checked_sub(MOST).filter(|&more| more > 0) {
-        let words = format!("{more} more were heard; `jaus discover` shows them");
+        let words = format!("{more} more were found; `jaus discover` lists them");
         findings.push(Finding::ok(CHECK, words));
     }
     findings
 }
 
-/// One id, heard from several places: a conflict on one network, possibly a single node on several
+/// One id at several addresses: a conflict on one network, possibly a single node on several
 /// networks.
 fn two_of(id: JausId, places: &BTreeSet<Path>) -> Finding {
     const CHECK: &str = "ids";
     let named: Vec<String> = places.iter().map(|path| path.peer.to_string()).collect();
-    let what = format!("{id} was heard from {}", named.join(" and from "));
+    let what = format!("{id} sends from {}", named.join(" and from "));
     let links: BTreeSet<_> = places.iter().map(|path| path.link).collect();
     if links.len() < places.len() {
         return Finding::problem(CHECK, what)
-            .advice("two nodes have this id, and answers go astray: give one of them another");
+            .advice("two nodes have this id, so answers go astray: give one of them another id");
     }
     Finding::warning(CHECK, what).advice(
-        "if that is one node on two networks, all is well; if they are two, give one another id",
+        "harmless if that is one node on two networks; if they are two nodes, give one another id",
     )
 }
 
@@ -139,15 +139,15 @@ fn two_of(id: JausId, places: &BTreeSet<Path>) -> Finding {
 fn is_free(id: JausId, peers: &[Peer]) -> Finding {
     const CHECK: &str = "ids";
     let Some(peer) = peers.iter().find(|peer| peer.id == id) else {
-        return Finding::ok(CHECK, format_args!("nobody else has the id {id}"));
+        return Finding::ok(CHECK, format_args!("no other node has the id {id}"));
     };
     let place = peer.path.peer;
     let here = interface::list().unwrap_or_default();
     let is_here = |ip| here.iter().any(|interface| interface.address == ip);
     if place.socket().is_some_and(|address| is_here(address.ip())) {
         return Finding::warning(CHECK, format_args!("{id} runs on this host, at {place}"))
-            .advice("if that is your node, all is well; a second one needs another id");
+            .advice("harmless if that is your node; a second one needs another id");
     }
     Finding::problem(CHECK, format_args!("{id} is taken by {place}"))
-        .advice("choose another id (--id), or end the other")
+        .advice("choose another id (--id), or stop the other node")
 }

@@ -47,32 +47,32 @@ fn judge(config: &Config, interface: &Interface, opened: Result<UdpLink, Error>)
     match opened {
         Ok(_) if config.port == 0 => Finding::ok(
             CHECK,
-            format_args!("any free UDP port is used on {}", interface.name),
+            format_args!("any free UDP port will be used on {}", interface.name),
         ),
         Ok(link) => Finding::ok(CHECK, format_args!("UDP {} is free", link.local())),
         Err(Error::PortTaken { address, holder }) => {
             let what = format!("UDP {address} is taken{holder}");
             if config.port_taken == PortTaken::UseFree {
                 return Finding::ok(CHECK, what)
-                    .advice("another one is taken then (port_taken = \"use-free\")");
+                    .advice("another port will be used (port_taken = \"use-free\")");
             }
             Finding::warning(CHECK, what).advice(
-                "if that is your node, all is well; a second node on this host needs another port \
+                "harmless if that is your node; a second node on this host needs another port \
                  (--port 3795, or 0 for any free one)",
             )
         }
         Err(Error::GroupTaken { group, holder }) => Finding::problem(
             CHECK,
             format_args!(
-                "the multicast group {group} cannot be received: its port is held{holder} for all \
-                 addresses, without sharing. Junior does that"
+                "the multicast group {group} cannot be received: its port is bound{holder} to all \
+                 addresses without sharing, as Junior does"
             ),
         )
         .advice(if holder.is_junior() {
-            "be its client, with the same flags and --junior (junior = \"/tmp\" in a settings file)"
+            "connect through it: the same flags and --junior (junior = \"/tmp\" in a settings file)"
         } else {
-            "if it is JuniorRTE, be its client: --junior; otherwise end that program, or do without \
-             the group: --group off --port 0, with --peer ADDRESS for each node to reach"
+            "if it is JuniorRTE, connect through it with --junior; otherwise stop that program, \
+             or run without the group: --group off --port 0, and --peer ADDRESS for each node"
         }),
         Err(error) => Finding::problem(CHECK, error),
     }
@@ -84,7 +84,7 @@ pub(super) fn check_junior(folder: &Path) -> Finding {
     match junior::check(folder) {
         Ok(()) => Finding::ok(
             CHECK,
-            format_args!("Junior's node manager is there, at {}", folder.display()),
+            format_args!("Junior's node manager is running, at {}", folder.display()),
         ),
         Err(error) => Finding::problem(CHECK, error),
     }
@@ -97,7 +97,8 @@ pub(super) fn check_tcp(config: &Config) -> Option<Finding> {
         Ok(_) => Finding::ok(CHECK, format_args!("TCP {listen} is free")),
         Err(error) => Finding::problem(CHECK, format_args!("TCP {listen} is not free: {error}"))
             .advice(format_args!(
-                "`sudo ss -tlpn 'sport = :{}'` shows who has it; choose another port in tcp.listen",
+                "find the owner with `sudo ss -tlpn 'sport = :{}'`, or choose another port in \
+                 tcp.listen",
                 listen.port()
             )),
     })

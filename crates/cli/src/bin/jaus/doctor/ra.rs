@@ -1,5 +1,5 @@
 //! Detects systems of the Reference Architecture, which AS5669A nodes do not discover: their
-//! heartbeats go to a multicast group of their own.
+//! heartbeats go to their own multicast group.
 
 use std::collections::BTreeMap;
 use std::future::poll_fn;
@@ -77,7 +77,7 @@ impl RaSystems {
                 "subsystem {subsystem} of the Reference Architecture (OpenJAUS 3.x) is at {from}"
             );
             Finding::ok("neighbours", what).advice(
-                "it does not read AS5669A: `jaus-ra-gateway` makes its components AS5669A ones \
+                "it does not understand AS5669A: connect it through `jaus-ra-gateway` \
                  (docs/ra-gateway.md)",
             )
         })

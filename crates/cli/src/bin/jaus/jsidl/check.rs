@@ -14,8 +14,8 @@ use super::definitions::{load, own_findings, own_services, style};
 
 /// Check service definitions: form, references, rules, state machines
 ///
-/// All findings are printed, each with its place, the reason and what to do. An error makes a
-/// definition unusable; a warning does not. Exit status: 0 no error; 1 an error, or a warning with
+/// Prints each finding with its position, the reason and the remedy. An error makes a definition
+/// unusable; a warning does not. Exit status: 0 no error; 1 an error, or a warning with
 /// --deny-warnings; 2 a path that does not exist.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -30,7 +30,7 @@ pub(crate) struct Arguments {
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
 
-    /// Print every finding as one JSON object a line, and no summary
+    /// Print each finding as one JSON object a line, without a summary
     #[arg(long)]
     json: bool,
 
@@ -83,7 +83,8 @@ fn summary(loaded: &Loaded, errors: usize, warnings: usize) -> String {
     let messages = services.clone().map(|s| s.messages().count()).sum();
     let usable = match (services.count(), messages) {
         (0, _) if errors == 0 => {
-            "no service is defined here (that is a file whose root is `service_def`)".to_owned()
+            "no service is defined here: a service is a file with the root element `service_def`"
+                .to_owned()
         }
         (0, _) => "no service is usable".to_owned(),
         (services, messages) => format!(

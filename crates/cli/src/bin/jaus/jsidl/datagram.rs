@@ -83,15 +83,16 @@ impl Datagram {
                 rows.number(trailer(frame), "sequence number");
             }
         }
-        rows.unread(self.octets.len(), "stale octets behind the last message");
+        rows.unread(self.octets.len(), "stale octets after the last message");
         Ok((rows.rows, messages))
     }
 }
 
 /// Note on a fragment.
-const PART: &str = "a part of a large message: put the parts together first";
+const PART: &str = "a fragment of a large message: reassemble it first";
 /// Note on data with an unknown layout.
-const NOBODYS: &str = "unknown to the Reference Architecture; --service chooses another layout";
+const NOBODYS: &str = "not defined in the Reference Architecture; choose another layout with \
+    --service";
 
 /// Octets of a frame after its message.
 const fn trailer(frame: &Frame) -> usize {

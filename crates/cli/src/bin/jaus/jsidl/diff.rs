@@ -13,11 +13,11 @@ use serde_json::{Value, json};
 
 use super::definitions::{complain, load, own_findings};
 
-/// Compare two sets of service definitions, and tell whether the wire is affected
+/// Compare two sets of service definitions and report wire incompatibilities
 ///
-/// It is affected if two parties, one built from each side, would misunderstand each other or miss a
+/// A change affects the wire if two programs, one built from each side, would misread or miss a
 /// message. Such changes are marked with !. Descriptions and state machines are not compared. Exit
-/// status: 0 the wire is as it was; 1 it is affected; 2 a side cannot be read or has errors.
+/// status: 0 the wire is unchanged; 1 it is affected; 2 a side cannot be read or has errors.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus jsidl diff old/Lights.xml new/Lights.xml\n  \
@@ -28,11 +28,11 @@ pub(crate) struct Arguments {
     #[arg(value_name = "OLD")]
     old: PathBuf,
 
-    /// What OLD has become
+    /// The new version of OLD
     #[arg(value_name = "NEW")]
     new: PathBuf,
 
-    /// Print every change as one JSON object a line, and no summary
+    /// Print each change as one JSON object a line, without a summary
     #[arg(long)]
     json: bool,
 }
@@ -70,7 +70,7 @@ fn sound(path: &Path) -> Result<Loaded, Failure> {
         return Ok(loaded);
     }
     Err(Failure::new(format!(
-        "{}: {}; mend that first, then compare",
+        "{}: {}; correct that first, then compare",
         path.display(),
         counted(errors.len(), "error")
     )))
@@ -95,7 +95,7 @@ fn print(output: &mut Output, changes: &[Change]) -> Result<(), Failure> {
 fn summary(changes: usize, wire: usize) -> String {
     match (changes, wire) {
         (0, _) => "no changes".to_owned(),
-        (changes, 0) => format!("{}; the wire is as it was", counted(changes, "change")),
+        (changes, 0) => format!("{}; the wire is unchanged", counted(changes, "change")),
         (changes, wire) => format!(
             "{}; the wire is affected by {wire} (marked with !)",
             counted(changes, "change")

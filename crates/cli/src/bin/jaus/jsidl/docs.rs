@@ -12,18 +12,18 @@ use super::sources::{self, Sources};
 
 /// Write documentation of services: linked pages with the wire layout of every message
 ///
-/// There is a page for each service, with what it inherits, its messages and its state machines,
-/// and an index by set and by message code. The pages need no server: open index.html.
+/// Writes one page per service, with its inheritance, messages and state machines, and an index by
+/// set and by message code. The pages need no server: open index.html.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus jsidl docs -o built-in\n  \
     jaus jsidl docs my-services/ -o site\n  \
     jaus jsidl docs my-services/ -o docs/services --markdown\n\n\
-    Exit status: 0 written; 1 written without definitions that have errors; 2 not written.")]
+    Exit status: 0 written; 1 written, without the definitions that have errors; 2 not written.")]
 pub(crate) struct Arguments {
     /// JSIDL files, and directories with `.xml` files; without any, the built-in definitions
     ///
-    /// Built-in services that yours inherit from get pages as well.
+    /// Includes pages of the built-in services that yours inherit from.
     #[arg(value_name = "PATH")]
     paths: Vec<PathBuf>,
 

@@ -24,10 +24,10 @@ const MOST: u64 = 4 << 20;
 
 /// Explain a message octet by octet: an annotated hex dump
 ///
-/// Shown are the octets, the field that they belong to, the number on the wire and what it means,
-/// optional fields that are absent, and where reading stops if something is wrong. A whole JUDP
-/// datagram is recognised by its header, which is explained as well, and which tells the messages of
-/// the Reference Architecture (OpenJAUS 3.x), whose codes mean other layouts.
+/// Shows the octets, their field, the integer on the wire and its value, absent optional fields,
+/// and where decoding stops on an error. A whole JUDP datagram is recognised by its header, which
+/// is explained too. The header also identifies messages of the Reference Architecture (OpenJAUS
+/// 3.x), which has other layouts for the same codes.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus jsidl explain 002B02\n  \
@@ -36,7 +36,7 @@ const MOST: u64 = 4 << 20;
     jaus jsidl explain --service 'urn:jaus:jss:core:Time 1.0' 11 40 40 e2 01 00\n  \
     jaus jsidl explain --ra 02 44 01 00 aa aa aa 2a\n  \
     jaus jsidl explain --json - < message.hex | jq .rows\n\n\
-    Exit status: 0 all was read; 1 reading stopped; 2 nothing is known of such a message.")]
+    Exit status: 0 decoded completely; 1 decoding stopped; 2 unknown message.")]
 pub(crate) struct Arguments {
     /// Hexadecimal digits, or a file of such digits or of octets; - is standard input
     #[arg(required = true, value_name = "HEX|FILE")]
@@ -46,11 +46,12 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "PATH")]
     jsidl: Vec<PathBuf>,
 
-    /// The service meant where several define the same message code, with or without its version
+    /// The service to prefer where several define the same message code, with or without its
+    /// version
     #[arg(long, value_name = "URN[ VERSION]")]
     service: Option<String>,
 
-    /// Explain a message without its header by the definitions of the Reference Architecture (RA 3.x)
+    /// Explain a bare message by the definitions of the Reference Architecture (RA 3.x)
     #[arg(long)]
     ra: bool,
 
@@ -118,7 +119,7 @@ impl Explainer {
         let mut text = format!("{}\n\n{}", title(&explanation), table(&explanation.rows));
         text.push_str(&remarks(&explanation));
         if let Some(damage) = damaged(octets).filter(|_| !complete) {
-            text.push_str(&format!("\nIt is no JUDP datagram either: {damage}\n"));
+            text.push_str(&format!("\nIt is not a JUDP datagram either: {damage}\n"));
         }
         if let Some(hint) = self.hint(octets).filter(|_| !complete) {
             text.push_str(&format!("\nBut {hint}\n"));
@@ -130,7 +131,7 @@ impl Explainer {
     fn hint(&self, octets: &Bytes) -> Option<&'static str> {
         let of_ra = !self.by_ra && self.explain_as_ra(octets).is_ok_and(|it| it.stop.is_none());
         of_ra.then_some(
-            "as a message of the Reference Architecture (OpenJAUS 3.x) all of it can be read: --ra",
+            "it is a valid message of the Reference Architecture (OpenJAUS 3.x): add --ra",
         )
     }
 
@@ -214,13 +215,13 @@ fn remarks(explanation: &Explanation) -> String {
     let mut text = String::new();
     if let Some(stop) = &explanation.stop {
         text.push_str(&format!(
-            "\nReading stopped: {stop}, counted from the message code\n"
+            "\nDecoding stopped: {stop}, counted from the message code\n"
         ));
     }
     if !explanation.others.is_empty() {
         let others: Vec<_> = explanation.others.iter().map(ToString::to_string).collect();
         text.push_str(&format!(
-            "\nOther services define {:04X}h otherwise; choose with --service: {}\n",
+            "\nOther services define {:04X}h differently; choose with --service: {}\n",
             explanation.code,
             others.join(", ")
         ));
@@ -256,7 +257,7 @@ fn read(input: impl Read, path: &Path) -> Result<Vec<u8>, Failure> {
         .map_err(|error| Failure::file(path, &error))?;
     if content.len() as u64 > MOST {
         return Err(Failure::new(format!(
-            "{}: more than {} MiB; give the octets of one message or datagram",
+            "{} is larger than {} MiB; give the octets of one message or datagram",
             path.display(),
             MOST >> 20
         )));
@@ -269,7 +270,7 @@ fn from_hex(text: &str) -> Result<Vec<u8>, Failure> {
     let plain = text.replace("0x", " ").replace([',', ':'], " ");
     let octets = jaus_view::from_hex(&plain).map_err(|error| {
         Failure::new(format!(
-            "{text}: neither a file nor hexadecimal digits: {error}"
+            "{text} is neither a file nor hexadecimal digits: {error}"
         ))
     })?;
     Ok(octets)

@@ -15,22 +15,22 @@ use super::definitions::{STANDARD_INPUT, complain, standard_input};
 /// Prefix of the JSIDL namespaces.
 const NAMESPACE: &str = "urn:jaus:jsidl:";
 
-/// Lay service definitions out: indentation, order of attributes, line width
+/// Format service definitions: indentation, order of attributes, line width
 ///
-/// Two blanks a level, attributes in one order, lines of at most 116 characters; comments, texts and
-/// the meaning stay. Files are replaced as a whole or not at all. Exit status: 0 all is laid out;
-/// 1 with --check, a file is not, or a file is no definition; 2 a path that cannot be read.
+/// Indents by two spaces, orders attributes and breaks lines at 116 characters; comments, texts and
+/// meaning are kept. Each file is replaced atomically. Exit status: 0 all files are formatted; 1
+/// with --check a file is not, or a file is not a definition; 2 a path cannot be read.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus jsidl fmt my-services/\n  \
     jaus jsidl fmt --check my-services/\n  \
     jaus jsidl fmt - < Lights.xml")]
 pub(crate) struct Arguments {
-    /// JSIDL files, and directories with `.xml` files; - lays standard input out to standard output
+    /// JSIDL files, and directories with `.xml` files; - formats standard input to standard output
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
 
-    /// Change nothing, and name the files that would be changed
+    /// Change nothing; list the files that would change
     #[arg(long)]
     check: bool,
 }
@@ -49,10 +49,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         } else if path.is_dir() {
             let files = jsidl::definition_files(path).map_err(Failure::new)?;
             if files.is_empty() {
-                say(format_args!(
-                    "{}: there is no `.xml` file here",
-                    path.display()
-                ));
+                say(format_args!("{} has no `.xml` files", path.display()));
             }
             for file in files {
                 run.file(&file, true)?;
@@ -124,11 +121,11 @@ impl Run {
         }
         let changed = counted(self.changed, "file");
         let what = if self.check {
-            "to be laid out"
+            "to be formatted"
         } else {
-            "laid out"
+            "formatted"
         };
-        say(format_args!("{changed} {what}, {} as before", self.same));
+        say(format_args!("{changed} {what}, {} unchanged", self.same));
     }
 }
 

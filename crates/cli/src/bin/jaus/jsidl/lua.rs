@@ -15,28 +15,28 @@ const FILE: &str = "jaus.lua";
 
 /// Write a Wireshark dissector (Lua) for the built-in definitions and your own
 ///
-/// It reads JAUS over UDP and TCP, puts large messages together, and knows every field by name:
-/// jaus.<message>.<field>, in lower case. Messages of the Reference Architecture (OpenJAUS 3.x) are
-/// told by their headers: jaus.ra.<message>.<field>. Where your definition and a built-in one share a
-/// message code, yours is tried first.
+/// It dissects JAUS over UDP and TCP, reassembles large messages, and names every field
+/// jaus.<message>.<field> in lower case. Messages of the Reference Architecture (OpenJAUS 3.x) are
+/// recognised by their headers: jaus.ra.<message>.<field>. Where your definition and a built-in one
+/// share a message code, yours takes precedence.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus jsidl lua -o ~/.local/lib/wireshark/plugins\n  \
     jaus jsidl lua my-services/ -o jaus.lua\n  \
     wireshark -X lua_script:jaus.lua drive.pcapng\n  \
     tshark -X lua_script:jaus.lua -r drive.pcapng -Y 'jaus.reportglobalpose.latitude > 53'\n\n\
-    Another port than 3794: Wireshark's Decode As, or tshark -d udp.port==5000,jaus\n\n\
-    Exit status: 0 written; 1 written without definitions that have errors; 2 not written.")]
+    For ports other than 3794: Wireshark's Decode As, or tshark -d udp.port==5000,jaus\n\n\
+    Exit status: 0 written; 1 written, without the definitions that have errors; 2 not written.")]
 pub(crate) struct Arguments {
     /// JSIDL files, and directories with `.xml` files
     #[arg(required_if_eq("only", "true"), value_name = "PATH")]
     paths: Vec<PathBuf>,
 
-    /// The file to write, or a directory, which gets jaus.lua; - is standard output
+    /// The file to write, or a directory for jaus.lua; - is standard output
     #[arg(short, long, value_name = "FILE_OR_DIR", default_value = "-")]
     output: PathBuf,
 
-    /// Leave the messages of the built-in definitions out; yours may still refer to them
+    /// Omit the messages of the built-in definitions; yours may still refer to them
     #[arg(long)]
     only: bool,
 }
@@ -50,7 +50,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     if arguments.only && library.services().next().is_none() {
         return Err(Failure::new(
-            "no service is usable in these files; `jaus jsidl check` says why",
+            "no service is usable in these files; run `jaus jsidl check` to see why",
         ));
     }
     let script = jsidl::lua::dissector(&library);

@@ -18,11 +18,10 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand};
 use jaus_cli::failure::Failure;
 
-/// Check, compare and lay out service definitions (JSIDL), and make things from them
+/// Check, compare and format service definitions (JSIDL), and generate code, docs and schemas
 #[derive(Args)]
-#[command(after_help = "Begin with `jaus jsidl check my-services/`.\n\n\
-    Wherever definitions are read, they may refer to the built-in ones (the core set and all others \
-    that come with this program) without naming them.")]
+#[command(after_help = "Start with `jaus jsidl check my-services/`.\n\n\
+    Definitions may refer to all built-in definitions without listing their files.")]
 pub(crate) struct Jsidl {
     #[command(subcommand)]
     command: Command,

@@ -61,9 +61,9 @@ fn restore(row: &mut Row, came: &[u8]) {
     }
     let missing = length - came.len();
     row.note = Some(if missing > 0 {
-        format!("{missing} of its {length} octets did not come")
+        format!("{missing} of its {length} octets are missing")
     } else {
-        "bits without a field are passed over".to_owned()
+        "bits without a field are ignored".to_owned()
     });
     row.octets = came.to_vec();
     if matches!(row.kind, Kind::Presence | Kind::Tag) {

@@ -12,19 +12,19 @@ use super::sources::{self, Sources};
 
 /// Write the messages of your services as a Rust module
 ///
-/// The messages of the built-in services are in the crate `jaus`, and yours may refer to them.
-/// Definitions with errors are not written.
+/// The messages of the built-in services are in the crate `jaus`; yours may refer to them. Writes
+/// nothing if a definition has errors.
 #[derive(Args)]
 #[command(after_help = "Example:\n  \
     jaus jsidl rust services/ -o src\n\n\
-    A crate with a dependency on `jaus` then says:\n\n  \
+    In a crate that depends on `jaus`, add:\n\n  \
     mod messages;\n\n\
-    It is less work to let the build do it. With the crate `jsidl` among the build-dependencies, \
-    this is all of build.rs:\n\n  \
+    Or generate it at build time, with the crate `jsidl` as a build dependency and this \
+    build.rs:\n\n  \
     fn main() {\n      \
         jsidl::build::Build::new().path(\"services\").module(\"messages\", \"urn:example:\").run();\n  \
     }\n\n\
-    and this brings the messages in:\n\n  \
+    and include the messages:\n\n  \
     pub mod messages {\n      \
         include!(concat!(env!(\"OUT_DIR\"), \"/messages.rs\"));\n  \
     }\n\n\
@@ -38,11 +38,11 @@ pub(crate) struct Arguments {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 
-    /// What the module, and its file, is called
+    /// The name of the module and its file
     #[arg(long, value_name = "NAME", default_value = "messages", value_parser = module)]
     module: String,
 
-    /// Where the generated code finds the codec runtime
+    /// The path of the codec runtime in the generated code
     #[arg(long, value_name = "RUST_PATH", default_value = "::jaus::codec")]
     runtime: String,
 }
@@ -50,7 +50,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let Sources { loaded, sound } = sources::load(&arguments.paths)?;
     if !sound {
-        say("nothing was written: mend the definitions first; `jaus jsidl check` says more");
+        say("nothing was written: correct the definitions first (`jaus jsidl check` says more)");
         return Ok(ExitCode::from(1));
     }
     let library = sources::own(&loaded);
@@ -73,6 +73,6 @@ fn module(name: &str) -> Result<String, String> {
     if starts_well && name.chars().all(goes_on_well) {
         Ok(name.to_owned())
     } else {
-        Err("a module is called by lower-case letters, digits and _".to_owned())
+        Err("a module name consists of lower-case letters, digits and _".to_owned())
     }
 }

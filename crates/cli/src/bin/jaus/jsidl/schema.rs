@@ -12,16 +12,15 @@ use super::sources::{self, Sources};
 
 /// Write JSON Schemas (draft 2020-12) of messages as `jaus decode` prints and `jaus encode` reads them
 ///
-/// There is a file for each service. A line with the keys `message` and `body` is valid if it is
-/// one of the service's messages; the schema of a body alone is under #/$defs/ and the message's
-/// name.
+/// Writes one file per service. It accepts lines with the keys `message` and `body` that hold one
+/// of the service's messages; the schema of a body alone is #/$defs/ plus the message's name.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus jsidl schema -o schemas\n  \
     jaus jsidl schema my-services/ -o schemas\n  \
     echo '00 2B 02' | jaus decode --hex > line.json\n  \
     check-jsonschema --schemafile schemas/core.Discovery.1.1.schema.json line.json\n\n\
-    Exit status: 0 written; 1 written without definitions that have errors; 2 not written.")]
+    Exit status: 0 written; 1 written, without the definitions that have errors; 2 not written.")]
 pub(crate) struct Arguments {
     /// JSIDL files, and directories with `.xml` files; without any, the built-in definitions
     #[arg(value_name = "PATH")]

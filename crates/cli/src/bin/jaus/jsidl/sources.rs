@@ -71,6 +71,6 @@ pub(super) fn wanted<P>(
         return Ok(wanted);
     }
     Err(Failure::new(
-        "no service is usable in these files; `jaus jsidl check` says why",
+        "no service is usable in these files; run `jaus jsidl check` to see why",
     ))
 }

@@ -1,5 +1,5 @@
 //! The judge's five components on the network: they send, receive, and answer the usual queries.
-#![expect(clippy::disallowed_methods, reason = "the judge works in real time")]
+#![expect(clippy::disallowed_methods, reason = "the judge runs in real time")]
 
 use std::collections::BTreeSet;
 use std::task::Poll;

@@ -84,7 +84,7 @@ impl Memory {
     /// The event stream of an earlier step.
     pub(super) fn event(&self) -> Result<u8, String> {
         self.event
-            .ok_or_else(|| "there is no event: its creation (step B4) was not confirmed".to_owned())
+            .ok_or_else(|| "no event exists: step B4 did not confirm its creation".to_owned())
     }
 
     /// Notes the cancellation of an event stream.

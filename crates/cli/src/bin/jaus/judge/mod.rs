@@ -38,22 +38,22 @@ use subject::Subject;
 /// The judge's main component, as in the contests; the others are 42.2.1 to 42.2.4.
 const MAIN: JausId = JausId::new(42, 1, 1);
 
-/// Judge whether a component does what the public JAUS contests ask of it
+/// Judge whether a component meets the requirements of the public JAUS contests
 ///
-/// Part A are the six tasks of the 2010 challenge, part B the 36 steps of the interface tasks since
-/// 2014, as their judging tool was seen to ask them, and part C what their judges look for besides:
-/// that a vehicle moves only for the client in control, and stops in standby, in an emergency and
-/// after control is released, although new efforts go on arriving 10 times a second: an effort that
-/// expires by itself proves nothing. Five components of the judge ask, subscribe, take control from
-/// one another and declare emergencies; --id moves the first of them, and the other four, 1 to 4,
-/// are on the node beside it. Every step is judged by the answers that the
-/// standard requires, within the time limit. Steps that need a service which the component does not
-/// list are skipped, and counted. What is said by multicast goes to all components of the node.
+/// Part A holds the six tasks of the 2010 challenge. Part B holds the 36 steps of the interface
+/// tasks since 2014, as observed from their judging tool. Part C holds the judges' further checks:
+/// the vehicle moves only for the client in control, and stops in standby, in an emergency and
+/// after control is released. In part C efforts keep arriving 10 times a second, because an effort
+/// that expires proves nothing. Five components of the judge query, subscribe, take control from
+/// one another and declare emergencies; --id sets the first, and the other four, 1 to 4, are on the
+/// next node. A step passes if the answers that the standard requires arrive within the time limit.
+/// Steps that need a service which the component does not list are skipped and counted. Multicast
+/// messages go to all components of the node.
 ///
-/// THE COMPONENT IS COMMANDED, AND A VEHICLE DRIVES: in task A6 some 9 metres along its X axis, and
-/// in part C, which sees to it that it stops, a few more.
+/// THE JUDGE COMMANDS THE COMPONENT, AND A VEHICLE DRIVES: about 9 metres along its X axis in task
+/// A6, and a few more in part C, which also checks that it stops.
 ///
-/// Exit status 1 means that a step failed, that none applied, or that nobody answered.
+/// Exit status 1 means that a step failed, that no step applied, or that there was no answer.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus judge 101.1.1\n  \
@@ -61,7 +61,7 @@ const MAIN: JausId = JausId::new(42, 1, 1);
     jaus judge 101.1.1 --peer 192.168.7.2 --junit judge.xml --record judge.pcapng\n  \
     jaus judge 101.1.1 --json | jq 'select(.verdict == \"failed\") | .step, .reason'")]
 pub(crate) struct Judge {
-    /// Whom to judge: SUBSYSTEM.NODE.COMPONENT
+    /// The component to judge: SUBSYSTEM.NODE.COMPONENT
     #[arg(required_unless_present = "list")]
     address: Option<JausId>,
 
@@ -69,39 +69,39 @@ pub(crate) struct Judge {
     #[arg(long, default_value = "1.5", value_parser = runtime::seconds)]
     limit: Duration,
 
-    /// Carry out only these steps, and those that they rest on, such as A1,B14-B19
+    /// Run only these steps and those they depend on, such as A1,B14-B19
     #[arg(long, value_name = "STEPS", value_delimiter = ',')]
     only: Vec<Span>,
 
-    /// Walk through this service instead of the contests' steps (repeatable): its URN or name
+    /// Test this service, by URN or name, instead of the contests' steps (repeatable)
     ///
-    /// From the service's definition: every query is asked, and its report read and checked; a
-    /// query that ends too early must be ignored; every command that only the controlling client
-    /// may give is given without control, must be ignored, and must leave the service's reports as
-    /// they were. Of Access Control and Management every transition is walked, too: in each state,
-    /// everything that can be said about control and state, by the client in control and by
-    /// another, with what must come, be ignored, and be the state afterwards. Services that inherit
-    /// from them share these states. The transitions of Events are in steps B3 to B10.
+    /// The tests follow from the service's definition: each query is sent and its report checked; a
+    /// truncated query must be ignored; each command that requires control is sent without control,
+    /// must be ignored, and must leave the service's reports unchanged. For Access Control and
+    /// Management every transition is tested too: in each state, each message about control and
+    /// state, from the client in control and from another one, with the required answers and the
+    /// state afterwards. Services that inherit from them share these states. Steps B3 to B10 test
+    /// the transitions of Events.
     #[arg(long, value_name = "URN", value_parser = script::service::known, conflicts_with = "only")]
     service: Vec<&'static str>,
 
-    /// Ask by multicast only [default: first by multicast, then by unicast]
+    /// Query by multicast only [default: first by multicast, then by unicast]
     #[arg(long, conflicts_with = "unicast")]
     multicast: bool,
 
-    /// Ask by unicast only, where multicast does not reach
+    /// Query by unicast only, where multicast does not reach
     #[arg(long)]
     unicast: bool,
 
-    /// Show what was said in the steps that passed, too
+    /// Show the messages of passed steps too
     #[arg(long)]
     all: bool,
 
-    /// Only list the steps
+    /// List the steps and exit
     #[arg(long)]
     list: bool,
 
-    /// Write JSON lines, one for each step, instead of the report; or, with a file, beside it
+    /// Write one JSON line per step instead of the report, or with a FILE in addition to it
     #[arg(
         long,
         value_name = "FILE",
@@ -115,10 +115,11 @@ pub(crate) struct Judge {
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
 
-    /// Record what is said into this file (pcapng, written over), with the step at each packet
+    /// Record the messages to this file (pcapng, overwritten), with the step as each packet's
+    /// comment
     ///
-    /// The packets are put together from the messages that the judge's components say and hear:
-    /// sequence numbers are not those on the wire.
+    /// The packets are rebuilt from the messages of the judge's components: sequence numbers differ
+    /// from those on the wire.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
 
@@ -143,7 +144,7 @@ impl FromStr for Span {
         for name in [first, last] {
             if !is_there(name) {
                 return Err(format!(
-                    "there is no step {name}: A1 to A6, B1 to B36, C1 to C5"
+                    "there is no step {name}; the steps are A1 to A6, B1 to B36 and C1 to C5"
                 ));
             }
         }
@@ -161,7 +162,7 @@ impl Judge {
         }
         let Some(address) = self.address.filter(|address| address.is_unicast()) else {
             return Err(Failure::new(
-                "only one component can be judged at a time: `jaus discover` shows who is there",
+                "the judge tests one component at a time: choose one that `jaus discover` lists",
             ));
         };
         runtime::run(self.judge(address))
@@ -216,8 +217,9 @@ impl Judge {
         let Some(subject) = Subject::meet(&mut judge_nodes, address, self.limit).await? else {
             judge_nodes.end().await?;
             say(format_args!(
-                "{address} gave no sign of life, so nothing was judged. `jaus discover` shows who \
-                 is there; --interface chooses the network, --peer reaches where multicast does not"
+                "{address} did not answer, so nothing was judged. List components with `jaus \
+                 discover`, choose the network with --interface, or name a host that multicast \
+                 does not reach with --peer"
             ));
             return Ok(Outcome::Incomplete);
         };

@@ -1,7 +1,10 @@
 //! Records the run as a capture file. Packets are written as the judge's components sent and
 //! received them, with their step as a comment; their sequence numbers are generated here, because
 //! the real ones are internal to the transport.
-#![expect(clippy::disallowed_methods, reason = "a recording has the time of day")]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "a recording carries the time of day"
+)]
 
 use std::fs::File;
 use std::io::{self, BufWriter};

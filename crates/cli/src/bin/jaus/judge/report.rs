@@ -38,7 +38,7 @@ impl<'d> Report<'d> {
         let Some(services) = &subject.services else {
             let id = subject.id;
             return vec![format!(
-                "{id}{name} does not list its services: no step is skipped"
+                "{id}{name} does not list its services, so no step is skipped"
             )];
         };
         let mut lines = vec![format!("{}{name} offers", subject.id)];
@@ -174,11 +174,11 @@ pub(super) fn conclusion(subject: &Subject, tally: &Tally, against: &str) -> Str
         return format!("{id} does not conform to {against} as tested: {failed} failed");
     }
     if tally.passed == 0 {
-        return format!("nothing can be said about {id}: no step applies to what it offers");
+        return format!("no result for {id}: no step applies to its services");
     }
     let skipped = match tally.skipped {
         0 => String::new(),
-        number => format!("; {} did not apply to what it offers", steps(number)),
+        number => format!("; {} did not apply to its services", steps(number)),
     };
     let passed = steps(tally.passed);
     format!("{id} conforms to {against} as tested: {passed} passed{skipped}")

@@ -1,5 +1,5 @@
 //! Runs steps: sends messages, waits for the required answers, and decides.
-#![expect(clippy::disallowed_methods, reason = "the judge works in real time")]
+#![expect(clippy::disallowed_methods, reason = "the judge runs in real time")]
 
 use std::time::Duration;
 
@@ -219,7 +219,7 @@ impl Runner {
             return Ok(Ok(()));
         }
         Ok(Err(format!(
-            "the subject has never sent {name} by itself; {} s were waited for it",
+            "the subject has not sent {name} by itself within {} s",
             within.as_secs_f64()
         )))
     }

@@ -50,7 +50,7 @@ impl FromStr for Name {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is no step: write A1 to A6, B1 to B36 or C1 to C5");
+        let wrong = || format!("`{text}` is not a step: write A1 to A6, B1 to B36 or C1 to C5");
         let (part, number) = text.split_at_checked(1).ok_or_else(wrong)?;
         let part = match part {
             "A" | "a" => Part::A,
@@ -372,7 +372,7 @@ impl Expectation {
 /// Requires a value.
 #[expect(
     clippy::needless_pass_by_value,
-    reason = "numbers and words made for the comparison"
+    reason = "called with values made for the comparison"
 )]
 pub(super) fn equal<T: PartialEq + fmt::Display>(what: &str, is: T, must_be: T) -> Check {
     if is == must_be {

@@ -1,5 +1,5 @@
 //! The component under test: presence and offered services.
-#![expect(clippy::disallowed_methods, reason = "the judge works in real time")]
+#![expect(clippy::disallowed_methods, reason = "the judge runs in real time")]
 
 use std::collections::BTreeMap;
 use std::time::Duration;

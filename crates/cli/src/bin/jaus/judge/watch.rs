@@ -123,10 +123,10 @@ impl Observation {
         let streams = self.streams.iter().map(|one| {
             let (id, events) = (one.stream.id, one.arrivals.len());
             let (Some(mean), Some(worst)) = (one.mean(), one.jitter()) else {
-                return format!("event {id}: {events} came");
+                return format!("event {id}: {events} reports");
             };
             let worst = worst.as_secs_f64() * 1e3;
-            format!("event {id}: {events} came, {mean:.3} s apart, at most {worst:.1} ms off")
+            format!("event {id}: {events} reports, {mean:.3} s apart, at most {worst:.1} ms off")
         });
         streams.collect::<Vec<_>>().join("; ")
     }
@@ -144,7 +144,9 @@ impl Observed {
         let id = self.stream.id;
         if self.arrivals.len() < events {
             let came = self.arrivals.len();
-            return Err(format!("of event {id} only {came} came, not {events}"));
+            return Err(format!(
+                "only {came} reports of event {id} arrived, not {events}"
+            ));
         }
         let wrong = |one: &&Arrival| one.report != Some(self.stream.report);
         if let Some(wrong) = self.arrivals.iter().find(wrong) {
@@ -167,10 +169,10 @@ impl Observed {
             .find(|&interval| !near(interval, INTERVAL_SLACK));
         match worst {
             Some(interval) => Err(format!(
-                "event {id} came {interval:.3} s after the one before, not after {period} s"
+                "event {id} arrived {interval:.3} s after the previous one, not after {period} s"
             )),
             None if !near(mean, MEAN_SLACK) => Err(format!(
-                "event {id} comes every {mean:.3} s, not every {period} s"
+                "event {id} arrives every {mean:.3} s, not every {period} s"
             )),
             None => Ok(()),
         }
@@ -182,7 +184,7 @@ impl Observed {
             return Ok(());
         }
         Err(format!(
-            "event {id} came {came} times after it was cancelled"
+            "{came} reports of event {id} arrived after it was cancelled"
         ))
     }
 
@@ -264,14 +266,14 @@ mod tests {
             (2.6, 4, 0x4202),
         ];
         for (events, reason) in [
-            (&few[..], "of event 9 only 2 came, not 3"),
+            (&few[..], "only 2 reports of event 9 arrived, not 3"),
             (&other, "event 9 carries 4002h, not 4202h"),
             (&unnumbered, "event 9 number 1 is followed by number 1"),
             (
                 &slow,
-                "event 9 came 2.000 s after the one before, not after 1 s",
+                "event 9 arrived 2.000 s after the previous one, not after 1 s",
             ),
-            (&fast, "event 9 comes every 0.800 s, not every 1 s"),
+            (&fast, "event 9 arrives every 0.800 s, not every 1 s"),
         ] {
             assert_eq!(watch(events).check(), Err(reason.to_owned()));
         }
@@ -282,7 +284,7 @@ mod tests {
         let mut observation = Observation::silence(vec![STREAM], SECOND);
         assert_eq!(observation.check(), Ok(()));
         observation.note(Instant::now(), &event(1, 0x4202));
-        let reason = "event 9 came 1 times after it was cancelled";
+        let reason = "1 reports of event 9 arrived after it was cancelled";
         assert_eq!(observation.check(), Err(reason.to_owned()));
     }
 }

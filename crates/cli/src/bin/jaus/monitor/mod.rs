@@ -21,28 +21,29 @@ use tokio::time::{MissedTickBehavior, interval};
 use self::sample::{Sample, View};
 use self::table::Screen;
 
-/// Watch peers, links and losses as they are
+/// Watch peers, links and losses live
 ///
-/// Runs a node of its own beside the others and shows whom it hears, where, how often, and how
-/// long answers take; its links; and what was dropped, with the reason. It hears what is sent to
-/// everybody and to itself, not what others send to each other: `jaus record` does that. On a
-/// terminal the table stays in place; otherwise it is printed anew each time.
+/// Runs its own node and shows its peers, their addresses, message rates and round trips; its
+/// links; and dropped messages with the reason. It receives broadcasts and messages to itself, not
+/// traffic between other nodes: `jaus record` captures that. On a terminal the table is updated in
+/// place; otherwise each one is printed below the last.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus monitor\n  \
     jaus monitor --sort received --interval 5\n  \
     jaus monitor --probe                  measures round trips\n  \
     jaus monitor --once --json | jq '.peers[].id'\n  \
-    jaus monitor --peer 192.168.7.2       where multicast does not reach\n\n\
-    Columns: messages and octets of payload a second from a peer; messages a second to it; \
-    lost (given up for want of an acknowledgement); rep (messages that came twice); round trip \
-    (--probe) in ms; seconds since it was heard.")]
+    jaus monitor --peer 192.168.7.2       for a host that multicast does not reach\n\n\
+    Columns: messages and payload octets per second from a peer; messages per second to it; lost \
+    (not acknowledged); rep (duplicates received); round trip (--probe) in ms; seconds since its \
+    last message.")]
 pub(crate) struct Monitor {
-    /// Seconds from one table to the next
+    /// The interval between tables, in seconds
     #[arg(long, short, default_value = "1", value_parser = runtime::seconds)]
     interval: Duration,
 
-    /// Print one table, after the first interval, and end; exit status 1 means that nobody is there
+    /// Print one table after the first interval and exit; exit status 1 means that there are no
+    /// peers
     #[arg(long)]
     once: bool,
 
@@ -50,15 +51,15 @@ pub(crate) struct Monitor {
     #[arg(long)]
     json: bool,
 
-    /// What comes first in the table
+    /// The sort order
     #[arg(long, value_enum, default_value_t = Sort::Id)]
     sort: Sort,
 
-    /// The most peers to show [default: as many as the terminal has room for, or 1000]
+    /// The maximum number of peers to show [default: as many as fit the terminal, or 1000]
     #[arg(long, value_name = "NUMBER")]
     limit: Option<usize>,
 
-    /// Ask peers for a heartbeat, some in each interval, and measure how long answers take
+    /// Query heartbeats of some peers in each interval, and measure the round trips
     #[arg(long)]
     probe: bool,
 
@@ -75,15 +76,15 @@ pub(crate) struct Monitor {
 enum Sort {
     /// JAUS id
     Id,
-    /// Messages a second from them, the most first
+    /// Messages received per second, highest first
     Received,
-    /// Messages a second to them, the most first
+    /// Messages sent per second, highest first
     Sent,
-    /// Lost and repeated messages, the most first
+    /// Lost and repeated messages, most first
     Lost,
-    /// Round trip, the longest first
+    /// Round trip, longest first
     RoundTrip,
-    /// Silence, the longest first
+    /// Silence, longest first
     Heard,
 }
 

@@ -75,7 +75,7 @@ impl Screen {
                     screen.push_str("\r\n");
                 }
                 screen.push_str(REST_OF_SCREEN);
-                screen.push_str("Ctrl-C ends it");
+                screen.push_str("Press Ctrl-C to end");
                 self.output.part(&screen)
             }
         }
@@ -105,7 +105,7 @@ fn lines(view: &View, most: usize) -> Vec<String> {
     )];
     lines.extend(view.peers.iter().take(most).map(peer_line));
     match view.peers.len() {
-        0 => lines.push("nobody was heard so far".to_owned()),
+        0 => lines.push("no peers yet".to_owned()),
         number if number > most => lines.push(format!("… and {} more", number - most)),
         _ => {}
     }

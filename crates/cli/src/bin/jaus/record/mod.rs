@@ -1,7 +1,7 @@
 //! `jaus record`: records the traffic of JAUS peers into a capture file.
 #![expect(
     clippy::disallowed_methods,
-    reason = "a recording has the time of day, and a pace"
+    reason = "a recording carries the time of day and prints progress"
 )]
 
 mod filter;
@@ -26,12 +26,12 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use filter::Filter;
 
-/// Record JAUS traffic into a capture file, for `jaus decode`, `jaus replay` and Wireshark
+/// Record JAUS traffic to a capture file, for `jaus decode`, `jaus replay` and Wireshark
 ///
-/// With the right to open packet sockets (root, or `setcap cap_net_raw+ep jaus`) everything is
-/// recorded that this host sends and receives: UDP and TCP of the chosen ports, and datagrams of
-/// other ports that are JAUS by their content. Without it only the multicast group is heard, which
-/// is said. Ctrl-C ends the recording; what was recorded is on disk within a second.
+/// With the privilege to open packet sockets (root, or `setcap cap_net_raw+ep jaus`) it records all
+/// traffic of this host: UDP and TCP of the chosen ports, and datagrams of other ports whose
+/// content is JAUS. Without it, it records only the multicast group and prints a note. Press Ctrl-C
+/// to end; packets are on disk within a second.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus record drive.pcapng\n  \
@@ -39,14 +39,15 @@ use filter::Filter;
     jaus record drive.pcapng --megabytes 500 --quiet &\n  \
     jaus decode drive.pcapng")]
 pub(crate) struct Record {
-    /// The file to write (pcapng); it must not exist yet, unless --overwrite is given
+    /// The file to write (pcapng); it must not exist without --overwrite
     file: PathBuf,
 
-    /// Write over an existing file
+    /// Overwrite an existing file
     #[arg(long)]
     overwrite: bool,
 
-    /// Record only this interface, by name or address (repeatable) [default: all, loopback too]
+    /// Record only this interface, by name or address (repeatable) [default: all, including
+    /// loopback]
     #[arg(long, value_name = "INTERFACE")]
     interface: Vec<String>,
 
@@ -54,7 +55,7 @@ pub(crate) struct Record {
     #[arg(long, default_values_t = [JAUS_PORT])]
     port: Vec<u16>,
 
-    /// The multicast group that is heard where packet sockets are not allowed
+    /// The multicast group to record without packet sockets
     #[arg(long, value_name = "ADDRESS", default_value_t)]
     group: Group,
 
@@ -62,11 +63,11 @@ pub(crate) struct Record {
     #[arg(long, value_parser = runtime::seconds)]
     seconds: Option<Duration>,
 
-    /// End when the file has so many megabytes
+    /// End when the file reaches this size, in megabytes
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     megabytes: Option<u64>,
 
-    /// Do not tell how it goes
+    /// Print no progress
     #[arg(long, short)]
     quiet: bool,
 }
@@ -118,9 +119,9 @@ impl Record {
         match packets::PacketSocket::open(&self.interface) {
             Ok(socket) => return Ok(Source::Packets(socket)),
             Err(packets::OpenError::NotAllowed) => say(
-                "packet sockets are not allowed to this process (run as root, or give the program \
-                 the right once: `sudo setcap cap_net_raw+ep $(which jaus)`). Only what goes to \
-                 the multicast group is recorded, not what others say to each other by unicast",
+                "this process may not open packet sockets (run as root, or grant the privilege \
+                 once: `sudo setcap cap_net_raw+ep $(which jaus)`). Only multicast is recorded, \
+                 not unicast between other nodes",
             ),
             Err(packets::OpenError::Other(failure)) => return Err(failure),
         }
@@ -183,7 +184,7 @@ impl Recording {
         };
         let file = options.open(path).map_err(|error| match error.kind() {
             io::ErrorKind::AlreadyExists => Failure::new(format!(
-                "{} exists already: choose another name, or say --overwrite",
+                "{} exists already: choose another name, or add --overwrite",
                 path.display()
             )),
             _ => Failure::file(path, &error),

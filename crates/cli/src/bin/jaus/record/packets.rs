@@ -1,7 +1,7 @@
 //! Captures all IP packets of this host with a packet socket (Linux).
 #![expect(
     clippy::disallowed_types,
-    reason = "what is recorded is what passes by, on no link of ours"
+    reason = "records other nodes' traffic, past our own links"
 )]
 
 use std::collections::BTreeMap;
@@ -65,7 +65,7 @@ impl PacketSocket {
             if !present.iter().any(|one| is(one, name)) {
                 let available = interface::Available(present);
                 return Err(Failure::new(format!(
-                    "there is no network interface `{name}` on this host; there are: {available}"
+                    "there is no network interface `{name}` on this host; choose from: {available}"
                 ))
                 .into());
             }
@@ -89,10 +89,10 @@ impl PacketSocket {
         );
         let socket = socket.map_err(|error| match error {
             Errno::EPERM | Errno::EACCES => OpenError::NotAllowed,
-            error => Failure::new(format!("opening a packet socket failed: {error}")).into(),
+            error => Failure::new(format!("cannot open a packet socket: {error}")).into(),
         })?;
         let socket = UdpSocket::from_std(net::UdpSocket::from(socket))
-            .map_err(|error| Failure::new(format!("watching the packet socket failed: {error}")))?;
+            .map_err(|error| Failure::new(format!("cannot poll the packet socket: {error}")))?;
         Ok(Self {
             socket,
             interfaces,
@@ -102,7 +102,8 @@ impl PacketSocket {
 
     /// Waits for packets of the chosen interfaces.
     pub(super) async fn next(&mut self) -> Result<Vec<Packet>, Failure> {
-        let failed = |error: io::Error| Failure::new(format!("the packet socket failed: {error}"));
+        let failed =
+            |error: io::Error| Failure::new(format!("cannot read the packet socket: {error}"));
         self.socket.readable().await.map_err(failed)?;
         let mut packets = Vec::new();
         while packets.len() < BATCH {

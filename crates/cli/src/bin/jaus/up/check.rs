@@ -60,7 +60,7 @@ fn mistake_in_flags(part: &Part) -> Option<String> {
 }
 
 fn cannot_run(error: &io::Error) -> String {
-    format!("its program cannot be started: {error}")
+    format!("cannot start its program: {error}")
 }
 
 /// The error message on flags, without the usage text.

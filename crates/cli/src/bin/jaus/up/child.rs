@@ -75,7 +75,8 @@ impl Child {
         if let Err(error) = killpg(self.group, signal)
             && error != Errno::ESRCH
         {
-            tracing::debug!(group = %self.group, %signal, %error, "cannot be signalled");
+            tracing::debug!(group = %self.group, %signal, %error, "cannot signal the process \
+                group");
         }
     }
 
@@ -100,7 +101,10 @@ impl Child {
             Err(_) => Exit::NotStarted,
         };
         // A process that has left the group may keep the pipe open forever.
-        #[expect(clippy::disallowed_methods, reason = "last words, in real time")]
+        #[expect(
+            clippy::disallowed_methods,
+            reason = "reads the last output in real time"
+        )]
         let _ = tokio::time::timeout(LAST_WORDS, self.listening).await;
         exit
     }
@@ -111,7 +115,7 @@ const LAST_WORDS: std::time::Duration = std::time::Duration::from_millis(200);
 /// Prints every line of a pipe.
 #[expect(
     clippy::disallowed_methods,
-    reason = "the command owns its tasks, and this one ends with the pipe"
+    reason = "the command owns its tasks; this one ends with the pipe"
 )]
 fn listen(reader: PipeReader, prefixed_console: PrefixedConsole) -> io::Result<JoinHandle<()>> {
     let mut pipe = pipe::Receiver::from_owned_fd(OwnedFd::from(reader))?;

@@ -117,7 +117,7 @@ impl Printer {
     }
 
     /// Waits briefly until all lines are printed. All consoles must be dropped.
-    #[expect(clippy::disallowed_methods, reason = "a farewell in real time")]
+    #[expect(clippy::disallowed_methods, reason = "ends in real time")]
     pub(super) async fn finish(mut self) {
         let _ = tokio::time::timeout(FAREWELL, self.closed()).await;
     }
@@ -129,7 +129,10 @@ fn print(waiting: &Receiver<String>, lost: &AtomicU64) -> io::Result<()> {
     while let Ok(line) = waiting.recv() {
         let missing = lost.swap(0, Ordering::Relaxed);
         if missing > 0 {
-            writeln!(out, "({missing} lines are lost: nobody read them in time)")?;
+            writeln!(
+                out,
+                "({missing} lines were dropped: the reader was too slow)"
+            )?;
         }
         out.write_all(line.as_bytes())?;
         for line in waiting.try_iter().take(if interactive { 0 } else { 64 }) {

@@ -23,10 +23,10 @@ pub(super) fn arguments() -> [String; 3] {
 /// Name of the subcommand.
 pub(crate) const NAME: &str = "up-leash";
 
-/// Become another program that ends with its parent (for `jaus up` itself)
+/// Replace this process by a program that ends with its parent (internal to `jaus up`)
 #[derive(Args)]
 pub(crate) struct Leash {
-    /// The process that must be our parent
+    /// The expected parent process
     parent: i32,
 
     /// The program and its arguments
@@ -43,7 +43,7 @@ impl Leash {
             return Ok(Outcome::Incomplete);
         }
         let Some((program, arguments)) = self.command.split_first() else {
-            return Err(Failure::new("there is no program to become"));
+            return Err(Failure::new("no program was given"));
         };
         // Returns only on an error.
         let error = Command::new(program).args(arguments).exec();

@@ -21,24 +21,25 @@ use jaus_cli::runtime;
 use programs::Programs;
 use system::System;
 
-/// Start a whole system from a file, keep it running, and stop it cleanly
+/// Start a system of programs from a file, supervise it, and stop it cleanly
 ///
-/// Every part is a process of its own. One that dies is started again, after a pause that grows with
-/// each failure up to 30 s; one that says that its flags are wrong (exit status 2) is given up. Ctrl-C
-/// or SIGTERM ends all, the last part first; a second one kills what is left.
+/// Every part is a process. A part that dies is restarted, after a delay that grows with each
+/// failure up to 30 s; a part that reports wrong flags (exit status 2) is given up. Ctrl-C or
+/// SIGTERM stops all parts in reverse order; a second one kills the rest.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus up packaging/system.toml          the whole vehicle on this machine\n  \
-    jaus up system.toml --check            only says what would run, or what is wrong\n  \
+    jaus up system.toml --check            only checks the file and prints what would run\n  \
     jaus up system.toml --only planner,knowledge-store\n  \
     jaus up system.toml --status /run/user/1000/jaus.json\n\n\
-    Exit status: 0 all was stopped as wanted; 1 a part was given up or failed for good; 2 the file is wrong.",
+    Exit status: 0 stopped on request; 1 a part was given up or failed for good; 2 the file is \
+    wrong.",
     after_long_help = FILE_HELP)]
 pub(crate) struct Up {
-    /// What the system is; see below
+    /// The system's file; see below
     file: PathBuf,
 
-    /// Only say what would be started, or what is wrong with the file
+    /// Check the file and print what would be started
     #[arg(long)]
     check: bool,
 
@@ -46,11 +47,11 @@ pub(crate) struct Up {
     #[arg(long, value_name = "PARTS", value_delimiter = ',')]
     only: Vec<String>,
 
-    /// How many seconds a part may take to end before it is killed
+    /// Seconds a part may take to end before it is killed
     #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = runtime::seconds)]
     grace: Duration,
 
-    /// Keep how the parts are in this file, as JSON
+    /// Write the state of the parts to this file, as JSON
     #[arg(long, value_name = "FILE")]
     status: Option<PathBuf>,
 
@@ -61,33 +62,33 @@ pub(crate) struct Up {
 
 const FILE_HELP: &str = r#"Examples:
   jaus up packaging/system.toml          the whole vehicle on this machine
-  jaus up system.toml --check            only says what would run, or what is wrong
+  jaus up system.toml --check            only checks the file and prints what would run
   jaus up system.toml --only planner,knowledge-store
   jaus up system.toml --status /run/user/1000/jaus.json
 
 The file is TOML:
-  [all]                                  # for every part; a part's own settings win
+  [all]                                  # for all parts; a part's own settings take precedence
   flags = { loopback = true }
-  directory = "~/.local/state/jaus"      # where the parts run; made if it is not there
+  directory = "~/.local/state/jaus"      # where the parts run; created if missing
   environment = { JAUS_LOG = "info" }
 
-  [parts.planner]                        # runs jaus-planner, from beside jaus or from PATH
+  [parts.planner]                        # runs jaus-planner, from the directory of jaus or from \
+      PATH
   flags = { id = "101.3.36", peer = ["10.0.0.2", "10.0.0.3"], loopback = false }
 
   [parts.node]
-  program = "jaus"                       # or a path; a relative one begins at the file
-  arguments = ["node"]                   # as they are, before the flags
-  restart = "on-failure"                 # or "always", which is usual, or "never"
+  program = "jaus"                       # or a path, relative to this file
+  arguments = ["node"]                   # passed unchanged, before the flags
+  restart = "on-failure"                 # or "always" (the default) or "never"
 
 Flags have their long names; true gives a flag without a value, false takes one of [all] away, a
 list gives it several times. The order of the parts matters only for stopping: the last ends first.
 
-When `jaus up` is killed itself, the kernel ends the parts (SIGTERM), and a second process of ours
-ends what they have started, and kills after the grace what is still there. Only a program that
-leaves its process group, or one that ignores SIGTERM when both of ours are killed, survives that.
+If `jaus up` itself is killed, the kernel sends SIGTERM to the parts, and a second process of \
+    `jaus up` ends their children and kills the rest after the grace period. A program survives \
+    only if it leaves its process group, or ignores SIGTERM and both processes are killed.
 
-Exit status: 0 all was stopped as wanted; 1 a part was given up or failed for good; 2 the file is
-wrong."#;
+Exit status: 0 stopped on request; 1 a part was given up or failed for good; 2 the file is wrong."#;
 
 impl Up {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {

@@ -42,8 +42,9 @@ impl Programs {
         }
         let beside = self.folders.first().map(|folder| folder.display());
         let beside = beside.map_or_else(String::new, |folder| format!(" ({folder})"));
-        let problem =
-            format!("there is no program `{name}`, neither beside jaus{beside} nor in PATH");
+        let problem = format!(
+            "there is no program `{name}`, neither in the directory of jaus{beside} nor in PATH"
+        );
         Err(match self.nearest(name) {
             Some(nearest) => format!("{problem}; did you mean `{nearest}`?"),
             None => problem,

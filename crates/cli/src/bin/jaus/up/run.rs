@@ -1,7 +1,7 @@
 //! Runs a system: executes the supervisor's orders and reports events to it.
 #![expect(
     clippy::disallowed_methods,
-    reason = "here the supervisor gets its clock and its processes"
+    reason = "gives the supervisor its clock and processes"
 )]
 
 use std::time::Instant;
@@ -11,13 +11,13 @@ use jaus_cli::output::counted;
 use nix::sys::signal::Signal;
 use tokio::signal::unix::{SignalKind, signal};
 
+use super::Up;
 use super::child::Child;
 use super::console::{Console, PrefixedConsole};
 use super::status::{self, StatusFile, in_words};
 use super::supervisor::{Exit, News, Order, Supervisor};
 use super::system::{OURSELVES, System};
 use super::warden::Guard;
-use super::Up;
 
 /// Runs a system until it ends.
 pub(super) async fn run(flags: &Up, system: System) -> Result<Outcome, Failure> {
@@ -218,10 +218,10 @@ impl<'f> Running<'f> {
     fn stop(&mut self) {
         let now = Instant::now();
         if std::mem::replace(&mut self.stopping, true) {
-            self.say("kills what is left");
+            self.say("kills the remaining parts");
             self.supervisor.hurry(now);
         } else {
-            self.say("stops all parts, the last one first");
+            self.say("stops all parts in reverse order");
             self.supervisor.stop(now);
         }
     }
@@ -261,7 +261,7 @@ impl<'f> Running<'f> {
                 ran,
                 pause,
             } => format!(
-                "{} ended after {:.1} s ({}) and starts again in {:.1} s",
+                "{} ended after {:.1} s ({}) and restarts in {:.1} s",
                 self.name(part),
                 ran.as_secs_f64(),
                 in_words(exit),
@@ -271,8 +271,8 @@ impl<'f> Running<'f> {
                 format!("{} has ended ({})", self.name(part), in_words(exit))
             }
             News::GaveUp { part } => format!(
-                "{} says that it cannot begin (status 2): see what it printed, correct its flags in \
-                 {}, and start again. It is given up; the others go on",
+                "{} cannot start (status 2) and is given up; the others continue. See its output, \
+                 correct its flags in {}, and start again",
                 self.name(part),
                 self.flags.file.display()
             ),
@@ -282,7 +282,10 @@ impl<'f> Running<'f> {
                 self.flags.grace.as_secs_f64()
             ),
             News::Stuck { part } => {
-                format!("{} cannot be killed: the system holds it", self.name(part))
+                format!(
+                    "{} cannot be killed: it is blocked in the kernel",
+                    self.name(part)
+                )
             }
         }
     }

@@ -13,7 +13,7 @@ struct Bench {
 impl Bench {
     #[expect(
         clippy::disallowed_methods,
-        reason = "virtual time begins at some instant"
+        reason = "virtual time starts at any instant"
     )]
     fn new(parts: &[Restart]) -> Self {
         let now = Instant::now();

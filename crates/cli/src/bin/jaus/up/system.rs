@@ -266,7 +266,7 @@ impl Reader<'_> {
             // The operating system does not accept NUL.
             Some(text) if !text.contains('\0') => Some(text.to_owned()),
             _ => {
-                self.wrong(value.span(), "write a text in double quotes");
+                self.wrong(value.span(), "write a string in double quotes");
                 None
             }
         }
@@ -303,7 +303,7 @@ impl Reader<'_> {
         } else if name == OURSELVES {
             self.wrong(
                 place,
-                "`up` is what `jaus up` itself is called: take another name",
+                "the name `up` is reserved for `jaus up` itself: choose another",
             );
         }
     }
@@ -313,7 +313,7 @@ impl Reader<'_> {
         if name.starts_with('-') || name.is_empty() || !name.chars().all(plain) {
             self.wrong(
                 place,
-                "a flag is written by its long name without the dashes: loopback = true",
+                "write a flag's long name without dashes: loopback = true",
             );
         }
     }

@@ -75,8 +75,8 @@ fn every_mistake_is_told_at_once_with_its_line_and_the_nearest_key() {
         ),
         (5, "did you mean `parts.one.program`?"),
         (6, "write \"always\", \"on-failure\" or \"never\""),
-        (9, "without the dashes"),
-        (10, "write a text in double quotes"),
+        (9, "without dashes"),
+        (10, "write a string in double quotes"),
         (11, "did you mean `parts`?"),
     ] {
         let told = |it: &String| it.starts_with(&format!("{line}: `")) && it.contains(part);
@@ -110,7 +110,7 @@ fn two_parts_with_one_id_and_names_that_cannot_be_are_refused() {
     let twice = part("a", "101.2.33") + &part("b", "101.2.33");
     assert!(only_mistake(&twice).contains("`a` has the id 101.2.33 already"));
     assert!(parse(&(part("a", "101.2.33") + &part("b", "101.2.34"))).is_ok());
-    assert!(only_mistake(&part("up", "1.1.1")).contains("take another name"));
+    assert!(only_mistake(&part("up", "1.1.1")).contains("choose another"));
     assert!(only_mistake(&part("\"a b\"", "1.1.1")).contains("letters, digits"));
 }
 

@@ -21,10 +21,10 @@ use super::leash;
 /// Name of the subcommand.
 pub(crate) const NAME: &str = "up-warden";
 
-/// End process groups when standard input ends (for `jaus up` itself)
+/// End process groups when standard input ends (internal to `jaus up`)
 #[derive(Args)]
 pub(crate) struct Warden {
-    /// How long they may take
+    /// The time limit before they are killed
     #[arg(value_parser = runtime::seconds)]
     grace: Duration,
 }
@@ -45,7 +45,7 @@ impl Warden {
         let mut left = self.grace;
         while !left.is_zero() && groups.iter().any(|&group| exists(group)) {
             let pause = left.min(LOOK);
-            #[expect(clippy::disallowed_methods, reason = "this process has one thread")]
+            #[expect(clippy::disallowed_methods, reason = "this process is single-threaded")]
             std::thread::sleep(pause);
             left -= pause;
         }

@@ -43,7 +43,7 @@ pub(super) fn watch(
     match stream.incomplete_messages() {
         0 => {}
         count => say(format_args!(
-            "note: {count} large messages not shown: some of their parts are missing"
+            "note: {count} large messages skipped: fragments are missing"
         )),
     }
     Ok(Outcome::complete_if(complete))
@@ -63,7 +63,7 @@ fn logs_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
     files.sort();
     if files.is_empty() {
         return Err(Failure::new(format!(
-            "{} holds no log: there are no files .pcapng or .jsonl in it",
+            "{} holds no log: it has no .pcapng or .jsonl files",
             directory.display()
         )));
     }
@@ -88,7 +88,7 @@ fn read_capture(
         let frame = match frame {
             Ok(frame) => frame,
             Err(error) => {
-                say(format_args!("{name}: {error}; what came before is shown"));
+                say(format_args!("{name}: {error}; the part before it is shown"));
                 complete = false;
                 continue;
             }

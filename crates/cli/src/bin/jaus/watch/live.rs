@@ -43,7 +43,7 @@ pub(super) fn watch(
                 }
             }
         }
-        say(format_args!("{address} has ended"));
+        say(format_args!("{address} closed the connection"));
         Ok(Outcome::Incomplete)
     })
 }
@@ -73,15 +73,19 @@ fn no_view(address: &str, error: &Error) -> Failure {
         Error::Http(response) => {
             let body = response.body().as_deref().unwrap_or_default();
             let said = String::from_utf8_lossy(body);
-            format!("{address} refuses: {} {said}", response.status())
+            format!(
+                "{address} refused the request: {} {said}",
+                response.status()
+            )
         }
         Error::Url(_) | Error::HttpFormat(_) => {
-            format!("`{address}` is no address of a debug view: write for example 127.0.0.1:8794")
+            format!(
+                "`{address}` is not an address of a debug view: write for example 127.0.0.1:8794"
+            )
         }
         other => format!(
-            "there is no debug view at {address}: {other}. A communicator has one \
-             (jaus-communicator, --debug ADDRESS); another address is chosen with --at, a log is read \
-             with `jaus watch FILE`"
+            "there is no debug view at {address}: {other}. Start jaus-communicator, choose its \
+             address with --at, or read a log with `jaus watch FILE`"
         ),
     };
     Failure::new(words)

@@ -16,11 +16,12 @@ use jaus_view::{Entry, Filter};
 use crate::definitions;
 use tally::Tally;
 
-/// Show the messages that pass a node, live or from files, whole and each once
+/// Show the messages that pass through a node, live or from files, reassembled and without
+/// duplicates
 ///
-/// Live they come from the debug view of a communicator, which is only looked at: whoever is too slow
-/// loses lines and is told how many. Files are captures (of a communicator's --log, of `jaus record`,
-/// of Wireshark …), lines of JSON, or directories with a communicator's log.
+/// Live messages come from a communicator's debug view. A viewer that is too slow loses lines, and
+/// their number is shown. Files are captures (from a communicator's --log, `jaus record`, Wireshark
+/// …), JSON lines, or directories with a communicator's log.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus watch\n  \
@@ -29,16 +30,16 @@ use tally::Tally;
     jaus watch --at 127.0.0.1:9000 --json | grep 4404\n  \
     jaus watch /var/log/jaus --stats\n  \
     jaus watch drive.pcapng --filter 'from=101 to=42 service=Pose state!=ready'\n\n\
-    In a filter a message must meet all terms: component=, from=, to= (101.2.33, 101.2, 101 or \
-    101.*.33), service=, message= (a part of the name, with * all of it, or the code), direction= \
-    (received, sent, local, passing), text=, and fields by name with = != < <= > >= or ~ \
-    (contains). Commas separate alternatives; neither case nor underscores matter in names.")]
+    A message must match all terms of a filter: component=, from=, to= (101.2.33, 101.2, 101 or \
+    101.*.33), service=, message= (part of the name, the whole name with *, or the code), \
+    direction= (received, sent, local, passing), text=, and fields by name with = != < <= > >= or \
+    ~ (contains). Commas separate alternatives; names ignore case and underscores.")]
 pub(crate) struct Watch {
-    /// Files or directories to read instead of looking on live
+    /// Files or directories to read instead of the live view
     #[arg(value_name = "FILE")]
     files: Vec<PathBuf>,
 
-    /// Where to look on: the address of a debug view
+    /// The address of a debug view
     #[arg(
         long,
         value_name = "ADDRESS",
@@ -48,7 +49,7 @@ pub(crate) struct Watch {
     at: String,
 
     /// From or to this component, node or subsystem: 101.2.33, 101.2, 101 (this and the following
-    /// are repeatable, and all must hold)
+    /// are repeatable; a message must match all)
     #[arg(long, value_name = "ID")]
     component: Vec<String>,
 
@@ -60,28 +61,28 @@ pub(crate) struct Watch {
     #[arg(long, value_name = "ID")]
     to: Vec<String>,
 
-    /// Of a service whose URN contains this
+    /// Of services whose URN contains this
     #[arg(long, value_name = "NAME")]
     service: Vec<String>,
 
-    /// Whose name contains this (or is like it, with *), or whose code it is
+    /// With this message code, or a name that contains this (or matches it, with *)
     #[arg(long, value_name = "NAME")]
     message: Vec<String>,
 
-    /// Received, sent, local (within the node) or passing (on to others); known when live, and in
-    /// lines of JSON
+    /// Received, sent, local (within the node) or passing (forwarded); only for the live view and
+    /// JSON lines
     #[arg(long, value_name = "WAY")]
     direction: Vec<String>,
 
-    /// With a field that compares so: 'velocity_x>1.0', state=ready, 'pose.x!=0', name~bat
+    /// With a matching field: 'velocity_x>1.0', state=ready, 'pose.x!=0', name~bat
     #[arg(long, value_name = "COMPARISON")]
     field: Vec<String>,
 
-    /// Whose line of JSON contains this
+    /// Whose JSON line contains this
     #[arg(long, value_name = "TEXT")]
     text: Vec<String>,
 
-    /// Terms of a filter in one text; see below
+    /// A whole filter; see below
     #[arg(long, value_name = "TERMS")]
     filter: Vec<String>,
 
@@ -89,7 +90,7 @@ pub(crate) struct Watch {
     #[arg(long)]
     json: bool,
 
-    /// Print no messages, but how many there were of each kind, at the end
+    /// Print only the number of messages of each type, at the end
     #[arg(long)]
     stats: bool,
 
@@ -176,7 +177,7 @@ impl Printer {
         match &mut self.form {
             Form::Words { .. } => self
                 .output
-                .line(format_args!("… {count} lost here: too slow")),
+                .line(format_args!("… {count} lost: this viewer is too slow")),
             Form::Json => self.output.line(format_args!("{{\"lost\":{count}}}")),
             Form::Tally(tally) => {
                 tally.lose(count);

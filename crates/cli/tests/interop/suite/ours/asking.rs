@@ -5,7 +5,7 @@ use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState};
 
 use super::{Outcome, RoleArguments};
 
-/// The query for the forward velocity alone, which whoever moves can tell.
+/// The query for the forward velocity alone, which every vehicle reports.
 pub(super) const FORWARD: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
 /// Reports in a row that make a subscription.
 const ENOUGH: usize = 10;
@@ -37,7 +37,7 @@ pub(super) async fn periodic(arguments: &RoleArguments) -> Outcome {
 pub(super) async fn keep(arguments: &RoleArguments) -> Outcome {
     let (_node, component) = arguments.component()?;
     loop {
-        // One that is not there yet is asked again.
+        // Retry if it has not started yet.
         let subscribed = component
             .subscribe::<ReportVelocityState, _>(arguments.sensor(), &FORWARD, When::hz(HZ))
             .await;

@@ -108,7 +108,7 @@ pub(super) async fn echo(arguments: &RoleArguments) -> Outcome {
             acknowledge: true,
             ..Outgoing::new(port.id(), source, message.payload)
         };
-        // An answer that nobody waits for is not missed.
+        // A late answer is ignored.
         let _ = port.send(back);
     }
 }

@@ -24,7 +24,7 @@ pub(crate) struct RoleArguments {
     pub(crate) id: JausId,
     /// Whom to speak to.
     pub(crate) other: JausId,
-    /// Who tells the velocity, if that is somebody else.
+    /// The component that reports the velocity, if it is a different one.
     sensor: Option<JausId>,
     /// An address: of the other for ours, of its own for a scripted peer.
     pub(crate) address: String,
@@ -123,7 +123,7 @@ impl RoleArguments {
         Ok(read)
     }
 
-    /// Somebody on the same node.
+    /// Another component on the same node.
     pub(crate) fn colleague(&self) -> JausId {
         let (subsystem, node) = (self.id.subsystem(), self.id.node());
         JausId::new(subsystem, node, self.id.component() + 1)
@@ -142,7 +142,7 @@ impl RoleArguments {
         Ok(config.or_any_free_port())
     }
 
-    /// A node with a component that offers nothing of its own.
+    /// A node with a component without own services.
     fn component(&self) -> Result<(Node, Component), String> {
         let node = Node::start(self.config()?).map_err(|error| error.to_string())?;
         let component = operator(&node, self.id)?;
@@ -150,7 +150,7 @@ impl RoleArguments {
     }
 }
 
-/// A component that offers nothing of its own.
+/// A component without own services.
 fn operator(node: &Node, id: JausId) -> Result<Component, String> {
     Component::builder(Kind::OperatorControlUnit, "Interoperability")
         .attach(node, id.component())

@@ -26,12 +26,12 @@ const MOTION: f64 = 0.1;
 const PUSH: f64 = 60.0;
 /// The authority of the judging tool, and a little more.
 const AUTHORITIES: [u8; 2] = [127, 128];
-/// The status of somebody who obeys.
+/// The status of a component that accepts commands.
 const READY: u8 = 1;
 /// Query Velocity State for the forward velocity.
 const FORWARD: [u8; 4] = [0x04, 0x24, 1, 0];
 
-/// Somebody who asks one other.
+/// A client of one other component.
 pub(super) struct Asker {
     pub(super) speaker: Speaker,
     pub(super) other: JausId,
@@ -44,7 +44,7 @@ impl Asker {
         self.ask_from(self.other, message, take)
     }
 
-    /// The same of somebody else, or of everybody; only the other's answers count.
+    /// The same to another component, or broadcast; only the other's answers count.
     fn ask_from<T>(
         &mut self,
         whom: JausId,
@@ -104,7 +104,7 @@ impl Asker {
         let list = [1, self.other.node(), 1, self.other.component()];
         let services = body::message(body::QUERY_SERVICES, &[&list]);
         let report = self.ask(&services, answer_to(body::QUERY_SERVICES))?;
-        // The names stand in it as they are.
+        // The answer contains the names unchanged.
         println!("{}", String::from_utf8_lossy(&report));
         Ok(())
     }
@@ -141,7 +141,7 @@ impl Asker {
         })
     }
 
-    /// Has the velocity reported at a rate, and hears enough of it.
+    /// Subscribes to the velocity at a rate, and expects enough reports.
     pub(super) fn periodic(&mut self) -> Result<(), String> {
         let id = self.subscribe(Some(HZ))?;
         for number in 0..ENOUGH {
@@ -152,7 +152,7 @@ impl Asker {
         self.cancel(id)
     }
 
-    /// Tells each report of the velocity, for ever.
+    /// Prints each velocity report, until killed.
     pub(super) fn keep(&mut self) -> Result<(), String> {
         loop {
             self.deadline = Instant::now() + UPKEEP;
@@ -225,7 +225,7 @@ impl Asker {
         self.stop()
     }
 
-    /// Subscribes to the velocity on change, has it change, and hears of that.
+    /// Subscribes to the velocity on change, changes it, and expects the reports.
     pub(super) fn on_change(&mut self) -> Result<(), String> {
         let id = self.subscribe(None)?;
         self.make_ready()?;

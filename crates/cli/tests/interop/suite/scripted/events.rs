@@ -50,7 +50,7 @@ impl Events {
                 answers
             }
             (Some(body::CANCEL_EVENT), &[request, id]) => {
-                // The first that has this number, whichever it is.
+                // The first with this number.
                 let found = self
                     .0
                     .iter()

@@ -25,7 +25,7 @@ pub(super) struct Heard {
     pub(super) payload: Vec<u8>,
 }
 
-/// Somebody who speaks and hears.
+/// A sender and receiver of messages.
 pub(super) struct Speaker {
     pub(super) id: JausId,
     pub(super) habits: Habits,
@@ -43,7 +43,7 @@ pub(super) struct Speaker {
 impl Speaker {
     /// Opens its socket on the network where it has this address.
     pub(super) fn open(id: JausId, habits: Habits, address: Ipv4Addr) -> std::io::Result<Self> {
-        // Whoever acts beside another takes any port that is free.
+        // A second actor on the host takes any free port.
         let at = |port| UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port));
         let socket = at(PORT).or_else(|_| at(0))?;
         socket.join_multicast_v4(&GROUP, &address)?;
@@ -170,10 +170,10 @@ impl Speaker {
             datagram.extend(stale.get(datagram.len()..).unwrap_or_default());
             stale.clone_from(&datagram);
         }
-        // With the cable out nothing can be sent; that is seen by what does not come back.
+        // Sending fails while the cable is out; the missing answers show it.
         let _ = self.socket.send_to(&datagram, to);
         if frame.piece != Piece::Whole && frame.receipt == Receipt::None {
-            // Nobody keeps up with a whole message at once.
+            // No receiver keeps up with a whole message at once.
             std::thread::sleep(Duration::from_micros(100));
         }
     }
@@ -188,7 +188,7 @@ impl Speaker {
             let Ok((length, from)) = self.socket.recv_from(&mut buffer) else {
                 continue;
             };
-            // Nobody is seen to put two into one; what follows is not looked at.
+            // No peer was seen to pack two messages; the rest is ignored.
             let frame = Frame::all(&buffer[..length]).into_iter().next();
             let Some(frame) = frame.filter(|frame| frame.destination.matches(self.id)) else {
                 continue;

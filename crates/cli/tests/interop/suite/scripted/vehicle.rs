@@ -36,7 +36,7 @@ const STEP: f64 = 0.05;
 const READY: u8 = 1;
 const IS_STANDBY: u8 = 2;
 
-/// Who is in control.
+/// The client in control.
 struct Controller {
     id: JausId,
     authority: u8,
@@ -52,7 +52,7 @@ struct Vehicle {
     events: Events,
 }
 
-/// Goes on until it is killed.
+/// Runs until it is killed.
 pub(super) fn run(speaker: Speaker) -> Result<(), String> {
     let mut vehicle = Vehicle {
         speaker,
@@ -140,12 +140,12 @@ impl Vehicle {
                 };
                 let id = controller.id;
                 let subsystem = id.subsystem().to_le_bytes();
-                // The authority is its own, not the controller's.
+                // Its own authority, not the client's.
                 answer(&[&subsystem, &[id.node(), id.component(), 0]])
             }
             body::QUERY_IDENTIFICATION => {
                 let about = *rest.first()?;
-                // Of systems nothing is told. A vehicle, or a component.
+                // No type for systems. A vehicle, or a component.
                 let kind: u16 = match about {
                     2 => 10_001,
                     3 => 40_001,
@@ -160,7 +160,7 @@ impl Vehicle {
                 let services = body::services(&SERVICES);
                 match rest {
                     [0] => {}
-                    // Wildcards are nobody.
+                    // Wildcards match no component here.
                     [1, node, 1, component]
                         if (*node, *component) == (id.node(), id.component()) => {}
                     _ => return answer(&[&[0]]),
@@ -184,7 +184,7 @@ impl Vehicle {
             .as_ref()
             .map(|controller| (controller.id, controller.authority));
         let is_granted = before.is_none_or(|(id, than)| id == from || authority > than);
-        // 0 granted, 2 too little authority.
+        // 0 granted, 2 insufficient authority.
         let response = if is_granted { 0 } else { 2 };
         if is_granted {
             if let Some((id, _)) = before.filter(|(id, _)| *id != from) {
@@ -201,7 +201,7 @@ impl Vehicle {
         self.speaker.say(from, &confirm);
     }
 
-    /// Nobody is in control any more.
+    /// Ends control.
     fn release(&mut self) {
         let Some(controller) = self.controller.take() else {
             return;
@@ -212,7 +212,7 @@ impl Vehicle {
         self.push = 0.0;
     }
 
-    /// Only who is in control commands; but if nobody is, everybody does.
+    /// Only the client in control may command; without one, any client may.
     fn command(&mut self, code: u16, heard: &Heard) {
         if self.controller.is_some() && !self.is_controller(heard.source) {
             return;

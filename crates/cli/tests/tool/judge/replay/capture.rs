@@ -70,7 +70,7 @@ pub(crate) fn said_by(
         };
         let to = said.frame.destination;
         if to.subsystem() == vehicle {
-            // A component of several is ours, all of them are all of ours.
+            // One of several components is ours; all of them means all of ours.
             let is_all = to.component() == JausId::ANY_COMPONENT;
             let component = if is_all {
                 to.component()
@@ -112,7 +112,7 @@ fn messages(capture: &Path) -> Vec<(f64, Vec<u8>, Frame)> {
         let octets = datagram.payload.into_owned();
         let first = judp::frames(Bytes::from(octets.clone()));
         let first = first.ok().and_then(|mut frames| frames.next()?.ok());
-        // Acknowledgements are the transport's business, and have no code.
+        // Acknowledgements belong to the transport and have no code.
         if let Some(message) = first.filter(|message| message.code().is_some()) {
             messages.push((time, octets, message));
         }

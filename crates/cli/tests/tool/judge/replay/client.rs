@@ -174,7 +174,7 @@ impl Client {
             .iter()
             .filter(|stream| stream.captured == captured);
         let running = named.clone().find(|stream| stream.is_running);
-        // A stream may be asked for after its end.
+        // A stream may be queried after its end.
         if let Some(stream) = running.or(named.next_back()) {
             assert_eq!(datagram[MESSAGE + at], captured);
             datagram[MESSAGE + at] = stream.ours;
@@ -237,7 +237,7 @@ pub(crate) fn answers_to(code: u16) -> Vec<u16> {
         CreateEvent::CODE => vec![ConfirmEventRequest::CODE, RejectEventRequest::CODE],
         UpdateEvent::CODE | CancelEvent::CODE => vec![ConfirmEventRequest::CODE],
         RequestControl::CODE => vec![ConfirmControl::CODE],
-        // Who resets is in control, and is released.
+        // The client that resets is in control, and is released.
         ReleaseControl::CODE | Reset::CODE => vec![RejectControl::CODE],
         SetElement::CODE => vec![ConfirmElementRequest::CODE],
         query if query >> 12 == 2 => vec![query + 0x2000],

@@ -33,7 +33,7 @@ const CONTEST: [&str; 11] = [
     "LocalPoseSensor",
     "PrimitiveDriver",
 ];
-/// Set to write the files anew, which then are to be read.
+/// Set to rewrite the files; review them afterwards.
 const RENEW: &str = "JAUS_RENEW_SNAPSHOTS";
 /// Long enough for a reset, during which the tool waited 1.5 s.
 const SHORT: Pauses = Pauses(Duration::from_millis(20));
@@ -140,7 +140,7 @@ fn every_request_of_the_scored_run_is_answered_rightly() {
         return;
     };
     check(&exchanges, "scored_run.jsonl");
-    // The only refusal is the one that is asked for: a stream of a report instead of a query.
+    // The only refusal is the provoked one: a stream of a report instead of a query.
     let refused = |exchange: &&Exchange| {
         exchange
             .answers

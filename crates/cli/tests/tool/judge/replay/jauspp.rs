@@ -87,7 +87,7 @@ fn events_do_not_multiply(capture: &str, vehicle: u16) {
             .windows(2)
             .all(|pair| pair[1] == pair[0].wrapping_add(1));
         assert!(is_one, "the events of stream {id} are numbered {numbers:?}");
-        // A stream without a rate comes with every change, however often that is.
+        // A stream without a rate reports every change, at any rate.
         let most = (rate * LISTENING * 1.2).ceil() + 1.0;
         let came = numbers.len();
         assert!(

@@ -376,7 +376,7 @@ impl Lease {
     fn tell<M: Message>(&mut self, client: JausId, message: &M) {
         match message.encode() {
             Ok(payload) => self.said.to_clients.push((client, payload)),
-            Err(error) => tracing::error!(%client, %error, "message cannot be sent"),
+            Err(error) => tracing::error!(%client, %error, "cannot send the message"),
         }
     }
 }

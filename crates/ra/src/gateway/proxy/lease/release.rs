@@ -140,7 +140,8 @@ impl Release {
         self.reports_control = true;
         match self.state {
             State::Asking { .. } if controller == self.own => {
-                tracing::info!(component = %self.ra, "held in the gateway's id: stopped and released");
+                tracing::info!(component = %self.ra, "was controlled under the gateway's id: \
+                    stopped and released");
                 self.begin(now, Standby::Send);
             }
             State::Asking { .. } | State::Releasing { .. } if controller != self.own => self.end(),
@@ -191,7 +192,7 @@ impl Release {
         };
         self.commands.push(question);
         self.state = State::Asking {
-            next: now + self.interval(asked, "does not say who controls it, and is not offered"),
+            next: now + self.interval(asked, "does not report its controller, and is not offered"),
             asked: asked.saturating_add(1),
         };
     }
@@ -202,7 +203,7 @@ impl Release {
         }
         self.round(standby);
         self.state = State::Releasing {
-            next: now + self.interval(rounds, "is still held in the gateway's id"),
+            next: now + self.interval(rounds, "is still controlled under the gateway's id"),
             rounds: rounds.saturating_add(1),
             standby,
         };

@@ -12,7 +12,7 @@ const RIVAL: JausId = JausId::new(43, 1, 1);
 fn lease() -> (Lease, Instant) {
     #[expect(
         clippy::disallowed_methods,
-        reason = "any moment will do as the beginning of virtual time"
+        reason = "virtual time starts at any instant"
     )]
     let now = Instant::now();
     let terms = Terms {

@@ -79,7 +79,7 @@ impl Question {
         }
     }
 
-    /// Sends it only once: a repetition would have an effect of its own.
+    /// Sends it only once: a repetition would have its own effect.
     pub(super) const fn once(mut self) -> Self {
         self.again = None;
         self
@@ -299,7 +299,7 @@ impl Case {
             .iter()
             .filter(|t| t.exchange.is_basic() && t.failed());
         let failed = basic.next()?.exchange.name();
-        Some(Verdict::cut_off(format!("not without \"{failed}\"")))
+        Some(Verdict::cut_off(format!("needs \"{failed}\" to pass")))
     }
 
     /// The reason to skip queries: a basic exchange has failed, or the id is unknown.
@@ -309,8 +309,8 @@ impl Case {
         }
         let known = self.id.is_some() && self.address.is_some();
         (!known).then(|| {
-            Verdict::skipped("no id is known there")
-                .advice("name it with its address: --peer 77.1.1@10.0.0.2")
+            Verdict::skipped("no component id is known at that address")
+                .advice("give id and address: --peer 77.1.1@10.0.0.2")
         })
     }
 
@@ -325,7 +325,7 @@ impl Case {
         BEFORE
             .into_iter()
             .all(silent)
-            .then(|| Verdict::skipped("it answers no questions: it has no services"))
+            .then(|| Verdict::skipped("it answers no queries: it has no services"))
     }
 
     /// The reason to skip a service: the component's list does not have it.

@@ -22,7 +22,7 @@ pub(super) fn identification(case: &mut Case) -> Begin {
     }
     match case.ask_peer(&query_identification()) {
         Some(send) => Begin::Ask(Question::new(send)),
-        None => Begin::Over(Verdict::skipped("no id is known there")),
+        None => Begin::Over(Verdict::skipped("no component id is known at that address")),
     }
 }
 
@@ -34,7 +34,7 @@ pub(super) fn identified(case: &mut Case, mark: usize) -> Judgement {
     let name = name.trim_end_matches('\0').to_owned();
     let kind = match report.r#type {
         Type::VEHICLE => "a vehicle".to_owned(),
-        Type::OCU => "an operator's station".to_owned(),
+        Type::OCU => "an operator control unit".to_owned(),
         Type::OTHER_SUBSYSTEM => "another subsystem".to_owned(),
         other => format!("of type {}", other.0),
     };
@@ -55,33 +55,33 @@ pub(super) fn not_identified(case: &Case, mark: usize) -> Verdict {
     if let Some(heard) = other {
         let other = heard.frame.source;
         return Verdict::failed(
-            format!("{id} was asked, and {other} answers"),
-            "another component speaks for the node, or the id is mistaken",
-            format!("examine that: --peer {other}@{}", heard.from),
+            format!("{id} was queried, but {other} answers"),
+            "another component answers for the node, or the id is wrong",
+            format!("examine that one: --peer {other}@{}", heard.from),
         );
     }
     let what = format!("{id} does not answer Query Identification");
-    let cause = "the component offers no Discovery service (a bare Junior client has no services)";
+    let cause = "the component has no Discovery service (a bare Junior client has no services)";
     if case.told(0).next().is_some() {
         return Verdict::failed(
             what,
             cause,
-            "ask its node's discovery component, if it has one",
+            "query its node's discovery component, if there is one",
         );
     }
     Verdict::failed(
         what,
-        format!("{cause}, or the id is not the one that it has"),
-        "ask its node's discovery component; look at the id in the peer's settings",
+        format!("{cause}, or its id is a different one"),
+        "query its node's discovery component; check the id in the peer's settings",
     )
 }
 
 /// The verdict on a malformed report.
 pub(super) fn malformed(report: &str, error: &str) -> Verdict {
     Verdict::failed(
-        format!("its {report} cannot be read: {error}"),
-        "the peer writes the message otherwise than its definition says",
-        "`jaus record`, then `jaus decode` show its octets field by field",
+        format!("its {report} cannot be decoded: {error}"),
+        "the peer encodes the message differently from its definition",
+        "inspect its octets field by field with `jaus record` and `jaus decode`",
     )
 }
 
@@ -115,11 +115,11 @@ pub(super) fn multicast_answered(case: &mut Case, mark: usize) -> Judgement {
         same && heard.frame.destination == own && heard.code() == Some(ReportIdentification::CODE)
     };
     if case.seen.since(mark).iter().any(|heard| answers(&heard)) {
-        return Judgement::Over(Verdict::ok("a question to everybody is answered"));
+        return Judgement::Over(Verdict::ok("a broadcast query is answered"));
     }
     let mut told = case.told(mark);
     if told.any(|heard| heard.frame.flags.acknowledgement().is_answer()) {
-        return Judgement::Over(Verdict::ok("a message to everybody is acknowledged"));
+        return Judgement::Over(Verdict::ok("a broadcast message is acknowledged"));
     }
     Judgement::Wait
 }
@@ -128,18 +128,19 @@ pub(super) fn multicast_unanswered(case: &Case) -> Verdict {
     let id = shown(case);
     if case.mark_of(Exchange::Identification) != Some(Mark::Ok) {
         return Verdict::failed(
-            "a question to everybody is neither answered nor acknowledged",
-            "it has not joined the group, or the network passes no multicast; or it answers and \
-             acknowledges nothing at all",
+            "a broadcast query is neither answered nor acknowledged",
+            "it has not joined the group, or the network does not forward multicast; or it \
+             answers and acknowledges nothing at all",
             "see \"identification\" and \"acknowledgement\"",
         );
     }
     Verdict::failed(
-        format!("{id} answers when it is asked alone, and not when everybody is asked"),
-        "the peer has not joined the group, or on another interface; or the network passes no \
-         multicast (IGMP snooping without a querier, an access point, a container)",
-        "let the peer join 239.255.0.1 on the interface of this network; on ours peers = \
-         [\"ADDRESS\"] does without multicast",
+        format!("{id} answers a unicast query, but not a multicast one"),
+        "the peer has not joined the group, or joined it on another interface; or the network \
+         does not forward multicast (IGMP snooping without a querier, an access point, a \
+         container)",
+        "let the peer join 239.255.0.1 on this network's interface; or set peers = [\"ADDRESS\"] \
+         in our settings, which needs no multicast",
     )
 }
 
@@ -168,7 +169,7 @@ pub(super) fn heard_by_multicast(case: &mut Case) -> Judgement {
     };
     match case.seen.all().iter().find(by_group) {
         Some(heard) => Judgement::Over(Verdict::ok(format!(
-            "{} speaks to everybody, and is heard",
+            "multicasts from {} arrive",
             heard.frame.source
         ))),
         None => Judgement::Wait,
@@ -178,8 +179,8 @@ pub(super) fn heard_by_multicast(case: &mut Case) -> Judgement {
 /// Not every peer multicasts, so silence is no proof.
 pub(super) fn nothing_by_multicast(case: &Case) -> Verdict {
     let seconds = case.settings.listen.as_secs_f64();
-    Verdict::skipped(format!("it said nothing to everybody within {seconds} s"))
-        .advice("if it should (JAUS++ calls every 5 s), listen longer: --seconds 15")
+    Verdict::skipped(format!("it sent no multicast within {seconds} s"))
+        .advice("if it should (JAUS++ sends every 5 s), listen longer: --seconds 15")
 }
 
 pub(super) fn configuration(case: &mut Case) -> Begin {
@@ -191,7 +192,7 @@ pub(super) fn configuration(case: &mut Case) -> Begin {
     };
     match case.ask_peer(&query) {
         Some(send) => Begin::Ask(Question::new(send)),
-        None => Begin::Over(Verdict::skipped("no id is known there")),
+        None => Begin::Over(Verdict::skipped("no component id is known at that address")),
     }
 }
 
@@ -220,9 +221,9 @@ pub(super) fn configured(case: &mut Case, mark: usize) -> Judgement {
         return Judgement::Over(Verdict::ok(what));
     }
     Judgement::Over(Verdict::failed(
-        format!("{what}, and {} itself is not among them", shown(case)),
-        "its node manager does not know the component, or lists another node's",
-        "whoever finds components by their node's list does not find it: name its id outright",
+        format!("{what}, but {} itself is not listed", shown(case)),
+        "its node manager does not know the component, or lists another node's components",
+        "clients that search the node's list do not find it: give them its id",
     ))
 }
 
@@ -232,8 +233,8 @@ pub(super) fn not_configured(case: &Case, mark: usize) -> Verdict {
     }
     Verdict::failed(
         format!("{} does not answer Query Configuration", shown(case)),
-        "the component does not speak for its subsystem",
-        "ask its node manager, or the component itself",
+        "the component does not report its subsystem's configuration",
+        "query its node manager, or the component itself",
     )
 }
 
@@ -243,7 +244,7 @@ pub(super) fn services(case: &mut Case, way: Exchange) -> Begin {
         return Begin::Over(skip);
     }
     let Some(id) = case.id else {
-        return Begin::Over(Verdict::skipped("no id is known there"));
+        return Begin::Over(Verdict::skipped("no component id is known at that address"));
     };
     let list = |node, component| vec![node_seq(node, vec![component])];
     let node_list = match way {
@@ -253,7 +254,7 @@ pub(super) fn services(case: &mut Case, way: Exchange) -> Begin {
     };
     match case.ask_peer(&QueryServices { node_list }) {
         Some(send) => Begin::Ask(Question::new(send)),
-        None => Begin::Over(Verdict::skipped("no id is known there")),
+        None => Begin::Over(Verdict::skipped("no component id is known at that address")),
     }
 }
 
@@ -344,18 +345,18 @@ fn empty(way: Exchange) -> Verdict {
     match way {
         Exchange::ServicesWildcard => Verdict::failed(
             "Query Services with 255 for node and component gets an empty list",
-            "the peer takes 255 for a number instead of \"all\" (JAUS++ does)",
-            "ask with numbers; our clients do",
+            "the peer reads 255 as an id, not as a wildcard (JAUS++ does)",
+            "query by id, as our clients do",
         ),
         Exchange::ServicesNamed => Verdict::failed(
-            "Query Services with its own numbers gets an empty list",
-            "its node manager does not know the component's services, or not yet",
-            "ask again later; ask the component itself rather than its node manager",
+            "Query Services by id gets an empty list",
+            "its node manager does not know the component's services, or does not know them yet",
+            "query again later; query the component itself instead of its node manager",
         ),
         _ => Verdict::failed(
             "Query Services with an empty list gets an empty list",
-            "the peer takes the list at its word instead of as \"all\"",
-            "ask with numbers; our clients do",
+            "the peer reads an empty list as \"none\", not as \"all\"",
+            "query by id, as our clients do",
         ),
     }
 }
@@ -365,8 +366,8 @@ fn no_services(case: &Case, way: Exchange, mark: usize) -> Verdict {
         return malformed("Report Services", &error);
     }
     let how = match way {
-        Exchange::ServicesWildcard => "for everything (255)",
-        Exchange::ServicesNamed => "by numbers",
+        Exchange::ServicesWildcard => "with wildcards (255)",
+        Exchange::ServicesNamed => "by id",
         _ => "with an empty list",
     };
     if case
@@ -374,14 +375,14 @@ fn no_services(case: &Case, way: Exchange, mark: usize) -> Verdict {
         .is_some_and(|id| case.seen.large_from(id, mark).is_some())
     {
         return Verdict::failed(
-            format!("asked {how}, it answers in fragments that make no Report Services"),
-            "it cuts large messages in a way of its own",
-            "ask for fewer components at a time",
+            format!("queried {how}, it answers in fragments that are not a Report Services"),
+            "it fragments large messages in a non-standard way",
+            "query fewer components at a time",
         );
     }
     Verdict::failed(
         format!("Query Services {how} is not answered"),
-        "the component offers no Discovery, or does not take this form of the question",
-        "ask in one of the other two forms",
+        "the component has no Discovery service, or does not support this form of the query",
+        "use one of the other two forms",
     )
 }

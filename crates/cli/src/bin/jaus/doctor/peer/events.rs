@@ -52,13 +52,15 @@ pub(super) fn periodic(case: &mut Case) -> Begin {
 
 fn subscribe(case: &mut Case, request_id: u8) -> Begin {
     let Some((query, _, _)) = answered_query(case) else {
-        return Begin::Over(Verdict::skipped("it answers no query to subscribe to"));
+        return Begin::Over(Verdict::skipped(
+            "it answers no query that could be subscribed to",
+        ));
     };
     let create = create(request_id, query, request_id == PERIODIC);
     match case.ask_peer(&create) {
         // A repeated request may create the event twice.
         Some(send) => Begin::Ask(Question::new(send).once()),
-        None => Begin::Over(Verdict::skipped("no id is known there")),
+        None => Begin::Over(Verdict::skipped("no component id is known at that address")),
     }
 }
 
@@ -96,7 +98,7 @@ pub(super) fn created(case: &mut Case, mark: usize) -> Judgement {
 
 fn rejected(case: &Case, reject: &RejectEventRequest, kind: &str) -> Verdict {
     const NAMES: [&str; 7] = [
-        "0, which is no reason of the standard (JAUS++ counts its reasons from 0)",
+        "0, which is not a code of the standard (JAUS++ counts its codes from 0)",
         "1, periodic events are not supported",
         "2, events on change are not supported",
         "3, the connection is refused",
@@ -107,12 +109,12 @@ fn rejected(case: &Case, reject: &RejectEventRequest, kind: &str) -> Verdict {
     let code = reject.response_code.map(|code| code.0);
     let why = match code.and_then(|code| NAMES.get(usize::from(code))) {
         Some(name) => (*name).to_owned(),
-        None => code.map_or_else(|| "no reason is given".to_owned(), |code| code.to_string()),
+        None => code.map_or_else(|| "no reason given".to_owned(), |code| code.to_string()),
     };
     Verdict::failed(
         format!("{} refuses a {kind} event: {why}", shown(case)),
-        "the peer has no such events for this query, or no room for more",
-        "ask at intervals instead of subscribing",
+        "the peer does not support such events for this query, or has no room for more",
+        "poll instead of subscribing",
     )
 }
 
@@ -124,15 +126,15 @@ pub(super) fn not_created(case: &Case, mark: usize) -> Verdict {
     }
     if case.report::<Event>(mark).is_some() {
         return Verdict::failed(
-            "Create Event is not confirmed, but its events come",
+            "Create Event is not confirmed, but its events arrive",
             "the confirmation is lost, or the peer sends none",
-            "a client that waits for the confirmation takes the event for refused",
+            "a client that waits for the confirmation assumes that the event was refused",
         );
     }
     Verdict::failed(
         "Create Event is not answered",
-        "the component offers no Events service, or takes too long",
-        "ask at intervals instead of subscribing",
+        "the component has no Events service, or answers too late",
+        "poll instead of subscribing",
     )
 }
 
@@ -184,17 +186,17 @@ pub(super) fn not_arrived(case: &Case, mark: usize) -> Verdict {
     }
     match times(case, mark).len() {
         0 => Verdict::failed(
-            "the event was confirmed, and none of its reports arrive",
-            "they are sent to another address than the confirmation, or have another number",
-            "`jaus record` on both sides shows where they go",
+            "the event was confirmed, but none of its reports arrive",
+            "they are sent to another address than the confirmation, or with another event id",
+            "run `jaus record` on both sides to see where they go",
         ),
         some => Verdict::failed(
             format!(
-                "{some} reports came in 2 s where {} were confirmed",
+                "{some} reports arrived in 2 s; {} were confirmed",
                 2.0 * RATE
             ),
-            "the peer is busy, or its timer is slower than it says (JAUS++ is known for it)",
-            "ask for twice the rate that is needed, and do not take a late report for a loss",
+            "the peer is busy, or its timer drifts (known of JAUS++)",
+            "request twice the required rate, and do not treat a late report as lost",
         ),
     }
 }
@@ -208,7 +210,7 @@ pub(super) fn cancel(case: &mut Case) -> Begin {
     };
     match cancellation(case, event) {
         Some(send) => Begin::Ask(Question::new(send)),
-        None => Begin::Over(Verdict::skipped("no id is known there")),
+        None => Begin::Over(Verdict::skipped("no component id is known at that address")),
     }
 }
 
@@ -235,22 +237,22 @@ pub(super) fn after_cancel(case: &mut Case, mark: usize, stage: u8) -> Verdict {
     if stage == 0 {
         return Verdict::failed(
             "Cancel Event is not answered",
-            "the peer lost the event, or confirms no cancellation",
-            "cancel again; an event that is not wanted any more may go on",
+            "the peer lost the event, or does not confirm cancellations",
+            "cancel again; expect reports of cancelled events",
         );
     }
     // One may have been in transit.
     let late = times(case, mark).len();
     if late > 1 {
         return Verdict::failed(
-            format!("{late} reports came after the cancellation was confirmed"),
-            "event numbers are not unique there and another one was cancelled (JAUS++), or there \
-             were two events",
-            "cancel all events, then create anew those that are wanted",
+            format!("{late} reports arrived after the confirmed cancellation"),
+            "its event ids are not unique and another event was cancelled (JAUS++), or there were \
+             two events",
+            "cancel all events, then create the required ones again",
         );
     }
     case.open_events.clear();
-    Verdict::ok("confirmed, and nothing more comes")
+    Verdict::ok("confirmed, and no more reports arrive")
 }
 
 pub(super) fn on_change(case: &mut Case) -> Begin {
@@ -266,7 +268,7 @@ pub(super) fn changes(case: &mut Case, mark: usize, stage: u8) -> Judgement {
         return match reply(case, mark, CANCEL) {
             Some(_) => {
                 case.open_events.clear();
-                Judgement::Over(Verdict::ok("confirmed, and cancelled again"))
+                Judgement::Over(Verdict::ok("confirmed and cancelled"))
             }
             None => Judgement::Wait,
         };
@@ -293,8 +295,8 @@ pub(super) fn not_on_change(case: &Case, mark: usize, stage: u8) -> Verdict {
     }
     Verdict::failed(
         "confirmed, but its cancellation is not answered",
-        "the peer confirms no cancellation",
-        "cancel again; an event that is not wanted any more may go on",
+        "the peer does not confirm cancellations",
+        "cancel again; expect reports of cancelled events",
     )
 }
 

@@ -291,6 +291,6 @@ fn at_the_end(exchange: Exchange, case: &mut Case, mark: usize, stage: u8) -> Ve
         Exchange::Tcp => manners::tcp_silent(case),
         Exchange::Rate => manners::some_answered(case, mark),
         Exchange::Reserved => reserved::over(case, mark, stage),
-        Exchange::Sequence | Exchange::Stacks | Exchange::Ids => Verdict::skipped("not asked"),
+        Exchange::Sequence | Exchange::Stacks | Exchange::Ids => Verdict::skipped("query not sent"),
     }
 }

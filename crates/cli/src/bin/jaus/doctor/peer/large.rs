@@ -26,7 +26,7 @@ pub(super) fn to_peer(case: &mut Case, size: u32, now: Duration) -> Begin {
     }
     if !case.went_well(Exchange::Acknowledgement) {
         return Begin::Over(Verdict::skipped(
-            "it acknowledges nothing, so nothing would be seen",
+            "it acknowledges nothing, so the result could not be observed",
         ));
     }
     let failed = |trial: &&super::exchange::Trial| {
@@ -34,7 +34,7 @@ pub(super) fn to_peer(case: &mut Case, size: u32, now: Duration) -> Begin {
     };
     if let Some(smaller) = case.trials.iter().find(failed) {
         let name = smaller.exchange.name();
-        return Begin::Over(Verdict::skipped(format!("not after \"{name}\"")));
+        return Begin::Over(Verdict::skipped(format!("not tried after \"{name}\"")));
     }
     let frames = fragments(case, size as usize);
     case.transfer = Some(Transfer::new(frames, case.seen.len()));
@@ -187,7 +187,7 @@ fn arrived(case: &mut Case, size: u32) -> Verdict {
 fn came_whole(case: &mut Case, size: u32) -> Verdict {
     case.echoes = true;
     let mut verdict = arrived(case, size);
-    verdict.what.push_str(", and sent back whole");
+    verdict.what.push_str(", and echoed completely");
     verdict
 }
 
@@ -203,24 +203,25 @@ pub(super) fn unacknowledged(case: &mut Case, size: u32) -> Verdict {
             format!(
                 "all {all} fragments of {size} octets are acknowledged, but the message is lost"
             ),
-            "the peer forgets the first fragments before the last come: Junior keeps \
-             MaxMsgHistory of them, 50 as shipped",
-            "payload_limit = 4079 on our side makes fewer of them; raise MaxMsgHistory there",
+            "the peer discards the first fragments before the last arrive: Junior keeps \
+             MaxMsgHistory of them, by default 50",
+            "set payload_limit = 4079 on our side for fewer fragments, or raise MaxMsgHistory \
+             there",
         );
     }
     if whole(size, case) {
         return Verdict::failed(
             format!("a message of {size} octets is not acknowledged, but a short one is"),
-            "something between drops packets of that size: an MTU below 1500 without \
-             fragmentation (VPN, tunnel), or a firewall that drops IP fragments",
-            "`ping -M do -s 1400 ADDRESS` finds the limit; set payload_limit below it",
+            "the network drops packets of that size: an MTU below 1500 without fragmentation \
+             (VPN, tunnel), or a firewall that drops IP fragments",
+            "find the limit with `ping -M do -s 1400 ADDRESS` and set payload_limit below it",
         );
     }
     Verdict::failed(
         format!("{done} of {all} fragments were acknowledged, then no more"),
-        "the peer takes no messages of that size, or no fragments at all, or its receive buffer \
-         is too small for several at a time (Junior's MaxBufferSize)",
-        "keep messages to it below the last size that went well; raise its buffers",
+        "the peer does not accept messages of that size, or no fragments at all, or its receive \
+         buffer is too small for several at a time (Junior's MaxBufferSize)",
+        "keep messages to it below the last size that passed; enlarge its buffers",
     )
 }
 
@@ -250,7 +251,7 @@ pub(super) fn from_peer(case: &mut Case) -> Begin {
     }
     if !case.went_well(Exchange::EventOnChange) {
         return Begin::Over(Verdict::skipped(
-            "nothing makes it send a large message: it gives no events on change",
+            "no large message can be provoked: it has no events on change",
         ));
     }
     let mut sends = Vec::new();
@@ -267,11 +268,8 @@ pub(super) fn from_peer(case: &mut Case) -> Begin {
 fn echoed(case: &Case) -> Option<Verdict> {
     let (message, fragments, _) = case.seen.large_from(case.id?, 0)?;
     let length = message.len();
-    (message == padded(length)).then(|| {
-        Verdict::ok(format!(
-            "{length} octets came back in {fragments} fragments"
-        ))
-    })
+    (message == padded(length))
+        .then(|| Verdict::ok(format!("{length} octets echoed in {fragments} fragments")))
 }
 
 pub(super) fn came_back(case: &mut Case, mark: usize, stage: u8) -> Judgement {
@@ -304,9 +302,12 @@ fn judge_large(message: &Bytes, fragments: usize, repeats: bool) -> Verdict {
     match ReportEvents::decode(message) {
         Ok(_) => Verdict::ok(format!("{length} octets in {fragments} fragments{style}")),
         Err(error) => Verdict::failed(
-            format!("{fragments} fragments make {length} octets that cannot be read: {error}"),
-            "the peer cuts large messages in a way of its own",
-            "keep what it has to report short: ask for less at a time",
+            format!(
+                "{fragments} fragments reassemble to {length} octets that cannot be decoded: \
+                {error}"
+            ),
+            "the peer fragments large messages in a non-standard way",
+            "keep its reports short: query less at a time",
         ),
     }
 }
@@ -322,7 +323,7 @@ fn subscribed(case: &mut Case, mark: usize) -> Judgement {
                 let cancels = cancel_all(case);
                 case.unsent.extend(cancels);
                 return Judgement::Over(Verdict::skipped(
-                    "nothing makes it send a large message: it gives no events of Query Services",
+                    "no large message can be provoked: it has no events of Query Services",
                 ));
             }
             None => return Judgement::Wait,
@@ -348,7 +349,7 @@ pub(super) fn not_back(case: &mut Case, mark: usize, stage: u8) -> Verdict {
         let cancels = cancel_all(case);
         case.unsent.extend(cancels);
         return Verdict::skipped(
-            "nothing makes it send a large message: long events go unanswered",
+            "no large message can be provoked: it does not answer long events",
         );
     }
     let fragments = case
@@ -358,12 +359,14 @@ pub(super) fn not_back(case: &mut Case, mark: usize, stage: u8) -> Verdict {
     let cancels = cancel_all(case);
     case.unsent.extend(cancels);
     if fragments == 0 {
-        return Verdict::skipped("it does not answer Query Events, so nothing large came");
+        return Verdict::skipped(
+            "no large message can be provoked: it does not answer Query Events",
+        );
     }
     Verdict::failed(
-        format!("{fragments} fragments came, and not all of the message"),
-        "fragments get lost on the way (buffers, or IP fragments that a firewall drops), or the \
-         last one is not marked as such (JAUS++, at exact multiples of its size)",
-        "keep what it has to report short: ask for less at a time",
+        format!("{fragments} fragments arrived, but the message is incomplete"),
+        "fragments are lost (buffers, or a firewall that drops IP fragments), or the last one is \
+         not marked as such (JAUS++, at exact multiples of its fragment size)",
+        "keep its reports short: query less at a time",
     )
 }

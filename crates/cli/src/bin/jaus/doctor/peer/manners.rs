@@ -34,7 +34,7 @@ pub(super) fn tcp_answered(case: &mut Case) -> Judgement {
         None => return Judgement::Wait,
         Some(TcpAnswer::Open) => Verdict::ok(format!("TCP {port} is open")),
         Some(TcpAnswer::Refused | TcpAnswer::Failed) => {
-            Verdict::skipped(format!("TCP {port} is closed: it offers no JTCP"))
+            Verdict::skipped(format!("TCP {port} is closed: it has no JTCP"))
         }
     })
 }
@@ -54,7 +54,7 @@ pub(super) fn rate(case: &mut Case) -> Begin {
         return Begin::Over(skip);
     }
     if case.mark_of(Exchange::Heartbeat) != Some(Mark::Ok) {
-        return Begin::Over(Verdict::skipped("it answers no heartbeats"));
+        return Begin::Over(Verdict::skipped("it does not answer heartbeat queries"));
     }
     let mut sends = Vec::new();
     for _ in 0..BURST {
@@ -75,17 +75,17 @@ pub(super) fn all_answered(case: &mut Case, mark: usize) -> Judgement {
         return Judgement::Wait;
     }
     Judgement::Over(Verdict::ok(format!(
-        "{BURST} questions at once are all answered"
+        "{BURST} simultaneous queries are all answered"
     )))
 }
 
 pub(super) fn some_answered(case: &Case, mark: usize) -> Verdict {
     let some = answers(case, mark);
     Verdict::failed(
-        format!("{some} of {BURST} questions at once are answered within 1 s"),
-        "the peer limits how fast it answers, or polls its messages one by one (JAUS++ takes \
-         about 1 ms for each), or its receive buffer is small",
-        "space questions out; subscribe instead of asking often",
+        format!("{some} of {BURST} simultaneous queries are answered within 1 s"),
+        "the peer limits its answer rate, or polls its messages one by one (JAUS++ takes about 1 \
+         ms for each), or its receive buffer is small",
+        "space queries out; subscribe instead of polling",
     )
 }
 
@@ -98,7 +98,7 @@ pub(super) fn sequence(case: &Case) -> Verdict {
     // Acknowledgements repeat the number of the acknowledged message.
     messages.retain(|heard| !heard.frame.flags.acknowledgement().is_answer());
     if messages.len() < 3 {
-        return Verdict::skipped("too few messages came");
+        return Verdict::skipped("too few messages arrived");
     }
     let (mut twice, mut shared) = (0, 0);
     let mut last: BTreeMap<u16, &Heard> = BTreeMap::new();
@@ -119,12 +119,12 @@ pub(super) fn sequence(case: &Case) -> Verdict {
     if last.len() == 1 {
         return Verdict::failed(
             format!(
-                "all {count} messages have the number {}",
+                "all {count} messages have the sequence number {}",
                 messages[0].frame.sequence
             ),
-            "the peer does not count; who drops duplicates by number (Junior) loses all messages \
-             but one",
-            "let the peer count its messages",
+            "the peer does not increment it; receivers that drop duplicates by number (Junior) \
+             lose all messages but one",
+            "let the peer increment its sequence number",
         );
     }
     judge_numbers(count, twice, shared)
@@ -133,21 +133,21 @@ pub(super) fn sequence(case: &Case) -> Verdict {
 fn judge_numbers(count: usize, twice: usize, shared: usize) -> Verdict {
     if shared > 0 {
         return Verdict::failed(
-            format!("{shared} of {count} messages have the number of another within 2 s"),
-            "the peer counts by kind of message, or was started anew; who drops duplicates by number \
-             (Junior) loses one of each two",
-            "let it count all messages of one component with one counter",
+            format!("{shared} of {count} messages reuse a sequence number within 2 s"),
+            "the peer has a counter per message type, or was restarted; receivers that drop \
+             duplicates by number (Junior) lose one of each two",
+            "let it use one counter for all messages of a component",
         );
     }
     if twice > 0 {
         return Verdict::failed(
-            format!("{twice} of {count} messages came twice"),
-            "there are two ways between the hosts (two interfaces, multicast and broadcast, a \
+            format!("{twice} of {count} messages arrived twice"),
+            "there are two paths between the hosts (two interfaces, multicast and broadcast, a \
              relay)",
             "use one interface on both sides (--interface, interfaces = [\"eth0\"])",
         );
     }
-    Verdict::ok(format!("{count} messages, none twice, no number shared"))
+    Verdict::ok(format!("{count} messages, no duplicates, no number reused"))
 }
 
 /// The JAUS stacks on its host.
@@ -177,10 +177,10 @@ pub(super) fn stacks(case: &Case) -> Verdict {
     let shared = ports.iter().find(|(_, nodes)| nodes.len() > 1);
     match shared {
         Some((port, nodes)) => Verdict::ok(format!("{} share port {port}", names(nodes))).advice(
-            "if those are two programs with one port, only one of them gets unicast: give one \
+            "if those are two programs with one port, only one of them receives unicast: give one \
              another port",
         ),
-        None if all.is_empty() => Verdict::skipped("nothing was heard"),
+        None if all.is_empty() => Verdict::skipped("nothing was received"),
         None => Verdict::ok(all.join(", ")),
     }
 }
@@ -191,28 +191,28 @@ pub(super) fn ids(case: &Case) -> Verdict {
         return skip;
     }
     let (Some(id), own) = (case.id, case.settings.own) else {
-        return Verdict::skipped("no id is known there");
+        return Verdict::skipped("no component id is known at that address");
     };
     let places = places(case, id);
     if places.len() > 1 {
         let named: Vec<String> = places.iter().map(ToString::to_string).collect();
         return Verdict::failed(
-            format!("{id} speaks from {}", named.join(" and from ")),
-            "two programs have this id, or one is on two networks",
-            "give one of them another id; answers go to whoever spoke last",
+            format!("{id} sends from {}", named.join(" and from ")),
+            "two programs have this id, or one program is on two networks",
+            "give one of them another id; answers go to the one that sent last",
         );
     }
     if case.settings.wanted == Some(id) {
         return Verdict::failed(
-            format!("{id} is the id that our node is to have"),
-            "two nodes have one id, unless the peer is that node",
+            format!("{id} is the id chosen for our node"),
+            "two nodes would have the same id, unless the peer is that node",
             "choose another id (--id)",
         );
     }
     if id.subsystem() == own.subsystem() {
         return Verdict::ok(format!("{id} is in our subsystem"));
     }
-    Verdict::ok(format!("{} has its id alone", shown(case)))
+    Verdict::ok(format!("no other node has the id {}", shown(case)))
 }
 
 /// The hosts that send with an id.

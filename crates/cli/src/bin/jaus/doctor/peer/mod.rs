@@ -127,7 +127,10 @@ fn interfaces(config: &Config, target: Target) -> Result<Vec<Interface>, Failure
 }
 
 /// Runs the examination; returns whether it was completed.
-#[expect(clippy::disallowed_methods, reason = "an examination has its time")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the examination runs in real time"
+)]
 async fn go_on(
     examiner: &mut Examiner,
     sockets: &mut Sockets,

@@ -80,22 +80,18 @@ impl Profile {
     /// The profile as text, line by line.
     pub(super) fn in_words(&self, case: &Case) -> Vec<String> {
         let verdict = match self {
-            Self::Unknown => return vec!["not recognised: too little was heard".to_owned()],
+            Self::Unknown => return vec!["not recognised: too few messages received".to_owned()],
             Self::Ra(_) => {
                 return vec![
-                    "Reference Architecture 3.x (OpenJAUS 3.x and its like): it speaks no AS5669A"
-                        .to_owned(),
-                    "→ `jaus-ra-gateway` makes its components AS5669A ones: docs/ra-gateway.md"
-                        .to_owned(),
+                    "Reference Architecture 3.x (OpenJAUS 3.x and similar), not AS5669A".to_owned(),
+                    "→ connect it through `jaus-ra-gateway`: docs/ra-gateway.md".to_owned(),
                 ];
             }
             Self::As5669a(verdict) => verdict,
         };
         let peer = verdict.peer;
         if peer == Peer::Standard {
-            return vec![
-                "none: nothing tells it from a peer that keeps to the standard".to_owned(),
-            ];
+            return vec!["none: it looks like a peer that conforms to the standard".to_owned()];
         }
         let mut lines = vec![format!("{} ({})", peer.title(), verdict.certainty)];
         lines.extend(
@@ -107,17 +103,17 @@ impl Profile {
         if case.unprovoked().certain() != peer {
             let id = case.id.map_or_else(String::new, |id| id.to_string());
             let once = match verdict.certainty {
-                Certainty::Certain => "it has said enough by itself",
+                Certainty::Certain => "it has sent enough messages by itself",
                 _ => "that is certain",
             };
             lines.push(format!(
-                "→ a node treats it so once {once}, or if its settings say: [[profile]] id = \
-                 \"{id}\", profile = \"{peer}\""
+                "→ a node applies this profile once {once}, or with these settings: [[profile]] \
+                 id = \"{id}\", profile = \"{peer}\""
             ));
         }
         let departures: Vec<_> = peer.departures().map(|departure| departure.name).collect();
         if !departures.is_empty() {
-            lines.push(format!("known of it: {}", departures.join("; ")));
+            lines.push(format!("known departures: {}", departures.join("; ")));
         }
         lines
     }

@@ -92,13 +92,13 @@ pub(super) fn verdict(case: &Case, address: SocketAddr, name: Option<&str>) -> V
     let name = name.map(|name| format!(" \"{name}\""));
     let multicast = of_ra(case, address).any(|heard| heard.listener == Listener::RaGroup);
     let multicast = if multicast {
-        ", heard on 224.1.0.1"
+        ", received on 224.1.0.1"
     } else {
         ""
     };
     let unnamed = name.is_none() && case.settings.port != judp::PORT;
     let unnamed = if unnamed {
-        ". Its name is not known: it answers to our port 3794, which is taken"
+        ". Its name is unknown: it answers to our port 3794, which is taken"
     } else {
         ""
     };
@@ -108,7 +108,7 @@ pub(super) fn verdict(case: &Case, address: SocketAddr, name: Option<&str>) -> V
             subsystem.unwrap_or_default(),
             name.unwrap_or_default()
         ),
-        "OpenJAUS 3.x and other systems of the Reference Architecture do not read AS5669A",
-        "put `jaus-ra-gateway` between: docs/ra-gateway.md",
+        "OpenJAUS 3.x and other systems of the Reference Architecture do not understand AS5669A",
+        "connect it through `jaus-ra-gateway`: docs/ra-gateway.md",
     )
 }

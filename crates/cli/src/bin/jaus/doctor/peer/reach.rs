@@ -29,13 +29,15 @@ pub(super) fn find(case: &mut Case) -> Begin {
         return Begin::Over(Verdict::skipped("its address is given"));
     };
     if let Some(address) = case.address {
-        return Begin::Over(Verdict::ok(format!("{id} is said to be at {address}")));
+        return Begin::Over(Verdict::ok(format!(
+            "{id} was named with the address {address}"
+        )));
     }
     if let Some(why) = &case.settings.no_group {
         return Begin::Over(Verdict::failed(
-            format!("there is no multicast group to call {id} by"),
+            format!("there is no multicast group to locate {id}"),
             why.clone(),
-            "name the address too: --peer ID@ADDRESS",
+            "give the address too: --peer ID@ADDRESS",
         ));
     }
     // A peer without Discovery acknowledges at least.
@@ -64,18 +66,19 @@ pub(super) fn not_found(case: &Case) -> Verdict {
     let id = case.id.map_or_else(String::new, |id| id.to_string());
     if others.is_empty() {
         return Verdict::failed(
-            format!("neither {id} nor anybody else was heard in {seconds} s"),
-            "multicast does not pass between the two hosts, or the peer is not running",
-            "name its address: --peer ID@ADDRESS; `jaus doctor` alone looks at multicast here",
+            format!("neither {id} nor any other node was found in {seconds} s"),
+            "multicast does not pass between the hosts, or the peer is not running",
+            "give its address: --peer ID@ADDRESS; `jaus doctor` without --peer checks multicast \
+             here",
         );
     }
     Verdict::failed(
         format!(
-            "{id} was not heard in {seconds} s, but {}",
+            "{id} was not found in {seconds} s, but {}",
             others.join(", ")
         ),
         "it has another id, or is not running",
-        "take the id from its settings, or name its address: --peer ADDRESS",
+        "take the id from its settings, or give its address: --peer ADDRESS",
     )
 }
 
@@ -146,24 +149,24 @@ fn refused(case: &Case, address: SocketAddr, refusal: Refusal) -> Verdict {
     let (ip, port) = (address.ip(), address.port());
     if refusal == Refusal::Host {
         return Verdict::failed(
-            format!("there is no way to {ip}, or nobody has that address"),
+            format!("there is no route to {ip}, or no host has that address"),
             "the host is off, or has another address, or is on another network",
-            format!("`ip route get {ip}`, `ping {ip}`; look at the cable and the address"),
+            format!("try `ip route get {ip}` and `ping {ip}`; check the cable and the address"),
         );
     }
     let ports = other_ports(case, address);
     if let Some(other) = ports.first() {
         return Verdict::failed(
-            format!("{ip} says that nobody listens at UDP {port}, but {other} speaks"),
+            format!("{ip} reports UDP port {port} as closed, but {other} sends"),
             "the peer has another port",
-            format!("name that: --peer {other}"),
+            format!("use that: --peer {other}"),
         );
     }
     Verdict::failed(
-        format!("{ip} says that nobody listens at UDP {port}"),
+        format!("{ip} reports UDP port {port} as closed"),
         "no JAUS program runs there, or it is bound to another address or port of that host",
         format!(
-            "on that host: `ss -ulpn 'sport = :{port}'` shows who listens, and at which address"
+            "on that host, `ss -ulpn 'sport = :{port}'` shows the listening program and its address"
         ),
     )
 }
@@ -171,7 +174,7 @@ fn refused(case: &Case, address: SocketAddr, refusal: Refusal) -> Verdict {
 pub(super) fn not_refused(case: &Case, stage: u8) -> Verdict {
     match (case.address, case.seen.refused) {
         (Some(address), Some(refusal)) if stage > 0 => refused(case, address, refusal),
-        (Some(address), _) => Verdict::ok(format!("UDP {address} does not refuse")),
+        (Some(address), _) => Verdict::ok(format!("UDP {address} is not refused")),
         (None, _) => Verdict::skipped("its address is not known"),
     }
 }
@@ -264,7 +267,7 @@ fn overheard(case: &mut Case, address: SocketAddr) -> Judgement {
 
 /// The next exchange finds out which one.
 fn only_older(address: SocketAddr) -> Verdict {
-    Verdict::ok(format!("{} was heard, but not in AS5669A", address.ip()))
+    Verdict::ok(format!("{} answers, but not in AS5669A", address.ip()))
 }
 
 /// No answer by unicast; there may be messages in the groups.
@@ -287,10 +290,10 @@ pub(super) fn unanswered(case: &mut Case) -> Verdict {
     }
     if let Some(beginning) = case.seen.unreadable_from(ip) {
         return Verdict::failed(
-            format!("{ip} sends datagrams of no JAUS framing: they begin with {beginning}"),
-            "another program has that port",
+            format!("{ip} sends datagrams without JAUS framing: they start with {beginning}"),
+            "another program uses that port",
             format!(
-                "on that host: `ss -ulpn 'sport = :{}'` shows which",
+                "on that host, `ss -ulpn 'sport = :{}'` shows which",
                 address.port()
             ),
         );
@@ -303,25 +306,25 @@ fn heard_only(case: &mut Case, address: SocketAddr, heard: &Heard) -> Verdict {
     let (id, from) = (heard.frame.source, heard.from);
     if let Some(named) = case.settings.target.id.filter(|named| *named != id) {
         return Verdict::failed(
-            format!("{named} does not answer there, but {id} speaks from {from}"),
+            format!("{named} does not answer there, but {id} sends from {from}"),
             "the peer has another id",
-            format!("name that: --peer {id}@{from}"),
+            format!("use that: --peer {id}@{from}"),
         );
     }
     case.id = case.id.or(Some(id));
     if from.port() != address.port() {
         return Verdict::failed(
-            format!("{id} speaks from {from}, and nobody answers at {address}"),
+            format!("{id} sends from {from}, and {address} does not answer"),
             "the peer has another port",
-            format!("name that: --peer {from}"),
+            format!("use that: --peer {from}"),
         );
     }
     Verdict::failed(
-        format!("{id} was heard from {from}, but does not answer what is sent there"),
-        "its firewall lets no UDP in, or it answers to an address that we do not have",
+        format!("{id} sends from {from}, but does not answer queries to it"),
+        "its firewall blocks incoming UDP, or it answers to an address that is not ours",
         format!(
-            "on that host: let UDP {} in (`nft list ruleset`); `jaus record` there shows whether \
-             our questions arrive",
+            "on that host, allow UDP {} (`nft list ruleset`); `jaus record` there shows whether \
+             our queries arrive",
             address.port()
         ),
     )
@@ -336,32 +339,33 @@ fn silent(case: &Case, address: SocketAddr, seconds: f64) -> Verdict {
     if let Some(heard) = elsewhere {
         let (id, from) = (heard.frame.source, heard.from);
         return Verdict::failed(
-            format!("{address} is silent, but {id} speaks from {from}"),
+            format!("{address} is silent, but {id} sends from {from}"),
             "the peer has another address",
-            format!("name that: --peer {id}@{from}"),
+            format!("use that: --peer {id}@{from}"),
         );
     }
     let others = others(case);
     if !others.is_empty() {
         return Verdict::failed(
             format!(
-                "{address} was silent for {seconds} s; heard were {}",
+                "{address} was silent for {seconds} s; others found: {}",
                 others.join(", ")
             ),
-            "the address is wrong, or the peer does not run, or its firewall drops UDP",
-            "compare the address with those heard; look at the peer and its firewall",
+            "the address is wrong, the peer is not running, or its firewall drops UDP",
+            "compare the address with those found; check the peer and its firewall",
         );
     }
     let remedy = if case.settings.target.id.is_some() {
-        "look at both firewalls, and run `jaus doctor` alone; without its id (--peer ADDRESS) \
-         whoever is there is asked"
+        "check both firewalls, and run `jaus doctor` without --peer; omit the id (--peer ADDRESS) \
+         to query any component there"
     } else {
-        "name its id too (--peer ID@ADDRESS), look at both firewalls, and run `jaus doctor` alone"
+        "give its id too (--peer ID@ADDRESS), check both firewalls, and run `jaus doctor` without \
+         --peer"
     };
     Verdict::failed(
-        format!("{address} was silent for {seconds} s, and nobody else was heard"),
-        "the peer does not run, or a firewall on either side drops UDP, or nobody there has the id \
-         that is asked",
+        format!("{address} was silent for {seconds} s, and no other node was found"),
+        "the peer is not running, a firewall on either side drops UDP, or no component there has \
+         that id",
         remedy,
     )
 }
@@ -378,7 +382,7 @@ pub(super) fn framing(case: &mut Case) -> Begin {
     if framings.contains(&Version::As5669a) || framings.is_empty() {
         let besides = framings.len() > 1;
         let besides = if besides {
-            ", and older framings besides"
+            ", and older framings too"
         } else {
             ""
         };
@@ -393,10 +397,10 @@ pub(super) fn source_port(case: &mut Case) -> Begin {
         return Begin::Over(skip);
     }
     let (Some(address), Some(id)) = (case.address, case.id) else {
-        return Begin::Over(Verdict::skipped("nobody answered"));
+        return Begin::Over(Verdict::skipped("no answer"));
     };
     let Some(from) = case.told(0).map(|heard| heard.from).next() else {
-        return Begin::Over(Verdict::skipped("nothing came by unicast"));
+        return Begin::Over(Verdict::skipped("nothing arrived by unicast"));
     };
     if from == address {
         let port = from.port();
@@ -417,10 +421,10 @@ pub(super) fn source_port(case: &mut Case) -> Begin {
 
 fn other_address(address: SocketAddr, from: SocketAddr, id: JausId) -> Verdict {
     Verdict::failed(
-        format!("{id} is asked at {address} and answers from {from}"),
-        "its host has several addresses, and the peer is bound to none or to another",
+        format!("{id} is queried at {address} and answers from {from}"),
+        "its host has several addresses, and the peer's socket is unbound or bound to another one",
         format!(
-            "name the one it answers from (--peer {id}@{from}), or bind the peer to one address"
+            "use the one it answers from (--peer {id}@{from}), or bind the peer to one address"
         ),
     )
 }
@@ -435,19 +439,19 @@ pub(super) fn asked_at_its_source(case: &mut Case, mark: usize) -> Judgement {
     };
     Judgement::Over(Verdict::failed(
         format!(
-            "asked at port {}, it answers from {}",
+            "queried at port {}, it answers from {}",
             address.port(),
             from.port()
         ),
-        "something between translates ports (NAT, a container), or two sockets share the work",
-        format!("messages reach it at both; name the one it speaks from: --peer {id}@{from}"),
+        "something on the path translates ports (NAT, a container), or it uses two sockets",
+        format!("messages reach it at both; use the one it sends from: --peer {id}@{from}"),
     ))
 }
 
 /// It sends from a port that does not receive.
 pub(super) fn deaf_source(case: &Case) -> Verdict {
     let (Some(address), Some(id)) = (case.address, case.id) else {
-        return Verdict::skipped("nobody answered");
+        return Verdict::skipped("no answer");
     };
     let from = case
         .told(0)
@@ -456,14 +460,13 @@ pub(super) fn deaf_source(case: &Case) -> Verdict {
         .unwrap_or(0);
     let port = address.port();
     Verdict::failed(
-        format!("it answers from port {from}, and does not listen there"),
+        format!("it answers from port {from}, but does not listen there"),
         format!(
-            "the peer sends from a socket of its own instead of the one bound to {port}; whoever \
-             answers to where a message came from (Junior, JAUS++ and this stack do) speaks to \
-             nobody"
+            "the peer sends from another socket than the one bound to {port}; answers to a \
+             message's source address (by Junior, JAUS++ and this stack) are lost"
         ),
         format!(
-            "let the peer send from its port {port}; until then pin its address in our settings: \
+            "let the peer send from port {port}; until then pin its address in our settings: \
              peers = [\"{id}@{address}\"]"
         ),
     )

@@ -80,7 +80,11 @@ pub(super) fn conclusion(case: &Case, whole: bool) -> String {
     };
     let (ok, failed, skipped) = (count(Mark::Ok), count(Mark::Failed), count(Mark::Skipped));
     let counts = format!("{ok} ok, {failed} failed, {skipped} skipped");
-    let ended = if whole { "" } else { " before it was stopped" };
+    let ended = if whole {
+        ""
+    } else {
+        " before the interruption"
+    };
     match case.trials.iter().find(|trial| trial.failed()) {
         None => format!("All is well{ended}: {counts}."),
         Some(first) => format!(

@@ -40,7 +40,7 @@ pub(super) fn begin(case: &mut Case) -> Begin {
             };
             Begin::Ask(question(vec![Send::To(address, typed)]))
         }
-        _ => Begin::Over(Verdict::skipped("no id is known there")),
+        _ => Begin::Over(Verdict::skipped("no component id is known at that address")),
     }
 }
 
@@ -96,5 +96,5 @@ pub(super) fn over(case: &mut Case, mark: usize, stage: u8) -> Verdict {
     }
     case.reserved.misreads_type = true;
     case.reserved.answers_for_zero = !to_zero.is_empty();
-    Verdict::ok("a message of the reserved type 4 is acknowledged, and one of type 1 is lost")
+    Verdict::ok("a message of the reserved type 4 is acknowledged, but one of type 1 is lost")
 }

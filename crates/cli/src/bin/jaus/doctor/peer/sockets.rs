@@ -3,7 +3,7 @@
 #![expect(
     clippy::disallowed_types,
     clippy::disallowed_methods,
-    reason = "an examination has to know at which socket a datagram arrives"
+    reason = "the examination needs the socket at which a datagram arrives"
 )]
 
 use std::collections::BTreeMap;
@@ -230,7 +230,7 @@ impl Link {
         let (group, why) = match group_of(&interface, config) {
             None => (
                 None,
-                Some("it is turned off, or the interface carries none".to_owned()),
+                Some("it is disabled, or the interface has none".to_owned()),
             ),
             Some(address) => match joined(&interface, address) {
                 Ok(socket) => (Some((socket, address)), None),

@@ -19,7 +19,7 @@ use super::judgement::{Begin, Judgement};
 fn ask(case: &mut Case, message: &impl jaus::codec::Message) -> Begin {
     match case.ask_peer(message) {
         Some(send) => Begin::Ask(Question::new(send)),
-        None => Begin::Over(Verdict::skipped("no id is known there")),
+        None => Begin::Over(Verdict::skipped("no component id is known at that address")),
     }
 }
 
@@ -46,8 +46,8 @@ pub(super) fn beats(case: &mut Case, mark: usize) -> Judgement {
 pub(super) fn no_heartbeat(case: &Case) -> Verdict {
     Verdict::failed(
         format!("{} does not answer Query Heartbeat Pulse", shown(case)),
-        "the component offers no Liveness service",
-        "whoever watches it by heartbeats takes it for gone: watch its other reports instead",
+        "the component has no Liveness service",
+        "clients that watch heartbeats consider it lost: let them watch its other reports",
     )
 }
 
@@ -56,7 +56,7 @@ pub(super) fn acknowledgement(case: &mut Case) -> Begin {
         return Begin::Over(skip);
     }
     let (Some(id), Some(address)) = (case.id, case.address) else {
-        return Begin::Over(Verdict::skipped("no id is known there"));
+        return Begin::Over(Verdict::skipped("no component id is known at that address"));
     };
     let frame = case.wanting_acknowledgement(id);
     Begin::Ask(Question::new(Send::To(address, frame)))
@@ -69,18 +69,18 @@ pub(super) fn acknowledged(case: &mut Case, mark: usize) -> Judgement {
         None => return Judgement::Wait,
         Some(frame) if frame.flags.acknowledgement() == Acknowledgement::Negative => {
             Verdict::failed(
-                "a message that wants an acknowledgement gets a negative one",
-                "the peer does not know the user-defined message, or cannot take it just now",
-                "send without acknowledgements to it",
+                "a message that requests acknowledgement gets a negative one",
+                "the peer does not know the user-defined message, or cannot accept it now",
+                "send to it without requesting acknowledgement",
             )
         }
         Some(frame) if !frame.payload.is_empty() => Verdict::failed(
             format!("its acknowledgement carries {} octets", frame.payload.len()),
-            "the peer sends the message back instead of an empty acknowledgement; JAUS++ and \
-             others drop such",
-            "send without acknowledgements to it",
+            "the peer returns the message instead of an empty acknowledgement; JAUS++ and others \
+             drop that",
+            "send to it without requesting acknowledgement",
         ),
-        Some(_) => Verdict::ok("a message that wants an acknowledgement gets it"),
+        Some(_) => Verdict::ok("a message that requests acknowledgement gets it"),
     };
     Judgement::Over(verdict)
 }
@@ -88,8 +88,9 @@ pub(super) fn acknowledged(case: &mut Case, mark: usize) -> Judgement {
 pub(super) fn not_acknowledged(case: &Case) -> Verdict {
     Verdict::failed(
         format!("{} acknowledges nothing", shown(case)),
-        "its transport does not implement acknowledgements, or answers them to another address",
-        "send without acknowledgements to it; large messages to it are then never certain",
+        "its transport does not implement acknowledgements, or sends them to another address",
+        "send to it without requesting acknowledgement; large messages to it are then never \
+         certain",
     )
 }
 
@@ -155,7 +156,7 @@ pub(super) fn is_controlled(case: &mut Case, mark: usize) -> Judgement {
     };
     Judgement::Over(Verdict::ok(match controller(&report) {
         Some(who) => format!("{who} is in control"),
-        None => "nobody is in control".to_owned(),
+        None => "no client is in control".to_owned(),
     }))
 }
 
@@ -164,15 +165,15 @@ pub(super) fn silent(case: &Case, query: &str, service: &str) -> Verdict {
     let id = shown(case);
     if case.services.is_some() {
         return Verdict::failed(
-            format!("{id} lists the service {service} and does not answer {query}"),
-            "it implements the service in part, or dropped the question",
-            "ask again; `jaus record` at the peer shows whether the question arrives",
+            format!("{id} lists the service {service} but does not answer {query}"),
+            "it implements the service only partly, or lost the query",
+            "try again; `jaus record` at the peer shows whether the query arrives",
         );
     }
     Verdict::failed(
         format!("{id} does not answer {query}"),
-        format!("the component offers no {service}"),
-        "ask the component that offers it: `jaus discover` lists components with their services",
+        format!("the component has no {service} service"),
+        "query the component that has it: `jaus discover` lists components with their services",
     )
 }
 
@@ -189,7 +190,7 @@ pub(super) fn take_control(case: &mut Case) -> Begin {
         .as_ref()
         .and_then(controller)
     {
-        return Begin::Over(Verdict::skipped(format!("{who} has it, and keeps it")));
+        return Begin::Over(Verdict::skipped(format!("{who} has control")));
     }
     let authority = case.report::<ReportAuthority>(0);
     let request = RequestControl {
@@ -198,7 +199,7 @@ pub(super) fn take_control(case: &mut Case) -> Begin {
     case.in_control = true;
     match case.ask_peer(&request) {
         Some(send) => Begin::Ask(Question::new(send)),
-        None => Begin::Over(Verdict::skipped("no id is known there")),
+        None => Begin::Over(Verdict::skipped("no component id is known at that address")),
     }
 }
 
@@ -206,7 +207,7 @@ pub(super) fn take_control(case: &mut Case) -> Begin {
 pub(super) fn taking_control(case: &mut Case, mark: usize, stage: u8) -> Judgement {
     if stage > 0 {
         return match case.report::<RejectControl>(mark) {
-            Some(_) => Judgement::Over(Verdict::ok("granted, and released again")),
+            Some(_) => Judgement::Over(Verdict::ok("granted and released")),
             None => Judgement::Wait,
         };
     }
@@ -223,13 +224,13 @@ pub(super) fn taking_control(case: &mut Case, mark: usize, stage: u8) -> Judgeme
     case.in_control = false;
     let why = match confirm.response_code {
         ResponseCode::NOT_AVAILABLE => "it is not available",
-        ResponseCode::INSUFFICIENT_AUTHORITY => "our authority does not suffice",
-        _ => "a reason without a name",
+        ResponseCode::INSUFFICIENT_AUTHORITY => "our authority is insufficient",
+        _ => "an unknown reason",
     };
     Judgement::Over(Verdict::failed(
         format!("control is refused: {why}"),
-        "somebody with more authority has it, or the component is not to be controlled now",
-        "`jaus query ID QueryControl` shows who has it; raise the client's authority code",
+        "a client with more authority has it, or the component cannot be controlled now",
+        "find that client with `jaus query ID QueryControl`; raise our authority code",
     ))
 }
 
@@ -240,14 +241,14 @@ pub(super) fn control_unanswered(case: &mut Case, stage: u8) -> Verdict {
         case.unsent.extend(send);
         return Verdict::failed(
             "Request Control is not answered",
-            "the component is not controlled by this service, or does not know who asks",
-            "look at the peer's access settings",
+            "the component is not controlled by this service, or does not accept our id",
+            "check the peer's access settings",
         );
     }
     Verdict::failed(
-        "control was granted, and Release Control is not answered",
+        "control was granted, but Release Control is not answered",
         "the peer sends no Reject Control when control is released",
-        "do not wait for it; Query Control shows whether control is free",
+        "do not wait for it; Query Control shows whether it is released",
     )
 }
 

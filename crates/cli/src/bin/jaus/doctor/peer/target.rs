@@ -50,7 +50,7 @@ fn of_one(id: JausId) -> Result<JausId, String> {
         return Ok(id);
     }
     Err(format!(
-        "{id} is not one component: `jaus discover` shows who is there; name one of them, or the \
+        "{id} is not a single component: run `jaus discover` and name one that it lists, or the \
          address of its host"
     ))
 }
@@ -94,7 +94,7 @@ mod tests {
              (10.0.0.2), an address with its port (10.0.0.2:3795), or both (77.1.1@10.0.0.2)"
         );
         for many in ["77.1.255", "65535.255.255", "77.255.255@10.0.0.2"] {
-            assert!(why(many).contains("is not one component"), "{many}");
+            assert!(why(many).contains("is not a single component"), "{many}");
         }
         for wrong in ["77.1", "10.0.0.300", "10.0.0.2:0", "239.255.0.1", ""] {
             assert!(

@@ -186,7 +186,7 @@ pub(super) fn identifies_a_subsystem(report: &ReportIdentification, _: &mut Memo
     let kinds = [Type::VEHICLE, Type::OCU, Type::OTHER_SUBSYSTEM];
     if !kinds.contains(&report.r#type) {
         return Err(format!(
-            "type {} is no kind of subsystem: 10001 vehicle, 20001 OCU, 30001 other",
+            "type {} is not a subsystem type: 10001 vehicle, 20001 OCU, 30001 other",
             report.r#type.0
         ));
     }
@@ -216,7 +216,7 @@ pub(super) fn lists_services(report: &ReportServices, memory: &mut Memory) -> Ch
         .map(|service| service.uri.to_string_lossy());
     let uris: Vec<_> = uris.collect();
     if let Some(uri) = uris.iter().find(|uri| !uri.starts_with("urn:")) {
-        return Err(format!("`{uri}` is no URN"));
+        return Err(format!("`{uri}` is not a URN"));
     }
     present(
         "Transport",
@@ -267,7 +267,7 @@ pub(super) fn is_in(report: &ReportStatus, must_be: Status) -> Check {
         Status::SHUTDOWN => "3 (shutdown)".to_owned(),
         Status::FAILURE => "4 (failure)".to_owned(),
         Status::EMERGENCY => "5 (emergency)".to_owned(),
-        Status(other) => format!("{other}, which is no state"),
+        Status(other) => format!("{other}, which is not a state"),
     };
     equal("the status", named(report.status), named(must_be))
 }

@@ -163,7 +163,10 @@ fn create_on_a_report() -> Exchange {
             equal("the request id", report.request_id, 3)?;
             match report.response_code {
                 Some(code) if (1..=6).contains(&code.0) => Ok(()),
-                Some(code) => Err(format!("{} is no response code: 1 to 6 are", code.0)),
+                Some(code) => Err(format!(
+                    "{} is not a response code, which is 1 to 6",
+                    code.0
+                )),
                 None => Err("the response code is missing".to_owned()),
             }
         },
@@ -239,7 +242,7 @@ fn subscribe(request_id: u8, query: impl Message, report: u16) -> Exchange {
 fn cancel_the_oldest(request_id: u8) -> Exchange {
     let message = move |memory: &Memory| {
         let oldest = memory.streams.first();
-        let oldest = oldest.ok_or("there is no event left to cancel")?;
+        let oldest = oldest.ok_or("no event is left to cancel")?;
         Ok(CancelEvent {
             request_id,
             event_id: oldest.id,

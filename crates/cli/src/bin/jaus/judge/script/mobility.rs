@@ -231,6 +231,6 @@ fn is_empty(empty: bool) -> Check {
     if empty {
         Ok(())
     } else {
-        Err("there are fields that were not asked for".to_owned())
+        Err("it has fields that were not requested".to_owned())
     }
 }

@@ -66,7 +66,7 @@ pub(in super::super) fn known(text: &str) -> Result<&'static str, String> {
     let names: BTreeSet<_> = registry().services().map(|info| info.name).collect();
     let names: Vec<_> = names.into_iter().collect();
     Err(format!(
-        "there is no service {text} here; there are {}",
+        "there is no service {text}; the services are {}",
         names.join(", ")
     ))
 }
@@ -173,7 +173,7 @@ fn asked(
         to: Main,
         code: report.code,
         name: report.name,
-        words: "as its definition has it".into(),
+        words: "as defined".into(),
         check: Box::new(move |octets, memory| look(report.code, &read(octets)?, memory)),
         is_optional,
         in_parts: false,
@@ -217,7 +217,9 @@ fn without_control(command: &MessageInfo, queries: &[&MessageInfo]) -> Vec<Act> 
 
 /// The JSON view of a report.
 fn read(octets: &Bytes) -> Result<Json, String> {
-    let message = registry().decode(octets).ok_or("it is no known message")?;
+    let message = registry()
+        .decode(octets)
+        .ok_or("it is not a known message")?;
     let message = message.map_err(|error| error.to_string())?;
     serde_json::to_value(message.view()).map_err(|error| error.to_string())
 }
@@ -233,7 +235,7 @@ fn is_unchanged(code: u16, report: &Json, memory: &mut Memory) -> Check {
     if is_same(before, report) {
         return Ok(());
     }
-    Err(format!("it was {before} before, and is {report} now"))
+    Err(format!("it was {before}, and is now {report}"))
 }
 
 /// Whether two reports are equal, except for time stamps and tolerated drift.

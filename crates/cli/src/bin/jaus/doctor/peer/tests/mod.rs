@@ -119,7 +119,7 @@ fn a_silent_host_and_a_closed_port_are_told_apart() {
         ..Silent::default()
     };
     let (text, _) = words(settings("10.0.0.2"), &mut gone);
-    let told = "there is no way to 10.0.0.2, or nobody has that address";
+    let told = "there is no route to 10.0.0.2, or no host has that address";
     assert!(text.contains(told), "{text}");
     let mut closed = Silent {
         refuses: true,
@@ -157,7 +157,7 @@ fn a_peer_that_answers_from_another_port_is_told_from_one_behind_a_translation()
     translated.hears_at_source = true;
     let (text, _) = words(settings("10.0.0.2"), &mut translated);
     assert!(
-        text.contains("something between translates ports"),
+        text.contains("something on the path translates ports"),
         "{text}"
     );
 }
@@ -169,7 +169,7 @@ fn a_wrong_port_is_told_with_the_right_one() {
     peer.speaks_from = 3795;
     let (text, outcome) = words(settings("10.0.0.2"), &mut peer);
     assert_eq!(outcome, Outcome::Broken);
-    assert!(text.contains("name that: --peer 10.0.0.2:3795"), "{text}");
+    assert!(text.contains("use that: --peer 10.0.0.2:3795"), "{text}");
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn a_wrong_id_is_told_with_the_right_one() {
     let (text, outcome) = words(settings("78.1.1@10.0.0.2"), &mut Vehicle::sound());
     assert_eq!(outcome, Outcome::Broken);
     assert!(
-        text.contains("name that: --peer 77.1.1@10.0.0.2:3794"),
+        text.contains("use that: --peer 77.1.1@10.0.0.2:3794"),
         "{text}"
     );
 }
@@ -188,7 +188,7 @@ fn a_firewall_before_a_peer_that_speaks_is_suspected() {
     peer.hears_unicast = false;
     let (text, outcome) = words(settings("10.0.0.2"), &mut peer);
     assert_eq!(outcome, Outcome::Broken);
-    assert!(text.contains("its firewall lets no UDP in"), "{text}");
+    assert!(text.contains("its firewall blocks incoming UDP"), "{text}");
 }
 
 #[test]
@@ -292,9 +292,9 @@ fn numbers_that_do_not_count_and_messages_that_come_twice_are_noticed() {
     for (knob, told) in [
         (
             (|v| v.counts = false) as fn(&mut Vehicle),
-            "messages have the number 7",
+            "messages have the sequence number 7",
         ),
-        (|v| v.doubles = true, "messages came twice"),
+        (|v| v.doubles = true, "messages arrived twice"),
     ] {
         let mut peer = Vehicle::sound();
         knob(&mut peer);
@@ -309,14 +309,14 @@ fn an_id_that_is_there_twice_or_that_our_node_is_to_have_is_noticed() {
     peer.twin = Some("10.0.0.9:3794".parse().unwrap());
     let (text, _) = words(settings("77.1.1@10.0.0.2"), &mut peer);
     assert!(
-        text.contains("77.1.1 speaks from 10.0.0.2 and from 10.0.0.9"),
+        text.contains("77.1.1 sends from 10.0.0.2 and from 10.0.0.9"),
         "{text}"
     );
     let mut same = settings("10.0.0.2");
     same.wanted = Some(JausId::new(77, 1, 1));
     let (text, _) = words(same, &mut Vehicle::sound());
     assert!(
-        text.contains("77.1.1 is the id that our node is to have"),
+        text.contains("77.1.1 is the id chosen for our node"),
         "{text}"
     );
 }

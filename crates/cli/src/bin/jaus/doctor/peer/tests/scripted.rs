@@ -473,7 +473,7 @@ impl Scripted for Silent {
     fn hear(&mut self, send: &Send, air: &mut Air) {
         match send {
             Send::Probe(..) if self.refuses => air.refuse(Refusal::Port),
-            // The system has searched for the host meanwhile.
+            // Meanwhile the system has searched for the host.
             Send::To(..) if self.gone => air.refuse(Refusal::Host),
             _ => {}
         }
