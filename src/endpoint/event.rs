@@ -141,6 +141,6 @@ pub enum Unacknowledged {
     #[error("not acknowledged in time")]
     TimedOut,
     /// It was never sent, because its destination did not acknowledge the messages before it.
-    #[error("not sent, as the receiver acknowledges nothing")]
+    #[error("not sent: the receiver acknowledges nothing")]
     NotSent,
 }

@@ -257,7 +257,7 @@ impl Endpoint {
             return Ok(());
         }
         if self.warnings.is_due(arrival.now, Warning::PinnedElsewhere) {
-            warn!(%id, from = %path.peer, "refused: peers says that this id is at another address");
+            warn!(%id, from = %path.peer, "refused: `peers` pins this id to another address");
         }
         Err(Counter::PinnedElsewhere)
     }
@@ -388,7 +388,7 @@ impl Endpoint {
         self.conflicts.insert(id, now);
         debug!(%id, ?path, "id conflict");
         if self.warnings.is_due(now, Warning::IdConflict) {
-            warn!(%id, from = %path.peer, "somebody else uses an id of this node: change one of the two");
+            warn!(%id, from = %path.peer, "another node uses an id of this node: change one of the two");
         }
         self.announce(Event::IdConflict { id, path });
     }

@@ -71,7 +71,7 @@ impl Endpoint {
                     if self.warnings.is_due(now, Warning::TableFull) {
                         warn!(
                             %forgotten, newcomer = %id, from = %path.peer,
-                            "the table of peers is full: raise limits.max_peers, or see who invents ids"
+                            "the peer table is full: raise limits.max_peers, or find the sender of forged ids"
                         );
                     }
                 }

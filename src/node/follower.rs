@@ -27,7 +27,7 @@ const SETTLE: Duration = Duration::from_millis(50);
 /// Follows the interfaces until the node has stopped.
 #[expect(
     clippy::disallowed_methods,
-    reason = "it looks at interfaces, and decides nothing by time"
+    reason = "it polls interfaces; the protocol does not depend on its clock"
 )]
 pub(super) async fn follow(shared: Arc<Shared>, mut changes: Changes) {
     // Addresses where a link could not be opened.
@@ -49,7 +49,7 @@ pub(super) async fn follow(shared: Arc<Shared>, mut changes: Changes) {
         let before = std::mem::replace(&mut refused, addresses.collect());
         for (interface, error) in failures {
             if !before.contains(&interface.at(0)) {
-                tracing::warn!(%interface, %error, "no link on an interface that came up");
+                tracing::warn!(%interface, %error, "cannot open a link on a new interface");
             }
         }
     }

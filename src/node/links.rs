@@ -258,7 +258,7 @@ fn route_to(
         return Ok(Some((address, near.address)));
     }
     let Some(local) = interface::local_address_for(address) else {
-        tracing::debug!(%peer, "no way there just now");
+        tracing::debug!(%peer, "no route to the peer");
         return Ok(None);
     };
     if !chosen.iter().any(|interface| interface.address == local) {

@@ -41,7 +41,7 @@ impl Listener {
             io::ErrorKind::AddrInUse => Error::PortTaken(port),
             _ => Error::io(format!("listening on {port}"))(source),
         };
-        tracing::warn!(%port, "every program on this host may attach components through a TCP port");
+        tracing::warn!(%port, "any program on this host can attach components through a TCP port");
         listen(port).map(Self::Tcp).map_err(failed)
     }
 

@@ -38,7 +38,7 @@ impl SerialError {
 
 fn choice(ports: &[String]) -> String {
     match ports {
-        [] => "no serial port is found on this host".to_owned(),
+        [] => "no serial ports found on this host".to_owned(),
         ports => format!("there are: {}", ports.join(", ")),
     }
 }

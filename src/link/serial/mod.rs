@@ -250,7 +250,9 @@ impl SerialLink {
                 tracing::info!(device, "serial port is back");
                 self.port = Some(port);
             }
-            Poll::Ready(Err(error)) => tracing::debug!(device, %error, "still no serial port"),
+            Poll::Ready(Err(error)) => {
+                tracing::debug!(device, %error, "serial port still unavailable")
+            }
         }
     }
 }

@@ -171,7 +171,7 @@ impl UdpLink {
                 {
                     self.gso_limit = limit;
                     let interface = &self.interface.name;
-                    tracing::info!(interface, limit, %error, "datagrams above the limit leave one by one");
+                    tracing::info!(interface, limit, %error, "batched send is unavailable; datagrams are sent one by one");
                     return;
                 }
                 self.counters.send_errors += datagrams as u64;

@@ -136,14 +136,14 @@ mod tests {
                 patience: Duration::from_millis(5),
                 ..usual()
             }),
-            "delivery.patience 5ms cannot be: choose from 100ms to 600s"
+            "delivery.patience 5ms is out of range: choose from 100ms to 600s"
         );
         assert_eq!(
             refused(Delivery {
                 window: 1,
                 ..usual()
             }),
-            "delivery.window 1 cannot be: choose from 2 to 16384"
+            "delivery.window 1 is out of range: choose from 2 to 16384"
         );
         let short = Delivery {
             pace_burst: 100,

@@ -11,13 +11,13 @@ use crate::link::InvalidGroup;
 #[non_exhaustive]
 pub enum ConfigError {
     /// A setting is out of its range.
-    #[error("{setting} {value} cannot be: choose {range}")]
+    #[error("{setting} {value} is out of range: choose {range}")]
     OutOfRange {
         /// Its section and key.
         setting: String,
         /// The configured value.
         value: String,
-        /// What can be.
+        /// The valid range.
         range: String,
     },
     /// Junior delivers only to its own clients.
@@ -44,7 +44,7 @@ pub enum ConfigError {
     Peer(String),
     /// Not an address to listen on.
     #[error(
-        "`{0}` is no address to listen on: write an address of this host, or 0.0.0.0 for all of \
+        "`{0}` is not an address to listen on: write an address of this host, or 0.0.0.0 for all of \
          them, with a port if it is not 3794, such as 10.0.0.5 or 0.0.0.0:3795"
     )]
     Listen(String),

@@ -115,7 +115,7 @@ mod tests {
         let none = error(|config| config.limits.messages_per_id = Some(Rate::new(0, 5)));
         assert_eq!(
             none,
-            "limits.messages_per_id.per_second 0 cannot be: choose 1 or more"
+            "limits.messages_per_id.per_second 0 is out of range: choose 1 or more"
         );
         let none = error(|config| config.routing.broadcasts = Rate::new(5, 0));
         assert!(none.contains("routing.broadcasts.burst 0"), "{none}");

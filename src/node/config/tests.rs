@@ -7,7 +7,9 @@ fn ids_that_name_nobody_or_everybody_are_refused() {
     for (subsystem, node) in [(0, 1), (65535, 1), (1, 0), (1, 255)] {
         let error = Config::new(subsystem, node).validate().unwrap_err();
         assert!(
-            error.to_string().contains("cannot be: choose from 1 to"),
+            error
+                .to_string()
+                .contains("is out of range: choose from 1 to"),
             "{error}"
         );
     }
@@ -32,7 +34,7 @@ fn sizes_that_no_packet_has_are_refused() {
     assert!(with(64, 4_194_240).is_ok());
     assert_eq!(
         with(64, 4_194_241).unwrap_err(),
-        "max_message 4194241 cannot be: choose from 64 to 4194240"
+        "max_message 4194241 is out of range: choose from 64 to 4194240"
     );
 }
 
@@ -173,7 +175,7 @@ mod toml_files {
         let interfaces = error("interfaces = \"eth0\"");
         assert!(interfaces.contains("[\"eth0\"]"), "{interfaces}");
         let peer = error("peers = [\"nobody\"]");
-        assert!(peer.contains("`nobody` is no peer's address"), "{peer}");
+        assert!(peer.contains("`nobody` is not a peer's address"), "{peer}");
     }
 
     #[test]

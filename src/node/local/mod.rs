@@ -103,11 +103,11 @@ async fn attach(shared: &Arc<Shared>, stream: Stream) -> Option<(Session, Reader
     let (version, id, name) = match timeout(HANDSHAKE, hello).await {
         Ok(Ok(hello)) => hello,
         Ok(Err(error)) => {
-            tracing::warn!(?pid, %error, "a connection to the local link is no component's");
+            tracing::warn!(?pid, %error, "rejected a connection to the local link: not a component");
             return None;
         }
         Err(_) => {
-            tracing::warn!(?pid, "a connection to the local link is silent");
+            tracing::warn!(?pid, "closed a silent connection to the local link");
             return None;
         }
     };
@@ -142,7 +142,7 @@ async fn admit(
     let deadline = tokio::time::Instant::now() + OVERLAP;
     loop {
         if shared.lock().is_stopping() {
-            return Err((Reason::Stopping, "the node is about to stop".to_owned()));
+            return Err((Reason::Stopping, "the node is stopping".to_owned()));
         }
         let error = match shared.attach(id, Some(process.clone())) {
             Ok(mailbox) => return Ok((id, mailbox)),
@@ -161,8 +161,8 @@ async fn admit(
 fn full_id(config: &Config, version: u8, wanted: JausId) -> Result<JausId, Refusal> {
     if version != VERSION {
         let why = format!(
-            "the component speaks version {version} of the local link's protocol, the node \
-             version {VERSION}: build both with the same release"
+            "the component uses version {version} of the local link's protocol, the node \
+             version {VERSION}: build both from the same release"
         );
         return Err((Reason::Version, why));
     }

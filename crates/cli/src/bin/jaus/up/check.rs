@@ -35,7 +35,7 @@ pub(super) fn check(file: &Path, system: &System) -> Result<Outcome, Failure> {
         }
     }
     let parts = counted(system.parts.len(), "part");
-    output.line(format_args!("{parts}, nothing is wrong"))?;
+    output.line(format_args!("{parts}, no errors"))?;
     Ok(Outcome::Done)
 }
 

@@ -29,7 +29,7 @@ pub(super) async fn run(flags: &Up, system: System) -> Result<Outcome, Failure> 
     let mut running = Running::new(flags, system, &console)?;
     drop(console);
     let parts = counted(running.system.parts.len(), "part");
-    running.say(&format!("{parts}; Ctrl-C ends all"));
+    running.say(&format!("{parts}; press Ctrl-C to end"));
     loop {
         running.settle();
         if running.supervisor.is_over() {
