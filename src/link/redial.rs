@@ -57,6 +57,7 @@ impl<T> Redial<T> {
     }
 
     /// Of what is open.
+    #[cfg(feature = "serial")]
     pub(super) fn up(timeout: Duration, pauses: RangeInclusive<Duration>) -> Self {
         Self {
             state: State::Up,

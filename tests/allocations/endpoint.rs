@@ -10,7 +10,7 @@ use jaus::endpoint::{Config, Endpoint, LinkId, LinkProfile, Outgoing, Path, Remo
 use jaus::wire::{Frame, judp};
 use stats_alloc::Region;
 
-use super::{ALLOCATOR, alone};
+use super::{ALLOCATOR, ALONE};
 
 const US: JausId = JausId::new(101, 1, 1);
 const PEER: JausId = JausId::new(42, 1, 1);
@@ -53,7 +53,7 @@ fn allocations(mut handle: impl FnMut(usize)) -> usize {
 
 #[test]
 fn a_small_message_is_received_and_sent_without_allocation() {
-    let _alone = alone();
+    let _alone = ALONE.blocking_lock();
     let start = Instant::now();
     let at = |number: usize| start + Duration::from_millis(number as u64);
     let payload = Bytes::from_static(&[0x02, 0x44, 1, 2, 3, 4, 5, 6, 7, 8]);

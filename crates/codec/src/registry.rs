@@ -133,7 +133,7 @@ pub struct ServiceSet {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Registry {
-    base: Option<&'static Registry>,
+    base: Option<&'static Self>,
     sets: &'static [ServiceSet],
 }
 

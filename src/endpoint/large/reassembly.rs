@@ -8,6 +8,7 @@
 //! Unfinished messages are bounded in octets (including an overhead per piece), per sender and in
 //! total, and in time. The oldest runs are dropped first.
 
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::Arc;
 use std::time::Instant;
@@ -305,7 +306,7 @@ impl Reassembly {
     }
 
     /// Adds a fragment; returns the message if it is complete. `style` is the sender's style, if
-    /// known. The payload keeps `held` octets of memory alive. Runs dropped to stay within bounds
+    /// known. Runs dropped to stay within bounds
     /// are counted.
     pub(in crate::endpoint) fn insert(
         &mut self,
@@ -315,9 +316,8 @@ impl Reassembly {
     ) -> Result<Option<Whole>, Counter> {
         let (frame, now, path) = (arrival.frame, arrival.now, arrival.path);
         let source = frame.source;
-        if !self.senders.contains_key(&source) {
-            let sender = Sender::new(now, frame.sequence, path.into());
-            self.senders.insert(source, sender);
+        if let Entry::Vacant(vacant) = self.senders.entry(source) {
+            vacant.insert(Sender::new(now, frame.sequence, path.into()));
             self.enlist(path.into(), now, source);
         }
         let max_message = self.config.max_message;

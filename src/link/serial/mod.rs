@@ -251,7 +251,7 @@ impl SerialLink {
                 self.port = Some(port);
             }
             Poll::Ready(Err(error)) => {
-                tracing::debug!(device, %error, "serial port still unavailable")
+                tracing::debug!(device, %error, "serial port still unavailable");
             }
         }
     }

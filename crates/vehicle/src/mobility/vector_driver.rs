@@ -103,7 +103,7 @@ impl Behaviour for LocalVectorDriver {
                 exchange.answer_if(|query: &QueryLocalVectorExt, exchange| {
                     let vector = self.0.current(exchange.controls);
                     local_ext(&vector, Wanted(query.presence_vector.into()))
-                })
+                });
             }
             _ => return Handled::No,
         }
@@ -151,7 +151,7 @@ impl Behaviour for GlobalVectorDriver {
                 exchange.answer_if(|query: &QueryGlobalVectorExt, exchange| {
                     let vector = self.0.current(exchange.controls);
                     global_ext(&vector, Wanted(query.presence_vector.into()))
-                })
+                });
             }
             _ => return Handled::No,
         }

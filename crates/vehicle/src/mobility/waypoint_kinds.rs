@@ -41,7 +41,7 @@ impl Kind for Global {
             QueryGlobalWaypointExt::CODE => {
                 exchange.answer_if(|query: &QueryGlobalWaypointExt, _| {
                     waypoint.report_ext(Wanted(query.presence_vector.into()))
-                })
+                });
             }
             _ => return Handled::No,
         }
@@ -77,7 +77,7 @@ impl Kind for Local {
             QueryLocalWaypointExt::CODE => {
                 exchange.answer_if(|query: &QueryLocalWaypointExt, _| {
                     waypoint.report_ext(Wanted(query.presence_vector.into()))
-                })
+                });
             }
             _ => return Handled::No,
         }
