@@ -34,6 +34,7 @@
 
 mod access;
 mod acknowledge;
+mod arrival;
 mod config;
 mod counters;
 mod delivery;

@@ -6,6 +6,7 @@ use std::time::Instant;
 use bytes::Bytes;
 use tracing::{debug, trace, warn};
 
+use super::arrival::Arrival;
 use super::duplicates::Novelty;
 use super::peers::is_challenge;
 use super::recent::Fingerprint;
@@ -14,18 +15,6 @@ use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
 use crate::address::JausId;
 use crate::peer::{self, Sign};
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, judp};
-
-/// A received message, and how it arrived.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Arrival<'a> {
-    pub(super) frame: &'a Frame,
-    pub(super) now: Instant,
-    pub(super) path: Path,
-    /// Whether it was sent to the link's group.
-    pub(super) to_all: bool,
-    /// Octets of memory that its payload keeps alive.
-    pub(super) held: usize,
-}
 
 /// A repeated message is forwarded at most this often. No sender retransmits more often before it
 /// gives up. A frame that circulates between routers, because it was corrupted or forged as if one

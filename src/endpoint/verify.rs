@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use tracing::{debug, warn};
 
+use super::arrival::Arrival;
 use super::peers::{CHALLENGE, CHALLENGE_FLAGS, Challenge, Finding, Heard, Probe};
-use super::receive::Arrival;
 use super::{Counter, Endpoint, Event, Path};
 use crate::address::JausId;
 use crate::wire::{Frame, Framing};

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use tokio::sync::oneshot;
 
+use super::answers::Answers;
 use super::error::Undelivered;
-use super::local::Answers;
 use crate::address::JausId;
 use crate::endpoint::{Event, MessageHandle};
 

@@ -33,6 +33,7 @@
 //! # }
 //! ```
 
+mod answers;
 mod awaiting;
 mod components;
 mod config;

@@ -17,8 +17,8 @@ use bytes::Bytes;
 
 use super::style;
 use crate::address::JausId;
+use crate::endpoint::arrival::Arrival;
 use crate::endpoint::rate::Origin;
-use crate::endpoint::receive::Arrival;
 use crate::endpoint::share::{Ages, Tally};
 use crate::endpoint::{Config, Counter, Counters};
 use crate::peer::LargeStyle;

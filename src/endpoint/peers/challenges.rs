@@ -7,8 +7,8 @@ use super::places::Standing;
 use super::{Challenge, Finding, Peers, RouteState, route};
 use crate::address::JausId;
 use crate::endpoint::Path;
+use crate::endpoint::arrival::Arrival;
 use crate::endpoint::rate::Origin;
-use crate::endpoint::receive::Arrival;
 use crate::endpoint::share::Tally;
 use crate::peer::Recogniser;
 

@@ -19,13 +19,16 @@
 //! | `connection` | the two halves of a connection, the same on both sides |
 //! | `stream` | the two kinds of stream, and the process at the other end |
 //! | `address` | the address at which the node listens |
-//! | `listener`, `unix_socket` | the node's side: its default directory, directory and socket with their permissions |
+//! | `default_place` | where the Unix socket is by default |
+//! | `listener`, `unix_socket` | the node's side: directory and socket with their permissions |
 //!
 //! [`node`](crate::node) reads and answers the records.
 
 mod address;
 mod assembler;
 mod connection;
+#[cfg(unix)]
+mod default_place;
 mod error;
 mod listener;
 pub mod record;

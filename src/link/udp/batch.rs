@@ -19,7 +19,7 @@ use nix::sys::socket::{
 
 use rustix::net::{MMsgHdr, SendAncillaryBuffer, SendFlags, SocketAddrAny, sendmmsg};
 
-use super::send::GsoBatch;
+use super::gso_batch::GsoBatch;
 use super::socket::Socket;
 use crate::link::Slab;
 use crate::link::slab::LONGEST;

@@ -7,6 +7,7 @@
 
 #[cfg(target_os = "linux")]
 mod batch;
+mod gso_batch;
 mod open;
 mod receive;
 mod send;
@@ -19,7 +20,7 @@ use std::net::SocketAddr;
 
 use bytes::Bytes;
 
-use send::GsoBatch;
+use gso_batch::GsoBatch;
 use socket::Socket;
 
 pub use settings::{Broadcasts, PortTaken, Settings};

@@ -11,34 +11,14 @@ use std::task::{Context, Poll, ready};
 use bytes::{Buf, Bytes};
 use socket2::SockRef;
 
+use super::UdpLink;
+use super::gso_batch::GsoBatch;
 use super::socket::Socket;
-use super::{MAX_SEGMENTS, UdpLink};
-use crate::endpoint::{MOST_OCTETS, Remote, To, Transmit};
+use crate::endpoint::{Remote, To, Transmit};
 use crate::wire::Priority;
 
-/// So many messages leave at once, and with one call if they are datagrams to different peers.
+/// How many messages leave at once, and with one call if they are datagrams to different peers.
 const BURST: usize = 64;
-
-/// Datagrams to one peer, of `segment` octets each, of which the last may be shorter.
-#[derive(Clone, Debug)]
-pub(super) struct GsoBatch {
-    pub(super) peer: SocketAddr,
-    pub(super) octets: Bytes,
-    pub(super) segment: usize,
-}
-
-impl GsoBatch {
-    /// What leaves with one call, if datagrams of up to `limit` octets may leave together.
-    pub(super) fn part(&self, limit: usize) -> &[u8] {
-        let datagrams = if self.segment <= limit {
-            (MOST_OCTETS / self.segment).clamp(1, MAX_SEGMENTS)
-        } else {
-            1
-        };
-        let octets = self.octets.len().min(datagrams * self.segment);
-        &self.octets[..octets]
-    }
-}
 
 impl UdpLink {
     /// Queues what the endpoint gives out, for [`flush`](Self::flush).

@@ -16,7 +16,6 @@ use std::time::Duration;
 use tokio::sync::{Semaphore, watch};
 use tokio::time::timeout;
 
-pub(super) use self::session::Answers;
 use self::session::Session;
 use super::Config;
 use super::components::{ComponentEvent, Departure};

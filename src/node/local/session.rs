@@ -8,18 +8,18 @@
 //! them wait, so nothing here grows without bound.
 
 use std::future::{pending, poll_fn};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
+use super::super::answers::Answers;
 use super::super::awaiting::Waiter;
 use super::super::components::{ComponentEvent, Departure};
 use super::super::core::{Core, LAST_WORDS, Shared};
-use super::super::error::Undelivered;
 use super::super::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::{Outgoing, Received};
-use crate::link::local::record::{Head, Outcome, Record, RecordError};
+use crate::link::local::record::{Head, Record, RecordError};
 use crate::link::local::{Error, Process, Reader, Writer};
 use crate::wire::{Acknowledgement, Flags};
 
@@ -209,44 +209,5 @@ fn delivery(message: Received) -> Record {
             path: message.path,
         },
         payload: message.payload,
-    }
-}
-
-/// The writing half of a component's connection: replies of the session, and outcomes of the
-/// component's messages.
-#[derive(Debug)]
-pub(in super::super) struct Answers(Mutex<Writer>);
-
-impl Answers {
-    const fn new(writer: Writer) -> Self {
-        Self(Mutex::new(writer))
-    }
-
-    /// Sends the outcome of a message.
-    pub(in super::super) fn send(&self, handle: u64, outcome: Result<(), Undelivered>) {
-        let octets = |octets: usize| u32::try_from(octets).unwrap_or(u32::MAX);
-        let outcome = match outcome {
-            Ok(()) => Outcome::Acknowledged,
-            Err(Undelivered::NotAcknowledged {
-                destination,
-                reason,
-                acknowledged,
-                length,
-            }) => Outcome::NotAcknowledged {
-                destination,
-                reason,
-                acknowledged: octets(acknowledged),
-                length: octets(length),
-            },
-            Err(error) => {
-                let rejected = Record::rejected(handle, &error.to_string());
-                return self.lock().send(&rejected);
-            }
-        };
-        self.lock().send(&Head::Outcome { handle, outcome }.into());
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Writer> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

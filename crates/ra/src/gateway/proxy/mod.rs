@@ -16,6 +16,7 @@ mod codes;
 mod emergency;
 mod entering;
 mod events;
+mod held_control;
 mod hold;
 mod lease;
 mod listing;

@@ -1,0 +1,29 @@
+//! Datagrams that the operating system splits: they leave with one call.
+
+use std::net::SocketAddr;
+
+use bytes::Bytes;
+
+use super::MAX_SEGMENTS;
+use crate::endpoint::MOST_OCTETS;
+
+/// Datagrams to one peer, of `segment` octets each, of which the last may be shorter.
+#[derive(Clone, Debug)]
+pub(super) struct GsoBatch {
+    pub(super) peer: SocketAddr,
+    pub(super) octets: Bytes,
+    pub(super) segment: usize,
+}
+
+impl GsoBatch {
+    /// What leaves with one call, if datagrams of up to `limit` octets may leave together.
+    pub(super) fn part(&self, limit: usize) -> &[u8] {
+        let datagrams = if self.segment <= limit {
+            (MOST_OCTETS / self.segment).clamp(1, MAX_SEGMENTS)
+        } else {
+            1
+        };
+        let octets = self.octets.len().min(datagrams * self.segment);
+        &self.octets[..octets]
+    }
+}
