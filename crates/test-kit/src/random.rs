@@ -36,13 +36,13 @@ impl Random {
         self.number() % 1000 < u64::from(of_1000)
     }
 
-    /// A time within the range.
+    /// A duration within the range.
     pub fn between(&mut self, range: &Range<Duration>) -> Duration {
         let spread = (range.end - range.start).as_nanos().max(1) as u64;
         range.start + Duration::from_nanos(self.number() % spread)
     }
 
-    /// A time of up to `millis` milliseconds.
+    /// A duration of up to `millis` milliseconds.
     pub fn up_to_millis(&mut self, millis: u64) -> Duration {
         self.between(&(Duration::ZERO..Duration::from_millis(millis.max(1))))
     }
