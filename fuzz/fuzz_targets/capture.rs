@@ -1,5 +1,5 @@
 //! Capture files: frames and errors do not depend on how the file is read, the frames hold no more
-//! octets than the file, and the frames survive writing and reading.
+//! octets than the file, and frames written to a file read back unchanged.
 //!
 //! The first octet is the length of the pieces in which the file is read the second time.
 #![no_main]

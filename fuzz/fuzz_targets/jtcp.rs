@@ -1,6 +1,6 @@
 //! JTCP streams: the first octet determines how the rest, a stream, is cut into parts. Cut or
-//! whole, it must give the same frames and the same error; frames survive writing and reading; at
-//! most one message is buffered.
+//! whole, it must give the same frames and the same error; decoded frames round-trip through the
+//! encoder; at most one message is buffered.
 #![no_main]
 
 use jaus::wire::jtcp::{self, Decoder};

@@ -1,7 +1,7 @@
 //! Datagrams: decoding and encoding them, and an endpoint that receives them.
 //!
-//! The first octet chooses. 0: the rest is one datagram, whose messages must survive writing and
-//! reading. Otherwise the rest drives an endpoint, and the octet's bits enable options (forwarding,
+//! The first octet chooses. 0: the rest is one datagram, whose messages must round-trip through the
+//! encoder. Otherwise the rest drives an endpoint, and the octet's bits enable options (forwarding,
 //! packing, rate limits, fragments): each step is an octet for the operation, and octets for its
 //! arguments. Tables and queues are small, so that they reach their limits.
 #![no_main]

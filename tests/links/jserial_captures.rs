@@ -44,8 +44,8 @@ fn juniors_packets_are_read_and_written_octet_for_octet() {
     check(&frames);
 }
 
-/// The first message goes to an unknown id and is acknowledged. Eight pings and pongs follow. The
-/// last message is of the first edition.
+/// The first ping goes to an unknown id and is acknowledged. Eight pings and eight pongs alternate,
+/// the first included. The last message is of the first edition.
 fn check(frames: &[Frame]) {
     let (a, b) = (JausId::new(1, 1, 1), JausId::new(2, 1, 1));
     let [first, acknowledgement, rest @ .., last] = frames else {

@@ -177,7 +177,7 @@ async fn what_is_sent_before_the_first_connection_waits_for_it_and_later_it_does
     assert!(link.poll_timeout().unwrap() > later);
 }
 
-/// JAUS++ writes it before each message, and loses its place in a stream without it.
+/// JAUS++ writes the version octet before each message, and loses its place in a stream without it.
 #[tokio::test]
 async fn who_writes_the_version_octet_before_each_message_gets_it_before_each() {
     let said = message(20);

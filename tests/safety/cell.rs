@@ -51,7 +51,7 @@ pub(crate) enum Fault {
     DeadIdsBefore,
     /// The controller is killed while 1000 ids appear and die.
     DeadIdsDuring,
-    /// The component shuts down in order.
+    /// The component shuts down gracefully.
     Stopped,
     /// The component's process is suspended.
     Hung,
@@ -67,7 +67,7 @@ pub(crate) enum Fault {
     DiskStall,
     /// The wall clock of the vehicle's host is stepped by an hour, and the controller is killed.
     VehicleClock,
-    /// The wall clock of the controller's host is stepped by an hour, and it is killed.
+    /// The wall clock of the controller's host is stepped by an hour, and the controller is killed.
     ControllerClock,
 }
 

@@ -99,7 +99,7 @@ impl Program {
         self.stack.standing()
     }
 
-    /// Shuts down in order; returns the messages still to be sent.
+    /// Shuts down gracefully; returns the messages still to be sent.
     pub(crate) fn stop(mut self, now: Instant) -> Vec<Outgoing> {
         self.stack.stop(&StopCause::Ended);
         self.stack.take_leave(now);

@@ -260,7 +260,7 @@ impl<O: Owner> Network<O> {
         self.settle(host.0);
     }
 
-    /// Sends a datagram from a host that is no node to a node's first link.
+    /// Sends a datagram from a host outside the simulation's nodes to a node's first link.
     pub fn inject(&mut self, from: SocketAddr, to: Host, datagram: &Bytes) {
         let what = format_args!("{from} sends {} octets to {to:?}", datagram.len());
         self.trace.note(self.now, what);

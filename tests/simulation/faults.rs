@@ -124,7 +124,7 @@ impl Faults {
         nodes.note("the wire is good");
     }
 
-    /// Sends a forged message of a node's component from a host that is no node.
+    /// Sends a message from an outside host in the name of a node's component.
     fn forge(&mut self, random: &mut Random, nodes: &mut Nodes, victim: usize) {
         self.count("forged");
         let to = random.below(nodes.len());

@@ -11,7 +11,7 @@ pub(crate) struct Plan {
     pub(crate) nodes: Vec<NodePlan>,
     /// The wire changes bits undetected: meanwhile no received message can be trusted.
     pub(crate) is_corrupting: bool,
-    /// A host that is no node sends messages in the names of others.
+    /// An outside host sends messages in the names of the nodes' components.
     pub(crate) is_forging: bool,
 }
 

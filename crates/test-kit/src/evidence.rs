@@ -2,7 +2,7 @@
 //!
 //! Most of it is in the repository, under `tests/evidence`, and always available. Evidence that
 //! must not be redistributed is in the folder named by `JAUS_SHARED` (by default `../shared` beside
-//! the repository). A test without its evidence reports this outside the test harness, with a
+//! the repository). A test without its evidence bypasses the test harness to report this, with a
 //! count, and fails if `JAUS_EVIDENCE=required` is set.
 
 use std::fs::OpenOptions;

@@ -88,7 +88,7 @@ impl Rover {
         }
     }
 
-    /// The vehicle stops this long after the controller's last report of ready or standby.
+    /// An effort ends this long after the controller's last report of ready or standby.
     const CONTROLLER_TIMEOUT: Duration = Duration::from_millis(1500);
 
     /// Whether the vehicle moves at this time.
