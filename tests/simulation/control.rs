@@ -384,7 +384,7 @@ impl World {
         Ok(())
     }
 
-    /// Checks on a good wire that every client that believes to be in control is in control.
+    /// Checks on a good wire that every client that believes itself in control really is.
     fn come_to_rest(&mut self) -> Result<(), String> {
         self.network.set_conditions(Conditions::good());
         for host in self.operators {
