@@ -1,4 +1,4 @@
-//! What a datagram costs: its header alone, the whole frame, and its way through an endpoint.
+//! The cost of a datagram: its header alone, the whole frame, and its way through an endpoint.
 
 #![expect(clippy::expect_used, reason = "a benchmark")]
 
@@ -22,7 +22,7 @@ fn frame(payload: usize) -> Frame {
     }
 }
 
-/// The least that reading an uncompressed header can be: one check of the length, five loads.
+/// The minimal code that reads an uncompressed header: one length check, five loads.
 fn by_hand(octets: &[u8]) -> Option<(u8, u16, u8, JausId, JausId)> {
     let &[kind, s0, s1, flags, d0, d1, d2, d3, a0, a1, a2, a3] = octets.first_chunk()?;
     let (destination, source) = ([d0, d1, d2, d3], [a0, a1, a2, a3]);
@@ -80,7 +80,7 @@ fn datagram(c: &mut Criterion) {
     group.finish();
 }
 
-/// An endpoint that knows a peer, by its configured address perhaps, with a clock that stands still.
+/// An endpoint that knows one peer, optionally by its configured address, with a fixed clock.
 #[expect(
     clippy::disallowed_methods,
     reason = "virtual time starts at any instant"
@@ -133,7 +133,7 @@ fn through_an_endpoint(c: &mut Criterion) {
                 BatchSize::SmallInput,
             );
         });
-        // Others get no more than a little before they have acknowledged something.
+        // Without a configured address a peer is rate-limited until it has acknowledged something.
         let (mut sender, _, now) = endpoint(true);
         let message = Outgoing::new(US, PEER, Bytes::from(vec![0x44; payload]));
         group.bench_function(format!("send/{payload}"), |b| {

@@ -1,5 +1,5 @@
 //! A vehicle that can be driven: it obeys the client in control while it is ready, and stops
-//! whenever it may not act. `cargo run --example operator` drives it.
+//! whenever it must not act. `cargo run --example operator` drives it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering::Relaxed};
@@ -20,7 +20,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
             println!("{} drives with {ahead:.0} %", from.source);
             throttle.store(ahead as i32, Relaxed);
         })
-        // Standby, an emergency, lost control, a silent client and shutdown all end here.
+        // Runs on standby, emergency, lost control, a silent client, and shutdown.
         .on_stop(move |_| motor.store(0, Relaxed));
 
     let rover = Component::builder(Kind::Vehicle, "Rover")
@@ -39,6 +39,6 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
         }
     }
-    node.shutdown().await; // which stops the motor, too
+    node.shutdown().await; // stops the motor, too
     Ok(())
 }

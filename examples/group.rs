@@ -1,12 +1,12 @@
-//! Watches the speed of all velocity sensors, and stops all vehicles in an emergency. Start and stop
-//! `cargo run --example sensor` and `cargo run --example driver` beside it.
+//! Watches the speed of all velocity sensors, and stops all vehicles in an emergency. Start and
+//! stop `cargo run --example sensor` and `cargo run --example driver` beside it.
 
 use jaus::component::{Audience, Component, GroupUpdate, Kind, When};
 use jaus::messages::core::{ClearEmergency, SetEmergency, management};
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
 
-/// Above this speed all vehicles are stopped.
+/// All vehicles are stopped above this speed.
 const TOO_FAST: f64 = 2.4;
 
 #[tokio::main(flavor = "current_thread")]
@@ -14,7 +14,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let node = Node::start(Config::loopback(44, 1))?;
     let watch = Component::builder(Kind::OperatorControlUnit, "Watch").attach(&node, 1)?;
 
-    // All providers of the service, now and later.
+    // All current and future providers of the service.
     let query = QueryVelocityState { presence_vector: 1 };
     let mut speeds = watch.subscribe_all::<ReportVelocityState, _>(
         velocity_state_sensor::URN,

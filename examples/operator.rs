@@ -22,7 +22,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut beat = tokio::time::interval(Duration::from_millis(100));
     for _ in 0..10 {
         beat.tick().await;
-        control.send(&ahead)?; // which fails once control is lost
+        control.send(&ahead)?; // fails once control is lost
     }
     control.release().await;
     println!("{rover} is free again");

@@ -1,5 +1,5 @@
-//! What one would write by hand for just these messages: nothing optional, nothing checked but the
-//! length, no names in errors.
+//! Hand-written minimal codecs for three of the messages: all fields present, no checks except the
+//! length, no field names in errors.
 
 use bytes::Bytes;
 

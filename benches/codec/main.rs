@@ -1,5 +1,5 @@
-//! Encoding and decoding of seven telling messages, beside a hand-written minimum and a copy of
-//! the octets in the same run.
+//! Encoding and decoding times of seven representative messages, compared with a hand-written
+//! minimum and a copy of the octets in the same run.
 //!
 //! | | |
 //! |---|---|
@@ -11,9 +11,9 @@
 //! | time10 | ReportTime: two bit fields |
 //! | event64k | Event with 64 KiB of report |
 //!
-//! A figure is the *least* time per operation over short batches: what the code takes while nobody
-//! else wants the processor. `encode` appends to a buffer that is there already; `bytes` makes new
-//! shared octets.
+//! Each figure is the *shortest* time per operation over short batches: the time that the code
+//! takes while no other process uses the processor. `encode` appends to an existing buffer; `bytes`
+//! allocates new shared octets.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a benchmark")]
 
 mod hand;
@@ -27,7 +27,7 @@ use criterion::measurement::WallTime;
 use criterion::{Bencher, BenchmarkGroup, Criterion, criterion_group, criterion_main};
 use jaus::codec::Message;
 
-/// Runs in batches and counts each of them as long as the shortest.
+/// Runs in batches and takes the time of the shortest one for each of them.
 fn least<T>(bencher: &mut Bencher<'_>, mut operation: impl FnMut() -> T) {
     #[expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
     let now = Instant::now;
@@ -45,7 +45,7 @@ fn least<T>(bencher: &mut Bencher<'_>, mut operation: impl FnMut() -> T) {
     });
 }
 
-/// The codec of a message, and the limit.
+/// Measures the codec of a message, and a copy of its octets as the limit.
 fn codec<M: Message>(group: &mut BenchmarkGroup<'_, WallTime>, message: &M) {
     let octets = message.encode().unwrap();
     let mut buffer = Vec::with_capacity(octets.len());
@@ -74,7 +74,7 @@ fn codec<M: Message>(group: &mut BenchmarkGroup<'_, WallTime>, message: &M) {
     assert_eq!(M::decode(&octets).unwrap(), *message);
 }
 
-/// A hand-written minimum that must do the same.
+/// Measures a hand-written minimum that must give the same result.
 fn by_hand<M: Message, H>(
     group: &mut BenchmarkGroup<'_, WallTime>,
     message: &M,

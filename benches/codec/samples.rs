@@ -1,4 +1,4 @@
-//! The messages that are measured.
+//! The measured messages.
 
 use jaus::codec::FormattedBlob;
 use jaus::messages::core::{
@@ -60,7 +60,7 @@ pub(crate) fn wrench() -> SetWrenchEffort {
     wrench
 }
 
-/// One node, four components, six services each.
+/// One node with four components of six services each.
 pub(crate) fn services() -> ReportServices {
     use core::report_services::{ComponentRec, ComponentSeq, NodeRec, NodeSeq, ServiceRec};
     let services = [
@@ -114,7 +114,7 @@ pub(crate) fn time() -> ReportTime {
     }
 }
 
-/// A report of 64 KiB.
+/// An event with a report of 64 KiB.
 pub(crate) fn event() -> Event {
     Event {
         event_id: 1,

@@ -1,4 +1,4 @@
-//! The cost of many subscriptions, beside that of as many queries.
+//! The cost of many subscriptions, compared with that of the same number of queries.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -75,7 +75,7 @@ const fn client(number: u16) -> JausId {
     JausId::new(1000 + number % CLIENTS, 1, 1)
 }
 
-/// Nanoseconds for each of a thousand queries.
+/// Nanoseconds per query, over a thousand queries.
 fn answer_queries() -> f64 {
     let now = Instant::now();
     let mut stack = stack(now);
@@ -93,7 +93,7 @@ fn fire_events(subscriptions: u16) -> f64 {
     let mut now = Instant::now();
     let mut stack = stack(now);
     for number in 0..subscriptions {
-        // Unlike one another, or they would be the same event: octets behind a query are ignored.
+        // The queries must differ, or all create the same event. Octets behind a query are ignored.
         let mut query = QueryHeartbeatPulse.encode().unwrap().to_vec();
         query.extend((number / CLIENTS).to_le_bytes());
         let mut create = CreateEvent {

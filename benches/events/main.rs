@@ -1,14 +1,14 @@
-//! What events cost, and how well they keep their rate.
+//! Benchmark of events: their cost, and how closely they keep their rate.
 //!
 //! ```sh
 //! cargo bench --bench events               # a little over a minute
 //! cargo bench --bench events -- --quick    # ten seconds of it
 //! ```
 //!
-//! *Cost* is without a network: a component answers a query, or fires a subscription to it; both end
-//! with a message that waits to be sent. *Rate* is between two nodes on loopback in this process,
-//! each with a thread of its own: the interval between two events of one subscription as its client
-//! sees it.
+//! *Cost* is measured without a network: a component answers a query, or fires a subscription to
+//! it; both end with a message ready to send. *Rate* is measured between two nodes on loopback in
+//! this process, each with its own thread: the interval between two events of one subscription at
+//! its client.
 #![allow(
     clippy::disallowed_methods,
     clippy::unwrap_used,
@@ -28,7 +28,7 @@ fn main() {
     rate::measure(Duration::from_secs(if quick { 10 } else { 60 }));
 }
 
-/// The value at a share of the sorted values.
+/// A quantile of the sorted values.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let last = sorted.len().saturating_sub(1);
     sorted[(last as f64 * share).round() as usize]

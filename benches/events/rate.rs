@@ -1,4 +1,4 @@
-//! How well periodic events keep their rate, between two nodes on loopback.
+//! How closely periodic events keep their rate, between two nodes on loopback.
 
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,7 @@ use crate::quantile;
 
 const RATES: [f64; 4] = [1.0, 10.0, 50.0, 100.0];
 
-/// What a client has seen of one subscription.
+/// A client's observations of one subscription.
 #[derive(Default)]
 struct Seen {
     confirmed: f64,
@@ -101,7 +101,7 @@ async fn listen(time: Duration) -> Vec<Seen> {
             let due = expected.unwrap_or(event.sequence_number);
             seen[which].lost += u32::from(event.sequence_number.wrapping_sub(due));
             sequences[which] = Some(event.sequence_number);
-            // The first follows the confirmation at once, out of beat with none.
+            // The first event follows the confirmation at once, independently of the period.
             seen[which].arrivals.push(now);
         }
     }
@@ -109,7 +109,7 @@ async fn listen(time: Duration) -> Vec<Seen> {
 }
 
 fn subscribe(port: &Port, request: usize, rate: f64) {
-    // Each subscription asks for other fields, or the last would take the place of the others.
+    // Each subscription requests different fields; otherwise the last would replace the others.
     let presence_vector = 1 << request;
     let mut create = CreateEvent {
         request_id: request as u8,

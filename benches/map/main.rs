@@ -1,13 +1,13 @@
-//! How fast a knowledge store over a file answers a client on another node: maps of several sizes, and
-//! changes, which are on the disk before they are answered.
+//! How fast a knowledge store over a file answers a client on another node: maps of several sizes,
+//! and changes, which are written to disk before they are answered.
 //!
 //! ```sh
 //! cargo bench --bench map               # a quarter of a minute
 //! cargo bench --bench map -- --quick    # some seconds
 //! ```
 //!
-//! Store and client are nodes of their own on loopback, each with a thread of its own. The baseline
-//! is a component on the store's node that answers the same query with the same cells from memory.
+//! Store and client are two nodes on loopback, each with its own thread. The baseline is a
+//! component on the store's node that answers the same query with the same cells from memory.
 #![allow(
     clippy::disallowed_methods,
     clippy::unwrap_used,
@@ -48,7 +48,7 @@ fn main() {
     std::fs::remove_dir_all(&directory).expect("removed");
 }
 
-/// On a disk, not in memory as the directory for temporary files may be.
+/// A directory on a disk: the directory for temporary files may be in memory.
 fn directory() -> PathBuf {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join("map-bench");
     let _ = std::fs::remove_dir_all(&directory);
@@ -62,7 +62,7 @@ fn runtime() -> tokio::runtime::Runtime {
         .expect("a runtime")
 }
 
-/// One map of each side, none of whose cells are as all are at first.
+/// Serves one map per side length, with no cell at its initial value.
 async fn serve(file: &Path, started: &std::sync::mpsc::Sender<()>) {
     let mut world = World::open(file).expect("a world");
     for side in SIDES {
@@ -145,7 +145,7 @@ async fn measure(runs: usize) {
     }
 }
 
-/// Milliseconds of each run, sorted. A few are for warming up.
+/// Milliseconds of each run, sorted, after five warm-up runs.
 async fn time<F: Future<Output = ()>>(runs: usize, mut run: impl FnMut() -> F) -> Vec<f64> {
     let mut times = Vec::with_capacity(runs);
     for _ in 0..5 {

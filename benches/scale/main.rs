@@ -1,11 +1,11 @@
-//! How long planning takes, and how much memory, on maps up to the largest.
+//! Duration and memory of planning, on maps up to the largest.
 //!
 //! ```sh
 //! cargo bench --bench scale
 //! ```
 //!
-//! Each row is the median of a few runs; memory is the most that the process held in one of them
-//! beyond the map itself (Linux).
+//! Each row is the median of a few runs. Memory is the peak of the process in one run, beyond the
+//! map itself (Linux).
 #![expect(clippy::disallowed_methods, reason = "a benchmark measures time")]
 
 use std::time::{Duration, Instant};
@@ -26,7 +26,7 @@ fn main() {
 
 type Ground = fn(usize, usize, usize) -> u8;
 
-/// The cell at a row and column of a map of that size.
+/// Kinds of terrain: each gives the cell at a row and column of a map of a given side length.
 const GROUNDS: [(&str, Ground); 5] = [
     ("open", |_, _, _| 255),
     ("uneven", |row, column, _| {
@@ -58,7 +58,7 @@ const GROUNDS: [(&str, Ground); 5] = [
     }),
 ];
 
-/// Some number for a place, always the same.
+/// A pseudorandom number for a cell, the same in every run.
 fn random(row: usize, column: usize) -> u8 {
     let mut seed = ((row as u64) << 32) | column as u64;
     seed = (seed ^ (seed >> 30))
@@ -105,9 +105,9 @@ fn row(side: usize, name: &str, ground: Ground) {
     );
 }
 
-/// Lets the peak begin at what is held now, in KiB.
+/// Resets the peak to the current memory; returns it in KiB.
 fn reset_peak() -> u64 {
-    // Without it the peak is that of the whole run.
+    // If this fails, the peak is that of the whole run.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
     status("VmRSS:")
 }

@@ -1,4 +1,5 @@
-//! What the machine can do without us: blocking sockets of the standard library, and a copy.
+//! Baselines of the machine without this library: blocking sockets of the standard library, and a
+//! copy.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, UdpSocket};
@@ -10,8 +11,8 @@ use crate::placement::{Placement, Side};
 use crate::roles::{Batching, Role};
 use crate::run::folder;
 
-/// What one run of sending gave: messages sent and received, and seconds from the first message sent
-/// to the last received.
+/// Result of one run of sending: messages sent and received, and seconds from the first message
+/// sent to the last received.
 #[derive(Clone, Copy)]
 pub(crate) struct Flow {
     pub(crate) sent: u64,
@@ -29,7 +30,7 @@ impl Flow {
     }
 }
 
-/// Round trips of a datagram to a child that sends each back.
+/// Round trips of a datagram to a child that echoes each.
 pub(crate) struct UdpEcho {
     socket: UdpSocket,
     _child: Process,
@@ -57,7 +58,7 @@ pub(crate) fn udp_echo() {
     // Connected like the other end, so that both use `send` and `recv`.
     socket.connect(from).expect("the client's address");
     while let Ok(length) = socket.recv(&mut buffer) {
-        // A sender that has gone is none of ours.
+        // The sender may be gone.
         let _ = socket.send(&buffer[..length]);
     }
 }
@@ -97,7 +98,7 @@ pub(crate) fn udp_one_way(
         }
     }
     let seconds = start.elapsed().as_secs_f64();
-    // An empty datagram asks how many came; it may be lost in the crowd.
+    // An empty datagram requests the count; it may be lost among the others.
     for _ in 0..50 {
         socket.send(&[]).expect("sent");
         let mut count = [0; 8];
@@ -115,13 +116,13 @@ pub(crate) fn udp_one_way(
 pub(crate) fn udp_sink(batching: Batching) {
     let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::DGRAM, None);
     let socket = socket.expect("a socket");
-    // As large as our links ask for.
+    // The size that our links request.
     socket.set_recv_buffer_size(4 << 20).expect("a buffer");
     let any = SocketAddr::from(([127, 0, 0, 1], 0));
     socket.bind(&any.into()).expect("an address");
     let socket = UdpSocket::from(socket);
     println!("{}", socket.local_addr().expect("an address"));
-    // The sender's first datagram is looked at and left there.
+    // Peek leaves the sender's first datagram in the socket.
     let from = socket.peek_from(&mut [0; 65_536]).expect("a client").1;
     socket.connect(from).expect("the client's address");
     if batching == Batching::Segments {
@@ -169,7 +170,7 @@ mod segments {
         .is_ok()
     }
 
-    /// Octets that came with one call, and those of each datagram but the last.
+    /// Octets received with one call, and the length of each datagram but the last.
     pub(super) fn receive(socket: &UdpSocket, into: &mut [u8]) -> io::Result<(usize, usize)> {
         let mut space = nix::cmsg_space!(i32);
         let mut into = [IoSliceMut::new(into)];
@@ -199,10 +200,10 @@ mod segments {
     }
 }
 
-/// Octets over a Unix stream to a child that counts them, in writes of 16 KiB or one message.
+/// Sends octets over a Unix stream to a child that counts them, in writes of 16 KiB or one message.
 pub(crate) fn unix_one_way(length: usize, time: Duration, placement: Placement) -> Flow {
     let path = folder().join("one-way.sock");
-    // That of the run before.
+    // Left by the previous run.
     let _ = std::fs::remove_file(&path);
     let listener = UnixListener::bind(&path).expect("a socket");
     let sink = Role::StreamSink(path);
@@ -233,7 +234,7 @@ pub(crate) fn stream_sink(at: &std::path::Path) {
     while let Ok(length @ 1..) = stream.read(&mut buffer) {
         count += length as u64;
     }
-    // A measuring side that has gone is none of ours.
+    // The measuring side may be gone.
     let _ = stream.write_all(&count.to_le_bytes());
 }
 

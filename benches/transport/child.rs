@@ -9,10 +9,10 @@ use crate::placement;
 use crate::roles::Role;
 use crate::run;
 
-/// A running child, ended when dropped.
+/// A running child process; killed when dropped.
 pub(crate) struct Process {
     child: Child,
-    /// The line it printed when ready, such as an address.
+    /// The line that it prints when ready, such as an address.
     pub(crate) ready: String,
 }
 
@@ -55,7 +55,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // It may have exited already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

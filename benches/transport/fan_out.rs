@@ -23,11 +23,11 @@ use crate::report::{self, ratio, spread};
 use crate::roles::{self, Role};
 
 const SENSOR: JausId = JausId::new(101, 1, 1);
-/// Subscribers are in the subsystems from this one on.
+/// The first subscriber's subsystem.
 const FIRST: u16 = 200;
 const MOST: usize = 100;
 const COUNTS: [usize; 3] = [1, 10, MOST];
-/// Between two events.
+/// The interval between two events.
 const PERIOD: Duration = Duration::from_millis(4);
 
 pub(crate) fn measure(effort: Effort) {
@@ -60,7 +60,7 @@ pub(crate) fn measure(effort: Effort) {
     Placement::Free.take();
 }
 
-/// Microseconds of the sender's processor for each event.
+/// Microseconds of the sender's CPU time per event.
 async fn cost(subscribers: usize, time: Duration, placement: Placement) -> f64 {
     let addresses = free_addresses::<{ MOST + 1 }>();
     let (sensor, clients) = addresses.split_first().expect("some");
@@ -96,7 +96,7 @@ async fn cost(subscribers: usize, time: Duration, placement: Placement) -> f64 {
     used.as_secs_f64() * 1e6 / f64::from(events)
 }
 
-/// Until an event has come.
+/// Subscribes, and waits for the first event.
 async fn subscribe(port: &mut Port) {
     let query = QueryVelocityState { presence_vector: 1 };
     let create = CreateEvent {
@@ -122,7 +122,7 @@ async fn subscribe(port: &mut Port) {
     panic!("no subscription");
 }
 
-/// A child: a sensor whose value changes all the time, with its subscribers' addresses.
+/// A child: a sensor with a constantly changing value, with its subscribers' addresses.
 pub(crate) async fn sensor(at: SocketAddr, subscribers: Vec<SocketAddr>) {
     let mut settings = Config::loopback(SENSOR.subsystem(), SENSOR.node())
         .port(at.port())
@@ -133,8 +133,8 @@ pub(crate) async fn sensor(at: SocketAddr, subscribers: Vec<SocketAddr>) {
     }
     let node = Node::start(settings).expect("a node");
     let count = AtomicU32::new(0);
-    // Each subscriber's next answer differs, or there would be no event: no number of subscribers is
-    // a multiple of 97.
+    // Successive answers to one subscriber must differ, or there would be no event: no number of
+    // subscribers is a multiple of 97.
     let answer = move |_: QueryVelocityState| {
         let speed = count.fetch_add(1, Ordering::Relaxed) % 97;
         let mut report = ReportVelocityState::default();

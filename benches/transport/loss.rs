@@ -18,13 +18,13 @@ use crate::report::{self, ratio, spread};
 use crate::roles::{self, CODE, Role};
 use crate::setting::Setting;
 
-/// Octets of a message.
+/// Payload lengths in octets.
 const LENGTHS: [usize; 3] = [64, 64 << 10, 1 << 20];
-/// Shares of datagrams that are lost, in percent.
+/// Share of lost datagrams, in percent.
 const LOSSES: [u8; 2] = [0, 5];
-/// Of each datagram.
+/// Delay of each datagram.
 const DELAY: Duration = Duration::from_millis(5);
-/// Loss needs more time than the rest to show its mean.
+/// With loss, the mean needs more time to settle than in the other measurements.
 const SECONDS: f64 = 3.0;
 
 pub(crate) fn measure(effort: Effort) {
@@ -72,7 +72,7 @@ fn flow(length: usize, percent: u8, seed: u64, time: Duration) -> Flow {
     })
 }
 
-/// A node at an address that knows one peer, and no others.
+/// Settings of a node at an address that knows one peer only.
 pub(crate) fn settings(
     id: jaus::address::JausId,
     at: SocketAddr,
@@ -90,7 +90,7 @@ pub(crate) fn free_addresses<const N: usize>() -> [SocketAddr; N] {
     sockets.map(|socket| socket.local_addr().expect("an address"))
 }
 
-/// A child: passes datagrams on between two addresses, later, and not all of them.
+/// A child: forwards datagrams between two addresses, with a delay and with loss.
 pub(crate) fn network(here: SocketAddr, there: SocketAddr, percent: u8, seed: u64) {
     let socket = |peer: SocketAddr| {
         let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::DGRAM, None);
@@ -114,13 +114,13 @@ fn pass_on(from: &UdpSocket, to: UdpSocket, percent: u8, seed: u64) {
     std::thread::spawn(move || {
         for (due, datagram) in waiting {
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
-            // The node may not be there yet, or no more.
+            // The node may not be there yet, or may be gone.
             let _ = to.send(&datagram);
         }
     });
     let (mut buffer, mut state) = ([0; 65_536], seed);
     loop {
-        // An error tells that an earlier datagram found no node.
+        // An error reports that an earlier datagram found no node.
         let Ok(length) = from.recv(&mut buffer) else {
             continue;
         };

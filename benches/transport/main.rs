@@ -1,4 +1,4 @@
-//! What the transport costs between processes, beside what the machine can do at best.
+//! The cost of the transport between processes, compared with the limits of the machine.
 //!
 //! ```text
 //! cargo bench --bench transport                     everything; takes a few minutes
@@ -6,11 +6,11 @@
 //! ```
 //!
 //! Every figure stands next to a baseline of the same run (raw UDP, a raw Unix stream, bare relays
-//! of as many hops, a copy in memory), because a machine that others share is never twice the same:
-//! read the ratios. The program starts itself as child processes for the other components and nodes,
-//! all on loopback, pinned to processors, and prints Markdown. What was measured, where and when, is
-//! kept in `docs/performance.md`. What a message costs within the endpoint alone is measured by
-//! `cargo bench --bench wire`.
+//! with the same number of hops, a copy in memory), because the speed of a shared machine varies:
+//! read the ratios. The program starts itself as child processes for the other components and
+//! nodes, all on loopback, pinned to processors, and prints Markdown. Results, with machine and
+//! date, are kept in `docs/performance.md`. `cargo bench --bench wire` measures the cost of a
+//! message within the endpoint alone.
 
 #![expect(
     clippy::expect_used,
@@ -41,7 +41,7 @@ use std::env;
 /// How much to measure.
 #[derive(Clone, Copy)]
 struct Effort {
-    /// How often each measurement is repeated, turn about with the others.
+    /// Repetitions of each measurement, alternating with the others.
     runs: usize,
     /// Round trips in one run.
     round_trips: usize,
@@ -75,7 +75,7 @@ fn main() {
     for argument in env::args().skip(1) {
         match argument.as_str() {
             "--quick" => effort = QUICK,
-            // What cargo passes to every benchmark.
+            // Cargo passes it to every benchmark.
             "--bench" => {}
             _ => filter = argument,
         }
@@ -98,6 +98,6 @@ fn main() {
         fan_out::measure(effort);
     }
     report::machine();
-    // Left behind if a measurement has failed.
+    // Remains if a measurement fails.
     let _ = std::fs::remove_dir_all(run::folder());
 }

@@ -1,4 +1,4 @@
-//! How many messages a component can send to another, and how many arrive.
+//! Throughput from one component to another: messages sent, and messages that arrive.
 
 use std::time::{Duration, Instant};
 
@@ -17,21 +17,21 @@ use crate::report::{self, median, ratio, spread};
 use crate::roles::{self, Batching, CODE, COUNT, Role};
 use crate::setting::Setting;
 
-/// Octets of a message.
+/// Payload lengths in octets.
 const LENGTHS: [usize; 4] = [64, 1024, 64 << 10, 1 << 20];
-/// Octets of acknowledged messages that are on their way at once, and the most messages.
+/// Limits of acknowledged messages in flight: octets, and messages.
 const UNDERWAY: (usize, usize) = (4 << 20, 256);
-/// Small messages a second, where the sender keeps to a pace.
+/// Small messages per second of a paced sender.
 const PACE: f64 = 300_000.0;
 
 /// How the messages are sent.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Manner {
-    /// As fast as the node takes them.
+    /// As fast as the node accepts them.
     AllOut,
-    /// Small ones at a steady pace.
+    /// Small messages at a steady rate.
     Paced,
-    /// Each is acknowledged, many at a time.
+    /// Each is acknowledged, with many in flight.
     Acknowledged,
 }
 
@@ -55,7 +55,7 @@ pub(crate) fn measure(effort: Effort) {
 
 fn measure_length(length: usize, placement: Placement, effort: Effort) {
     let time = Duration::from_secs_f64(effort.seconds);
-    // What a datagram of ours holds at most; a larger message takes several.
+    // The most that one datagram of ours holds; a larger message takes several.
     let datagram = length.min(1440);
     let mut flows: Vec<(String, Vec<Flow>)> = Vec::new();
     let mut copies = Vec::new();
@@ -121,7 +121,7 @@ fn print(length: usize, placement: Placement, flows: &[(String, Vec<Flow>)], cop
     report::row(["copy in memory", "", &copy, "", "", ""]);
 }
 
-/// Sends for a time from here to a child that counts.
+/// Sends for a given time to a child that counts.
 fn flow(
     setting: Setting,
     length: usize,
@@ -142,7 +142,7 @@ fn flow(
     })
 }
 
-/// Sends for a time to a component that counts.
+/// Sends for a given time to a component that counts.
 pub(crate) async fn send(
     port: &mut Port,
     message: &Outgoing,
@@ -150,7 +150,7 @@ pub(crate) async fn send(
     time: Duration,
 ) -> Flow {
     let sink = message.destination;
-    // Also makes the two known to each other.
+    // Also makes the two components known to each other.
     assert_eq!(count(port, sink).await, 0);
     let start = Instant::now();
     let sent = match manner {
@@ -172,7 +172,7 @@ async fn all_out(port: &Port, message: &Outgoing, time: Duration) -> u64 {
     while start.elapsed() < time {
         for _ in 0..32 {
             if port.send(message.clone()).is_err() {
-                // Full: let the node work.
+                // The queue is full: let the node work.
                 break;
             }
             sent += 1;
@@ -196,7 +196,7 @@ async fn paced(port: &Port, message: &Outgoing, time: Duration) -> u64 {
     sent
 }
 
-/// Messages that were acknowledged.
+/// The number of acknowledged messages.
 async fn acknowledged(port: &Port, message: &Outgoing, time: Duration) -> u64 {
     let (octets, most) = UNDERWAY;
     let underway = (octets / message.payload.len()).clamp(1, most);
@@ -208,7 +208,7 @@ async fn acknowledged(port: &Port, message: &Outgoing, time: Duration) -> u64 {
             while start.elapsed() < time {
                 match sender.deliver(message.clone()).await {
                     Ok(()) => sent += 1,
-                    // No room; nothing was sent.
+                    // The queue is full; nothing was sent.
                     Err(Undelivered::NotSent(_) | Undelivered::Rejected(_)) => {
                         sleep(Duration::from_millis(1)).await;
                     }
@@ -221,7 +221,8 @@ async fn acknowledged(port: &Port, message: &Outgoing, time: Duration) -> u64 {
     tasks.join_all().await.into_iter().sum()
 }
 
-/// How many messages have come when all have or no more come, and the time until the last.
+/// Waits until all messages have arrived or no more arrive; returns their number and the time until
+/// the last.
 async fn arrived(port: &mut Port, sink: JausId, sent: u64, start: Instant) -> (u64, f64) {
     let (mut received, mut unchanged) = (0, 0);
     let mut seconds = start.elapsed().as_secs_f64();
@@ -240,11 +241,11 @@ async fn arrived(port: &mut Port, sink: JausId, sent: u64, start: Instant) -> (u
     }
 }
 
-/// Asks the sink how many messages came.
+/// Queries the sink for the number of received messages.
 async fn count(port: &mut Port, sink: JausId) -> u64 {
     for _ in 0..50 {
         let mut question = Outgoing::new(port.id(), sink, Bytes::from_static(&COUNT));
-        // Before the crowd, or it would be dropped with it.
+        // Sent with high priority, or it would be dropped with the other messages.
         question.priority = Priority::High;
         if port.send(question).is_ok()
             && let Ok(Some(answer)) = timeout(Duration::from_millis(300), port.recv()).await

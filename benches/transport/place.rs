@@ -10,7 +10,7 @@ use jaus::node::{Config, Host, Node, Port};
 
 use crate::run;
 
-/// Where a component lives.
+/// Where a component runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
     /// In its own node.
@@ -46,7 +46,7 @@ pub(crate) struct Component {
 }
 
 impl Place {
-    /// Brings a component to life there.
+    /// Attaches a component there.
     pub(crate) async fn attach(&self, id: JausId) -> Component {
         match self {
             Self::Own => {
@@ -66,7 +66,8 @@ impl Place {
     }
 }
 
-/// A node on loopback, in a group that no other program of this host is in, nor another run.
+/// Settings of a node on loopback, in a group that no other program of this host uses, nor another
+/// run.
 pub(crate) fn settings(id: JausId) -> Config {
     let mut config = Config::loopback(id.subsystem(), id.node());
     let port = 20_000 + run::number() % 40_000;

@@ -1,10 +1,10 @@
-//! On which processors the processes of the benchmark run. Left to itself the kernel puts two
-//! processes that wake each other now on one processor and now on two, which decides more than the
-//! code does.
+//! Placement of the benchmark's processes on processors. Left to itself, the kernel puts two
+//! processes that wake each other sometimes on one processor and sometimes on two, which affects
+//! the figures more than the code does.
 
 use std::sync::OnceLock;
 
-/// Names its processors to a child process.
+/// Environment variable that gives a child process its processors.
 pub(crate) const VARIABLE: &str = "JAUS_BENCH_PROCESSORS";
 
 /// Where the two sides of a measurement run. Each side is a component and its own node.
@@ -12,14 +12,14 @@ pub(crate) const VARIABLE: &str = "JAUS_BENCH_PROCESSORS";
 pub(crate) enum Placement {
     /// All processes on one processor.
     OneCore,
-    /// The side that measures on one processor with the nodes and relays that both share, the other
+    /// The measuring side, with the nodes and relays that both share, on one processor; the other
     /// side on another.
     TwoCores,
     /// The kernel chooses.
     Free,
 }
 
-/// The side that measures, or the other.
+/// The measuring side, or the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
     Ours,
@@ -27,14 +27,14 @@ pub(crate) enum Side {
 }
 
 impl Placement {
-    /// Those that differ on this machine.
+    /// The placements that differ on this machine.
     pub(crate) fn all() -> Vec<Self> {
         let mut all = vec![Self::OneCore, Self::TwoCores, Self::Free];
         all.retain(|it| *it == Self::OneCore || usable().len() > 1);
         all
     }
 
-    /// Those that are pinned.
+    /// The pinned placements.
     pub(crate) fn pinned() -> Vec<Self> {
         let mut pinned = Self::all();
         pinned.retain(|it| *it != Self::Free);
@@ -59,7 +59,7 @@ impl Placement {
         }
     }
 
-    /// Moves this thread, which is the measuring side.
+    /// Moves this thread, which is the measuring side, to its processors.
     pub(crate) fn take(self) {
         pin(&self.of(Side::Ours));
     }

@@ -1,4 +1,4 @@
-//! What a child process does in its role.
+//! Runs a child process in its role.
 
 use jaus::address::JausId;
 use jaus::endpoint::Outgoing;
@@ -8,7 +8,7 @@ use crate::place::{self, Place};
 use crate::roles::{CODE, COUNT, Role, is, runtime};
 use crate::{baseline, fan_out, idle, loss, relay};
 
-/// Plays a role, for as long as the process lives.
+/// Plays a role for the lifetime of the process.
 pub(crate) fn play(role: Role) {
     match role {
         Role::UdpEcho => baseline::udp_echo(),
@@ -27,7 +27,7 @@ pub(crate) fn play(role: Role) {
     }
 }
 
-/// Runs a component in its own task, like most components: a future that the runtime blocks on
+/// Runs a component in its own task, as most components do: blocking the runtime on its future
 /// costs one more system call per turn.
 fn run(role: impl Future<Output = ()> + Send + 'static) {
     let runtime = runtime();

@@ -1,5 +1,5 @@
-//! Bare relays: as many processes and hops as a path through nodes has, which only copy. A thread
-//! for each direction blocks in the kernel.
+//! Bare relays that only copy, with the same number of processes and hops as a path through nodes.
+//! One thread per direction blocks in the kernel.
 
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, UdpSocket};
@@ -12,8 +12,8 @@ use crate::placement::{Placement, Side};
 use crate::roles::Role;
 use crate::run::folder;
 
-/// Round trips over a Unix stream to a child that sends each octet back: straight, through one
-/// relay, or through two with UDP between them.
+/// Round trips over a Unix stream to a child that echoes each octet: directly, through one relay,
+/// or through two with UDP between them.
 pub(crate) struct StreamEcho {
     stream: UnixStream,
     _children: Vec<Process>,
@@ -60,7 +60,7 @@ impl StreamEcho {
     }
 }
 
-/// A child: sends back what comes.
+/// A child: echoes received octets.
 pub(crate) fn stream_echo(at: &Path) {
     let mut stream = UnixStream::connect(at).expect("a relay, or the measuring side");
     println!("ready");
@@ -89,13 +89,13 @@ pub(crate) fn datagram_relay(at: &PathBuf, other: Option<SocketAddr>) {
     println!("{}", socket.local_addr().expect("an address"));
     let other = other.unwrap_or_else(|| socket.recv_from(&mut []).expect("the other relay").1);
     socket.connect(other).expect("the other relay");
-    // Says where this one is.
+    // Announces this relay's address.
     socket.send(&[]).expect("sent");
     let mut stream = listener.accept().expect("a client").0;
     let mut to_stream = stream.try_clone().expect("the same stream");
     let datagrams = socket.try_clone().expect("the same socket");
     std::thread::spawn(move || {
-        // The first datagram of the other relay is empty, and not the end.
+        // The other relay's first datagram is empty, and does not mean the end.
         let next = |into: &mut [u8]| loop {
             match datagrams.recv(into) {
                 Ok(0) => {}
@@ -110,7 +110,7 @@ pub(crate) fn datagram_relay(at: &PathBuf, other: Option<SocketAddr>) {
     );
 }
 
-/// Until the input ends or the output is closed.
+/// Copies until the input ends or the output is closed.
 fn copy(
     mut read: impl FnMut(&mut [u8]) -> io::Result<usize>,
     mut write: impl FnMut(&[u8]) -> io::Result<()>,

@@ -1,9 +1,9 @@
-//! Numbers for people: medians, ratios and Markdown tables.
+//! Output for readers: medians, ratios and Markdown tables.
 
 use std::fs;
 use std::time::Duration;
 
-/// Says what machine this is and how busy.
+/// Prints the machine's model and load.
 pub(crate) fn machine() {
     let model = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = model
@@ -18,7 +18,7 @@ pub(crate) fn machine() {
     println!("{processors} × {model}; load {}\n", load.join(" "));
 }
 
-/// The middle one; of an even number the upper.
+/// The median; the upper one of an even number of values.
 pub(crate) fn median<T: PartialOrd + Copy>(values: &[T]) -> T {
     percentile(values, 50)
 }

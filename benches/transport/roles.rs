@@ -10,46 +10,47 @@ use jaus::node::Peer;
 
 use crate::place::Place;
 
-/// The code of all messages here: an experimental one, which no service takes.
+/// The code of all messages here: an experimental one, which no service handles.
 pub(crate) const CODE: [u8; 2] = [0x01, 0xD7];
-/// The code of the message that asks a sink how much came, and of its answer.
+/// The code of the query for a sink's message count, and of its answer.
 pub(crate) const COUNT: [u8; 2] = [0x02, 0xD7];
 
-/// How datagrams are handed to the kernel.
+/// How datagrams are passed to the kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Batching {
-    /// One with each call.
+    /// One per call.
     Single,
-    /// As our links do: as many as one call takes (`UDP_SEGMENT`, `UDP_GRO`).
+    /// As many as one call takes (`UDP_SEGMENT`, `UDP_GRO`), as our links do.
     Segments,
 }
 
-/// A role, with what it needs to know.
+/// A role with its parameters.
 #[derive(Clone, Debug)]
 pub(crate) enum Role {
-    /// Sends datagrams back.
+    /// Echoes datagrams.
     UdpEcho,
     /// Counts datagrams.
     UdpSink(Batching),
-    /// Connects to a stream and sends octets back.
+    /// Connects to a stream and echoes octets.
     StreamEcho(PathBuf),
     /// Connects to a stream and counts octets.
     StreamSink(PathBuf),
     /// Copies between two streams.
     Relay(PathBuf),
-    /// Copies between a stream and another relay, at this address if it is there already.
+    /// Copies between a stream and another relay, at this address if that relay has started
+    /// already.
     DatagramRelay(PathBuf, Option<SocketAddr>),
     /// Delays datagrams between two addresses and drops a percentage of them, by a seed.
     Network(SocketAddr, SocketAddr, u8, u64),
-    /// A component that sends messages back.
+    /// A component that echoes messages.
     Echo(JausId, Place),
     /// A component that counts messages.
     Sink(JausId, Place),
     /// The same on a node at an address, which knows one peer.
     SinkAt(JausId, SocketAddr, Peer),
-    /// A sensor at an address, and its subscribers.
+    /// A sensor at an address, with its subscribers.
     Sensor(SocketAddr, Vec<SocketAddr>),
-    /// A node for other processes, that serves this socket.
+    /// A node for other processes that serves this socket.
     Node(JausId, Place),
     /// An idle node with this number of components.
     Idle(usize),
@@ -121,13 +122,13 @@ impl Role {
     }
 }
 
-/// The role of this process; none for the one that the user has started.
+/// The role of this process; `None` for the one that the user started.
 pub(crate) fn of_this_process() -> Option<Role> {
     let words = env::var(Role::VARIABLE).ok()?;
     Some(Role::from_words(&words).unwrap_or_else(|| panic!("{words} is no role")))
 }
 
-/// One thread for node, components and sockets, as a component on a small board has it.
+/// One thread for node, components and sockets, as on a small board.
 pub(crate) fn runtime() -> tokio::runtime::Runtime {
     tokio::runtime::Builder::new_current_thread()
         .enable_all()

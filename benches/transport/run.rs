@@ -1,13 +1,13 @@
-//! One run of the benchmark, which all its processes know by its number.
+//! One run of the benchmark, identified in all its processes by a number.
 
 use std::env;
 use std::fs;
 use std::path::PathBuf;
 
-/// Names the run to its child processes.
+/// Environment variable that gives the run to child processes.
 pub(crate) const VARIABLE: &str = "JAUS_BENCH_RUN";
 
-/// The number of this run: the id of the process that the user has started.
+/// The number of this run: the id of the process that the user started.
 pub(crate) fn number() -> u32 {
     let told = env::var(VARIABLE)
         .ok()

@@ -1,4 +1,4 @@
-//! How two components of the benchmark stand to each other, and the nodes that they need for it.
+//! Arrangements of two components of the benchmark, and the nodes that they need.
 
 use jaus::address::JausId;
 
@@ -8,14 +8,14 @@ use crate::placement::{Placement, Side};
 use crate::roles::Role;
 use crate::run::folder;
 
-/// How two components of the benchmark stand to each other.
+/// How two components of the benchmark are arranged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Setting {
     /// Each runs its own node.
     OwnNodes,
     /// Both are attached to one node in a third process.
     OneNode,
-    /// Each is attached to a node; the two nodes are two more processes.
+    /// Each is attached to its own node; the two nodes run in two more processes.
     TwoNodes,
 }
 
@@ -30,7 +30,7 @@ impl Setting {
         }
     }
 
-    /// The ids of the two components; others for each setting, because all are in one group.
+    /// The ids of the two components. They differ between settings, because all are in one group.
     pub(crate) const fn ids(self) -> [JausId; 2] {
         match self {
             Self::OwnNodes => [JausId::new(101, 1, 33), JausId::new(102, 1, 33)],
@@ -39,7 +39,7 @@ impl Setting {
         }
     }
 
-    /// Starts the nodes, and says where the two components are to live.
+    /// Starts the nodes; returns the places of the two components.
     pub(crate) fn start(self, placement: Placement) -> (Vec<Process>, [Place; 2]) {
         let node = |id: JausId, side| {
             let place = Place::On(folder().join(format!("{self:?}-{side:?}.sock")));

@@ -1,7 +1,7 @@
-//! Capture files: the same frames and errors however the file is read, no more octets than it has,
-//! and what was read comes back from being written.
+//! Capture files: frames and errors do not depend on how the file is read, the frames hold no more
+//! octets than the file, and frames written to a file read back unchanged.
 //!
-//! The first octet says in pieces of how many octets the file is read the second time.
+//! The first octet is the length of the pieces in which the file is read the second time.
 #![no_main]
 
 use std::io::Read;
@@ -9,7 +9,7 @@ use std::io::Read;
 use jaus_view::{Capture, CaptureWriter, LinkType, Timestamp};
 use libfuzzer_sys::fuzz_target;
 
-/// What a frame says of itself, and its octets.
+/// A frame's description and its octets.
 #[derive(Debug, PartialEq)]
 struct Kept {
     time: Option<Timestamp>,
@@ -19,7 +19,7 @@ struct Kept {
     octets: Vec<u8>,
 }
 
-/// A reader that returns at most this many octets at a time.
+/// A reader that returns at most this number of octets per call.
 struct Pieces<'a>(&'a [u8], usize);
 
 impl Read for Pieces<'_> {

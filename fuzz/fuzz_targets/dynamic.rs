@@ -1,5 +1,5 @@
-//! The dynamic codec on the embedded definitions: two octets choose the message, one the way in
-//! (JSON text, a random value, octets), and the rest goes in. The generated codec must agree.
+//! The dynamic codec on the embedded definitions: two octets choose the message, one the input form
+//! (JSON text, a random value, octets), and the rest is the input. The generated codec must agree.
 #![no_main]
 
 use bytes::Bytes;
@@ -36,7 +36,8 @@ fn value_comes_back(declared: &Declared, value: Value) {
     view_comes_back(message, &value);
 }
 
-/// The JSON text of a value reads as a value of the same octets, but for the bits of a NaN.
+/// The JSON text of a value reads back as a value with the same octets, except for the bits of a
+/// NaN.
 fn view_comes_back(message: &Message, value: &Value) {
     let text = to_json(message, value)
         .expect("names are unique")

@@ -1,9 +1,9 @@
-//! Large messages in fragments, as a sequence of operations against a model: what is delivered is
-//! what was sent, whole, and not more often than all of its fragments were given.
+//! Large messages in fragments, as a sequence of operations against a model: a message is delivered
+//! whole and unchanged, and not more often than all of its fragments arrived.
 //!
-//! The first octet chooses roomy or narrow budgets. Then each step is an octet that says what
-//! happens and octets that say with what: a sender cuts another message, a fragment is given (in
-//! any order, again, never), time passes, or a forged fragment arrives with its own numbers.
+//! The first octet chooses large or small budgets. Then each step is an octet for the operation,
+//! and octets for its arguments: a sender fragments another message, a fragment arrives (in any
+//! order, repeatedly, or never), time passes, or a forged fragment arrives with numbers of its own.
 #![no_main]
 
 use std::net::SocketAddr;
@@ -16,20 +16,20 @@ use jaus::endpoint::{Config, Endpoint, LinkId, LinkProfile, Path, Received};
 use jaus::wire::{Acknowledgement, DataControl, Flags, Frame, judp};
 use libfuzzer_sys::fuzz_target;
 
-/// Time zero of every story.
+/// Time zero of every input.
 static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 const US: JausId = JausId::new(101, 1, 1);
 const SENDERS: usize = 3;
 const MOST_MESSAGES: usize = 64;
 
-/// A message that a sender has cut.
+/// A fragmented message.
 struct Sent {
     sender: usize,
     content: Bytes,
     part: usize,
     first: u16,
-    /// How often each fragment was given.
+    /// How often each fragment arrived.
     given: Vec<u32>,
     delivered: u32,
 }
@@ -43,9 +43,9 @@ struct World {
     sent: Vec<Sent>,
     /// The next sequence number of each sender.
     next: [u16; SENDERS],
-    /// Whether nothing may be forgotten: the budgets are roomy, and no time has passed.
+    /// Whether nothing may be forgotten: the budgets are large, and no time has passed.
     calm: bool,
-    /// Senders in whose name fragments were forged: nothing is promised about them.
+    /// Senders whose fragments were forged: nothing is guaranteed for them.
     forged: [bool; SENDERS],
 }
 
@@ -60,7 +60,7 @@ fuzz_target!(|octets: &[u8]| {
     }
 });
 
-/// The next octet of the story; zero when it has run out.
+/// The next octet of the input; zero at its end.
 fn octet(story: &mut &[u8]) -> u8 {
     let Some((&first, rest)) = story.split_first() else {
         return 0;
@@ -106,14 +106,14 @@ impl World {
         }
     }
 
-    /// A sender cuts a message into parts.
+    /// A sender splits a message into fragments.
     fn cut(&mut self, sender: u8, parts: u8, part: u8) {
         if self.sent.len() == MOST_MESSAGES {
             return;
         }
         let sender = usize::from(sender) % SENDERS;
         let (parts, part) = (2 + usize::from(parts % 7), 4 + usize::from(part % 60));
-        // Every message differs from all others, in each of its parts.
+        // Every fragment of every message has different content.
         let mark = self.sent.len() as u8;
         let content = (0..parts * part - part / 2).map(|i| match i % 2 {
             0 => mark,

@@ -1,9 +1,9 @@
-//! Anything at all to a gateway, from RA systems and from JAUS components: nothing panics, tables
-//! and output keep their bounds, time does not stand still, and it speaks for no JAUS component
-//! that it has not attached.
+//! Arbitrary input to a gateway, from RA systems and from JAUS components: no panic, bounded tables
+//! and output, advancing time, and no messages in the name of a JAUS component that the gateway has
+//! not attached.
 //!
-//! The story is a row of steps. Each begins with an octet for how much time passes, one for the side
-//! and the sender, and one for the length of what follows.
+//! The input is a sequence of steps. Each begins with an octet for the time that passes, one for
+//! the side and the sender, and one for the length of the data that follows.
 #![no_main]
 
 use std::collections::BTreeSet;
@@ -21,13 +21,13 @@ use jaus_ra::RaId;
 use jaus_ra::gateway::{Action, Gateway, Settings};
 use libfuzzer_sys::fuzz_target;
 
-/// Time zero of every story.
+/// Time zero of every input.
 static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 const GATEWAY: JausId = JausId::new(250, 1, 1);
-/// The most RA components that JAUS sees here.
+/// The limit of RA components visible to JAUS here.
 const COMPONENTS: usize = 8;
-/// The most datagrams, and the most actions, that a single call may make.
+/// The limit of datagrams, and of actions, that a single call may produce.
 const MOST_OUT: usize = 4096;
 
 struct Story {
@@ -95,7 +95,7 @@ impl Story {
         }
     }
 
-    /// Lets time pass, up to 13 seconds, waking the gateway whenever it wants.
+    /// Advances time, by up to 13 seconds, and wakes the gateway whenever it is due.
     fn pass(&mut self, pause: u8) {
         let end = self.now + Duration::from_millis(u64::from(pause).pow(2) / 5);
         while let Some(next) = self.gateway.poll_timeout().filter(|&next| next <= end) {
@@ -131,8 +131,8 @@ impl Story {
     }
 }
 
-/// A datagram with a valid header, whose first octets say what is in it: most of them from a driver
-/// of subsystem 20, for the gateway.
+/// A datagram with a valid header. Its first octets determine the content: most are from a driver
+/// of subsystem 20 to the gateway.
 fn framed(octets: &[u8]) -> Bytes {
     let (head, data) = octets.split_at(octets.len().min(4));
     let at = |index: usize| head.get(index).copied().unwrap_or_default();

@@ -1,5 +1,5 @@
-//! The generated messages: the first two octets are the message code, the rest is its body. A code
-//! that no message has stands for one of those that there are.
+//! The generated messages: the first two octets are the message code, the rest is the body. An
+//! unassigned code stands for one of the existing messages.
 #![no_main]
 
 use bytes::Bytes;
@@ -41,7 +41,7 @@ fn message_comes_back(info: &MessageInfo, octets: &Bytes) {
     let text = serde_json::to_string(&*message).expect("a tree of plain values");
     let view: view::Value = serde_json::from_str(&text).expect("our own text");
     let again = (info.from_view)(&view).expect("our own view");
-    // A NaN has many patterns of bits and one name.
+    // A NaN has many bit patterns and one name.
     if !text.contains("\"NaN\"") {
         assert_eq!(again.encode().as_ref(), Ok(octets), "{text}");
         assert!(*again == *message, "{text}");

@@ -1,7 +1,7 @@
-//! Serial lines: the first octet says how the line is cut into parts, the second whether the rest is
-//! the line itself or, so that checksums do not keep everything out, messages that are written as
-//! packets with octets of the input between them. However it is cut, the same frames and counts
-//! must come out, and what waits is bounded.
+//! Serial lines: the first octet determines how the line is cut into parts. The second determines
+//! whether the rest is the line itself, or messages written as packets with octets of the input
+//! between them, so that checksums do not reject everything. The frames and counts must not depend
+//! on the cuts, and the buffered data is bounded.
 #![no_main]
 
 use bytes::Bytes;
@@ -32,7 +32,7 @@ fuzz_target!(|octets: &[u8]| {
     }
 });
 
-/// Packets with `length` octets of payload from the input, and as many octets of it in between.
+/// Packets with `length` octets of payload from the input, separated by as many octets of it.
 fn line_of(length: u8, input: &[u8]) -> Vec<u8> {
     let mut line = Vec::new();
     for (index, part) in input.chunks(length.into()).enumerate() {

@@ -1,12 +1,12 @@
-//! Arbitrary text through the loader, which must answer with diagnostics whatever it is given; and
-//! some octets through the codec of whatever it takes for sound.
+//! Arbitrary text through the loader, which must answer any input with diagnostics; and some octets
+//! through the codec of each definition that it accepts.
 #![no_main]
 
 use jaus_fuzz::{octets_come_back, with_code};
 use jsidl::Loader;
 use libfuzzer_sys::fuzz_target;
 
-/// What messages are tried with: zeros satisfy most fields, ones ask for much.
+/// Message bodies to try: zeros satisfy most fields, ones request large counts.
 const BODIES: [[u8; 32]; 3] = [[0; 32], [1; 32], [0xFF; 32]];
 
 fuzz_target!(|text: &str| {

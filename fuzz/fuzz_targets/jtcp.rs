@@ -1,6 +1,6 @@
-//! JTCP streams: the first octet says how the rest, a stream, is cut into parts. Cut like that and
-//! whole, it must give the same frames and the same error; frames come back from writing them; no
-//! more than one message waits.
+//! JTCP streams: the first octet determines how the rest, a stream, is cut into parts. Cut or
+//! whole, it must give the same frames and the same error; decoded frames round-trip through the
+//! encoder; at most one message is buffered.
 #![no_main]
 
 use jaus::wire::jtcp::{self, Decoder};

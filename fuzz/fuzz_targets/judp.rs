@@ -1,10 +1,9 @@
-//! Datagrams: reading and writing them, and an endpoint that is fed with them.
+//! Datagrams: decoding and encoding them, and an endpoint that receives them.
 //!
-//! The first octet chooses. 0: the rest is one datagram, whose messages must come back from writing
-//! them. Otherwise the rest is a story for an endpoint, and the octet's bits choose what it does
-//! beyond the usual (forwarding, packing, rate limits, fragments): each step is an octet that says
-//! what happens and octets that say with what. Its tables and queues are small, so that their bounds
-//! are met.
+//! The first octet chooses. 0: the rest is one datagram, whose messages must round-trip through the
+//! encoder. Otherwise the rest drives an endpoint, and the octet's bits enable options (forwarding,
+//! packing, rate limits, fragments): each step is an octet for the operation, and octets for its
+//! arguments. Tables and queues are small, so that they reach their limits.
 #![no_main]
 
 use std::net::{Ipv4Addr, SocketAddr};
@@ -19,7 +18,7 @@ use jaus::endpoint::{
 use jaus::wire::{Broadcast, Flags, Frame, Kind, Priority, Version, judp};
 use libfuzzer_sys::fuzz_target;
 
-/// Time zero of every story.
+/// Time zero of every input.
 static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 const QUEUE_LIMIT: usize = 16;
@@ -47,7 +46,7 @@ fn frames_come_back(datagram: &[u8]) {
     assert!(frames.offset() + frames.remaining() <= datagram.len().max(frames.offset()));
 }
 
-/// The octets that a story is read from; zeros when they have run out.
+/// The octets that drive the endpoint; zeros at their end.
 struct Story<'a>(&'a [u8]);
 
 impl<'a> Story<'a> {
@@ -70,7 +69,7 @@ impl<'a> Story<'a> {
         octets
     }
 
-    /// One of few ids, so that they meet; sometimes any.
+    /// One of a few ids, so that they coincide; sometimes any.
     fn id(&mut self) -> JausId {
         match self.octet() {
             id @ 0..8 => JausId::new(1, 1 + id / 4, 1 + id % 4),
@@ -201,9 +200,9 @@ fn play(choices: u8, story: &[u8]) {
     settle(&mut endpoint, now);
 }
 
-/// Takes everything that the endpoint has to say, and checks what can be checked from outside.
+/// Takes all output of the endpoint, and checks its externally visible invariants.
 fn drain(endpoint: &mut Endpoint, now: Instant) {
-    // News have a queue, datagrams one for each of the priorities.
+    // Events have one queue, datagrams one per priority.
     let most = QUEUE_LIMIT * 8;
     let taken = std::iter::from_fn(|| endpoint.poll_event()).count();
     assert!(taken <= most, "more events than the queues hold");
@@ -219,7 +218,7 @@ fn drain(endpoint: &mut Endpoint, now: Instant) {
     }
 }
 
-/// Without new datagrams an endpoint comes to rest: no wake-up leads to another forever.
+/// Without new datagrams an endpoint comes to rest: no endless chain of wake-ups.
 fn settle(endpoint: &mut Endpoint, mut now: Instant) {
     for _ in 0..1000 {
         let Some(wake_up) = endpoint.poll_timeout() else {

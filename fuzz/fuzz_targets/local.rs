@@ -1,4 +1,4 @@
-//! The local link: streams of records, as node and component read them, in pieces.
+//! The local link: streams of records in pieces, as node and component read them.
 //!
 //! The first octet is the length of the pieces; the rest is the stream.
 #![no_main]
@@ -7,12 +7,12 @@ use jaus::link::local::Assembler;
 use jaus::link::local::record::{Record, RecordError};
 use libfuzzer_sys::fuzz_target;
 
-/// Longer than the inputs, so that records may well announce more than ever comes.
+/// Longer than the inputs, so that records may announce more than ever arrives.
 const LIMIT: usize = 1 << 20;
 
 fuzz_target!(|octets: &[u8]| {
     if let Some((&piece, stream)) = octets.split_first() {
-        // Nothing more is read from a stream with an error.
+        // After an error, nothing more is read from a stream.
         let _ = read(stream, 1 + usize::from(piece) * 8);
     }
 });
@@ -33,7 +33,7 @@ fn read(mut stream: &[u8], piece: usize) -> Result<(), RecordError> {
     Ok(())
 }
 
-/// What was understood is understood the same when it is written again. (Its octets may differ: a
+/// A decoded record encodes to octets that decode to the same record. (The octets may differ: a
 /// path's address may be written in two ways.)
 fn comes_back(record: &Record) {
     let mut octets = Vec::new();

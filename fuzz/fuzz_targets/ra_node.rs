@@ -1,9 +1,9 @@
-//! Anything at all to a node among systems of the Reference Architecture: nothing panics, nothing
-//! grows beyond its bound, time does not stand still.
+//! Arbitrary input to a node among systems of the Reference Architecture: no panic, no growth
+//! beyond limits, advancing time.
 //!
-//! The story is a row of steps. Each begins with an octet for how much time passes, one for the host
-//! it comes from and how (as it is, or behind a valid header to one of our components), and one for
-//! the length of what follows.
+//! The input is a sequence of steps. Each begins with an octet for the time that passes, one for
+//! the source host and the form (raw, or behind a valid header to one of our components), and one
+//! for the length of the data that follows.
 #![no_main]
 
 use std::net::SocketAddr;
@@ -18,10 +18,10 @@ use jaus_ra::connection::{self, Connections};
 use jaus_ra::node::{Component, Event, Node, RaNode, Settings, Subsystem};
 use libfuzzer_sys::fuzz_target;
 
-/// Time zero of every story.
+/// Time zero of every input.
 static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
-/// What the node itself handles, and some that it does not.
+/// The codes that the node itself handles, and some that it does not.
 const CODES: [u16; 20] = [
     0x4202, 0x2202, 0x2B00, 0x2B01, 0x2B03, 0x4B00, 0x4B01, 0x4B03, 0x01F0, 0x01F2, 0x01F3, 0x01F4,
     0x41F1, 0x0008, 0x0009, 0x000A, 0x000B, 0x000C, 0x4402, 0x0405,
@@ -93,7 +93,7 @@ fn vehicle() -> Subsystem {
     }
 }
 
-/// A datagram with a valid header; the first octets say what is in it.
+/// A datagram with a valid header; the first octets determine the content.
 fn framed(octets: &[u8]) -> Bytes {
     let (head, data) = octets.split_at(octets.len().min(5));
     let at = |index: usize| head.get(index).copied().unwrap_or_default();

@@ -1,10 +1,10 @@
-//! Any messages from anybody, in any order, with any time between, to all services of a vehicle:
-//! nothing panics, tables and output keep their bounds, time does not stand still, and the vehicle
+//! Arbitrary messages from arbitrary senders, in any order and with any time between them, to all
+//! services of a vehicle: no panic, bounded tables and output, advancing time, and the vehicle
 //! moves only while a client controls it and it is ready.
 //!
-//! The story is a row of steps. Each begins with an octet for how much time passes, one for the
-//! source and how the payload is made (as it is, or a definition of our own choice filled with it),
-//! and one for the length of what follows.
+//! The input is a sequence of steps. Each begins with an octet for the time that passes, one for
+//! the source and the form of the payload (raw, or a definition of our choice filled with it), and
+//! one for the length of the data that follows.
 #![no_main]
 
 use std::sync::{Arc, LazyLock, Mutex};
@@ -22,7 +22,7 @@ use jaus_vehicle::mobility;
 use jaus_vehicle::motion::{Drive, Frame, Limits, Motion, Pilot, Platform, Pose, Velocity};
 use libfuzzer_sys::fuzz_target;
 
-/// Time zero of every story.
+/// Time zero of every input.
 static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 const VEHICLE: JausId = JausId::new(101, 1, 1);
@@ -32,12 +32,13 @@ const CLIENTS: [JausId; 4] = [
     JausId::new(43, 1, 1),
     JausId::new(101, 1, 2),
 ];
-/// The most components that discovery remembers here.
+/// The limit of components in the directory here.
 const COMPONENTS: usize = 16;
-/// The most messages that a single call may make: all components asked, all subscribers served.
+/// The limit of messages that a single call may produce: queries to all components, reports to all
+/// subscribers.
 const MOST_OUT: usize = 2048;
 
-/// Wheels that do at once what they are commanded, and remember it.
+/// Wheels that execute each command at once, and remember it.
 #[derive(Clone, Default)]
 struct Wheels(Arc<Mutex<(Drive, Motion)>>);
 
@@ -124,7 +125,7 @@ fn stack(wheels: &Wheels) -> Stack {
     Stack::new(discovery, services).management(Management::new())
 }
 
-/// Lets time pass, up to 13 seconds, waking the component whenever it wants.
+/// Advances time, by up to 13 seconds, and wakes the component whenever it is due.
 fn pass(stack: &mut Stack, wheels: &Wheels, mut now: Instant, pause: u8) -> Instant {
     let end = now + Duration::from_millis(u64::from(pause).pow(2) / 5);
     while let Some(next) = stack.poll_timeout().filter(|&next| next <= end) {
@@ -137,7 +138,7 @@ fn pass(stack: &mut Stack, wheels: &Wheels, mut now: Instant, pause: u8) -> Inst
     end
 }
 
-/// Takes what the component says, and checks what must hold between any two calls.
+/// Takes the component's output, and checks the invariants that hold between any two calls.
 fn settle(stack: &mut Stack, wheels: &Wheels) {
     let sent = std::iter::from_fn(|| stack.poll_transmit()).count();
     let news = std::iter::from_fn(|| stack.poll_event()).count();

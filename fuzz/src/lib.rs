@@ -1,4 +1,4 @@
-//! What several fuzz targets share.
+//! Shared parts of the fuzz targets.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
@@ -11,8 +11,7 @@ use jsidl::model::{Id, Message};
 /// A message of the embedded definitions, and a service that declares it.
 pub type Declared = (Id, Arc<Message>);
 
-/// Every message of the embedded definitions; of those that several services declare under one code
-/// and name, the last version's.
+/// Every message of the embedded definitions, once for each code, name and service version.
 pub fn catalogue() -> &'static [Declared] {
     static MESSAGES: LazyLock<Vec<Declared>> = LazyLock::new(|| {
         let mut loader = jsidl::Loader::new();
@@ -39,7 +38,7 @@ pub fn choose(octets: &[u8]) -> Option<(&'static Declared, &[u8])> {
         .map(|m| (m, rest))
 }
 
-/// The type that was generated for a declared message, if its set is switched on.
+/// The type generated for a declared message, if its set is enabled.
 pub fn generated((id, message): &Declared) -> Option<&'static MessageInfo> {
     let same = |service: &jaus::codec::ServiceId| {
         *service.urn == *id.urn
@@ -49,12 +48,12 @@ pub fn generated((id, message): &Declared) -> Option<&'static MessageInfo> {
     types.find(|info| info.name == message.name && info.services.iter().any(same))
 }
 
-/// Octets of a message: its code and these.
+/// A message's octets: this code and this body.
 pub fn with_code(code: u16, body: &[u8]) -> Vec<u8> {
     [&code.to_le_bytes(), body].concat()
 }
 
-/// A payload: the octets as they are, or the message that they choose, filled with the rest of them.
+/// A payload: the octets as they are, or a chosen message filled from the rest of the octets.
 /// `None` if they are too few for a message code.
 pub fn message(is_chosen: bool, octets: &[u8]) -> Option<Bytes> {
     if !is_chosen {
@@ -65,7 +64,7 @@ pub fn message(is_chosen: bool, octets: &[u8]) -> Option<Bytes> {
     Some(octets.into())
 }
 
-/// Reads octets by their definition; what is accepted must encode back to the same octets.
+/// Decodes octets by their definition; accepted octets must encode to the same octets.
 pub fn octets_come_back(message: &Message, octets: &[u8]) {
     for limits in [Limits::Enforced, Limits::Ignored] {
         if let Ok(value) = decode_with(message, octets, limits) {

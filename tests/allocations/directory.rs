@@ -12,10 +12,10 @@ use super::{ALLOCATOR, ALONE};
 /// Long enough for the discovery among new components to end.
 const SETTLED: Duration = Duration::from_secs(4);
 
-/// The most octets that an idle component may keep.
+/// Limit of an idle component's memory, in octets.
 const MOST: usize = 10 * 1024;
 
-/// Allocated octets that are in use.
+/// Allocated octets in use.
 fn in_use() -> usize {
     let stats = ALLOCATOR.stats();
     stats.bytes_allocated - stats.bytes_deallocated

@@ -1,5 +1,5 @@
-//! A small message without acknowledgement passes an endpoint without an allocation once the tables
-//! are filled.
+//! Once its tables are filled, an endpoint passes a small unacknowledged message without an
+//! allocation.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
@@ -38,8 +38,8 @@ fn endpoint() -> (Endpoint, Path) {
     (endpoint, path)
 }
 
-/// How often `handle` allocates in the quietest stretch, once tables are filled: one of them may
-/// grow late, as where its entries lie is random.
+/// The fewest allocations of `handle` in any `STRETCH` calls, once tables are filled: a table may
+/// still grow late, because the positions of its entries are random.
 fn allocations(mut handle: impl FnMut(usize)) -> usize {
     let stretch = |number: usize| {
         let region = Region::new(ALLOCATOR);

@@ -1,4 +1,5 @@
-//! Allocations, counted by this program's allocator: of a small message, and of a further component.
+//! Allocations, counted by this program's allocator: of a small message, and of a further
+//! component.
 #![allow(
     clippy::disallowed_methods,
     clippy::expect_used,
@@ -17,5 +18,5 @@ use tokio::sync::Mutex;
 #[global_allocator]
 static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
-/// Keeps the other tests waiting: their allocations would be counted too.
+/// Makes the tests run one at a time: the allocations of others would be counted too.
 static ALONE: Mutex<()> = Mutex::const_new(());

@@ -1,10 +1,10 @@
 //! The generated codec against the dynamic one, which shares only the definitions: for every
-//! generated message both accept and refuse the same octets, show the same JSON text and write the
+//! generated message both accept and reject the same octets, show the same JSON text and write the
 //! same octets.
 //!
 //! The messages of the Reference Architecture are compared in `roundtrip` and `ra33`.
 //!
-//! `JAUS_CASES=500` tests that many inputs per message instead of a few.
+//! `JAUS_CASES=500` tests 500 inputs per message instead of a few.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -37,7 +37,7 @@ fn id(service: &ServiceId) -> Id {
     }
 }
 
-/// What a service says about a generated message.
+/// A service's definition of a generated message.
 fn definition(library: &Library, service: &ServiceId, info: &MessageInfo) -> Arc<Message> {
     let service = library
         .service(&id(service))
@@ -49,7 +49,7 @@ fn definition(library: &Library, service: &ServiceId, info: &MessageInfo) -> Arc
         .clone()
 }
 
-/// The same octets through both codecs.
+/// Checks that both codecs agree on the octets.
 fn agree(info: &MessageInfo, message: &Message, octets: &[u8]) -> Result<(), TestCaseError> {
     let shared = Bytes::copy_from_slice(octets);
     let (generated, value) = match ((info.decode)(&shared), decode(message, octets)) {

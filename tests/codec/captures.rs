@@ -1,5 +1,5 @@
-//! Recorded traffic of other JAUS stacks through the wire formats, and through an endpoint in the
-//! place of one party.
+//! Recorded traffic of other JAUS stacks, decoded with the wire formats, and replayed to an
+//! endpoint in place of one party.
 
 use std::fs::File;
 use std::net::{IpAddr, SocketAddr};
@@ -48,8 +48,8 @@ fn recorded(file: &FilePath) -> Vec<Recorded> {
     datagrams
 }
 
-/// What is in a capture: datagrams, messages by header version (AS5669A, AS5669, RA), datagrams
-/// with stale octets, datagrams that cannot be read.
+/// Contents of a capture: datagrams, messages by header version (AS5669A, AS5669, RA), datagrams
+/// with stale octets, and undecodable datagrams.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Contents {
     datagrams: usize,
@@ -81,8 +81,8 @@ fn contents(datagrams: &[Recorded]) -> Contents {
     contents
 }
 
-/// Each file of UDP traffic; those of TCP and of OpenJAUS's inner traffic hold nothing on the JAUS
-/// port.
+/// Each file of UDP traffic. Those of TCP and of OpenJAUS's internal traffic have nothing on the
+/// JAUS port.
 #[test]
 fn every_recorded_datagram_is_read() {
     let expected = [
@@ -199,7 +199,7 @@ impl Replay {
             .extend(std::iter::from_fn(|| self.endpoint.poll_transmit(now)));
     }
 
-    /// The counters that are not zero, but for those that every replay has.
+    /// The nonzero counters, except those that every replay has.
     fn notable(&self) -> Vec<(Counter, u64)> {
         const ORDINARY: [Counter; 2] = [Counter::DatagramsReceived, Counter::DatagramsSent];
         let counters = self.endpoint.counters().iter();
@@ -216,7 +216,8 @@ impl Replay {
     }
 }
 
-/// In the place of Junior's node B, 2.1.1: what arrives, what is acknowledged, what is dropped.
+/// The endpoint replaces Junior's node B, 2.1.1. Checks received, acknowledged and dropped
+/// messages.
 #[test]
 fn what_junior_sends_is_taken_as_junior_takes_it() {
     let captures = evidence::captures();
@@ -315,7 +316,7 @@ fn a_large_message_of_junior_is_put_together() {
     }
 }
 
-/// Our acknowledgements are the very octets with which Junior's own node B answered.
+/// Our acknowledgements equal those of Junior's node B, octet by octet.
 #[test]
 fn our_acknowledgements_are_those_that_junior_sends() {
     let captures = evidence::captures();
@@ -349,7 +350,7 @@ fn our_acknowledgements_are_those_that_junior_sends() {
     }
 }
 
-/// Stale octets behind most of its messages neither lose a message nor make one up.
+/// Stale octets behind most of its messages neither lose nor fabricate a message.
 #[test]
 fn what_jauspp_sends_is_delivered_and_nothing_else() {
     let captures = evidence::captures();
@@ -419,8 +420,8 @@ fn what_jauspp_sends_is_delivered_and_nothing_else() {
     }
 }
 
-/// The heartbeats go to 255.255.1.1 in the older notation, which reads as component 1 of node 1 of
-/// every subsystem.
+/// The heartbeats go to 255.255.1.1 in the older notation, which decodes as component 1 of node 1
+/// of every subsystem.
 #[test]
 fn openjaus_is_heard_through_both_older_headers() {
     let captures = evidence::captures();
@@ -451,7 +452,7 @@ fn openjaus_is_heard_through_both_older_headers() {
     }
 }
 
-/// The tool counts sequence numbers per destination, so that the same numbers come again and again.
+/// The tool counts sequence numbers per destination, so that the same numbers recur.
 #[test]
 fn nothing_that_the_judging_tool_asks_is_lost() {
     let Some(captures) = evidence::outside("captures/igvc2015") else {

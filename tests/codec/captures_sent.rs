@@ -1,15 +1,15 @@
 //! Messages of recorded peers, sent again by our endpoint in their place: the same octets, or a
-//! difference with a reason.
+//! difference with a known reason.
 //!
-//! Intended differences, left out of the comparison:
+//! Intended differences, excluded from the comparison:
 //!
 //! | recording | difference | reason |
 //! |---|---|---|
 //! | junior/08 | Junior repeats after 100, 108 and 112 ms | our timer follows the round trip; the repetitions are the same octets |
-//! | junior/09, 10 | sent in an older header before anything was heard | we answer in a peer's header and never begin with an old one, so the peer is heard first |
-//! | junior/11 | the last datagram has flags FFh | Junior's fault with priority 0: what it means to send has priority low |
+//! | junior/09, 10 | sent in an older header before anything was received | we answer in a peer's header and never begin with an old one, so the peer sends first |
+//! | junior/11 | the last datagram has flags FFh | Junior's fault with priority 0: the intended message has low priority |
 //! | jauspp/* | sequence numbers | JAUS++ counts from 0 for each component, we count for the whole node from a random number |
-//! | jauspp/* | octets behind the message | JAUS++ leaves what an older, longer message had there |
+//! | jauspp/* | octets behind the message | JAUS++ leaves those of an older, longer message there |
 //!
 //! `jtcp_captures.rs` and `jserial_captures.rs` compare streams and serial lines; `captures.rs`
 //! covers reception.
@@ -30,7 +30,7 @@ use jaus_view::{Capture, Network};
 struct Recorded {
     source: SocketAddr,
     frame: Frame,
-    /// The datagram without what is behind the message.
+    /// The datagram up to the end of the message.
     octets: Bytes,
 }
 
@@ -54,7 +54,7 @@ fn recorded(file: &FilePath) -> Vec<Recorded> {
     datagrams
 }
 
-/// An endpoint of ours in the place of a recorded party.
+/// Our endpoint in place of a recorded party.
 struct Party {
     endpoint: Endpoint,
     now: Instant,
@@ -65,8 +65,8 @@ struct Party {
 const LINK: LinkId = LinkId(0);
 
 impl Party {
-    /// A party that speaks for all ids that the recorded one spoke for, with Junior's fragments and
-    /// its first sequence number.
+    /// A party with all ids of the recorded one, with Junior's fragments and its first sequence
+    /// number.
     #[expect(
         clippy::disallowed_methods,
         reason = "virtual time starts at any instant"
@@ -78,7 +78,7 @@ impl Party {
         let mut endpoint = Endpoint::new(Config {
             payload_limit: 4079,
             first_sequence: first.wrapping_sub(1),
-            // A recording answers no challenges, and the octets are all that matters here.
+            // A recording answers no challenges, and only the octets matter here.
             unverified_address: Rate::new(1 << 20, 1 << 20),
             unverified_total: Rate::new(1 << 20, 1 << 20),
             ..Config::default()
@@ -106,7 +106,7 @@ impl Party {
         self.drain();
     }
 
-    /// Sends the message that the recorded party sent, when it sent the first of it.
+    /// Sends the recorded party's message, at the position of its first datagram.
     fn say(&mut self, frame: &Frame, payload: Bytes, unknown: bool) {
         let wanted = frame.flags.acknowledgement() == Acknowledgement::Request;
         let outgoing = Outgoing {
@@ -145,7 +145,7 @@ impl Party {
     }
 }
 
-/// The whole message that begins with this datagram; `None` if none does.
+/// The whole message that begins with this datagram; `None` if none begins there.
 fn message(datagrams: &[Recorded], begin: usize) -> Option<Bytes> {
     let first = &datagrams[begin];
     if first.frame.flags.acknowledgement().is_answer() {
@@ -175,8 +175,8 @@ fn without_repetitions(datagrams: Vec<Bytes>) -> Vec<Bytes> {
     datagrams.into_iter().filter(first_time).collect()
 }
 
-/// A message with the header of what was recorded: an acknowledgement that nobody waits for teaches
-/// nothing, not even which header its sender writes.
+/// A message with the recorded header, in place of an acknowledgement: an unsolicited
+/// acknowledgement teaches nothing, not even its sender's header version.
 fn greeting(recorded: &Recorded) -> Recorded {
     let frame = Frame {
         flags: Flags::default(),

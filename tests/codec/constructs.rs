@@ -1,5 +1,5 @@
-//! Messages generated from small definitions, one module per language construct. The texts are
-//! those of the emitter's own tests.
+//! Messages generated from small definitions, one module per language construct. The definitions
+//! are those of the emitter's own tests.
 
 macro_rules! constructs {
     ($($name:ident),* $(,)?) => {
@@ -15,7 +15,7 @@ macro_rules! constructs {
             }
         )*
 
-        /// All of them.
+        /// The service sets of all constructs.
         pub(crate) static SETS: &[jaus::codec::ServiceSet] = &[$(
             jaus::codec::ServiceSet { services: $name::SERVICES, messages: $name::MESSAGES }
         ),*];

@@ -1,5 +1,5 @@
 //! The generated codec against octets of JTS' C++ encoder: every vector of a generated message
-//! decodes to the stated values and encodes to the same octets.
+//! decodes to the vector's values and encodes to the same octets.
 
 use std::fs;
 
@@ -22,8 +22,8 @@ fn octets(hex: &str) -> Bytes {
     pairs.map(octet).collect()
 }
 
-/// A vector's way to show values as our way: the body's own name goes, list elements and variants
-/// lose their wrappers, reals stand for themselves.
+/// Converts a vector's notation of values to ours: drops the body's own name and the wrappers of
+/// list elements and variants; reals stay as they are.
 fn our_view(fields: &Value) -> Value {
     match fields.get("body").and_then(Value::as_object) {
         Some(body) => view(body.values().next().unwrap()),
@@ -57,7 +57,7 @@ fn view(value: &Value) -> Value {
     }
 }
 
-/// The vectors write integers from 2^53 as text, on both sides of 0.
+/// The vectors write integers with a magnitude of 2^53 or more as text.
 fn big(text: &str) -> Option<Value> {
     let number: i128 = text.parse().ok()?;
     let is_big = number.unsigned_abs() >= 1 << 53;
@@ -66,15 +66,14 @@ fn big(text: &str) -> Option<Value> {
     is_big.then(|| unsigned().or_else(|_| signed()).ok())?
 }
 
-/// Messages that one source lays out or spells otherwise than the definitions that our types are
-/// generated from, under the same service and version: the dynamic codec reads them with that
-/// source's own definitions.
+/// Messages whose layout or spelling in one source differs from the definitions of our types, under
+/// the same service and version: the dynamic codec reads them with that source's own definitions.
 const OTHERWISE: &[(&str, &str)] = &[
-    // One position for each stabilizer, where the two other sources have two.
+    // One position per stabilizer; the two other sources have two.
     ("fkie-ugv.jsonl", "ReportStabilizerPosition"),
-    // The lights in another order.
+    // A different order of lights.
     ("jts-ugv.jsonl", "ReportIlluminationState"),
-    // Names start with a lower-case letter.
+    // Names with a lower-case first letter.
     ("jts-ugv.jsonl", "ReportPlatformSpecifications"),
 ];
 
@@ -95,8 +94,9 @@ fn alternative(members: &Map<String, Value>) -> Value {
     }
 }
 
-/// Equal; only a real in the vector may be anything that the field rounds to the same integer, and
-/// is merely close to what we show. That both stand for the same octets is checked besides.
+/// Whether the values agree. They must be equal, except that a real in the vector may be any value
+/// that the field rounds to the same integer, and need only be close to ours. A separate check
+/// covers the octets.
 fn agree(ours: &Value, theirs: &Value) -> bool {
     match (ours, theirs) {
         (Value::Object(a), Value::Object(b)) => {
@@ -114,7 +114,7 @@ fn agree(ours: &Value, theirs: &Value) -> bool {
     }
 }
 
-/// The types that the vector may be of, the one that its service declares first. (Published
+/// The candidate types of the vector, beginning with the one that its service declares. (Published
 /// definitions of one service and version differ in two messages; both layouts are generated.)
 fn generated(row: &Value) -> Vec<&'static MessageInfo> {
     let text = |key: &str| row[key].as_str().unwrap();
@@ -134,7 +134,7 @@ fn every_vector_decodes_shows_its_values_and_encodes_to_the_same_octets() {
     for entry in fs::read_dir(evidence::golden()).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap().to_owned();
-        // The examples have their own services, whose messages only look like these.
+        // The examples have their own services, whose messages only resemble these.
         if !name.ends_with(".jsonl") || name.starts_with("scaling") || name == "jts-examples.jsonl"
         {
             continue;

@@ -10,10 +10,10 @@ use jaus_test_kit::evidence;
 use jaus_test_kit::tools::has_tshark;
 use jaus_view::{Capture, Content, Dictionary, JAUS_PORT, Line, MessageLog, Network};
 
-/// By number of the packet: the messages in it, and whether something is wrong with one.
+/// Messages by packet number, and whether one of them has an error.
 type Packets = BTreeMap<u64, (Vec<String>, bool)>;
 
-/// What our own log says about the datagrams of a capture.
+/// Our own log's messages for the datagrams of a capture.
 fn ours(dictionary: &Dictionary, path: &Path) -> Packets {
     let mut capture = Capture::new(File::open(path).unwrap()).unwrap();
     let mut network = Network::new([JAUS_PORT]);
@@ -31,7 +31,7 @@ fn ours(dictionary: &Dictionary, path: &Path) -> Packets {
         for line in &lines {
             let is_whole = header(line).is_some_and(|header| header.data == "whole");
             if is_whole && !matches!(line.content, Content::Octets(_)) {
-                // Wireshark has one item for the last fragment and what it completes.
+                // Wireshark has one item for the last fragment and the complete message.
                 messages.pop();
             }
             messages.extend(summary(line));
@@ -46,7 +46,7 @@ fn header<'l>(line: &'l Line<'_>) -> Option<&'l jaus_view::Header> {
     line.envelope.as_ref()?.header.as_ref()
 }
 
-/// A line as the dissector sums it up.
+/// A line in the form of the dissector's summary.
 fn summary(line: &Line<'_>) -> Option<String> {
     let header = header(line)?;
     let code = line.code.map_or_else(
@@ -63,7 +63,7 @@ fn summary(line: &Line<'_>) -> Option<String> {
     Some(name)
 }
 
-/// What tshark says, with the dissector in `script`.
+/// The output of tshark with the dissector in `script`.
 fn theirs(script: &Path, path: &Path) -> Packets {
     let home = script.parent().unwrap();
     let fields = [
@@ -135,7 +135,7 @@ fn tshark_finds_the_messages_and_faults_that_our_own_reading_finds() {
         .with_catalogue();
     let (mut files, mut total) = (Vec::new(), 0);
     captures(evidence::captures(), &mut files);
-    // Those that are not in the repository, if they are there.
+    // Captures outside the repository, if available.
     evidence::outside("captures/igvc2015")
         .iter()
         .for_each(|folder| captures(folder, &mut files));

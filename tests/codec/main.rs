@@ -19,8 +19,8 @@ mod versions;
 
 use jaus::codec::Registry;
 
-/// The registries of all generated services: those of the Reference Architecture share codes with
-/// the others.
+/// The registries of all generated services. Those of the Reference Architecture are separate,
+/// because they share codes with the others.
 fn generated() -> [Registry; 2] {
     [
         jaus_vehicle::messages::registry(),

@@ -154,7 +154,7 @@ mod people {
                     let theirs = dynamic::to_json(definition, &dynamic).unwrap().to_string();
                     prop_assert_eq!(ours, theirs);
                 }
-                // Where a list cannot fit, the generated codec says so before its first element.
+                // If a list cannot fit, the generated codec reports it before the first element.
                 (Err(generated), Err(dynamic)) => {
                     prop_assert!(
                         generated.offset() <= dynamic.offset,

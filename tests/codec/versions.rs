@@ -16,14 +16,14 @@ use tokio::sync::mpsc;
 
 const NEWEST_FIRST: [ServiceId; 2] = [V1_1, V1_0];
 
-/// What the driver has understood: the version, speed and heading.
+/// A command as the driver decoded it: version, speed and heading.
 type Heard = (&'static str, Option<f64>, Option<f64>);
 
 fn start(group: Group, subsystem: u16) -> Node {
     Node::start(Config::loopback(subsystem, 1).group(group)).unwrap()
 }
 
-/// A driver that accepts both versions, and reports what it received.
+/// A driver that accepts both versions, and reports each command.
 fn both(heard: mpsc::UnboundedSender<Heard>) -> Handlers {
     let newer = heard.clone();
     Handlers::new(V1_1)

@@ -48,7 +48,7 @@ impl Scene {
         }
     }
 
-    /// A subscription that the peer has confirmed as the event 7, at 20 Hz.
+    /// A subscription that the peer has confirmed as event 7, at 20 Hz.
     async fn subscribed(&mut self) -> Subscription<ReportStatus> {
         let id = self.peer.id();
         let subscribing = self.operator.subscribe(id, &QueryStatus {}, When::hz(20.0));
@@ -60,7 +60,7 @@ impl Scene {
         subscription
     }
 
-    /// Control that the peer has granted.
+    /// Control granted by the peer.
     async fn controlled(&mut self) -> Control {
         let id = self.peer.id();
         let peer = &mut self.peer;
@@ -220,7 +220,7 @@ async fn a_peer_that_rejects_or_says_nothing_is_named_with_what_it_did() {
     );
     let peer = &mut scene.peer;
     let rejecting = async {
-        // The last of the two before.
+        // Rejects the last of the two previous requests.
         loop {
             let request_id = peer.expect::<CreateEvent>().await.request_id;
             peer.say(&RejectEventRequest {
@@ -346,7 +346,7 @@ async fn the_greater_authority_takes_control_and_an_emergency_stops_everybody() 
     assert!(
         refused
             .to_string()
-            .starts_with("no control of 101.1.1: the authority 50 is too low"),
+            .starts_with("no control of 101.1.1: the authority 50 is below"),
         "{refused}"
     );
     let taken = within_limit(teacher.control(peer, 60)).await.unwrap();
@@ -440,7 +440,7 @@ async fn commands_are_refused_once_the_peer_is_known_to_be_no_longer_ready() {
     })
     .await;
     assert_eq!(control.send(&Resume {}), Ok(()));
-    // It was started again, or is in an emergency; the lease asks, and nobody else does.
+    // The peer was restarted, or is in an emergency. Only the lease queries it.
     let answering = async {
         loop {
             peer.expect::<QueryStatus>().await;
@@ -461,7 +461,7 @@ async fn commands_are_refused_once_the_peer_is_known_to_be_no_longer_ready() {
 async fn control_can_be_asked_for_again_as_soon_as_it_is_dropped() {
     let mut scene = Scene::new();
     for _ in 0..50 {
-        // The peer need not have confirmed the release.
+        // The peer may not have confirmed the release yet.
         drop(scene.controlled().await);
     }
 }

@@ -11,11 +11,11 @@ use std::time::Instant;
 
 use jaus_test_kit::waiting::LIMIT;
 
-/// Held by a test that has a driver: the group stops every driver on this host.
+/// Held by each test that runs a driver: the group example stops every driver on this host.
 static DRIVER: Mutex<()> = Mutex::new(());
 
 fn alone_with_a_driver() -> MutexGuard<'static, ()> {
-    // Leftovers of a failed test do not matter here.
+    // The state after a failed test does not matter here.
     DRIVER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -49,7 +49,7 @@ impl Example {
         }
     }
 
-    /// Waits until it prints a line with this in it.
+    /// Waits until it prints a line that contains this text.
     fn expect(&mut self, wanted: &str) {
         let end = Instant::now() + LIMIT;
         while self.seen.last().is_none_or(|line| !line.contains(wanted)) {
@@ -64,7 +64,7 @@ impl Example {
 
 impl Drop for Example {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // It may have exited already.
         let _ = self.program.kill();
         let _ = self.program.wait();
     }

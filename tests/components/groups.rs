@@ -34,7 +34,7 @@ impl Network {
         Node::start(config).unwrap()
     }
 
-    /// A component that tells a speed.
+    /// A component that reports a speed.
     fn sensor(&self, subsystem: u16, speed: f64) -> Component {
         let mut report = ReportVelocityState::default();
         report.set_velocity_x_m_per_s(speed).unwrap();
@@ -46,7 +46,7 @@ impl Network {
             .unwrap()
     }
 
-    /// One that notices quickly who comes and goes.
+    /// A component that quickly notices others that appear and leave.
     fn operator(&self) -> Component {
         let timing = Timing {
             call: Duration::from_millis(100),
@@ -64,7 +64,7 @@ impl Network {
     }
 }
 
-/// Waits until an audience has so many members.
+/// Waits until an audience has this number of members.
 async fn gathered(component: &Component, audience: &Audience, members: usize) {
     let mut changes = component.watch();
     within_limit(async {
@@ -75,7 +75,7 @@ async fn gathered(component: &Component, audience: &Audience, members: usize) {
     .await;
 }
 
-/// Waits until a component is told `M` by the other.
+/// Waits until a component receives `M` from the sender.
 async fn hears<M: Message>(messages: &mut Messages, from: JausId) {
     let heard = async {
         while let Some(message) = messages.next().await {
@@ -107,7 +107,7 @@ async fn a_message_to_a_subsystem_a_node_or_providers_reaches_those_and_nobody_e
     let mut ears = [&here, &beside, &elsewhere].map(Component::messages);
     gathered(&operator, &Audience::EVERYBODY, 3).await;
 
-    // In this order, so a message that went too far would arrive before the expected one.
+    // In this order: a message with too wide a destination would arrive before the expected one.
     let pulse = ReportHeartbeatPulse {};
     assert_eq!(operator.send_all(Audience::node(101, 2), &pulse), Ok(1));
     hears::<ReportHeartbeatPulse>(&mut ears[0], operator.id()).await;
@@ -144,7 +144,7 @@ async fn everybody_who_acknowledged_or_answered_is_told_apart_from_who_did_not()
     assert_eq!(named.await.successes().count(), 2);
 
     drop((doomed, doomed_node));
-    // By id, so discovery need not have noticed.
+    // Addressed by id, so that discovery need not have noticed the loss.
     let both = [alive, dead].map(Audience::from);
     let [to_the_living, to_the_dead] = both.map(|one| operator.deliver_all(one, &pulse));
     assert!(within_limit(to_the_living).await.is_complete());
@@ -168,7 +168,7 @@ async fn a_group_subscription_follows_providers_as_they_come_restart_and_go() {
     let second = network.sensor(102, 2.0);
     let other = second.id();
     while next().await != (other, GroupUpdate::Up) {}
-    // Both report, each with its own speed.
+    // Both sensors report, each with its own speed.
     let mut heard = [false; 2];
     while heard != [true; 2] {
         if let (id, GroupUpdate::Report(report)) = next().await {

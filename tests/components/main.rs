@@ -1,5 +1,5 @@
-//! Components as applications build them: discovery, queries, subscriptions, control, groups,
-//! other stacks as peers.
+//! Components in an application: discovery, queries, subscriptions, control, groups, and other
+//! stacks as peers.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

@@ -1,4 +1,5 @@
-//! Components as an application offers them, on nodes with real sockets on the loopback interface.
+//! Services offered by an application's components, on nodes with real sockets on the loopback
+//! interface.
 
 use std::time::Duration;
 
@@ -20,7 +21,7 @@ fn start(subsystem: u16, group: Group) -> Node {
     Node::start(Config::loopback(subsystem, 1).group(group)).unwrap()
 }
 
-/// A rover that reports a speed of 1.5 m/s, and an operator who looks for it.
+/// A rover that reports a speed of 1.5 m/s, and an operator that discovers it.
 fn rover_and_operator() -> (Component, Component) {
     let group = own_group();
     let mut speed = ReportVelocityState::default();

@@ -1,4 +1,4 @@
-//! A hostile serial line: garbage, endless messages, and ids of peers elsewhere. The line is a
+//! A hostile serial line: garbage, endless messages, and ids of peers on other links. The line is a
 //! pseudo-terminal; the attacked peers use UDP on loopback.
 #![cfg(target_os = "linux")]
 
@@ -18,25 +18,25 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
 const VEHICLE: JausId = JausId::new(101, 1, 1);
 const CLIENT: JausId = JausId::new(102, 1, 1);
-/// What the peer on the line is called.
+/// The id of the peer on the line.
 const ON_THE_LINE: JausId = JausId::new(103, 1, 1);
-/// Questions of the client, and messages of the peer on the line.
+/// Queries of the client, and messages of the peer on the line.
 const QUESTIONS: u32 = 200;
 const VALID: u16 = 100;
 
-/// A vehicle with a line, at whose other end the attacker is, and a client.
+/// A vehicle with a serial line whose other end is the attacker's, and a client.
 struct Scene {
     vehicle: Node,
     driver: Port,
     console: Port,
     line: File,
-    /// Whether the client acknowledges answers, which proves where it is.
+    /// Whether the client acknowledges answers, which verifies its address.
     acknowledges: bool,
     _client: Node,
 }
 
 impl Scene {
-    /// `adapt` changes the vehicle's settings, for a client at this address.
+    /// Starts the nodes; `adapt` changes the vehicle's settings, given the client's address.
     fn new(adapt: impl FnOnce(Config, Remote) -> Config) -> Self {
         let end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
         grantpt(&end).unwrap();
@@ -48,7 +48,7 @@ impl Scene {
         let config = adapt(config, client.links()[0].local.into());
         let vehicle = Node::start(config.serial(Settings::new(device))).unwrap();
         let line = File::from(end);
-        // The vehicle's output there is read and discarded.
+        // The vehicle's output on the line is read and discarded.
         let mut other = line.try_clone().unwrap();
         std::thread::spawn(move || while let Ok(1..) = other.read(&mut [0; 4096]) {});
         Self {
@@ -61,8 +61,8 @@ impl Scene {
         }
     }
 
-    /// The client asks while octets come by the line, at least until all of them have come. How many
-    /// questions were not answered, and what the line has brought to the driver.
+    /// Sends queries while octets arrive on the line, at least until all have arrived. Returns the
+    /// number of unanswered queries, and the messages that the driver received from the line.
     async fn ask_during(&mut self, octets: Vec<u8>) -> (u32, Vec<(JausId, Bytes)>) {
         self.ask(0).await;
         let mut line = self.line.try_clone().unwrap();
@@ -86,8 +86,8 @@ impl Scene {
         (lost, from_line)
     }
 
-    /// Asks, answers at the other end, and waits for the answer; whether it came, and what else the
-    /// driver has got.
+    /// Sends a query, answers it at the vehicle, and waits for the answer. Returns whether it
+    /// arrived, and the driver's other messages.
     async fn ask(&mut self, number: u32) -> (bool, Vec<(JausId, Bytes)>) {
         let (console, driver) = (&mut self.console, &mut self.driver);
         let acknowledge = self.acknowledges;
@@ -125,7 +125,7 @@ impl Scene {
     }
 }
 
-/// A message on the line, with this acknowledgement field.
+/// A message on the line with this acknowledgement field.
 fn on_line(source: JausId, sequence: u16, acknowledgement: Acknowledgement) -> Bytes {
     let payload = [&[0x02, 0x42][..], &sequence.to_le_bytes()].concat();
     let frame = Frame {
@@ -136,7 +136,7 @@ fn on_line(source: JausId, sequence: u16, acknowledgement: Acknowledgement) -> B
     jserial::encode(&frame).unwrap()
 }
 
-/// What this process holds in memory, in octets.
+/// Resident memory of this process, in octets.
 fn resident() -> usize {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find(|line| line.starts_with("VmRSS:"));

@@ -1,5 +1,5 @@
-//! A flood over real sockets: while one socket sends 100 000 packets of 10 000 forged senders, two
-//! components keep communicating. Loopback only.
+//! A flood over real sockets: while one socket sends 100 000 packets from 10 000 forged senders,
+//! two components keep communicating. Loopback only.
 
 use std::collections::BTreeSet;
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
@@ -17,14 +17,14 @@ use jaus_test_kit::waiting::within_limit;
 
 const FLOOD: u32 = 100_000;
 const SOURCES: u32 = 10_000;
-/// Packets at once, and the pause behind them: 20 000 a second.
+/// Packets per volley, and the pause after each: 20 000 packets a second.
 const VOLLEY: u32 = 40;
 const PAUSE: Duration = Duration::from_millis(2);
 
-/// How long the asker waits for an answer before it asks the next question. A later answer counts too.
+/// How long the client waits for an answer before its next query. A later answer counts too.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Sends the flood, and says when it is over.
+/// Sends the flood, and sets `over` at its end.
 fn flood(victim: SocketAddr, receiver: JausId, over: &AtomicBool) {
     let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     for number in 0..FLOOD {
@@ -38,7 +38,7 @@ fn flood(victim: SocketAddr, receiver: JausId, over: &AtomicBool) {
                 Bytes::from_static(&[0x02, 0x42, 1, 2, 3, 4]),
             )
         };
-        // Datagrams that the kernel refuses are lost, as on a network.
+        // Datagrams refused by the kernel are lost, as on a network.
         let _ = socket.send_to(&judp::encode(&frame).unwrap(), victim);
         if number % VOLLEY == 0 {
             std::thread::sleep(PAUSE);
@@ -47,7 +47,7 @@ fn flood(victim: SocketAddr, receiver: JausId, over: &AtomicBool) {
     over.store(true, Ordering::Relaxed);
 }
 
-/// Asks questions, and knows which of them have no answer yet.
+/// Sends queries, and tracks the unanswered ones.
 struct Asker {
     port: Port,
     answerer: JausId,
@@ -56,7 +56,7 @@ struct Asker {
 }
 
 impl Asker {
-    /// One question; waits for its answer, but not for long.
+    /// Sends one query, and waits up to `PATIENCE` for its answer.
     async fn ask(&mut self) {
         self.asked += 1;
         let number = self.asked;

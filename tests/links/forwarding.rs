@@ -11,7 +11,8 @@ use jaus::node::{Config, Node, Port};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::{until, within_limit};
 
-/// A router with UDP and TCP and its own component, one component beyond UDP and one beyond TCP.
+/// A router with UDP and TCP and a component of its own, one component reached over UDP and one
+/// over TCP.
 fn network(forward: bool) -> (Vec<Node>, [Port; 3]) {
     let group = own_group();
     let listen: SocketAddr = ([127, 0, 0, 1], 0).into();
@@ -28,7 +29,7 @@ fn network(forward: bool) -> (Vec<Node>, [Port; 3]) {
     (vec![router, by_udp, by_tcp], ports)
 }
 
-/// Sends until received: there may be no connection yet.
+/// Sends repeatedly until the message is received: there may be no connection yet.
 async fn say_until_heard(from: &Port, destination: JausId, to: &mut Port) -> Received {
     let say = async {
         loop {

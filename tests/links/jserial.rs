@@ -1,5 +1,5 @@
 //! Nodes connected by a serial line, with and without noise. The line is a pair of
-//! pseudo-terminals, with the test copying the octets between them.
+//! pseudo-terminals; the test copies the octets between them.
 #![cfg(target_os = "linux")]
 
 use std::fs::{self, File};
@@ -19,7 +19,7 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 const QUERY_HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x22]);
 const REPORT_HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x42]);
 
-/// A pseudo-terminal: the end that the test holds, and the device that a node opens.
+/// A pseudo-terminal: the test's end, and the device that a node opens.
 fn terminal() -> (File, String) {
     let end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
     grantpt(&end).unwrap();
@@ -28,7 +28,7 @@ fn terminal() -> (File, String) {
     (File::from(end), device.into_string().unwrap())
 }
 
-/// Carries octets from one terminal to the other until either is closed.
+/// Copies octets from one terminal to the other until either is closed.
 fn carry(mut from: File, mut to: File, mut change: impl FnMut(&[u8]) -> Vec<u8> + Send + 'static) {
     std::thread::spawn(move || {
         let mut octets = [0; 256];
@@ -40,13 +40,13 @@ fn carry(mut from: File, mut to: File, mut change: impl FnMut(&[u8]) -> Vec<u8> 
     });
 }
 
-/// A node with nothing but a serial line.
+/// A node with only a serial line.
 fn node(subsystem: u16, device: &str) -> Node {
     let config = Config::new(subsystem, 1).without_udp();
     Node::start(config.serial(Settings::new(device))).unwrap()
 }
 
-/// Two nodes and the line between them, on which `change` is done to what passes, both ways.
+/// Two nodes and the line between them; `change` is applied to the octets in both directions.
 fn line(change: impl FnMut(&[u8]) -> Vec<u8> + Clone + Send + 'static) -> (Node, Node) {
     let ((a, device_a), (b, device_b)) = (terminal(), terminal());
     let nodes = (node(101, &device_a), node(102, &device_b));
@@ -84,7 +84,7 @@ async fn nodes_talk_over_a_line() {
         (driver.id(), REPORT_HEARTBEAT)
     );
 
-    // Long, and full of octets that are escaped on the line.
+    // Long, and made of octets that are escaped on the line.
     let map = Bytes::from(vec![0x10; 20_000]);
     driver
         .send(Outgoing::new(
@@ -129,7 +129,7 @@ async fn acknowledged_messages_come_through_noise_each_once() {
             acknowledge: true,
             ..Outgoing::new(console.id(), driver.id(), payload.clone())
         };
-        // A message that noise hit too often is requested again, as an application would.
+        // A message that noise destroys is sent again, as an application would do.
         let arrives = async {
             loop {
                 console.send(message.clone()).unwrap();
@@ -149,7 +149,7 @@ async fn acknowledged_messages_come_through_noise_each_once() {
     );
 }
 
-/// The device of a USB converter comes back under its name.
+/// The device of a USB converter reappears under its name.
 #[tokio::test]
 async fn a_port_that_went_away_is_used_again_when_it_is_back() {
     let folder = std::env::temp_dir().join(format!("jaus-serial-{}", std::process::id()));

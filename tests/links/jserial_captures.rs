@@ -8,7 +8,7 @@ use jaus::wire::jserial::{self, Counters, Decoder};
 use jaus::wire::{Acknowledgement, Broadcast, Frame, Version};
 use jaus_test_kit::evidence;
 
-/// What was read from the line at once, as a line of the record: time, direction, length, octets.
+/// The octets of one read, from a line of the record: time, direction, length, octets.
 fn octets(line: &str) -> Vec<u8> {
     let fields: Vec<_> = line.split_whitespace().collect();
     let digits = fields.last().expect("four fields");
@@ -44,8 +44,8 @@ fn juniors_packets_are_read_and_written_octet_for_octet() {
     check(&frames);
 }
 
-/// The first goes to an unknown id and is answered; then ping and pong eight times; at the end one
-/// message of the first edition.
+/// The first ping goes to an unknown id and is acknowledged. Eight pings and eight pongs alternate,
+/// the first included. The last message is of the first edition.
 fn check(frames: &[Frame]) {
     let (a, b) = (JausId::new(1, 1, 1), JausId::new(2, 1, 1));
     let [first, acknowledgement, rest @ .., last] = frames else {

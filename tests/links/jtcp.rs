@@ -1,5 +1,5 @@
 //! Nodes connected by TCP on the loopback interface, with each other and with scripted peers that
-//! behave like other stacks, or badly. Needs no network.
+//! imitate other stacks or misbehave. Needs no network.
 
 use std::net::SocketAddr;
 use std::time::{Duration, SystemTime};
@@ -26,7 +26,7 @@ fn listening(subsystem: u16) -> Config {
         .tcp_listen(at.into())
 }
 
-/// A node without UDP that connects to another; `id` is what is known to live there.
+/// A node without UDP that connects to another; `id` is the peer's configured id.
 fn connecting(subsystem: u16, to: SocketAddr, id: &str) -> Config {
     let peer: Peer = format!("{id}{to}").parse().unwrap();
     Config::new(subsystem, 1).without_udp().tcp_connect(peer)
@@ -46,7 +46,7 @@ fn to(port: &Port, destination: JausId, payload: Bytes) -> Outgoing {
     Outgoing::new(port.id(), destination, payload)
 }
 
-/// Queries until the other one answers: there may be no connection yet.
+/// Sends queries until the receiver gets one: there may be no connection yet.
 async fn ask_until_heard(console: &Port, driver: &mut Port) -> Received {
     let ask = async {
         loop {
@@ -62,7 +62,7 @@ async fn ask_until_heard(console: &Port, driver: &mut Port) -> Received {
     within_limit(ask).await
 }
 
-/// A peer that is played by the test.
+/// A peer scripted by the test.
 struct Scripted {
     stream: TcpStream,
     decoder: Decoder,
@@ -160,7 +160,7 @@ async fn a_broadcast_goes_to_all_connections() {
 async fn a_large_message_arrives_whole() {
     let vehicle = Node::start(listening(101)).unwrap();
     let mut operator = connecting(102, address(&vehicle), "101.255.255@");
-    // As Junior cuts them: 64 KB in 17 messages.
+    // Junior's fragment size: 64 KB in 17 messages.
     operator.payload_limit = 4079;
     let operator = Node::start(operator).unwrap();
     let (mut driver, console) = (vehicle.attach(1).unwrap(), operator.attach(1).unwrap());
@@ -182,7 +182,7 @@ async fn a_large_message_arrives_whole() {
     assert!(vehicle.tcp().unwrap().counters.received >= received + 17);
 }
 
-/// Junior writes the version octet once, and TCP may cut anywhere.
+/// Junior writes the version octet once, and TCP may split the stream anywhere.
 #[tokio::test]
 async fn a_peer_that_writes_one_octet_at_a_time_is_answered_on_its_connection() {
     let vehicle = Node::start(listening(101)).unwrap();
@@ -239,7 +239,7 @@ async fn each_id_is_answered_on_the_connection_on_which_it_was_heard_last() {
         let report = connection.read().await.unwrap();
         assert_eq!((report.destination, report.payload), (id, REPORT_HEARTBEAT));
     }
-    // It restarted and has the first id on its own connection again.
+    // The peer restarts, and opens a new connection for the first id.
     let mut again = Scripted::connect(address(&vehicle)).await;
     let encoded = jtcp::encode(&frame(ids[0], driver.id(), 2)).unwrap();
     again.write(&encoded).await;
@@ -248,7 +248,7 @@ async fn each_id_is_answered_on_the_connection_on_which_it_was_heard_last() {
     assert_eq!(again.read().await.unwrap().destination, ids[0]);
 }
 
-/// Junior takes messages of a node that is started again for old ones, if their numbers are.
+/// Junior takes messages of a restarted node for old ones if their sequence numbers are old.
 #[tokio::test]
 async fn a_node_begins_at_the_number_that_the_clock_tells() {
     let now = || {
@@ -267,7 +267,7 @@ async fn a_node_begins_at_the_number_that_the_clock_tells() {
         .send(to(&driver, query.source, REPORT_HEARTBEAT))
         .unwrap();
     let number = junior.read().await.unwrap().sequence;
-    // The first is the one after it; 0 is skipped.
+    // The first message has the next number; 0 is skipped.
     let ahead = number.wrapping_sub(earliest);
     assert!((1..=started + 2).contains(&ahead), "{ahead} of {started}");
 }
@@ -289,8 +289,8 @@ async fn a_version_octet_before_each_message_is_taken() {
     }
 }
 
-/// Register Services to another subsystem is what others might send too; the version octet before
-/// each message besides makes it certain.
+/// Other stacks might also send Register Services to another subsystem; only the version octet
+/// before each message makes it certain.
 #[tokio::test]
 async fn jauspp_is_recognised_by_the_version_octets_in_its_stream() {
     let registration = Bytes::from_static(b"\x00\x0B\x00");
@@ -372,7 +372,7 @@ async fn a_peer_that_does_not_read_loses_its_own_messages_only() {
         .await;
     receive(&mut driver).await;
 
-    // Until the backlog is full, which is when the first message is lost.
+    // Sends until the backlog is full and a message is lost.
     let payload = Bytes::from(vec![2; 1400]);
     let lost = || vehicle.tcp().unwrap().counters.send_overflows;
     let mut sent: u16 = 0;
@@ -393,7 +393,7 @@ async fn a_peer_that_does_not_read_loses_its_own_messages_only() {
     let connections = vehicle.tcp().unwrap().connections;
     let overflows: Vec<_> = connections.iter().map(|c| c.overflows > 0).collect();
     assert_eq!(overflows.iter().filter(|&&lost| lost).count(), 1);
-    // It is not disconnected yet: its backlog arrives when it reads.
+    // The connection is still open: the backlog arrives when the peer reads.
     assert_eq!(slow.read().await.unwrap().payload, payload);
 }
 
@@ -414,7 +414,7 @@ async fn a_peer_that_was_restarted_is_connected_to_again() {
     assert_eq!(operator.tcp().unwrap().counters.connected, 2);
 }
 
-/// Nothing is known of the peer but its address, and there is no connection yet.
+/// Only the peer's address is known, and there is no connection yet.
 #[tokio::test]
 async fn the_first_message_to_an_unknown_id_waits_for_the_connection() {
     let far = tokio::net::TcpListener::bind(("127.0.0.1", 0))

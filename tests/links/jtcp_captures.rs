@@ -21,7 +21,7 @@ fn decode(stream: &[u8], part: usize) -> Vec<Frame> {
     frames
 }
 
-/// As our side writes them: the version octet once.
+/// Our encoding: the version octet once.
 fn encode(frames: &[Frame]) -> Bytes {
     let mut stream = BytesMut::new();
     for frame in frames {
@@ -31,7 +31,7 @@ fn encode(frames: &[Frame]) -> Bytes {
     stream.freeze()
 }
 
-/// The frames of each stream of a capture, by all cuts alike.
+/// The frames of each stream of a capture; every segmentation gives the same.
 fn frames(file: &Path) -> Vec<(Vec<u8>, Vec<Frame>)> {
     let read = |stream: Vec<u8>| {
         let frames = decode(&stream, usize::MAX);
@@ -71,8 +71,8 @@ fn juniors_64_kb_come_in_17_parts() {
     assert_eq!((parts.len(), length), (17, 65_536));
 }
 
-/// JAUS++ writes the version octet before each message, ours only at the beginning: that is all
-/// the difference.
+/// JAUS++ writes the version octet before each message, our side only at the beginning. There is no
+/// other difference.
 #[test]
 fn jausplusplus_streams_differ_by_their_version_octets() {
     let captures = evidence::captures();

@@ -21,7 +21,7 @@ fn listening(max_accepted: usize) -> TcpLink {
     TcpLink::open(&settings).unwrap()
 }
 
-/// A connection from `address`, another of this host's loopback addresses.
+/// A connection from `address`, one of this host's other loopback addresses.
 async fn connect_from(address: [u8; 4], to: SocketAddr) -> TcpStream {
     let socket = tokio::net::TcpSocket::new_v4().unwrap();
     socket.bind((address, 0).into()).unwrap();
@@ -35,7 +35,7 @@ fn message(octets: usize) -> Bytes {
     jtcp::encode(&frame).unwrap()
 }
 
-/// Gives the link a turn at the time `now`; why connections closed.
+/// Polls the link once at the time `now`; returns why connections closed.
 async fn turn(link: &mut TcpLink, now: Instant) -> Vec<Closed> {
     let mut closed = Vec::new();
     std::future::poll_fn(|cx| {
@@ -53,7 +53,7 @@ async fn turn(link: &mut TcpLink, now: Instant) -> Vec<Closed> {
     closed
 }
 
-/// Gives the link turns at the time `now` until `is_enough`, and collects why connections closed.
+/// Polls the link at the time `now` until `is_enough`; returns why connections closed.
 async fn turns(
     link: &mut TcpLink,
     now: Instant,
@@ -87,7 +87,7 @@ async fn a_connection_that_says_nothing_loses_its_place_when_it_is_needed() {
     let _silent = TcpStream::connect(address).unwrap();
     turns(&mut link, now, |link| link.counters().accepted == 1).await;
 
-    // Too early: it may be about to send.
+    // Too early: the connection may be about to send.
     let _second = TcpStream::connect(address).unwrap();
     turns(&mut link, now, |link| link.counters().refused == 1).await;
 
@@ -111,7 +111,7 @@ async fn a_peer_that_takes_nothing_for_too_long_is_cut_off() {
     turns(&mut link, now, |link| link.counters().accepted == 1).await;
     let remote = peer.local_addr().unwrap();
     let payload = message(60_000);
-    // The kernel makes its buffers larger for a while.
+    // The kernel enlarges its buffers for a while.
     let overflows = |link: &TcpLink| link.counters().send_overflows;
     let mut lost_without_progress = 0;
     while lost_without_progress < 20 {
@@ -136,7 +136,7 @@ async fn a_peer_that_takes_nothing_for_too_long_is_cut_off() {
     assert_eq!(link.connections().count(), 0);
 }
 
-/// Both nodes of a pair may be told to connect to each other.
+/// Both nodes of a pair may be configured to connect to each other.
 #[tokio::test]
 async fn what_is_sent_before_the_first_connection_waits_for_it_and_later_it_does_not() {
     let far = TcpListener::bind(("127.0.0.1", 0)).unwrap();
@@ -167,7 +167,7 @@ async fn what_is_sent_before_the_first_connection_waits_for_it_and_later_it_does
         ..Counters::default()
     };
     assert_eq!(link.counters(), expected);
-    // The next attempt comes after a pause, and fails.
+    // The next attempt follows after a pause, and fails.
     let later = link.poll_timeout().unwrap();
     assert!(later > now);
     turns(&mut link, later, |link| {
@@ -177,7 +177,7 @@ async fn what_is_sent_before_the_first_connection_waits_for_it_and_later_it_does
     assert!(link.poll_timeout().unwrap() > later);
 }
 
-/// As JAUS++ does, which loses its place in a stream without.
+/// JAUS++ writes the version octet before each message, and loses its place in a stream without it.
 #[tokio::test]
 async fn who_writes_the_version_octet_before_each_message_gets_it_before_each() {
     let said = message(20);
@@ -215,7 +215,7 @@ async fn a_peer_that_still_writes_when_the_link_hangs_up_is_not_cut_off() {
     );
     assert_eq!(peer.read(&mut [0]).unwrap(), 0, "it is told");
     for received in 2..6 {
-        // The stream's version octet came with the first.
+        // The stream's version octet came with the first message.
         peer.write_all(&message(20)[1..]).unwrap();
         turns(&mut link, now, |link| link.counters().received == received).await;
     }
@@ -324,7 +324,7 @@ async fn what_is_for_everyone_waits_for_the_first_connection_too() {
     assert_eq!(link.counters().not_connected, 1, "lost, and counted");
 }
 
-/// Peers that read nothing cost no more memory together than one link may have.
+/// The backlogs of peers that read nothing share one memory limit per link.
 #[tokio::test]
 async fn what_waits_for_all_connections_is_bounded() {
     const MOST: usize = 16 << 20;

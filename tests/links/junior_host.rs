@@ -1,4 +1,4 @@
-//! A node behind the node manager of a Junior on the same host, which the test simulates: a Unix
+//! A node behind the node manager of Junior on the same host, which the test simulates: a Unix
 //! datagram socket in a folder, as in the real one.
 #![cfg(unix)]
 
@@ -26,7 +26,7 @@ const CANCEL: &[u8] = &[3, 0];
 const QUERY_HEARTBEAT: &[u8] = &[0x02, 0x22];
 const REPORT_HEARTBEAT: &[u8] = &[0x02, 0x42];
 
-/// A folder of sockets; gone when dropped.
+/// A folder of sockets, removed when dropped.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -52,14 +52,14 @@ impl Drop for Folder {
     }
 }
 
-/// The node manager, as far as a client sees it.
+/// The node manager, as a client sees it.
 struct Manager<'a> {
     socket: UnixDatagram,
     folder: &'a Folder,
 }
 
 impl<'a> Manager<'a> {
-    /// Starts in the folder; as Junior does, in the place of whatever is there.
+    /// Starts in the folder. Like Junior, replaces an existing socket.
     fn start(folder: &'a Folder) -> Self {
         let path = folder.0.join("JuniorRTE");
         let _ = std::fs::remove_file(&path);
@@ -67,7 +67,7 @@ impl<'a> Manager<'a> {
         Self { socket, folder }
     }
 
-    /// The next message, with the octets of its datagram; probes are read as Junior reads them.
+    /// The next message, with the octets of its datagram; probes are skipped, as by Junior.
     async fn next(&self) -> (Frame, Vec<u8>) {
         let mut buffer = [0; 5000];
         loop {
@@ -86,7 +86,7 @@ impl<'a> Manager<'a> {
         }
     }
 
-    /// The next message from `source` with this payload, or beginning with this code.
+    /// The next message from `source` whose payload begins with these octets.
     async fn wait_for(&self, source: JausId, payload: &[u8]) -> Frame {
         loop {
             let (frame, _) = self.next().await;
@@ -180,7 +180,7 @@ async fn each_component_is_a_client_and_takes_leave_when_it_goes() {
     assert_eq!(left, [false, false]);
 }
 
-/// A broadcast of another client comes once for each of our components, with its wildcards.
+/// Another client's broadcast arrives once for each of our components, with its wildcards.
 #[tokio::test]
 async fn a_broadcast_that_comes_by_each_socket_is_delivered_once_to_each() {
     let folder = Folder::new("broadcast");
@@ -201,7 +201,7 @@ async fn a_broadcast_that_comes_by_each_socket_is_delivered_once_to_each() {
     assert_eq!(vehicle.counters().waiting, 0);
 }
 
-/// Junior gives our own broadcasts to our other components, which had them already.
+/// Junior forwards our own broadcasts to our other components, which already have them.
 #[tokio::test]
 async fn our_own_broadcast_that_junior_brings_back_is_no_second_one_and_no_conflict() {
     let folder = Folder::new("echo");
@@ -234,7 +234,7 @@ async fn discovery_answers_what_the_node_manager_brings_from_the_network() {
         .attach(&node, 1)
         .unwrap();
     manager.accept(VEHICLE).await;
-    // Query Identification of a subsystem, to all; Junior replaced the wildcards by our id.
+    // Query Identification of a subsystem, to all; Junior replaced the wildcards with our id.
     let mut query = message(OPERATOR, VEHICLE, &[0x00, 0x2B, 2], 9);
     query.flags = Flags::default().with_broadcast(Broadcast::Global);
     manager.deliver(VEHICLE, &query);
@@ -262,7 +262,7 @@ async fn a_node_that_starts_first_waits_for_the_node_manager_and_finds_it_again_
     manager.accept(VEHICLE).await;
     until(|| node.junior().unwrap().is_registered).await;
     drop(manager);
-    // A quick restart: another socket in the same place.
+    // A quick restart: another socket at the same path.
     let manager = Manager::start(&folder);
     manager.accept(VEHICLE).await;
     until(|| node.junior().unwrap().is_registered).await;
@@ -290,7 +290,7 @@ async fn a_node_manager_that_reads_nothing_blocks_nobody_and_all_is_counted() {
         assert!(sensor.recv().await.is_some(), "the node goes on");
     }
     until(|| node.junior().unwrap().counters.send_overflows > 0).await;
-    // It reads again and receives the kept messages: the newest ones.
+    // The manager reads again and receives the kept messages: the newest ones.
     let mut read = 0;
     let newest = (MESSAGES - 1).to_le_bytes();
     while manager.wait_for(VEHICLE, QUERY_HEARTBEAT).await.payload[2..] != newest {

@@ -12,7 +12,7 @@ use jaus::wire::Priority;
 use jaus_test_kit::evidence::not_tested;
 use jaus_test_kit::waiting::{LIMIT, within_limit};
 
-/// A port that no test of this process gets twice and nothing else uses just now.
+/// A free port, different for each test of this process.
 fn free_port() -> u16 {
     let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
     socket.local_addr().unwrap().port()
@@ -22,7 +22,7 @@ fn loopback() -> Interface {
     Interfaces::Loopback.choose(Ip::V4).unwrap().remove(0)
 }
 
-/// A free unicast port and a group of the test's own.
+/// A free unicast port, and a separate multicast group.
 fn settings() -> Settings {
     let group = SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), free_port());
     Settings {
@@ -191,7 +191,7 @@ async fn the_longest_datagram_arrives_whole() {
     assert_eq!(receive(&mut b).await.1, longest);
 }
 
-/// Several datagrams at once, as the endpoint gives them out.
+/// A GSO batch: several datagrams in one transmit, as the endpoint emits them.
 fn train(link: &UdpLink, octets: Bytes, segment: usize) -> Transmit {
     Transmit {
         link: LinkId(0),
@@ -204,7 +204,7 @@ fn train(link: &UdpLink, octets: Bytes, segment: usize) -> Transmit {
 
 #[tokio::test]
 async fn a_train_arrives_as_the_datagrams_that_it_is_made_of() {
-    // Less than a default receive buffer holds.
+    // Fits into a default receive buffer.
     let octets: Bytes = (0..90_500_u32).map(|i| (i * 7 % 251) as u8).collect();
     for (sends, receives) in [(true, true), (true, false), (false, true), (false, false)] {
         let with = |batch| Settings {
@@ -214,7 +214,7 @@ async fn a_train_arrives_as_the_datagrams_that_it_is_made_of() {
         let mut a = UdpLink::open(&loopback(), &with(sends)).unwrap();
         let mut b = UdpLink::open(&loopback(), &with(receives)).unwrap();
         a.transmit(&train(&b, octets.clone(), 1000));
-        // Shorter than a datagram of the train, and as long as one.
+        // Shorter than a datagram of the batch, and exactly as long.
         a.transmit(&train(&b, octets.slice(..999), 1000));
         a.transmit(&train(&b, octets.slice(..1000), 1000));
         a.flush();
@@ -343,8 +343,7 @@ fn an_interface_that_does_not_exist_is_refused_with_a_list_of_those_that_do() {
     }
 }
 
-/// An event goes to many subscribers at once: a call into the kernel for each would cost most of
-/// the time.
+/// An event goes to many subscribers at once: a system call for each would take most of the time.
 #[cfg(target_os = "linux")]
 #[tokio::test]
 async fn datagrams_to_many_peers_leave_with_few_calls() {
@@ -377,7 +376,7 @@ async fn datagrams_to_many_peers_leave_with_few_calls() {
     assert!(counters.send_calls <= 4, "{} calls", counters.send_calls);
 }
 
-/// What the kernel refuses costs that one datagram, wherever it stands among the others.
+/// A datagram refused by the kernel loses only itself, at any position in the queue.
 #[tokio::test]
 async fn a_datagram_that_is_refused_does_not_take_others_with_it() {
     let mut link = UdpLink::open(&loopback(), &settings()).unwrap();

@@ -1,4 +1,4 @@
-//! Large messages between two nodes on the loopback interface: no loss without acknowledgement,
+//! Large messages between two nodes on the loopback interface: without acknowledgement no loss,
 //! although nothing is retransmitted; with acknowledgement no loss at any size.
 
 use std::collections::BTreeSet;
@@ -9,11 +9,11 @@ use jaus::node::{Config, Node, Port};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::{until, within_limit};
 
-/// Asked for, this gives the receive buffer of 212992 octets that sockets have on Linux unless
-/// they ask for another: the kernel doubles it.
+/// A request for this size gives Linux's default receive buffer of 212992 octets: the kernel
+/// doubles the requested size.
 const USUAL_BUFFER: usize = 212_992 / 2;
 
-/// Two nodes with a component each, which know each other's address.
+/// Two nodes with one component each, which know each other's address.
 async fn pair(receive_buffer: Option<usize>) -> ([Node; 2], [Port; 2]) {
     let group = own_group();
     let nodes = [101, 102].map(|subsystem| {
@@ -39,7 +39,7 @@ fn message(from: &Port, to: &Port, payload: Bytes) -> Outgoing {
     Outgoing::new(from.id(), to.id(), payload)
 }
 
-/// No two messages are the same.
+/// A payload that differs between messages.
 fn image(length: usize, number: usize) -> Bytes {
     (0..length).map(|i| (i * 7 % 251 + number) as u8).collect()
 }
@@ -92,7 +92,7 @@ async fn sixteen_mebibytes_with_acknowledgement_arrive_through_usual_buffers() {
     within_limit(told).await;
 }
 
-/// More than a mailbox holds.
+/// More messages than a mailbox holds.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn what_was_acknowledged_is_not_dropped_when_the_receiver_is_slow() {
     let (nodes, [sender, mut receiver]) = pair(None).await;
@@ -104,7 +104,7 @@ async fn what_was_acknowledged_is_not_dropped_when_the_receiver_is_slow() {
         let sender = sender.sender();
         sent.push(tokio::spawn(async move { sender.deliver(message).await }));
     }
-    // Nothing is read before the mailbox is full.
+    // Read nothing until the mailbox is full.
     until(|| nodes[1].counters().get(Counter::ReceiverBusy) > 0).await;
     let mut received = Vec::new();
     while received.len() < MESSAGES {

@@ -60,7 +60,7 @@ async fn nodes_that_never_met_talk_by_id_alone() {
         (report.source, &report.payload),
         (driver.id(), &REPORT_HEARTBEAT)
     );
-    // The answer went to the address that the query came from.
+    // The answer went to the query's source address.
     assert_eq!(report.broadcast, Broadcast::None);
     assert_eq!(report.path.unwrap().peer, a.links()[0].local);
     assert_eq!(b.peers()[0].path.peer, a.links()[0].local);
@@ -116,7 +116,7 @@ async fn a_local_broadcast_stays_in_its_subsystem() {
 
     assert_eq!(receive(&mut sibling).await.payload, QUERY_HEARTBEAT);
     assert_eq!(receive(&mut sibling).await.payload, REPORT_HEARTBEAT);
-    // Sent later, received first: the other one was not for it.
+    // Sent later, received first: the other one had a different destination.
     assert_eq!(receive(&mut stranger).await.payload, REPORT_HEARTBEAT);
 }
 
@@ -257,7 +257,7 @@ async fn large_messages_arrive_whole_whatever_the_size_of_packets() {
         let b = Node::start(config).unwrap();
         let (mut receiver, sender) = (a.attach(1).unwrap(), b.attach(1).unwrap());
 
-        // No longer than a default receive buffer holds.
+        // Fits into a default receive buffer.
         for length in [2, 1425, 1426, 100_000] {
             let image: Bytes = (0..length).map(|i| (i * 7 % 251) as u8).collect();
             sender

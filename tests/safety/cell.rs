@@ -3,12 +3,12 @@
 use std::fmt;
 use std::time::Duration;
 
-/// What the controller drives the vehicle with.
+/// The driver service by which the controller moves the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Driver {
-    /// Primitive Driver, with a setpoint ten times a second.
+    /// Primitive Driver, with ten setpoints per second.
     Effort,
-    /// Velocity State Driver, with a setpoint ten times a second.
+    /// Velocity State Driver, with ten setpoints per second.
     Velocity,
     /// Primitive Driver with the policy `hold`: one setpoint.
     HeldEffort,
@@ -22,36 +22,36 @@ pub(crate) enum Driver {
     List,
     /// Local Path Segment Driver: a list, executed once.
     Path,
-    /// A service of the application's own, with a setpoint ten times a second.
+    /// A service defined by the application, with ten setpoints per second.
     Own,
 }
 
-/// What goes wrong while the vehicle moves.
+/// The fault that occurs while the vehicle moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Fault {
     /// The controller's process is killed.
     Killed,
     /// The controller's process is suspended.
     Suspended,
-    /// Nothing passes between controller and vehicle.
+    /// No datagrams pass between controller and vehicle.
     CutOff,
-    /// Nothing passes from the controller to the vehicle.
+    /// No datagrams pass from the controller to the vehicle.
     CutToVehicle,
-    /// Nothing passes from the vehicle to the controller.
+    /// No datagrams pass from the vehicle to the controller.
     CutToController,
     /// The controller's process is killed, and another one with the same id sends its setpoints.
     Restarted,
-    /// A client with a greater authority takes control.
+    /// A client with higher authority takes control.
     TakenOver,
-    /// The controller releases control, but nothing of that arrives; then it is killed.
+    /// The controller releases control, but no release message arrives; then it is killed.
     ReleaseLost,
-    /// The gateway between the vehicle and an RA controller is killed and started again.
+    /// The gateway between the vehicle and an RA controller is killed and restarted.
     Gateway,
-    /// The controller is killed, when 1000 ids are known that are dead.
+    /// The controller is killed while 1000 dead ids are known.
     DeadIdsBefore,
-    /// The controller is killed, and 1000 ids turn up and die.
+    /// The controller is killed while 1000 ids appear and die.
     DeadIdsDuring,
-    /// The component ends in an orderly way.
+    /// The component shuts down gracefully.
     Stopped,
     /// The component's process is suspended.
     Hung,
@@ -59,15 +59,15 @@ pub(crate) enum Fault {
     Dropped,
     /// A motor reports a fault.
     MotorFailed,
-    /// The pose is not a number any more.
+    /// The pose becomes NaN.
     NanPose,
-    /// The pose is not measured any more.
+    /// The pose is no longer measured.
     FrozenPose,
     /// The pose is not measured for five seconds.
     DiskStall,
     /// The wall clock of the vehicle's host is stepped by an hour, and the controller is killed.
     VehicleClock,
-    /// The wall clock of the controller's host is stepped by an hour, and it is killed.
+    /// The wall clock of the controller's host is stepped by an hour, and the controller is killed.
     ControllerClock,
 }
 
@@ -101,12 +101,12 @@ impl Driver {
         matches!(self, Self::Velocity | Self::HeldVelocity)
     }
 
-    /// Whether effort and velocity stay in force without being repeated.
+    /// Whether effort and velocity stay in force without repetition.
     pub(crate) const fn is_held(self) -> bool {
         matches!(self, Self::HeldEffort | Self::HeldVelocity)
     }
 
-    /// Whether the vehicle needs to know where it is.
+    /// Whether the vehicle needs its pose.
     pub(crate) const fn needs_pose(self) -> bool {
         matches!(
             self,
@@ -114,8 +114,8 @@ impl Driver {
         )
     }
 
-    /// For how long the vehicle may move on: of what is repeated, after the last setpoint, otherwise
-    /// after the controller's last message.
+    /// How long the vehicle may continue to move: after the last setpoint if setpoints are
+    /// repeated, otherwise after the controller's last message.
     pub(crate) const fn limit(self) -> Duration {
         Duration::from_secs(match self {
             Self::Effort | Self::Velocity | Self::Own => 1,
@@ -156,7 +156,8 @@ impl Fault {
 }
 
 impl Cell {
-    /// All cells: the RA knows no velocity command that a gateway could pass on.
+    /// All cells except the gateway with velocity drivers: the RA has no velocity command to pass
+    /// on.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
         let cells = Fault::ALL.iter().flat_map(|&fault| {
             let cell = move |driver| Self { driver, fault };
@@ -165,8 +166,8 @@ impl Cell {
         cells.filter(|cell| cell.fault != Fault::Gateway || !cell.driver.is_velocity())
     }
 
-    /// Whether the fault by itself has to stop this driver; otherwise the controller is killed a
-    /// moment later.
+    /// Whether the fault itself must stop this driver. Otherwise the controller is killed a moment
+    /// later.
     pub(crate) const fn stops_by_itself(self) -> bool {
         match self.fault {
             Fault::NanPose | Fault::FrozenPose | Fault::DiskStall => self.driver.needs_pose(),

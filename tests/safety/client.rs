@@ -18,32 +18,33 @@ use crate::commands;
 use crate::sim::{Event as EndpointEvent, OwnedEndpoint, WallClock};
 use crate::vehicle::VEHICLE;
 
-/// A controller, or a program that wants to become one.
+/// A controller, or a client that requests control.
 pub(crate) struct Client {
     stack: Stack,
     driver: Driver,
     authority: u8,
     control: Option<ControlId>,
     holds: bool,
-    /// Whether it wants control, and asks again when it is refused.
+    /// Whether it wants control, and repeats a refused request.
     wants: bool,
-    /// Whether it sends its setpoints again and again, in control or not.
+    /// Whether it keeps repeating its setpoints, in control or not.
     insists: bool,
-    /// What is to be sent in this order, each after the one before was acknowledged.
+    /// Commands to send in this order, each after the acknowledgement of the previous one.
     queue: VecDeque<Bytes>,
     unacknowledged: Option<MessageHandle>,
     is_driving: bool,
-    /// Whether the vehicle has ever reported that it is ready.
+    /// Whether the vehicle has ever reported ready.
     was_ready: bool,
     next: Instant,
-    /// When it looks whether the vehicle is ready.
+    /// When to check whether the vehicle is ready.
     check: Instant,
 }
 
 impl Client {
-    /// The interval of setpoints that are repeated.
+    /// Interval of repeated setpoints.
     const PERIOD: Duration = Duration::from_millis(100);
-    /// So long after Resume the vehicle is ready, unless control lapsed while Resume was on its way.
+    /// The vehicle is ready this long after Resume, unless control lapsed while Resume was in
+    /// transit.
     const READY_WITHIN: Duration = Duration::from_secs(1);
     /// Ready in Report Status.
     const READY: u8 = 1;
@@ -84,7 +85,7 @@ impl Client {
         self.queue.extend(commands::motion(self.driver));
     }
 
-    /// Takes control and does nothing with it.
+    /// Takes control without using it.
     pub(crate) fn take_control(&mut self, now: Instant) {
         self.wants = true;
         self.next = now;
@@ -98,18 +99,18 @@ impl Client {
         }
     }
 
-    /// Makes the vehicle ready and drives; it is in control already.
+    /// Makes the vehicle ready and drives; the client is already in control.
     pub(crate) fn drive(&mut self) {
         self.queue.push_back(commands::encode(&Resume {}));
         self.queue.extend(commands::motion(self.driver));
     }
 
-    /// Sends its setpoints again and again from now on, in control or not.
+    /// Keeps repeating its setpoints from now on, in control or not.
     pub(crate) fn insist(&mut self) {
         self.insists = true;
     }
 
-    /// Releases control and says no more.
+    /// Releases control and stops sending.
     pub(crate) fn let_go(&mut self, now: Instant) {
         self.wants = false;
         self.is_driving = false;
@@ -119,7 +120,7 @@ impl Client {
         }
     }
 
-    /// Sets the vehicle's time by its own wall clock.
+    /// Sets the vehicle's time to the client's wall clock.
     pub(crate) fn set_time(&mut self, clock: &WallClock) {
         let set_time = commands::set_time(clock.since_1970());
         self.stack.send_octets(VEHICLE, set_time);
@@ -163,7 +164,7 @@ impl Client {
         self.stack.poll_timeout().into_iter().chain(next).min()
     }
 
-    /// Does what is due, and sends what there is.
+    /// Performs due actions, and sends all pending messages.
     pub(crate) fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         self.note_news(now);
         if self.next <= now {

@@ -20,7 +20,7 @@ const SET_LOCAL_PATH_SEGMENT: u16 = 0x0410;
 /// Metres to the goal: more than the vehicle covers in any run.
 const FAR: f64 = 400.0;
 
-/// What is to be sent, in this order, to set the vehicle in motion.
+/// The messages that set the vehicle in motion, in this order.
 pub(crate) fn motion(driver: Driver) -> Vec<Bytes> {
     match driver {
         Driver::Effort | Driver::HeldEffort | Driver::Own => vec![encode(&effort())],
@@ -38,7 +38,7 @@ pub(crate) fn motion(driver: Driver) -> Vec<Bytes> {
     }
 }
 
-/// The same for a client that knows no lists: the places one by one, and then a speed. A segment is a
+/// The same for a client without lists: the places one by one, and then a speed. A segment is a
 /// report here, which has the layout of the command.
 pub(crate) fn places_and_speed(driver: Driver) -> Vec<Bytes> {
     let [first, second] = match driver {
@@ -49,7 +49,7 @@ pub(crate) fn places_and_speed(driver: Driver) -> Vec<Bytes> {
     vec![first, second, encode(&travel_speed())]
 }
 
-/// Set Time, by the sender's wall clock.
+/// Set Time, from the sender's wall clock.
 pub(crate) fn set_time(since_1970: Duration) -> Bytes {
     let of_day = since_1970.as_secs() % 86_400;
     let stamp = TimeStamp::default()

@@ -1,5 +1,5 @@
-//! An operator among RA systems and the gateway to the vehicle: the controller in the row "gateway
-//! restarted".
+//! An operator among RA systems and the gateway to the vehicle: the controller in the cells with
+//! the fault "gateway restarted".
 //!
 //! The two form one party without losses between them; the gateway's JAUS side is a node of the
 //! simulated network.
@@ -24,12 +24,12 @@ use crate::vehicle::VEHICLE;
 const GATEWAY: JausId = JausId::new(250, 1, 1);
 /// The operator among RA systems, a commander.
 const OPERATOR: RaId = RaId::new(42, 1, 32, 1);
-/// What a report's code has more than the command's.
+/// Offset from a command's code to its report's.
 const REPORT: u16 = 0x4000;
-/// The operator as the vehicle knows it.
+/// The operator's JAUS id.
 pub(crate) const OPERATOR_BEHIND_GATEWAY: JausId = JausId::new(42, 1, 32);
 
-/// A gateway and an operator that is reached through it.
+/// A gateway, and an operator behind it.
 pub(crate) struct Crossing {
     gateway: Gateway,
     operator: Operator,
@@ -60,7 +60,7 @@ impl Crossing {
         Self { gateway, operator }
     }
 
-    /// A gateway that was killed is started again; the operator has lived on.
+    /// Restarts a killed gateway; the operator keeps its state.
     pub(crate) fn restart(self, now: Instant) -> Self {
         Self::with(now, self.operator)
     }
@@ -96,7 +96,7 @@ impl Crossing {
             .min()
     }
 
-    /// Carries everything until nothing is left to carry.
+    /// Passes datagrams and actions on until none are left.
     pub(crate) fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         while self.carry_datagrams(now) | self.carry_actions(now, endpoint) {}
     }
@@ -140,7 +140,7 @@ impl Crossing {
 }
 
 impl Operator {
-    /// The interval of its setpoints.
+    /// Interval of its setpoints.
     const PERIOD: Duration = Duration::from_millis(100);
 
     fn new(now: Instant, driver: Driver) -> Self {
@@ -164,7 +164,7 @@ impl Operator {
         self.streams = self.driver.is_streamed();
     }
 
-    /// The vehicle moves: only what has to be repeated is repeated from now on.
+    /// The vehicle moves: from now on the operator repeats only setpoints.
     pub(crate) fn note_motion(&mut self) {
         self.sets_out = false;
     }
@@ -209,13 +209,13 @@ impl Operator {
     fn say(&mut self, now: Instant, part: u8, code: u16, data: Bytes) {
         let (subsystem, instance) = (VEHICLE.subsystem() as u8, VEHICLE.component());
         let vehicle = RaId::new(subsystem, VEHICLE.node(), part, instance);
-        // The gateway may not be there.
+        // The gateway may be gone.
         let _ = self
             .node
             .send(now, &Message::new(OPERATOR, vehicle, code, data));
     }
 
-    /// Answers that it is ready when it is asked for its status.
+    /// Answers status queries with ready.
     fn handle_events(&mut self, now: Instant) -> bool {
         let mut moved = false;
         while let Some(event) = self.node.poll_event() {
@@ -254,7 +254,7 @@ fn subsystem() -> Subsystem {
     }
 }
 
-/// The RA component type that a driver is shown as.
+/// The RA component type that represents a driver.
 fn part(driver: Driver) -> u8 {
     match driver {
         Driver::Effort | Driver::HeldEffort | Driver::Own => 33,
@@ -265,7 +265,8 @@ fn part(driver: Driver) -> u8 {
     }
 }
 
-/// The RA messages that set the vehicle in motion. An RA client makes a list by numbering its places.
+/// The RA messages that set the vehicle in motion. An RA client makes a list by numbering its
+/// places.
 fn motion(driver: Driver) -> Vec<(u16, Bytes)> {
     let mut number = 0_u16;
     let message = |payload: Bytes| {

@@ -42,8 +42,7 @@ use cell::Cell;
 use sim::seeds;
 use table::Table;
 
-/// So many fresh seeds are tried if `JAUS_SEEDS` does not say: about one for each cell. Thousands are
-/// tried by hand.
+/// Number of fresh seeds without `JAUS_SEEDS`: about one per cell. Thousands are run by hand.
 const FRESH_SEEDS: u64 = 178;
 
 #[test]
@@ -78,7 +77,7 @@ fn every_cell_stops() {
 
 #[test]
 fn fresh_seeds_stop() {
-    /// Prints also when a seed fails.
+    /// Also prints the table when a seed fails.
     struct Printed(Table);
     impl Drop for Printed {
         fn drop(&mut self) {

@@ -5,29 +5,29 @@ use std::time::{Duration, Instant};
 
 use jaus_vehicle::motion::{Drive, Limits, Motion, Platform, Pose, SkidSteer, SkidSteerConfig};
 
-/// Wheels, an actuator that stops by itself without orders, and a pose sensor.
+/// Wheels, an actuator that stops without orders, and a pose sensor.
 pub(crate) struct Plant {
     now: Instant,
     rover: SkidSteer,
     ordered: Drive,
-    /// What the program has ordered last.
+    /// The program's last order.
     pub(crate) order: Movement,
-    /// What the actuator does: the order, until its deadline.
+    /// The actuator's movement: the order, until its deadline.
     pub(crate) actuator: Movement,
     /// The wheels.
     pub(crate) wheels: Movement,
     last_order: Instant,
-    /// Metres, forward and backward.
+    /// Distance in metres, forward and backward.
     pub(crate) odometer: f64,
     pub(crate) sensor: Sensor,
     sample: Motion,
-    /// What is wrong with the motors.
+    /// The motors' fault.
     pub(crate) fault: Option<&'static str>,
-    /// Whether an order was not a number; the actuator ignores it.
+    /// Whether an order was not finite; the actuator ignores it.
     pub(crate) got_rubbish: bool,
 }
 
-/// Whether something moves, and when it did last.
+/// Whether something moves, and when it last moved.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Movement {
     moves: bool,
@@ -45,15 +45,15 @@ pub(crate) enum Sensor {
     Unknown,
 }
 
-/// The plant, as its program and the world share it.
+/// The plant, shared by its program and the world.
 #[derive(Clone)]
 pub(crate) struct SharedPlant(Arc<Mutex<Plant>>);
 
 impl Plant {
-    /// The actuator stops when it has had no order for so long.
+    /// The actuator stops after this time without an order.
     pub(crate) const DEADLINE: Duration = Duration::from_millis(200);
     const STEP: Duration = Duration::from_millis(10);
-    /// Wheels that turn more slowly are at rest, in metres or radians per second.
+    /// Slower wheels count as at rest, in metres or radians per second.
     const REST: f64 = 0.005;
 
     pub(crate) fn new(now: Instant) -> Self {
@@ -74,13 +74,13 @@ impl Plant {
         }
     }
 
-    /// Metres per second.
+    /// Speed in metres per second.
     pub(crate) fn speed(&self) -> f64 {
         self.rover.motion().velocity.x.abs()
     }
 
-    /// Moves on to `now`. Only what lasts is motion: an order that is taken back in the same instant
-    /// is none.
+    /// Advances to `now`. Only lasting motion counts: an order that is revoked at the same instant
+    /// does not.
     pub(crate) fn advance(&mut self, now: Instant) {
         if now <= self.now {
             return;
@@ -115,7 +115,7 @@ impl Plant {
         self.actuator.moves_until(next);
     }
 
-    /// The program orders something.
+    /// Processes an order of the program.
     fn drive(&mut self, command: Drive) {
         if !is_finite(&command) {
             self.got_rubbish = true;
@@ -126,7 +126,7 @@ impl Plant {
         self.obey();
     }
 
-    /// The actuator gets the order, or gets it again.
+    /// Gives the actuator the order, for the first time or again.
     fn obey(&mut self) {
         self.last_order = self.now;
         self.rover.drive(self.ordered);
@@ -153,7 +153,7 @@ impl Movement {
         }
     }
 
-    /// When it moved last.
+    /// Time of the last movement.
     pub(crate) const fn last(&self) -> Option<Instant> {
         self.last
     }
@@ -184,12 +184,12 @@ impl SharedPlant {
         self.0.lock().expect("no panic")
     }
 
-    /// Orders something.
+    /// Gives an order.
     pub(crate) fn drive(&self, command: Drive) {
         self.lock().drive(command);
     }
 
-    /// Gives the actuator its last order again.
+    /// Repeats the last order to the actuator.
     pub(crate) fn repeat_order(&self) {
         self.lock().obey();
     }
@@ -199,7 +199,7 @@ impl SharedPlant {
     }
 }
 
-/// What the program sees of the plant; what depends on the library's version is in `vehicle.rs`.
+/// The program's view of the plant; code that depends on the library's version is in `vehicle.rs`.
 pub(crate) struct Wheels(pub(crate) SharedPlant);
 
 impl Wheels {
@@ -240,7 +240,7 @@ mod tests {
         turn_brake: 0.0,
     });
 
-    /// A plant that was ordered to move and is left alone for a second.
+    /// A plant that was ordered to move, after one second without further orders.
     #[expect(
         clippy::disallowed_methods,
         reason = "virtual time starts at any instant"

@@ -29,7 +29,7 @@ fn pair(conditions: Conditions) -> (Network, [Host; 2]) {
     (network, hosts)
 }
 
-/// One node sends this many messages to the other.
+/// Sends this number of messages from one node to the other.
 fn say(network: &mut Network, hosts: [Host; 2], from: usize, count: u8) {
     for number in 0..count {
         let payload = Bytes::copy_from_slice(&[2, 0x44, number]);
@@ -38,7 +38,7 @@ fn say(network: &mut Network, hosts: [Host; 2], from: usize, count: u8) {
     }
 }
 
-/// How many messages have arrived since the last call.
+/// Number of messages received since the last call.
 fn received(network: &mut Network, host: Host) -> usize {
     network.owner(host).take_messages().len()
 }

@@ -20,7 +20,7 @@ struct Row {
     revived: u32,
     stop: Duration,
     distance: f64,
-    /// The first seed that broke something, and what.
+    /// The first failing seed, and its broken promise.
     broken: Option<(u64, String)>,
 }
 
@@ -63,14 +63,14 @@ impl Table {
         ));
     }
 
-    /// Every cell was run, and moved each time before it was to stop.
+    /// Whether every cell was run, and moved before the fault in every run.
     pub(crate) fn is_complete(&self) -> bool {
         let rows = self.0.lock().expect("no panic");
         let has_moved = |cell| rows.get(&cell).is_some_and(|row| row.moved == row.runs);
         Cell::all().all(has_moved)
     }
 
-    /// What did not hold, a line for each cell.
+    /// Broken promises, one line per cell.
     pub(crate) fn broken(&self) -> Vec<String> {
         let rows = self.0.lock().expect("no panic");
         let broken = rows.iter().filter_map(|(cell, row)| {

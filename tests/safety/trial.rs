@@ -8,22 +8,22 @@ use crate::plant::{Plant, Sensor};
 use crate::sim::{Conditions, Random};
 use crate::world::{CROWD, World};
 
-/// What came out of a trial.
+/// The result of a trial.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Outcome {
     /// Whether the vehicle moved before the fault.
     pub(crate) moved: bool,
-    /// For how long after the fault it was ordered to move.
+    /// How long after the fault the vehicle was ordered to move.
     pub(crate) stop: Duration,
-    /// Metres that it covered after the fault.
+    /// Distance in metres after the fault.
     pub(crate) distance: f64,
-    /// Whether it moved again with a new lease; `None` if that was not tried.
+    /// Whether it moved again with a new lease; `None` if not tried.
     pub(crate) revived: Option<bool>,
-    /// What did not hold.
+    /// Broken promises.
     pub(crate) broken: Vec<String>,
 }
 
-/// The cell of a seed. The first seeds are each cell once.
+/// The cell of a seed. The first seeds cover each cell once.
 pub(crate) fn cell_of(seed: u64) -> Cell {
     let cells: Vec<_> = Cell::all().collect();
     cells[(seed % cells.len() as u64) as usize]
@@ -46,14 +46,14 @@ struct Trial {
     cell: Cell,
     random: Random,
     world: World,
-    /// When the fault happened.
+    /// Time of the fault.
     fault: Instant,
     odometer: f64,
-    /// Until when the fault itself has to have stopped the vehicle, and ended control.
+    /// When the fault itself must have stopped the vehicle, and ended control.
     sudden: Option<Instant>,
-    /// Whether the controller sends its setpoints again and again after the fault.
+    /// Whether the controller keeps repeating its setpoints after the fault.
     insists: bool,
-    /// Whether the component is there and sound at the end.
+    /// Whether the component is running and sound at the end.
     is_sound: bool,
     outcome: Outcome,
 }
@@ -72,15 +72,15 @@ fn conditions(random: &mut Random) -> Conditions {
 }
 
 impl Trial {
-    /// How long the vehicle may take to set out, with everything before it.
+    /// How long the vehicle may take to start moving, with all preparations.
     const START: Duration = Duration::from_secs(12);
-    /// How long it is watched when the fault is over.
+    /// How long it is watched after the fault.
     const WATCH: Duration = Duration::from_secs(30);
     /// How long control may outlast the last Request Control.
     const CONTROL: Duration = Duration::from_secs(5);
-    /// The brakes' time from any speed, with some room.
+    /// Braking time from any speed, with a margin.
     const BRAKES: Duration = Duration::from_millis(1500);
-    /// Control is over as soon as the vehicle has noticed.
+    /// Tolerance for the end of control after the vehicle notices its cause.
     const AT_ONCE: Duration = Duration::from_millis(100);
 
     fn new(cell: Cell, seed: u64) -> Self {
@@ -104,7 +104,7 @@ impl Trial {
         self.outcome.broken.push(what);
     }
 
-    /// A time between two numbers of milliseconds.
+    /// A random duration between two numbers of milliseconds.
     fn between(&mut self, least: u64, most: u64) -> Duration {
         let millis = Duration::from_millis;
         self.random.between(&(millis(least)..millis(most)))
@@ -115,7 +115,7 @@ impl Trial {
         self.world.run_for(time);
     }
 
-    /// Has the vehicle driven until it moves properly; false if it does not.
+    /// Drives until the vehicle moves properly; false if it does not.
     fn drive_off(&mut self) -> bool {
         self.run_between(100, 1000);
         if self.cell.fault == Fault::DeadIdsBefore {
@@ -151,7 +151,7 @@ impl Trial {
         self.outcome.moved
     }
 
-    /// Whether it has covered more than this distance in metres and is faster than this.
+    /// Whether it has covered more than this distance in metres and is faster than this speed.
     fn has_moved(&self, metres: f64, speed: f64) -> bool {
         let plant = self.world.plant.lock();
         plant.odometer > metres && plant.speed() > speed
@@ -216,7 +216,7 @@ impl Trial {
         }
     }
 
-    /// The controller lives on after the fault: it may insist on its setpoints, and ask for control
+    /// The controller survives the fault: it may insist on its setpoints, and request control
     /// again. It does not send Resume.
     fn persist(&mut self) {
         let (controller, insists) = (self.world.controller, self.insists);
@@ -231,8 +231,8 @@ impl Trial {
         });
     }
 
-    /// The gateway dies, and its operator lives on. It may insist on its commands when the gateway is
-    /// there again, and request control when it has lost it. It does not send Resume.
+    /// The gateway is killed, and its operator survives. It may insist on its commands after the
+    /// gateway's restart, and request control after losing it. It does not send Resume.
     fn restart_gateway(&mut self) {
         self.world.network.kill(self.world.controller);
         self.run_between(100, 8000);
@@ -255,8 +255,8 @@ impl Trial {
         for &(from, to) in directions {
             self.world.network.set_cut_one_way(from, to, true);
         }
-        // A client that continues although it has lost control. A client that only stops receiving
-        // is still in control, as far as the vehicle can know, until its last request times out.
+        // A client that continues after losing control. A client that only stops receiving is still
+        // in control for the vehicle, until its last request times out.
         let is_deaf = self.cell.fault == Fault::CutToController;
         if self.insists && self.random.happens(500) && !is_deaf {
             let controller = self.world.controller;
@@ -274,7 +274,7 @@ impl Trial {
         }
     }
 
-    /// The crowd comes, and in the midst of it the controller is killed.
+    /// The crowd appears, and the controller is killed in the middle of it.
     fn flood(&mut self) {
         let part = self.random.below(CROWD);
         self.world.let_crowd_come(&mut self.random, part);
@@ -301,7 +301,7 @@ impl Trial {
         self.persist();
     }
 
-    /// The component ends, and is perhaps started again.
+    /// Ends the component, and possibly restarts it.
     fn end_component(&mut self) {
         let orderly = self.cell.fault == Fault::Stopped;
         self.world.with_vehicle(|now, vehicle| {
@@ -326,7 +326,7 @@ impl Trial {
         }
     }
 
-    /// The component's process is suspended. With a controller that lives on it is suspended until
+    /// Suspends the component's process. If the controller survives, the suspension lasts until
     /// control is over.
     fn hang(&mut self) {
         let (vehicle, controller) = (self.world.vehicle, self.world.controller);
@@ -350,7 +350,7 @@ impl Trial {
         }
     }
 
-    /// The controller continues during a fault, which is repaired after a while, or never.
+    /// The controller continues during a fault, which is repaired later or never.
     fn outlast(&mut self, mend: impl FnOnce(&mut Plant)) {
         let time = match self.cell.fault {
             Fault::DiskStall => Duration::from_secs(5),
@@ -392,7 +392,7 @@ impl Trial {
         self.kill_later();
     }
 
-    /// What has gone wrong must not stop this driver; the death of its controller must.
+    /// The fault must not stop this driver; the death of its controller must.
     fn kill_later(&mut self) {
         self.run_between(500, 3000);
         if !self.has_moved(0.2, 0.1) {
@@ -457,7 +457,7 @@ impl Trial {
         self.judge_control();
     }
 
-    /// Control is free again, or another client's.
+    /// Checks that control became free, or passed to another client, in time.
     fn judge_control(&mut self) {
         if self.cell.fault.ends_component() {
             return;
@@ -477,7 +477,7 @@ impl Trial {
         }
     }
 
-    /// A supervisor takes control, sends Resume and drives: then the vehicle moves again.
+    /// A supervisor takes control, sends Resume and drives. The vehicle must move again.
     fn revive(&mut self) {
         if !self.is_sound || !self.outcome.broken.is_empty() {
             return;

@@ -1,4 +1,4 @@
-//! The vehicle's program: creates a component and its services. Only this file of the test depends
+//! The vehicle's program: creates a component and its services. No other file of this test depends
 //! on the library's API.
 
 use std::time::{Duration, Instant};
@@ -23,7 +23,7 @@ pub(crate) const VEHICLE: JausId = JausId::new(101, 1, 1);
 pub(crate) struct Program {
     stack: Stack,
     plant: SharedPlant,
-    /// When the loop of an own service runs again.
+    /// When the own service's loop runs next.
     next: Option<Instant>,
 }
 
@@ -70,8 +70,8 @@ impl Program {
         self.stack.handle_timeout(now);
     }
 
-    /// What an application does for a motor beside its service: it repeats the order within the
-    /// actuator's deadline, and reports a fault.
+    /// The application's duties for a motor beside its service: repeat the order within the
+    /// actuator's deadline, and report a fault.
     fn run_own_loop(&mut self, now: Instant) {
         self.plant.repeat_order();
         let state = self.stack.standing().state;
@@ -99,7 +99,7 @@ impl Program {
         self.stack.standing()
     }
 
-    /// Ends in an orderly way; returns what is still to be sent.
+    /// Shuts down gracefully; returns the messages still to be sent.
     pub(crate) fn stop(mut self, now: Instant) -> Vec<Outgoing> {
         self.stack.stop(&StopCause::Ended);
         self.stack.take_leave(now);
@@ -107,8 +107,8 @@ impl Program {
     }
 }
 
-/// All drivers on one vehicle. A gateway turns an RA client's waypoints into a list where it can, so
-/// that a vehicle that is to be driven to a single waypoint offers it no lists.
+/// All drivers on one vehicle. A gateway turns an RA client's waypoints into a list if it can, so a
+/// vehicle for single waypoints offers it no lists.
 fn drivers(plant: &SharedPlant, time: &TimeOfDay, cell: Cell) -> Vec<Box<dyn Service>> {
     let pilot = Pilot::new(Wheels(plant.clone()), Frame::at(52.5, 13.4));
     let policy = match cell.driver.is_held() {
@@ -134,7 +134,7 @@ fn drivers(plant: &SharedPlant, time: &TimeOfDay, cell: Cell) -> Vec<Box<dyn Ser
     services
 }
 
-/// A driver made of functions, as an application writes it.
+/// A driver made of functions, as in an application.
 fn own_service(plant: &SharedPlant) -> Handlers {
     let (motor, brake) = (plant.clone(), plant.clone());
     Handlers::new(primitive_driver::LATEST)

@@ -11,23 +11,23 @@ use crate::cell::Driver;
 use crate::commands;
 use crate::world::SUPERVISOR;
 
-/// Looks at the vehicle's messages and its controller.
+/// Observes the vehicle's messages and its controller.
 #[derive(Clone, Debug)]
 pub(crate) struct Witness {
     controller: JausId,
-    /// The first two octets of a setpoint.
+    /// Message code of a setpoint: its first two octets.
     setpoint: [u8; 2],
-    /// Whether the controller's messages still count: not those that it sends after a fault is over.
+    /// Whether the controller's messages still count. Those after the end of a fault do not.
     counts: bool,
-    /// When the vehicle got the controller's last message,
+    /// When the vehicle received the controller's last message.
     pub(crate) last_message: Option<Instant>,
-    /// its last setpoint,
+    /// When the vehicle received its last setpoint.
     pub(crate) last_setpoint: Option<Instant>,
-    /// and its last Request Control.
+    /// When the vehicle received its last Request Control.
     pub(crate) last_request: Option<Instant>,
-    /// Whether the controller was in control when last seen.
+    /// Whether the controller was in control at the last observation.
     pub(crate) is_held: bool,
-    /// Since when it has been out of control for the first time.
+    /// When it first lost control.
     pub(crate) freed: Option<Instant>,
     /// When the supervisor got control.
     pub(crate) taken_over: Option<Instant>,
@@ -49,7 +49,7 @@ impl Witness {
         }
     }
 
-    /// What the controller sends from now on changes no deadline.
+    /// From now on the controller's messages change no deadline.
     pub(crate) fn stop_counting(&mut self) {
         self.counts = false;
     }

@@ -24,7 +24,7 @@ use crate::witness::Witness;
 
 pub(crate) const CONTROLLER: JausId = JausId::new(42, 1, 1);
 pub(crate) const SUPERVISOR: JausId = JausId::new(43, 1, 1);
-/// Ids in the crowd.
+/// Number of ids in the crowd.
 pub(crate) const CROWD: usize = 1000;
 
 /// One node of the network.
@@ -36,7 +36,7 @@ pub(crate) enum Party {
     Crowd,
 }
 
-/// The vehicle's program, while it lives, and what is seen of it.
+/// The vehicle's program while it runs, and its observations.
 pub(crate) struct Vehicle {
     program: Option<Program>,
     plant: SharedPlant,
@@ -48,7 +48,7 @@ pub(crate) struct World {
     pub(crate) plant: SharedPlant,
     cell: Cell,
     pub(crate) vehicle: Host,
-    /// The controller; in the row "gateway restarted" the gateway with the operator behind it.
+    /// The controller; with the fault "gateway restarted" the gateway with the operator behind it.
     pub(crate) controller: Host,
     pub(crate) supervisor: Host,
     pub(crate) crowd: Host,
@@ -70,7 +70,7 @@ impl Vehicle {
             .note_controller(now, controller.map(|it| it.id));
     }
 
-    /// Takes the program away.
+    /// Removes the program.
     pub(crate) fn take_program(&mut self) -> Option<Program> {
         self.program.take()
     }
@@ -226,7 +226,7 @@ impl World {
         }
     }
 
-    /// Lets a client do something.
+    /// Runs `act` on a client, and sends its messages.
     pub(crate) fn with_client(&mut self, host: Host, act: impl FnOnce(Instant, &mut Client)) {
         self.network.act(host, |now, party, endpoint| {
             let Party::Client(client) = party else {
@@ -237,7 +237,7 @@ impl World {
         });
     }
 
-    /// Lets something be done with the vehicle; what it returns is sent.
+    /// Runs `act` on the vehicle, and sends the messages that it returns.
     pub(crate) fn with_vehicle(
         &mut self,
         act: impl FnOnce(Instant, &mut Vehicle) -> Vec<Outgoing>,
@@ -261,7 +261,7 @@ impl World {
         }
     }
 
-    /// Starts the vehicle's program again, on the same hardware.
+    /// Restarts the vehicle's program on the same hardware.
     pub(crate) fn restart_vehicle(&mut self) {
         let (now, clock) = (self.network.now(), self.network.clock(self.vehicle));
         let witness = self.witness().clone();
@@ -284,7 +284,7 @@ impl World {
             .restart(self.controller, endpoint(CONTROLLER), party);
     }
 
-    /// Lets the operator behind the gateway do something.
+    /// Runs `act` on the operator behind the gateway.
     pub(crate) fn with_operator(&mut self, act: impl FnOnce(Instant, &mut Operator)) {
         self.network.act(self.controller, |now, party, endpoint| {
             let Party::Gateway(crossing) = party else {
@@ -295,7 +295,7 @@ impl World {
         });
     }
 
-    /// Starts the gateway again; the operator behind it has lived on.
+    /// Restarts the gateway; the operator behind it keeps its state.
     pub(crate) fn restart_gateway(&mut self) {
         let party = std::mem::replace(self.network.owner(self.controller), Party::Crowd);
         let Party::Gateway(crossing) = party else {
@@ -307,7 +307,7 @@ impl World {
         self.network.restart(self.controller, nobody, party);
     }
 
-    /// So many more ids of the crowd say one thing each.
+    /// Sends one message each from `count` more ids of the crowd.
     pub(crate) fn let_crowd_come(&mut self, random: &mut Random, count: usize) {
         let ids: Vec<_> = crowd_ids().skip(self.crowd_size).take(count).collect();
         self.crowd_size += ids.len();
@@ -320,7 +320,7 @@ impl World {
             self.network.act(self.crowd, |now, _, endpoint| {
                 for &id in some {
                     let payload = payloads[random.below(2)].clone();
-                    // A datagram refused by a full queue does not count.
+                    // A datagram refused by a full queue does not matter.
                     let _ = endpoint.send(now, Outgoing::new(id, VEHICLE, payload));
                 }
             });

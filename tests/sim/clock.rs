@@ -1,14 +1,14 @@
-//! Wall clocks of the simulated hosts, which tests can step while virtual time advances evenly.
+//! Wall clocks of the simulated hosts: tests can step them while virtual time advances evenly.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
-/// What every wall clock shows at the beginning of a simulation: 2026-01-01 00:00:00 UTC, in
-/// seconds since the beginning of 1970.
+/// The time of every wall clock at the start of a simulation: 2026-01-01 00:00:00 UTC, in seconds
+/// since the beginning of 1970.
 const START: u64 = 1_767_225_600;
 
-/// Virtual time since the beginning of a simulation, which all clocks of a network share.
+/// Virtual time since the start of a simulation, shared by all clocks of a network.
 #[derive(Clone, Debug, Default)]
 pub(super) struct VirtualTime(Arc<AtomicU64>);
 
@@ -30,12 +30,12 @@ impl VirtualTime {
 #[derive(Clone, Debug)]
 pub struct WallClock {
     time: VirtualTime,
-    /// Nanoseconds by which it is ahead of virtual time; negative if it is behind.
+    /// Offset from virtual time in nanoseconds; negative if the clock is behind.
     ahead: Arc<AtomicI64>,
 }
 
 impl WallClock {
-    /// The time that it shows, since the beginning of 1970 (UTC).
+    /// The time shown, since the beginning of 1970 (UTC).
     pub fn since_1970(&self) -> Duration {
         let elapsed = Duration::from_nanos(self.time.0.load(Relaxed));
         let true_time = Duration::from_secs(START) + elapsed;
@@ -47,7 +47,7 @@ impl WallClock {
         }
     }
 
-    /// Moves it by `nanoseconds`, backward if negative.
+    /// Steps the clock by `nanoseconds`, backward if negative.
     pub(super) fn step(&self, nanoseconds: i64) {
         self.ahead.fetch_add(nanoseconds, Relaxed);
     }

@@ -1,5 +1,5 @@
-//! A network in memory: endpoints, virtual time, and a seeded wire that delays, loses, duplicates
-//! and reorders.
+//! Simulated network in memory: endpoints, virtual time, and a seeded wire that delays, loses,
+//! duplicates and reorders datagrams.
 //!
 //! Used by several test binaries (`mod sim;`). Each node is an [`Endpoint`] with an [`Owner`] that
 //! takes its events: [`Mailbox`] stores them for the test; a service or component on top of the
@@ -39,26 +39,26 @@ pub use trace::Trace;
 use wire::{Backlog, Flight, Wire};
 pub use wire::{Conditions, Harm, Socket};
 
-/// The first link of each node, and the only one of most.
+/// The first link of each node; most nodes have no other.
 pub const WIRE: LinkId = LinkId(0);
-/// So often can nothing honest happen at one time.
+/// Limit of steps at one instant; a higher number means an endless loop.
 const MOST_STEPS: u32 = 100_000;
 
-/// What takes the events of a simulated node, and may wake up and send by itself.
+/// Takes the events of a simulated node; may also wake up and send by itself.
 pub trait Owner {
     /// Takes an event; may send through the endpoint at once.
     fn handle_event(&mut self, now: Instant, endpoint: &mut OwnedEndpoint, event: Event);
 
-    /// Tells that the time that [`poll_timeout`](Self::poll_timeout) asked for has come.
+    /// Called when the time of [`poll_timeout`](Self::poll_timeout) has come.
     fn handle_timeout(&mut self, _now: Instant, _endpoint: &mut OwnedEndpoint) {}
 
-    /// When to be woken.
+    /// The next wake-up time.
     fn poll_timeout(&self) -> Option<Instant> {
         None
     }
 }
 
-/// An owner that keeps what it gets.
+/// An owner that stores its events.
 #[derive(Debug, Default)]
 pub struct Mailbox {
     /// The events, with their times, oldest first.
@@ -72,7 +72,7 @@ impl Owner for Mailbox {
 }
 
 impl Mailbox {
-    /// Takes out the messages, and leaves the news.
+    /// Removes and returns the messages; the other events remain.
     pub fn take_messages(&mut self) -> Vec<Received> {
         let messages = self
             .events
@@ -84,7 +84,7 @@ impl Mailbox {
         messages.filter_map(message).collect()
     }
 
-    /// Takes out the news, and leaves the messages.
+    /// Removes and returns the endpoint's other events; the messages remain.
     pub fn take_news(&mut self) -> Vec<endpoint::Event> {
         let news = self
             .events
@@ -97,7 +97,7 @@ impl Mailbox {
     }
 }
 
-/// Names a node of the network, in order of joining.
+/// Index of a node, in order of joining.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Host(pub usize);
 
@@ -105,14 +105,14 @@ struct Node<O> {
     endpoint: OwnedEndpoint,
     owner: O,
     attachments: Vec<Attachment>,
-    /// Datagrams that its links take at once.
+    /// Limit of datagrams per transmit of its links.
     max_segments: usize,
     /// Whether its owner takes the events.
     is_read: bool,
     process: Process,
 }
 
-/// A link of a node: the network that it is on, and its address there.
+/// A link of a node: its network, and the node's address there.
 #[derive(Clone, Copy)]
 struct Attachment {
     link: LinkId,
@@ -120,7 +120,7 @@ struct Attachment {
     address: SocketAddr,
 }
 
-/// What a node's process does.
+/// State of a node's process.
 enum Process {
     Running,
     /// Stopped by a signal: it does nothing, and its socket fills up.
@@ -133,7 +133,7 @@ impl<O> Node<O> {
         matches!(self.process, Process::Running)
     }
 
-    /// Tells the endpoint which links it has.
+    /// Adds the node's links to the endpoint.
     fn add_links(&mut self) {
         for attachment in &self.attachments {
             let profile = LinkProfile {
@@ -149,7 +149,7 @@ impl<O> Node<O> {
 pub struct Network<O = Mailbox> {
     start: Instant,
     now: Instant,
-    /// How often something has happened at this very time.
+    /// Number of steps at the current instant.
     steps: u32,
     time: VirtualTime,
     wire: Wire,
@@ -164,7 +164,7 @@ pub struct Network<O = Mailbox> {
 }
 
 impl<O: Owner> Network<O> {
-    /// A network without nodes. The seed decides about every loss and delay.
+    /// A network without nodes. The seed determines every loss and delay.
     #[expect(
         clippy::disallowed_methods,
         reason = "virtual time starts at any instant"
@@ -192,7 +192,7 @@ impl<O: Owner> Network<O> {
         self.join_with(endpoint, |_clock| owner)
     }
 
-    /// Puts a node on the wire whose owner goes by the wall clock of its host.
+    /// Puts a node on the wire whose owner uses the wall clock of its host.
     pub fn join_with(&mut self, endpoint: Endpoint, owner: impl FnOnce(WallClock) -> O) -> Host {
         let clock = self.time.clock();
         let owner = owner(clock.clone());
@@ -223,7 +223,7 @@ impl<O: Owner> Network<O> {
         Host(host)
     }
 
-    /// Replaces a node by a new one at the same address, as after a crash and a restart.
+    /// Replaces a node with a new one at the same address, as after a crash and a restart.
     pub fn restart(&mut self, host: Host, endpoint: Endpoint, owner: O) {
         let node = &mut self.nodes[host.0];
         node.endpoint = OwnedEndpoint::new(endpoint);
@@ -247,20 +247,20 @@ impl<O: Owner> Network<O> {
         node.add_links();
     }
 
-    /// How many datagrams the links of a node take at once.
+    /// Limits the number of datagrams per transmit of a node's links.
     pub fn set_max_segments(&mut self, host: Host, max_segments: usize) {
         let node = &mut self.nodes[host.0];
         node.max_segments = max_segments;
         node.add_links();
     }
 
-    /// Whether the owner of a node takes its events; what waits meanwhile is taken afterwards.
+    /// Sets whether the owner of a node takes its events. Waiting events are taken later.
     pub fn set_read(&mut self, host: Host, is_read: bool) {
         self.nodes[host.0].is_read = is_read;
         self.settle(host.0);
     }
 
-    /// Puts a datagram from outside the nodes on the wire to a node's first link.
+    /// Sends a datagram from a host outside the simulation's nodes to a node's first link.
     pub fn inject(&mut self, from: SocketAddr, to: Host, datagram: &Bytes) {
         let what = format_args!("{from} sends {} octets to {to:?}", datagram.len());
         self.trace.note(self.now, what);
@@ -268,7 +268,7 @@ impl<O: Owner> Network<O> {
             .launch(self.now, (None, from), (to.0, WIRE), datagram);
     }
 
-    /// Kills a node: it neither receives nor sends any more.
+    /// Kills a node: it no longer receives or sends.
     pub fn kill(&mut self, host: Host) {
         self.nodes[host.0].process = Process::Dead;
     }
@@ -282,8 +282,8 @@ impl<O: Owner> Network<O> {
         }
     }
 
-    /// Lets a suspended node go on, as SIGCONT does: it reads everything in its socket before it
-    /// looks at its timers, which is the more dangerous order.
+    /// Resumes a suspended node, as SIGCONT does: it reads everything in its socket before it
+    /// checks its timers, which is the more dangerous order.
     pub fn resume(&mut self, host: Host) {
         let process = &mut self.nodes[host.0].process;
         let Process::Suspended(backlog) = process else {
@@ -302,24 +302,24 @@ impl<O: Owner> Network<O> {
         self.clocks[host.0].clone()
     }
 
-    /// Moves the wall clock of a host by `nanoseconds`, backward if negative. Virtual time, by which
-    /// timers go, stays as it is.
+    /// Steps the wall clock of a host by `nanoseconds`, backward if negative. Virtual time, which
+    /// timers use, is unaffected.
     pub fn step_clock(&mut self, host: Host, nanoseconds: i64) {
         self.clocks[host.0].step(nanoseconds);
     }
 
-    /// Cuts or joins the wire between two nodes.
+    /// Cuts or restores the wire between two nodes, in both directions.
     pub fn set_cut(&mut self, one: Host, other: Host, cut: bool) {
         self.set_cut_one_way(one, other, cut);
         self.set_cut_one_way(other, one, cut);
     }
 
-    /// Cuts or joins the wire in one direction.
+    /// Cuts or restores the wire in one direction.
     pub fn set_cut_one_way(&mut self, from: Host, to: Host, cut: bool) {
         self.wire.set_cut(from.0, to.0, cut);
     }
 
-    /// Makes the wire better or worse from now on.
+    /// Changes the conditions of the wire from now on.
     pub fn set_conditions(&mut self, conditions: Conditions) {
         self.wire.conditions = conditions;
     }
@@ -344,37 +344,37 @@ impl<O: Owner> Network<O> {
         self.nodes[host.0].attachments[0].address
     }
 
-    /// How many datagrams were put on the wire; a multicast counts once.
+    /// Number of datagrams put on the wire; a multicast counts once.
     pub fn carried(&self) -> u64 {
         self.carried
     }
 
-    /// How many of them went to the group.
+    /// Number of datagrams sent to the group.
     pub fn multicast(&self) -> u64 {
         self.multicast
     }
 
-    /// How many transmits were several datagrams at once.
+    /// Number of transmits with several datagrams.
     pub fn segmented(&self) -> u64 {
         self.segmented
     }
 
-    /// How many datagrams held more than one message.
+    /// Number of datagrams with more than one message.
     pub fn packed(&self) -> u64 {
         self.packed
     }
 
-    /// How many datagrams were lost because a receiver's socket was full.
+    /// Number of datagrams lost because a receiver's socket was full.
     pub fn overflowed(&self) -> u64 {
         self.wire.harm.overflowed
     }
 
-    /// What the wire has done to datagrams.
+    /// The wire's effects on datagrams so far.
     pub fn harm(&self) -> Harm {
         self.wire.harm
     }
 
-    /// What has happened.
+    /// The trace of all events.
     pub fn trace(&mut self) -> &mut Trace {
         &mut self.trace
     }
@@ -386,7 +386,7 @@ impl<O: Owner> Network<O> {
         handle
     }
 
-    /// Lets a node's owner do something with its endpoint, and puts the outcome on the wire.
+    /// Runs `act` on a node's owner and endpoint, and puts the resulting datagrams on the wire.
     pub fn act<T>(
         &mut self,
         host: Host,
@@ -398,7 +398,7 @@ impl<O: Owner> Network<O> {
         result
     }
 
-    /// Lets `time` pass.
+    /// Advances virtual time by `time`.
     pub fn run_for(&mut self, time: Duration) {
         let end = self.now + time;
         while self.next_time().is_some_and(|next| next <= end) {
@@ -410,7 +410,7 @@ impl<O: Owner> Network<O> {
     /// Runs until no event is left.
     ///
     /// # Panics
-    /// After 100 000 steps: the nodes then keep each other busy for ever.
+    /// After 100 000 steps: the nodes then keep each other busy forever.
     pub fn run_until_idle(&mut self) {
         for _step in 0..100_000 {
             if !self.step() {
@@ -420,11 +420,10 @@ impl<O: Owner> Network<O> {
         panic!("the network does not come to rest");
     }
 
-    /// Goes to the next time at which something happens, and lets it happen. False if nothing is
-    /// left.
+    /// Advances to the next event, and processes it. False if none is left.
     ///
     /// # Panics
-    /// If time does not go on.
+    /// If time does not advance.
     pub fn step(&mut self) -> bool {
         let Some(next) = self.next_time() else {
             return false;
@@ -446,7 +445,7 @@ impl<O: Owner> Network<O> {
         self.time.set(now.saturating_duration_since(self.start));
     }
 
-    /// The next time at which something happens.
+    /// The time of the next event.
     pub fn next_time(&self) -> Option<Instant> {
         let alarms = self.nodes.iter().filter(|node| node.is_running());
         let alarms =
@@ -488,7 +487,7 @@ impl<O: Owner> Network<O> {
         self.settle(host);
     }
 
-    /// Hands events to the owner and datagrams to the wire until the node wants no more.
+    /// Passes events to the owner and datagrams to the wire until the node has no more output.
     fn settle(&mut self, host: usize) {
         loop {
             let node = &mut self.nodes[host];
@@ -515,7 +514,7 @@ impl<O: Owner> Network<O> {
         }
     }
 
-    /// Puts a datagram on the network of a link. The group is everybody there, the sender included.
+    /// Puts a datagram on the network of a link. The group includes all its nodes, even the sender.
     fn carry(&mut self, from: usize, link: LinkId, to: To, datagram: &Bytes) {
         if !self.nodes[from].is_running() {
             return;
@@ -546,7 +545,7 @@ impl<O: Owner> Network<O> {
     }
 }
 
-/// The next event of a node whose owner takes them.
+/// The next event of a node whose owner takes events.
 fn next_event<O>(node: &mut Node<O>) -> Option<Event> {
     if node.is_read {
         node.endpoint.poll_event()

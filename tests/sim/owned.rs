@@ -9,19 +9,19 @@ use jaus::address::JausId;
 use jaus::endpoint::{self, Endpoint, Ingress, MessageHandle, Outgoing, Received, SendError, Sink};
 use jaus::wire::Priority;
 
-/// Messages of each priority that may wait.
+/// Limit of waiting messages per priority.
 const ROOM: usize = 1024;
 
-/// What comes out of an endpoint for its owner.
+/// An endpoint's output for its owner.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
     /// A message for a component.
     Received(Received),
-    /// Anything else.
+    /// Any other event of the endpoint.
     News(endpoint::Event),
 }
 
-/// An endpoint whose messages wait until its owner takes them.
+/// An endpoint with a queue of delivered messages for its owner.
 #[derive(Debug)]
 pub struct OwnedEndpoint {
     endpoint: Endpoint,
@@ -36,7 +36,8 @@ impl Sink for Inbox {
         self.0[usize::from(priority.bits())].len() < ROOM / 2
     }
 
-    /// The other half is for what cannot be refused; when it is full too, the oldest goes.
+    /// The second half of the queue is for messages that cannot be refused. When it is full too,
+    /// the oldest message is dropped.
     fn deliver(&mut self, message: Received) {
         let waiting = &mut self.0[usize::from(message.priority.bits())];
         waiting.push_back(message);
@@ -63,7 +64,7 @@ impl OwnedEndpoint {
             .handle_datagram(now, from, datagram, &mut self.inbox);
     }
 
-    /// The next thing that the owner is to take: news first, then the most urgent message.
+    /// The owner's next event: the endpoint's own events first, then the most urgent message.
     pub fn poll_event(&mut self) -> Option<Event> {
         let news = self.endpoint.poll_event().map(Event::News);
         news.or_else(|| {

@@ -16,16 +16,16 @@ fn number_in(variable: &str) -> Option<u64> {
     Some(number.unwrap_or_else(|_| panic!("{variable}={text}: a number is expected")))
 }
 
-/// Whether what happens is to be printed.
+/// Whether to print the trace.
 pub(crate) fn is_traced() -> bool {
     std::env::var_os("JAUS_TRACE").is_some_and(|value| value != "0")
 }
 
-/// Runs `JAUS_SEED` if it is set, or else the seeds that `kept` holds for the test and
-/// `JAUS_SEEDS` (or `usual`) seeds that no run before had: they are printed.
+/// Runs `JAUS_SEED` if it is set; otherwise the seeds of this test in `kept`, and `JAUS_SEEDS` (or
+/// `usual`) fresh random seeds, whose numbers it prints.
 ///
-/// `kept` has a line for each seed that once failed: the test, the seed, and after `#` what failed.
-/// Whether all of the fresh seeds were run, so that their totals say something.
+/// `kept` has a line for each seed that once failed: the test, the seed, and after `#` the failure.
+/// Returns whether all fresh seeds were run, so that their totals are meaningful.
 pub(crate) fn for_kept_and_fresh_seeds(
     test: &str,
     kept: &str,
@@ -35,7 +35,8 @@ pub(crate) fn for_kept_and_fresh_seeds(
     for seed in kept_seeds(test, kept) {
         run_seeds(test, seed..seed + 1, &run);
     }
-    // The hasher's keys are the operating system's randomness. Fewer digits are easier to type.
+    // The operating system's randomness, through the hasher's keys. Fewer digits are easier to
+    // type.
     let first = RandomState::new().hash_one(test) % 1_000_000_000_000;
     let seeds = match number_in("JAUS_SEED") {
         Some(seed) => seed..seed + 1,
@@ -50,7 +51,7 @@ pub(crate) fn for_kept_and_fresh_seeds(
     number_in("JAUS_SEED").is_none() && number_in("JAUS_SEEDS").is_none_or(|seeds| seeds >= usual)
 }
 
-/// None if `JAUS_SEED` chooses one.
+/// Empty if `JAUS_SEED` chooses a seed.
 fn kept_seeds(test: &str, kept: &str) -> Vec<u64> {
     let lines = kept.lines().filter(|_| number_in("JAUS_SEED").is_none());
     let lines = lines.map(|line| line.split('#').next().unwrap_or_default());
@@ -63,7 +64,7 @@ fn kept_seeds(test: &str, kept: &str) -> Vec<u64> {
     words.filter_map(seed).collect()
 }
 
-/// Prints a line past the test harness, which keeps the output of tests that pass.
+/// Prints a line directly to standard error: the test harness hides the output of passing tests.
 pub(crate) fn announce(line: &str) {
     // If printing fails, the tests still count.
     let _written = writeln!(std::io::stderr().lock(), "{line}");
@@ -85,7 +86,7 @@ fn run_seeds(test: &str, seeds: Range<u64>, run: impl Fn(u64) -> Result<(), Stri
                 Err(_) => "it panics; see above".to_owned(),
             };
             failed.lock().expect("no panic").push((seed, reason));
-            // The others would only repeat it.
+            // The remaining seeds would only repeat the failure.
             next.fetch_add(end, Ordering::Relaxed);
         }
     };

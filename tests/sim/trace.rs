@@ -3,7 +3,7 @@
 use std::fmt::{self, Write};
 use std::time::Instant;
 
-/// Takes note of all that happens.
+/// Records all events.
 pub struct Trace {
     start: Instant,
     digest: u64,
@@ -25,12 +25,12 @@ impl Trace {
         self.printed = true;
     }
 
-    /// A number that stands for all that happened.
+    /// A hash of all recorded events.
     pub fn digest(&self) -> u64 {
         self.digest
     }
 
-    /// Takes note of something.
+    /// Records an event.
     pub fn note(&mut self, now: Instant, what: fmt::Arguments<'_>) {
         let time = now.saturating_duration_since(self.start);
         // Writing into the digest never fails.

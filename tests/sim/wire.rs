@@ -11,38 +11,38 @@ use jaus::endpoint::LinkId;
 
 use super::Random;
 
-/// How well the wire works.
+/// Quality of the wire.
 #[derive(Clone, Debug)]
 pub struct Conditions {
-    /// How long a datagram travels; the spread reorders them.
+    /// Travel time of a datagram; its spread reorders them.
     pub latency: Range<Duration>,
-    /// How many of 1000 copies are lost.
+    /// Lost copies per 1000.
     pub lost: u32,
-    /// How many of 1000 copies arrive twice.
+    /// Copies per 1000 that arrive twice.
     pub repeated: u32,
-    /// How many of 1000 copies make a detour, so that others overtake them.
+    /// Copies per 1000 that make a detour, so that others overtake them.
     pub detoured: u32,
-    /// How long the longest detour takes.
+    /// The longest detour.
     pub detour: Duration,
-    /// In how many of 1000 copies one bit changes, unnoticed by checksums.
+    /// Copies per 1000 in which one bit changes, undetected by checksums.
     pub corrupted: u32,
-    /// The longest datagram, in octets, that gets through.
+    /// The longest datagram that gets through, in octets.
     pub mtu: usize,
-    /// The socket of each receiver; `None` for one that is read at once.
+    /// The socket of each receiver; `None` for one that is read immediately.
     pub socket: Option<Socket>,
 }
 
-/// A socket with a buffer, which its node reads at some speed.
+/// A socket with a buffer, which its node reads at a fixed speed.
 #[derive(Clone, Copy, Debug)]
 pub struct Socket {
-    /// Octets that are read in a second.
+    /// Reading speed, in octets per second.
     pub speed: usize,
-    /// Octets that fit in. What comes when it is full is lost.
+    /// Buffer size in octets. Datagrams beyond it are lost.
     pub buffer: usize,
 }
 
 impl Conditions {
-    /// A quiet switch: 100 µs, nothing lost.
+    /// A quiet switch: 100 µs, no loss.
     pub fn good() -> Self {
         Self {
             latency: Duration::from_micros(100)..Duration::from_micros(101),
@@ -56,7 +56,7 @@ impl Conditions {
         }
     }
 
-    /// A poor radio: 1 to 30 ms, one copy of ten lost, one of twenty repeated.
+    /// A poor radio: 1 to 30 ms, one of ten copies lost, one of twenty repeated.
     pub fn poor() -> Self {
         Self {
             latency: Duration::from_millis(1)..Duration::from_millis(30),
@@ -67,17 +67,17 @@ impl Conditions {
     }
 }
 
-/// A datagram on its way. Ordered by arrival, then by departure.
+/// A datagram in flight. Ordered by arrival, then by departure.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Flight {
     pub(super) arrival: Instant,
     number: u64,
     pub(super) to: usize,
-    /// The link of the receiver by which it comes.
+    /// The receiver's link.
     pub(super) link: LinkId,
     pub(super) from: SocketAddr,
     pub(super) datagram: Bytes,
-    /// It is in the receiver's socket already, and will be read.
+    /// Already in the receiver's socket; it will be read.
     buffered: bool,
 }
 
@@ -89,15 +89,15 @@ pub(super) struct Backlog {
 }
 
 impl Backlog {
-    /// Octets that fit in if the conditions do not say: Linux's default.
+    /// Default buffer size in octets, without a socket in the conditions: that of Linux.
     const ROOM: usize = 212_992;
 }
 
-/// What is in a node's socket.
+/// Contents of a node's socket.
 #[derive(Clone, Copy, Default)]
 struct Buffer {
     octets: usize,
-    /// When what is in it will have been read.
+    /// When the buffered datagrams will have been read.
     read: Option<Instant>,
 }
 
@@ -106,27 +106,27 @@ pub(super) struct Wire {
     pub(super) conditions: Conditions,
     random: Random,
     flights: BinaryHeap<Reverse<Flight>>,
-    /// Sender and receiver of each direction that is cut.
+    /// The cut directions, as sender and receiver.
     cut: HashSet<(usize, usize)>,
     buffers: Vec<Buffer>,
     launched: u64,
     pub(super) harm: Harm,
 }
 
-/// What the wire has done to datagrams.
+/// The wire's effects on datagrams so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Harm {
-    /// Copies that were lost, or too long.
+    /// Lost or oversized copies.
     pub lost: u64,
-    /// Copies that could not leave because the way was cut.
+    /// Copies that could not leave because the wire was cut.
     pub cut: u64,
     /// Copies that arrive twice.
     pub repeated: u64,
     /// Copies that make a detour.
     pub detoured: u64,
-    /// Copies of which a bit has changed.
+    /// Copies with a changed bit.
     pub corrupted: u64,
-    /// Copies that were lost because a receiver's socket was full.
+    /// Copies lost because a receiver's socket was full.
     pub overflowed: u64,
 }
 
@@ -151,12 +151,12 @@ impl Wire {
         }
     }
 
-    /// The next time at which something happens.
+    /// The time of the next arrival.
     pub(super) fn next_time(&self) -> Option<Instant> {
         self.flights.peek().map(|Reverse(flight)| flight.arrival)
     }
 
-    /// A datagram leaves for one receiver, who gets it by `link`.
+    /// Sends a datagram to one receiver's link.
     pub(super) fn launch(
         &mut self,
         now: Instant,
@@ -199,7 +199,7 @@ impl Wire {
         }
     }
 
-    /// The next datagram that has been received by now.
+    /// The next datagram received by now.
     pub(super) fn receive(&mut self, now: Instant) -> Option<Flight> {
         while self.next_time().is_some_and(|next| next <= now) {
             let Reverse(flight) = self.flights.pop()?;
@@ -255,7 +255,7 @@ impl Wire {
     }
 }
 
-/// Headers are corrupted as often as all the rest: what lies in them matters more.
+/// Half of the bit flips hit the header, where they matter more.
 fn flip_a_bit(datagram: &Bytes, random: &mut Random) -> Bytes {
     const HEADER: usize = 16;
     let mut octets = datagram.to_vec();

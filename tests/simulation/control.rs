@@ -1,6 +1,6 @@
 //! Operators that compete for a vehicle over a bad wire with restarts: there are never two
 //! controllers, only the controller makes the vehicle act, an emergency from any client stops it, a
-//! controller soon learns of its loss of control, and once the wire is good control can be taken.
+//! controller soon learns of its loss of control, and on a good wire control can be taken.
 
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -26,7 +26,7 @@ const OPERATORS: [JausId; 3] = [
     JausId::new(43, 1, 1),
     JausId::new(44, 1, 1),
 ];
-/// What is counted.
+/// The counted events.
 const NAMES: [&str; 6] = [
     "requests",
     "restarts",
@@ -37,17 +37,17 @@ const NAMES: [&str; 6] = [
 ];
 const TROUBLE: Duration = Duration::from_secs(120);
 const ACTIONS: usize = 150;
-/// After this time with a good wire, operators and vehicle agree.
+/// On a good wire, operators and vehicle agree after this time.
 const REST: Duration = Duration::from_secs(10);
-/// A client knows that it lost control at the latest when control is unconfirmed for five seconds,
-/// plus the delay of the last confirmation.
+/// A client knows of its loss of control at the latest when control has been unconfirmed for five
+/// seconds, plus the delay of the last confirmation.
 const DELUSION: Duration = Duration::from_millis(5500);
 
-/// Once the wire is good, an operator with the greatest authority gets control of a vehicle without
-/// an emergency within this time, and is obeyed.
+/// On a good wire, an operator with the highest authority gets control of a vehicle without an
+/// emergency within this time, and is obeyed.
 const TAKEN: Duration = Duration::from_secs(5);
 
-/// Runs the scenario of a seed; tells which promise was broken.
+/// Runs the scenario of a seed; an error names the broken promise.
 pub(crate) fn run(seed: u64) -> Result<Counts, String> {
     let mut world = World::new(seed);
     let start = world.network.now();
@@ -65,15 +65,15 @@ pub(crate) fn run(seed: u64) -> Result<Counts, String> {
     Ok(world.counts)
 }
 
-/// The vehicle, with what an onlooker on the wire knows of it.
+/// The vehicle, with an observer's view of its messages.
 struct Vehicle {
     stack: Stack,
     rules: Rules,
-    /// Whose commands it has acted on since the last look.
+    /// Senders of the executed commands since the last check.
     acted: Arc<Mutex<Vec<JausId>>>,
-    /// How many commands it has acted on since they were counted last.
+    /// Number of executed commands since the last count.
     obeyed: u64,
-    /// The first promise that it has broken.
+    /// The first broken promise.
     broken: Option<String>,
 }
 
@@ -81,7 +81,7 @@ struct Operator {
     stack: Stack,
     asked: Option<ControlId>,
     holds: bool,
-    /// Since when it has been wrong about that.
+    /// When it began to be wrong about `holds`.
     wrong: Option<Instant>,
 }
 
@@ -100,7 +100,7 @@ impl Vehicle {
     fn party(now: Instant, timeout: u8) -> Party {
         let acted = Arc::new(Mutex::new(Vec::new()));
         let acts = acted.clone();
-        // Any command will do.
+        // Any command would do.
         let driver =
             Handlers::new(list_manager::LATEST).command(move |_: DeleteElement, from, _context| {
                 acts.lock().expect("no panic").push(from.source);
@@ -231,7 +231,7 @@ struct World {
     timeout: u8,
     vehicle: Host,
     operators: [Host; 3],
-    /// Who was in control at the last look, and whether there was an emergency.
+    /// The controller at the last check, and whether there was an emergency.
     seen: (Option<JausId>, bool),
     counts: Counts,
 }
@@ -384,7 +384,7 @@ impl World {
         Ok(())
     }
 
-    /// With a good wire, every client that believes to be in control is.
+    /// Checks on a good wire that every client that believes itself in control really is.
     fn come_to_rest(&mut self) -> Result<(), String> {
         self.network.set_conditions(Conditions::good());
         for host in self.operators {
@@ -404,7 +404,8 @@ impl World {
         Ok(())
     }
 
-    /// With a good wire and no emergency, the greatest authority gets control and is obeyed.
+    /// Checks on a good wire without an emergency that the highest authority gets control and is
+    /// obeyed.
     fn take_control(&mut self) -> Result<(), String> {
         for host in self.operators {
             self.say(host, &ClearEmergency::default());

@@ -13,14 +13,14 @@ use jaus::service::{
 use crate::sim::{Conditions, Event as EndpointEvent, Host, Network, OwnedEndpoint, Owner, Random};
 use crate::totals::Counts;
 
-/// How long things go wrong.
+/// Duration of the faults.
 const TROUBLE: Duration = Duration::from_secs(60);
 const ACTIONS: usize = 15;
-/// With a good wire, all directories tell the truth within this time.
+/// On a good wire, all directories are correct within this time.
 const AGREED: Duration = Duration::from_secs(240);
-/// How often that is looked at.
+/// Interval of the checks.
 const LOOK: Duration = Duration::from_secs(1);
-/// What is counted.
+/// The counted events.
 const NAMES: [&str; 8] = [
     "cuts",
     "restarts",
@@ -32,7 +32,7 @@ const NAMES: [&str; 8] = [
     "seconds until they did",
 ];
 
-/// Runs the scenario of a seed; tells which directory is wrong.
+/// Runs the scenario of a seed; an error names the incorrect directory.
 pub(crate) fn run(seed: u64) -> Result<Counts, String> {
     let mut world = World::new(seed);
     let start = world.network.now();
@@ -52,7 +52,7 @@ pub(crate) fn run(seed: u64) -> Result<Counts, String> {
     Ok(world.counts())
 }
 
-/// What a directory tells of components: their services.
+/// Components and their services in a directory.
 type Listing = BTreeMap<JausId, Vec<String>>;
 
 /// The two components of a node.
@@ -65,7 +65,7 @@ struct World {
     random: Random,
     network: Network<Components>,
     is_routed: bool,
-    /// How many nodes there are, and which of them are dead.
+    /// One entry per node: whether it is dead.
     is_dead: Vec<bool>,
     counts: Counts,
 }
@@ -99,7 +99,7 @@ impl Components {
     fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         for stack in &mut self.stacks {
             while let Some(message) = stack.poll_transmit() {
-                // The other may have gone.
+                // The other component may be gone.
                 let _ = endpoint.send(now, message);
             }
             while let Some(event) = stack.poll_event() {
@@ -201,7 +201,7 @@ impl World {
                 self.count("restarts");
                 self.restart(node);
             }
-            // A dead router would leave two networks.
+            // A dead router would leave two separate networks.
             6 if node > 0 => {
                 self.count("deaths");
                 self.is_dead[node] = true;
@@ -241,7 +241,7 @@ impl World {
         }
     }
 
-    /// Whether every directory of the living tells the truth.
+    /// Checks that the directory of every running component is correct.
     fn check(&mut self) -> Result<(), String> {
         let living = (0..self.is_dead.len()).filter(|&node| !self.is_dead[node]);
         let living: Vec<_> = living.collect();

@@ -14,10 +14,10 @@ use crate::plan::conditions;
 use crate::sim::{Conditions, Host, Random};
 use crate::totals::Counts;
 
-/// A fault that lasts.
+/// A lasting fault.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Lasting {
-    /// Nothing passes between two nodes.
+    /// No datagrams pass between two nodes.
     Cut(Host, Host),
     /// A node's components do not read.
     Unread(Host),
@@ -26,17 +26,17 @@ enum Lasting {
 /// The faults of a scenario.
 #[derive(Default)]
 pub(crate) struct Faults {
-    /// What lasts, with its end, the first to end first.
+    /// Lasting faults with their end times, in order of end.
     lasting: Vec<(Instant, Lasting)>,
     pub(crate) counts: Counts,
 }
 
 impl Faults {
-    /// How long a cut lasts, in milliseconds.
+    /// Longest cut, in milliseconds.
     const CUT: u64 = 4000;
-    /// How long components do not read, in milliseconds.
+    /// Longest pause of reading, in milliseconds.
     const UNREAD: u64 = 2000;
-    /// What may be counted.
+    /// The counted events.
     const NAMES: [&str; 5] = ["cuts", "restarts", "moves", "pauses", "forged"];
 
     pub(crate) fn new() -> Self {
@@ -46,7 +46,7 @@ impl Faults {
         }
     }
 
-    /// Something goes wrong.
+    /// Injects a random fault.
     pub(crate) fn strike(&mut self, random: &mut Random, nodes: &mut Nodes) {
         let node = random.below(nodes.len());
         match random.below(22) {
@@ -104,7 +104,7 @@ impl Faults {
         self.lasting.first().map(|&(end, _)| end)
     }
 
-    /// Ends the lasting faults whose time has come.
+    /// Ends the lasting faults that are due.
     pub(crate) fn end_due(&mut self, nodes: &mut Nodes) {
         let now = nodes.network.now();
         while let Some(&(end, fault)) = self.lasting.first()
@@ -115,7 +115,7 @@ impl Faults {
         }
     }
 
-    /// Ends the trouble: the wire is good from now on.
+    /// Ends all faults: the wire is good from now on.
     pub(crate) fn end_all(&mut self, nodes: &mut Nodes) {
         for (_, fault) in self.lasting.drain(..) {
             set(nodes, fault, false);
@@ -124,7 +124,7 @@ impl Faults {
         nodes.note("the wire is good");
     }
 
-    /// A host that is no node sends a message in the name of a node's component.
+    /// Sends a message from an outside host in the name of a node's component.
     fn forge(&mut self, random: &mut Random, nodes: &mut Nodes, victim: usize) {
         self.count("forged");
         let to = random.below(nodes.len());

@@ -1,16 +1,16 @@
-//! Invariants of every endpoint under all faults: its bounds, and silence once all is quiet.
+//! Invariants of every endpoint under all faults: its limits, and silence after all activity.
 
 use jaus::endpoint::Counter;
 
 use crate::nodes::{Nodes, components};
 use crate::sim::Host;
 
-/// So many packets may be on their way above the window when they are urgent.
+/// Number of urgent packets that may exceed the window.
 const URGENT: usize = 32;
-/// Each packet of a message and each answer may be tried that often, and to many.
+/// Limit of datagrams per packet of a message or answer, over all attempts and receivers.
 const TRIES: u64 = 80;
 
-/// Whether tables, buffers and windows keep their bounds.
+/// Checks that tables, buffers and windows keep their limits.
 pub(crate) fn check_bounds(nodes: &mut Nodes) -> Result<(), String> {
     (0..nodes.len()).try_for_each(|node| check_bounds_of(nodes, node))
 }
@@ -38,8 +38,8 @@ fn check_bounds_of(nodes: &mut Nodes, node: usize) -> Result<(), String> {
     Ok(())
 }
 
-/// Whether nothing is left of `packets` packets that nodes were given to send, and no more was sent
-/// for them than is sensible.
+/// Checks that nothing is left of the `packets` packets to send, and that the number of datagrams
+/// for them was reasonable.
 pub(crate) fn check_rest(nodes: &mut Nodes, packets: u64) -> Result<(), String> {
     let links: usize = nodes.plan.nodes.iter().map(|it| it.networks.len()).sum();
     // A router forwards each datagram to all its other links.

@@ -13,7 +13,7 @@ const FROM: JausId = JausId::new(101, 1, 1);
 const TO: JausId = JausId::new(102, 1, 1);
 const LENGTH: u32 = 1 << 20;
 
-/// Sends one message of a MiB; tells if it does not arrive whole or is not acknowledged.
+/// Sends one message of 1 MiB; fails if it does not arrive whole or is not acknowledged.
 pub(crate) fn run(seed: u64) -> Result<Counts, String> {
     let conditions = Conditions {
         latency: Duration::from_micros(200)..Duration::from_millis(3),

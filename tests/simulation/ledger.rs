@@ -1,7 +1,6 @@
 //! Ledger of a scenario: sent messages, their receivers, and their delivery.
 //!
-//! Each message of a scenario has a unique code, so that every copy is recognised, whatever its
-//! length.
+//! Each message of a scenario has a unique code, so that every copy is recognised at any length.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -14,44 +13,44 @@ use jaus::endpoint::{Event, MessageHandle, Outgoing, Received};
 use crate::sim::Random;
 use crate::totals::Counts;
 
-/// The message code of all that is forged.
+/// The message code of all forged messages.
 pub(crate) const FORGED: u16 = 0xFFFF;
 
-/// One life of a node, from its start or restart on: the node and how often it was restarted.
+/// One life of a node, from a start or restart: the node and its number of restarts before.
 pub(crate) type Life = (usize, u32);
 
-/// A message that was sent.
+/// A sent message.
 struct Sent {
     by: Life,
     message: Outgoing,
     at: Instant,
-    /// For whom it may be: components and the lives that they had when it was sent.
+    /// Possible receivers: components, and their nodes' lives at the time of sending.
     receivers: Vec<(JausId, Life)>,
-    /// The shortest time after which the same message may be delivered once more.
+    /// The shortest time after which the same message may be delivered again.
     window: Duration,
-    /// When it was delivered last to whom, and how often.
+    /// Per receiver, the last delivery and the number of deliveries.
     delivered: HashMap<(JausId, Life), (Instant, u32)>,
-    /// Whether it was acknowledged, once that is known.
+    /// Whether it was acknowledged; `None` until the result is known.
     result: Option<bool>,
-    /// Whether bits changed on the wire when it was sent, so that nothing is promised.
+    /// Whether the wire corrupted bits when it was sent, so that no promise holds.
     is_at_risk: bool,
 }
 
-/// What was sent. See the [module](self).
+/// The sent messages. See the [module](self).
 pub(crate) struct Ledger {
     sent: Vec<Sent>,
     handles: HashMap<(Life, MessageHandle), usize>,
     noise: Bytes,
-    /// Whether bits change on the wire now.
+    /// Whether the wire corrupts bits now.
     is_at_risk: bool,
-    /// From this message on all has to be fulfilled.
+    /// From this message on, every message must be fulfilled.
     calm: usize,
     pub(crate) counts: Counts,
 }
 
 impl Ledger {
-    /// What must happen in some seed. A repeated delivery is counted too, but it is allowed rather
-    /// than promised, and rare.
+    /// Events that must happen in some seed. A repeated delivery is counted too, but it is rare, and
+    /// allowed rather than promised.
     const NAMES: [&str; 7] = [
         "delivered",
         "delivered corrupted",
@@ -78,7 +77,7 @@ impl Ledger {
         *self.counts.entry(name).or_default() += 1;
     }
 
-    /// A unique payload of this many octets, at least 2.
+    /// A unique payload of `length` octets, at least 2.
     pub(crate) fn payload(&mut self, random: &mut Random, length: usize) -> Bytes {
         let code = self.sent.len() as u16 + 1;
         let start = random.below(self.noise.len() - length);
@@ -89,7 +88,7 @@ impl Ledger {
         payload.freeze()
     }
 
-    /// Takes note of a message that was sent.
+    /// Records a sent message.
     pub(crate) fn enter(
         &mut self,
         at: Instant,
@@ -111,16 +110,16 @@ impl Ledger {
         });
     }
 
-    /// From now on every message has to be fulfilled: delivered once to each receiver, and
-    /// acknowledged if it asks for that.
+    /// From now on, every message must be fulfilled: delivered once to each receiver, and
+    /// acknowledged if requested.
     pub(crate) fn expect_all(&mut self) {
         self.is_at_risk = false;
         self.calm = self.sent.len();
     }
 
-    /// Judges a message that was delivered in one life of a node; `is_strict` tells whether the node
-    /// has room for all its peers, and so need not forget where one is in its numbers, and reads at once
-    /// what has arrived.
+    /// Checks a message delivered in one life of a node. `is_strict` tells whether the node reads
+    /// all messages at once and has room for all its peers, so that it need not forget their
+    /// sequence numbers.
     pub(crate) fn receive(
         &mut self,
         at: Instant,
@@ -162,7 +161,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Whether what was delivered is what was sent, to whom it was sent.
+    /// Checks that a delivered message equals the sent one, and has the right receiver.
     fn identify(&self, place: usize, life: Life, received: &Received) -> Result<(), String> {
         let sent = self.sent.get(place).ok_or("was never sent")?;
         let message = &sent.message;
@@ -180,7 +179,7 @@ impl Ledger {
         Err(format!("was delivered to {to} of node {node}"))
     }
 
-    /// Judges a result that was told in one life of a node.
+    /// Checks a result reported in one life of a node.
     pub(crate) fn learn(&mut self, life: Life, event: &Event) -> Result<(), String> {
         let (handle, acknowledged) = match event {
             Event::Acknowledged { message, .. } => (*message, true),
@@ -210,9 +209,9 @@ impl Ledger {
         Ok(())
     }
 
-    /// Judges what has become of everything when nothing happens any more: `is_forgetful` tells which
-    /// nodes forget fragments for want of room, `is_reached` which have to have got all that was
-    /// for them.
+    /// Checks the outcome of every message once the network is idle. `is_forgetful` tells which
+    /// nodes forget fragments for lack of room, `is_reached` which nodes must have received all
+    /// their messages.
     pub(crate) fn close(
         &self,
         lives: &[u32],
@@ -235,8 +234,8 @@ impl Ledger {
 }
 
 impl Sent {
-    /// Whether its sender knows what has become of it, and what it knows is true. A component may
-    /// read later what was acknowledged, so that this is judged in the end.
+    /// Checks that the sender knows the result, and that the result is true. A component may read
+    /// an acknowledged message later, so this is checked at the end.
     fn check_result(
         &self,
         lives: &[u32],
@@ -263,7 +262,7 @@ impl Sent {
         }
     }
 
-    /// Whether it was delivered once to each receiver, and acknowledged if it asks for that.
+    /// Checks that it was delivered once to each receiver, and acknowledged if requested.
     fn check_fulfilled(&self, is_reached: impl Fn(usize) -> bool) -> Result<(), String> {
         let to = self.message.destination;
         for receiver in self.receivers.iter().filter(|it| is_reached(it.1.0)) {

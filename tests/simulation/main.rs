@@ -47,13 +47,13 @@ use totals::run_seeds;
 
 /// The default number of seeds.
 const SEEDS: u64 = 1000;
-/// So many of them send a large message: it has 736 fragments.
+/// Default number of seeds that send a large message: it has 736 fragments.
 const LARGE_SEEDS: u64 = 100;
-/// So many of them have operators contend for a vehicle for two minutes.
+/// Default number of seeds with operators that contend for a vehicle for two minutes.
 const CONTROL_SEEDS: u64 = 50;
-/// So many of them have clients subscribe to reports for three minutes.
+/// Default number of seeds with clients that subscribe to reports for three minutes.
 const STREAM_SEEDS: u64 = 15;
-/// So many of them have components look for each other for two minutes.
+/// Default number of seeds with components that discover each other for two minutes.
 const DIRECTORY_SEEDS: u64 = 20;
 
 #[test]

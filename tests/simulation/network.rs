@@ -1,4 +1,4 @@
-//! Endpoints on a simulated network, good and poor.
+//! Endpoints on a simulated network, under good and poor conditions.
 
 #![expect(clippy::expect_used, reason = "helpers of tests")]
 
@@ -33,7 +33,7 @@ fn network(seed: u64, conditions: Conditions, ids: &[JausId]) -> (Network, Vec<H
     (network, hosts)
 }
 
-/// A report that carries a number, so that each can be told from the others.
+/// A report with a number, so that each is distinguishable.
 fn numbered(number: u32) -> Bytes {
     let mut payload = BytesMut::from(&b"\x02\x44"[..]);
     payload.put_u32_le(number);
@@ -333,7 +333,7 @@ fn a_flood_of_invented_peers_is_bounded_and_leaves_the_node_working() {
     assert_eq!(network.owner(victim).take_messages().len(), 1001);
 }
 
-/// How long it takes to deliver 4000 acknowledged messages over a round trip of 10 ms.
+/// The time to deliver 4000 acknowledged messages over a round trip of 10 ms.
 fn time_for_4000(seed: u64, lost_of_1000: u32) -> Duration {
     let delay = Duration::from_millis(5);
     let conditions = Conditions {
@@ -346,7 +346,7 @@ fn time_for_4000(seed: u64, lost_of_1000: u32) -> Duration {
         acknowledge: true,
         ..message(number)
     };
-    // The two find each other first.
+    // The two nodes discover each other first.
     network
         .send(hosts[0], acknowledged(4000))
         .expect("room for it");

@@ -12,11 +12,11 @@ use crate::totals::Counts;
 pub(crate) struct Nodes {
     pub(crate) plan: Plan,
     pub(crate) network: Network,
-    /// How often each was restarted.
+    /// Number of restarts of each node.
     lives: Vec<u32>,
-    /// Whether its components have ever let messages wait.
+    /// Whether a node's components have ever stopped reading.
     has_rested: Vec<bool>,
-    /// What the endpoints counted that are gone.
+    /// Counts of the endpoints that are gone.
     past: Counts,
 }
 
@@ -26,7 +26,7 @@ pub(crate) fn components(node: usize) -> [JausId; 2] {
     [JausId::new(subsystem, 1, 1), JausId::new(subsystem, 1, 2)]
 }
 
-/// What endpoints count that is worth telling.
+/// The reported counters of the endpoints.
 const COUNTERS: [(&str, Counter); 6] = [
     ("packets sent again", Counter::Retransmissions),
     ("duplicates dropped", Counter::Duplicate),
@@ -69,7 +69,7 @@ impl Nodes {
         (node, self.lives[node])
     }
 
-    /// Lets the components of a node read messages, or leave them waiting.
+    /// Sets whether the components of a node read messages.
     pub(crate) fn set_read(&mut self, host: Host, reads: bool) {
         self.has_rested[host.0] |= !reads;
         self.network.set_read(host, reads);
@@ -97,7 +97,7 @@ impl Nodes {
             .act(Host(node), |now, _, endpoint| endpoint.send(now, message))
     }
 
-    /// The components that a message is for, with their nodes' lives.
+    /// The components that match a message's destination, with their nodes' lives.
     pub(crate) fn receivers(&self, message: &Outgoing) -> Vec<(JausId, Life)> {
         let everyone = (0..self.len()).flat_map(|node| components(node).map(|id| (id, node)));
         everyone
@@ -109,16 +109,16 @@ impl Nodes {
             .collect()
     }
 
-    /// Whether everything has to reach a node on a good wire: it has room for messages of all the
-    /// others at once, and there is one way to it. Where there are several, a large message that
-    /// comes by more than one of them may time out.
+    /// Whether every message must reach a node on a good wire: it has room for messages of all
+    /// others at once, and there is one route to it. With several routes, a large message that
+    /// arrives on more than one of them may time out.
     pub(crate) fn is_reached(&self, node: usize) -> bool {
         let plan = &self.plan.nodes[node];
         let has_room = !plan.is_forgetful && plan.config.max_peers >= 4 * self.len();
         has_room && !self.plan.has_loop()
     }
 
-    /// Writes into the trace what each endpoint has counted.
+    /// Writes each endpoint's counters into the trace.
     pub(crate) fn note_counters(&mut self) {
         for node in 0..self.len() {
             let counters = self.network.endpoint(Host(node)).counters().to_string();
@@ -126,7 +126,7 @@ impl Nodes {
         }
     }
 
-    /// Tells the ledger all that has come out: first what was delivered.
+    /// Reports all output to the ledger, deliveries first.
     pub(crate) fn report_to(&mut self, ledger: &mut Ledger) -> Result<(), String> {
         let mut news = Vec::new();
         for node in 0..self.len() {
@@ -144,7 +144,7 @@ impl Nodes {
             .try_for_each(|(life, event)| ledger.learn(*life, event))
     }
 
-    /// What the endpoints have counted, those that are gone included, and what the wire has done.
+    /// The endpoints' counters, including those of replaced endpoints.
     pub(crate) fn counts(&mut self) -> Counts {
         let mut counts = self.past.clone();
         for (name, counter) in COUNTERS {

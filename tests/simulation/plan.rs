@@ -9,19 +9,19 @@ use crate::sim::{Conditions, Random, Socket};
 
 pub(crate) struct Plan {
     pub(crate) nodes: Vec<NodePlan>,
-    /// Bits change on the wire, unnoticed: meanwhile nothing that arrives can be trusted.
+    /// The wire changes bits undetected: meanwhile no received message can be trusted.
     pub(crate) is_corrupting: bool,
-    /// A host that is no node sends messages in the names of others.
+    /// An outside host sends messages in the names of the nodes' components.
     pub(crate) is_forging: bool,
 }
 
 pub(crate) struct NodePlan {
-    /// The networks that it has a link on.
+    /// The networks to which it has a link.
     pub(crate) networks: Vec<u8>,
     pub(crate) config: Config,
-    /// Datagrams that its links take at once.
+    /// Limit of datagrams per transmit of its links.
     pub(crate) max_segments: usize,
-    /// Whether so little memory makes it forget what it has acknowledged of a large message.
+    /// Whether it has too little memory to remember what it acknowledged of a large message.
     pub(crate) is_forgetful: bool,
 }
 
@@ -43,7 +43,7 @@ impl Plan {
         }
     }
 
-    /// Whether there is more than one way between two networks.
+    /// Whether there is more than one route between two networks.
     pub(crate) fn has_loop(&self) -> bool {
         self.nodes.iter().filter(|it| it.config.forwarding).count() > 1
     }
@@ -110,7 +110,7 @@ impl NodePlan {
     }
 }
 
-/// Copies of a message are recognised for a minute.
+/// Extends the time in which copies of a message are recognised to a minute.
 fn lengthen_windows(config: &mut Config) {
     let long = Duration::from_secs(60);
     config.duplicate_window = long;
@@ -118,7 +118,7 @@ fn lengthen_windows(config: &mut Config) {
     config.first_contact_window = long;
 }
 
-/// How well the wire works for a while.
+/// Random conditions of the wire.
 pub(crate) fn conditions(random: &mut Random, is_corrupting: bool) -> Conditions {
     let fastest = random.choose(&[50, 1000, 20_000]);
     let spread = random.choose(&[1, 1000, 20_000]);

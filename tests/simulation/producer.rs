@@ -1,5 +1,5 @@
-//! An event producer with the behaviour of known peers: some number their events per query, some
-//! create a duplicate event, some drop an event that is not renewed.
+//! An event producer that imitates known peers: some number their events per query, some create a
+//! duplicate event, some drop an event that is not renewed.
 
 use std::time::{Duration, Instant};
 
@@ -14,21 +14,21 @@ use jaus::messages::core::{
 
 use crate::sim::{Event as EndpointEvent, OwnedEndpoint, Owner, Random};
 
-/// How a peer treats events.
+/// A peer's treatment of events.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Habits {
     /// It numbers events per query, like JAUS++.
     numbers_by_query: bool,
-    /// It takes a repeated Create Event for a new one.
+    /// It treats a repeated Create Event as a new one.
     pub(crate) multiplies: bool,
-    /// It drops events that are not renewed for a minute, as version 1.1 does.
+    /// It drops an event that is not renewed for a minute, as version 1.1 does.
     forgets: bool,
 }
 
 impl Habits {
     pub(crate) fn choose(random: &mut Random) -> Self {
         // No known peer does both: a client that cancels an event with a duplicate id and
-        // re-creates the other one would loop for ever.
+        // re-creates the other one would loop forever.
         let numbers_by_query = random.happens(300);
         Self {
             numbers_by_query,
@@ -56,9 +56,9 @@ struct Running {
 }
 
 impl Producer {
-    /// How long a forgetful producer keeps an event.
+    /// How long a producer that `forgets` keeps an event.
     const LIFETIME: Duration = Duration::from_secs(60);
-    /// How often what is subscribed to on change changes.
+    /// Interval between changes, for subscriptions on change.
     const CHANGE: Duration = Duration::from_secs(3);
 
     pub(crate) const fn new(id: JausId, habits: Habits) -> Self {
@@ -69,7 +69,7 @@ impl Producer {
         }
     }
 
-    /// How many events a client has.
+    /// Number of a client's events.
     pub(crate) fn events_of(&self, client: JausId) -> usize {
         self.running.iter().filter(|it| it.client == client).count()
     }
@@ -202,9 +202,9 @@ impl Owner for Producer {
         for running in self.running.iter_mut().filter(|it| it.next <= now) {
             running.next += running.period;
             let mut report = running.query.to_vec();
-            // From a query to its report: 2402h to 4402h.
+            // From a query's code to its report's: 2402h to 4402h.
             report[1] += 0x20;
-            // Each one differs.
+            // Makes each report different.
             report.push(running.sequence);
             let event = Event {
                 event_id: running.number,

@@ -1,5 +1,5 @@
-//! Rules for a vehicle under Management, derived only from its messages: whose commands it follows,
-//! in which state it is, and who is in control.
+//! Rules for a vehicle under Management, derived only from its messages: which client's commands it
+//! follows, its state, and its controller.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
@@ -14,19 +14,19 @@ use jaus::messages::core::{
 use jaus::service::{Standing, State};
 
 pub(crate) struct Rules {
-    /// How long control lasts without being renewed; zero is for ever.
+    /// How long control lasts without renewal; zero means forever.
     timeout: Duration,
-    /// Who was told last to be in control, and has not been told otherwise.
+    /// The client with the last confirmation of control, unless it was revoked.
     told: Option<JausId>,
-    /// When it asked for it last.
+    /// When that client last requested control.
     asked: Instant,
     emergencies: BTreeSet<JausId>,
-    /// When each client last sent a message: the client in control may clear an emergency whose
-    /// setter is silent for long.
+    /// When each client last sent a message: the client in control may clear the emergency of a
+    /// client that is silent for long.
     heard: BTreeMap<JausId, Instant>,
-    /// Whether the client in control has said Resume, and nothing has stopped the vehicle since.
+    /// Whether the client in control has sent Resume, and nothing has stopped the vehicle since.
     resumed: bool,
-    /// For whom it should act now.
+    /// Clients whose commands it should execute now.
     acts_for: Vec<JausId>,
 }
 
@@ -36,7 +36,7 @@ fn code_of(payload: &[u8]) -> Option<u16> {
 }
 
 impl Rules {
-    /// What the vehicle acts on; any command would do.
+    /// The vehicle's command; any command would do.
     const COMMAND: u16 = DeleteElement::CODE;
 
     pub(crate) fn new(now: Instant, timeout: Duration) -> Self {
@@ -51,7 +51,7 @@ impl Rules {
         }
     }
 
-    /// The vehicle is about to receive a message.
+    /// Processes a message that the vehicle is about to receive.
     pub(crate) fn hear(&mut self, now: Instant, message: &Received) {
         let client = message.source;
         self.heard.insert(client, now);
@@ -69,7 +69,7 @@ impl Rules {
                     is_cleared |= self.emergencies.len() < before;
                 }
                 if is_cleared {
-                    // It keeps control, and the timeout restarts.
+                    // The client keeps control, and the timeout restarts.
                     self.asked = now;
                 }
             }
@@ -81,7 +81,7 @@ impl Rules {
         }
     }
 
-    /// The vehicle says something.
+    /// Processes a message from the vehicle.
     pub(crate) fn say(&mut self, now: Instant, message: &Outgoing) -> Result<(), String> {
         let client = message.destination;
         if let Ok(confirm) = ConfirmControl::decode(&message.payload) {
@@ -110,7 +110,7 @@ impl Rules {
         Ok(())
     }
 
-    /// Whether the vehicle is and has done what it should.
+    /// Checks the vehicle's state, controller and actions.
     pub(crate) fn judge(
         &mut self,
         now: Instant,
@@ -151,7 +151,7 @@ impl Rules {
     }
 }
 
-/// Whether a client has shown no life for so long that the client in control may clear its emergency.
+/// Whether a client has been silent long enough that the client in control may clear its emergency.
 fn is_silent(heard: &BTreeMap<JausId, Instant>, now: Instant, client: JausId) -> bool {
     let since = heard.get(&client);
     since.is_none_or(|&at| now.saturating_duration_since(at) >= Duration::from_secs(4))

@@ -17,28 +17,29 @@ use crate::totals::Counts;
 
 /// The longest message.
 const LONGEST: usize = 100 << 10;
-/// The longest message once all is mended.
+/// The longest message after all faults.
 const LONGEST_AFTER_HEALING: usize = 20_000;
-/// When the trouble ends, in milliseconds.
+/// Duration of the faults, in milliseconds.
 const TROUBLE: u64 = 3000;
-/// What happens until then, at the most.
+/// Limit of actions in that time.
 const MOST_ACTIONS: usize = 40;
-/// After the last action the network rests by then: each packet of a large message is tried for some
-/// time, 20 times, with up to 2 seconds between.
+/// Time limit for the network to become idle after the last action: each packet of a large message
+/// is sent up to 20 times, with up to 2 seconds between.
 const REST: Duration = Duration::from_secs(240);
-/// The pause after the repair before the next message: windows and duplicate memories have expired.
+/// Pause between the end of the faults and the next message: windows and duplicate memories have
+/// expired.
 const PAUSE: Duration = Duration::from_secs(10);
-/// After the first words of everybody, all know where all are.
+/// After each component's first message, all nodes know each other's addresses within this time.
 const ACQUAINTANCE: Duration = Duration::from_secs(1);
 
-/// What was done in a run, to tell runs from each other.
+/// Result of a run, to compare runs.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Summary {
     digest: u64,
     pub(crate) counts: Counts,
 }
 
-/// Runs the scenario of a seed; tells which promise was broken.
+/// Runs the scenario of a seed; an error names the broken promise.
 pub(crate) fn run(seed: u64) -> Result<Summary, String> {
     let mut world = World::new(seed);
     let mut times: Vec<Duration> = (0..5 + world.random.below(MOST_ACTIONS - 5))
@@ -61,7 +62,7 @@ struct World {
     nodes: Nodes,
     faults: Faults,
     ledger: Ledger,
-    /// Packets that were sent for the first time.
+    /// Number of packets sent for the first time.
     packets: u64,
 }
 
@@ -93,7 +94,7 @@ impl World {
         self.nodes.network.run_for(time);
     }
 
-    /// Judges all that has come out, and the memory that is used.
+    /// Checks all output, and the memory in use.
     fn look(&mut self) -> Result<(), String> {
         self.nodes.report_to(&mut self.ledger)?;
         check_bounds(&mut self.nodes)
@@ -101,7 +102,7 @@ impl World {
 
     fn act(&mut self) -> Result<(), String> {
         if self.random.happens(220) {
-            // A restart loses unread messages.
+            // Checked first, because a restart loses unread messages.
             self.look()?;
             self.faults.strike(&mut self.random, &mut self.nodes);
         } else {
@@ -116,7 +117,7 @@ impl World {
             random.below(self.nodes.len()),
             random.below(self.nodes.len()),
         );
-        // Equally many short and long ones.
+        // Short and long messages are equally frequent.
         let length = (2 << random.below(16)) + random.below(500);
         let broadcast = random.happens(100);
         let destination = match random.choose(&components(to)) {
@@ -165,7 +166,7 @@ impl World {
         }
     }
 
-    /// Ends all trouble, and lets what was sent in it come to its end.
+    /// Ends all faults, and waits for the end of the messages sent before.
     fn heal(&mut self) -> Result<(), String> {
         while let Some(end) = self.faults.next_end() {
             self.run_until(end)?;
@@ -176,7 +177,7 @@ impl World {
         self.look()
     }
 
-    /// Every component says something to everybody; then each node to each one alone.
+    /// Sends a message from every component to all; then one from each node to each single node.
     fn send_to_all(&mut self) {
         self.ledger.expect_all();
         let count = self.nodes.len();
@@ -211,8 +212,8 @@ impl World {
         check_rest(&mut self.nodes, self.packets + forged)
     }
 
-    /// Lets time pass until nothing is left to happen. Each look costs time; nothing that it would
-    /// see in between goes away.
+    /// Advances until the network is idle. One check at the end suffices: checks are slow, and no
+    /// intermediate output gets lost.
     fn rest(&mut self) -> Result<(), String> {
         let limit = self.nodes.network.now() + REST;
         while self.nodes.network.step() {

@@ -18,20 +18,20 @@ use crate::vehicle::Vehicle;
 
 const PRODUCER: JausId = JausId::new(101, 1, 1);
 const CLIENTS: [JausId; 2] = [JausId::new(42, 1, 1), JausId::new(43, 1, 1)];
-/// What is counted.
+/// The counted events.
 const NAMES: [&str; 4] = ["times up", "times down", "reports", "ended"];
-/// How long things go wrong.
+/// Duration of the faults.
 const TROUBLE: Duration = Duration::from_secs(120);
 /// The time limit for recovery: the longest pause of a client, and the time after which a producer
 /// drops an event that is not renewed.
 const REST: Duration = Duration::from_secs(70);
-/// How long streams are then measured.
+/// How long the rate of streams is measured afterwards.
 const MEASURED: Duration = Duration::from_secs(20);
 const ACTIONS: usize = 40;
-/// The first report of a stream may be followed by a pause.
+/// A pause may follow the first report of a stream.
 const BEGINNING: Duration = Duration::from_millis(2500);
 
-/// Runs the scenario of a seed; tells which promise was broken.
+/// Runs the scenario of a seed; an error names the broken promise.
 pub(crate) fn run(seed: u64) -> Result<Counts, String> {
     let mut world = World::new(seed);
     let start = world.network.now();
@@ -48,20 +48,20 @@ pub(crate) fn run(seed: u64) -> Result<Counts, String> {
     Ok(world.counts())
 }
 
-/// A client with its notes about its subscriptions.
+/// A client with its records of its subscriptions.
 struct Client {
     stack: Stack,
     streams: BTreeMap<SubscriptionId, Stream>,
     counts: Counts,
-    /// Whether it has subscribed to anything; before that it leaves events alone.
+    /// Whether it has subscribed to anything; before that it ignores events.
     has_subscribed: bool,
 }
 
-/// What a client was told about a subscription.
+/// A client's record of a subscription.
 struct Stream {
     topic: Topic,
     up: bool,
-    /// Since when it is up, or was.
+    /// When it last came up; before that, when it was subscribed to.
     since: Instant,
     sign: Instant,
     reports: u32,
@@ -77,7 +77,7 @@ enum Party {
 struct World {
     random: Random,
     network: Network<Party>,
-    /// `None` if the producer is a component of ours.
+    /// `None` if the producer is a component of this library.
     habits: Option<Habits>,
     conditions: Conditions,
     producer: Host,
@@ -142,8 +142,8 @@ impl Client {
 }
 
 impl Stream {
-    /// A stream that is up is not silent for longer than four periods, nor than half a second,
-    /// except when it begins.
+    /// Checks that a running stream is never silent for longer than eight periods or one second,
+    /// whichever is longer, except at its start.
     fn check(&self, now: Instant) -> Result<(), String> {
         if let Some(broken) = &self.broken {
             return Err(broken.clone());
@@ -153,7 +153,7 @@ impl Stream {
         };
         let limit = Duration::from_secs_f64(4.0 / hz).max(Duration::from_millis(500));
         let silent = now.saturating_duration_since(self.sign);
-        // A renewal is a sign of life too, and is not reported.
+        // Twice the timeout, because a renewal is a sign of life too, and is not reported.
         let has_begun = now.saturating_duration_since(self.since) > BEGINNING;
         if self.up && has_begun && silent > 2 * limit {
             return Err(format!(
@@ -335,7 +335,7 @@ impl World {
         Ok(())
     }
 
-    /// What the clients have been told in their last lives, and how the streams are in the end.
+    /// The clients' counts since their last restart, and their number of streams.
     fn counts(&mut self) -> Counts {
         let mut counts = Counts::new();
         for host in self.clients {
@@ -348,7 +348,7 @@ impl World {
         counts
     }
 
-    /// With a good wire, every stream runs at its rate and no event is left over.
+    /// Checks on a good wire that every stream runs at its rate, without surplus events.
     fn come_to_rest(&mut self) -> Result<(), String> {
         self.conditions = Conditions::good();
         self.network.set_conditions(self.conditions.clone());
@@ -371,7 +371,7 @@ impl World {
                 continue;
             };
             let running = producer.events_of(CLIENTS[place]);
-            // An event that a renewal duplicated is noticed when it fires.
+            // A duplicate event from a renewal is only noticed when it fires.
             let multiplies = self.habits.is_some_and(|habits| habits.multiplies);
             let most = if multiplies { 2 * wanted } else { wanted };
             if minds && !(wanted..=most).contains(&running) {

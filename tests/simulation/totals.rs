@@ -1,15 +1,15 @@
-//! Events over all seeds of a test: a guarantee that was never exercised is not tested.
+//! Totals of events over all seeds of a test: an untriggered guarantee is untested.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use crate::sim::seeds::{announce, for_kept_and_fresh_seeds};
 
-/// How often what happened in a run.
+/// Number of occurrences of each kind of event.
 pub(crate) type Counts = BTreeMap<&'static str, u64>;
 
-/// Runs the kept and the fresh seeds of a test, prints what happened in all of them, and fails if
-/// any of it has not happened at all.
+/// Runs the kept and the fresh seeds of a test, prints the totals, and fails if any kind of event
+/// never occurred.
 pub(crate) fn run_seeds(
     test: &str,
     usual: u64,

@@ -55,7 +55,7 @@ fn answers(changes: &Arc<AtomicU8>) -> Handlers {
         move || changes.load(Relaxed)
     };
     let (status, control, authority) = (number(), number(), number());
-    // Any service will do.
+    // Any service would do.
     Handlers::new(discovery::LATEST)
         .answer(move |_: QueryStatus| ReportStatus {
             status: status().into(),

@@ -1,9 +1,9 @@
 //! Locates recorded evidence: messages and captures of other stacks, for comparison with ours.
 //!
 //! Most of it is in the repository, under `tests/evidence`, and always available. Evidence that
-//! must not be redistributed is in the folder that `JAUS_SHARED` names (by default `../shared`
-//! beside the repository). A test without its evidence reports this outside the test harness, with
-//! a count, and fails if `JAUS_EVIDENCE=required` is set.
+//! must not be redistributed is in the folder named by `JAUS_SHARED` (by default `../shared` beside
+//! the repository). A test without its evidence bypasses the test harness to report this, with a
+//! count, and fails if `JAUS_EVIDENCE=required` is set.
 
 use std::fs::OpenOptions;
 use std::io::Write;
@@ -61,8 +61,8 @@ pub fn this_test() -> String {
     thread.name().unwrap_or("a test").to_owned()
 }
 
-/// Reports that a test proves nothing, outside the test harness, which hides the output of passing
-/// tests, with the number of such tests since `cargo test` began.
+/// Reports that a test proves nothing, with the number of such tests since `cargo test` began. The
+/// report bypasses the test harness, which hides the output of passing tests.
 ///
 /// # Panics
 /// If `JAUS_EVIDENCE=required` is set.
@@ -75,7 +75,7 @@ pub fn not_tested(test: &str, reason: &str) {
     let _ = std::io::stderr().lock().write_all(words.as_bytes());
 }
 
-/// Counts one more test, over all programs of the same `cargo test`: they share their parent
+/// Counts one more such test, over all programs of the same `cargo test`: they share their parent
 /// process.
 fn count_not_tested() -> Option<u64> {
     let name = format!("jaus-not-tested-{}", parent_id());

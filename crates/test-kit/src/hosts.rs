@@ -12,14 +12,14 @@ use crate::waiting::{LIMIT, block_until};
 /// Role of a test node's process.
 const ROLE: &str = "JAUS_TEST_ROLE";
 
-/// Nondefault settings of a test node's process.
+/// Settings of a test node's process that differ from the defaults.
 pub const SETTINGS: &str = "JAUS_TEST_SETTINGS";
 
 /// Set for a test that was restarted in a user namespace.
 const INSIDE: &str = "JAUS_TEST_IN_USER_NAMESPACE";
 
-/// The test that plays the roles of test nodes. It stands in the outermost module of the tests that
-/// start them, or at the top of their program, and calls [`play`].
+/// The test that plays the roles of test nodes and calls [`play`]. It is in the outermost module of
+/// the tests that start them, or at the top of their program.
 const PLAYER: &str = "a_process_that_plays_a_node";
 
 /// The path of the [`PLAYER`] of this thread's test.
@@ -30,13 +30,14 @@ fn player() -> String {
     }
 }
 
-/// Runs the body of this thread's test on hosts: created here; otherwise in a user namespace, where
-/// this test binary is restarted for the same test; otherwise [not at all](not_tested).
+/// Runs the body of this thread's test on hosts. If they cannot be created here, restarts this test
+/// binary for the same test in a user namespace. If that fails too, reports the test as [not
+/// run](not_tested).
 pub fn on_hosts<H>(make: impl FnOnce() -> Result<H, String>, body: impl FnOnce(&H)) {
     on_hosts_for(&this_test(), make, body);
 }
 
-/// The same for a program that is its own test harness.
+/// The same, for a program that is its own test harness.
 pub fn on_hosts_for<H>(
     test: &str,
     make: impl FnOnce() -> Result<H, String>,
@@ -169,7 +170,7 @@ impl TwoHosts {
         ip(&[&["-n", &self.names[host]], arguments].concat()).unwrap();
     }
 
-    /// A program of ours on one of the two hosts.
+    /// One of our programs on one of the two hosts.
     #[must_use]
     pub fn command(&self, host: usize, program: &str) -> Command {
         on_host(&self.names[host], program)
@@ -220,7 +221,7 @@ pub fn on_two_hosts(body: impl FnOnce(&TwoHosts)) {
     on_hosts(TwoHosts::new, body);
 }
 
-/// A program of ours on a host, with its usual log.
+/// One of our programs on a host, with its usual log.
 #[must_use]
 pub fn on_host(host: &str, program: &str) -> Command {
     let mut command = Command::new("ip");
@@ -268,7 +269,7 @@ impl Process {
         assert!(sent.unwrap().success(), "{name} to {id}");
     }
 
-    /// Waits until the process prints a line with this beginning; returns the rest.
+    /// Waits until the process prints a line with this prefix; returns the rest.
     pub fn says(&self, beginning: &str) -> String {
         let deadline = Instant::now() + LIMIT;
         loop {
@@ -295,7 +296,7 @@ impl Drop for Process {
 /// Duration of a manual test, in seconds.
 pub const SOAK: &str = "JAUS_SOAK_SECONDS";
 
-/// Plays the role of this process, if it has one; for a limited time, in case the waiting test is
+/// Plays this process's role, if it has one. A time limit ends it in case the waiting test is
 /// killed.
 pub fn play(part: impl AsyncFnOnce(&str)) {
     let Ok(role) = std::env::var(ROLE) else {

@@ -13,7 +13,7 @@ impl Random {
         Self(seed)
     }
 
-    /// Any number.
+    /// The next 64-bit number.
     pub fn number(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -36,13 +36,13 @@ impl Random {
         self.number() % 1000 < u64::from(of_1000)
     }
 
-    /// A time within the range.
+    /// A duration within the range.
     pub fn between(&mut self, range: &Range<Duration>) -> Duration {
         let spread = (range.end - range.start).as_nanos().max(1) as u64;
         range.start + Duration::from_nanos(self.number() % spread)
     }
 
-    /// A time of up to `millis` milliseconds.
+    /// A duration of up to `millis` milliseconds.
     pub fn up_to_millis(&mut self, millis: u64) -> Duration {
         self.between(&(Duration::ZERO..Duration::from_millis(millis.max(1))))
     }

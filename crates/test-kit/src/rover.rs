@@ -1,4 +1,4 @@
-//! Simulated RA vehicle with the behaviour of OpenJAUS 3.3.1's simulator: it reports by service
+//! Simulated RA vehicle with the behaviour of OpenJAUS 3.3.1's simulator: it reports over service
 //! connections and obeys the component in control, or any component while there is none. It keeps
 //! the last effort and applies it as long as its controller reports ready or standby over a service
 //! connection. It keeps the last speed and applies it in any case. It does not report its
@@ -63,7 +63,7 @@ pub struct Rover {
     /// Time of the controller's last report of ready or standby.
     controller_heard: Option<Instant>,
     next_connection: Option<Instant>,
-    /// The controlled component.
+    /// The driver component under control.
     driver: Option<RaId>,
     /// Received vectors.
     pub vectors: Vec<Bytes>,
@@ -88,10 +88,10 @@ impl Rover {
         }
     }
 
-    /// It stops this long after the controller's last report of ready or standby.
+    /// An effort ends this long after the controller's last report of ready or standby.
     const CONTROLLER_TIMEOUT: Duration = Duration::from_millis(1500);
 
-    /// Whether it moves now.
+    /// Whether the vehicle moves at this time.
     #[must_use]
     pub fn drives(&self, now: Instant) -> bool {
         let heard = self.controller_heard.filter(|_| self.controller.is_some());
@@ -99,7 +99,7 @@ impl Rover {
         let pushes = |effort: &Bytes| effort[0] & 1 != 0 && effort[2..4] != [0, 0];
         let effort = is_ready && self.efforts.last().is_some_and(pushes);
         let is_fast = |speed: &Bytes| speed[..2] != [0, 0];
-        // The least integer means no speed.
+        // The smallest integer means no speed.
         let is_vector = |vector: &Bytes| vector[..4] != [1, 0, 0, 0x80];
         effort
             || self.speeds.last().is_some_and(is_fast)
@@ -236,7 +236,7 @@ impl Rover {
         self.next_connection = None;
     }
 
-    /// Another client takes control.
+    /// Gives control to another client.
     pub fn lose_controller(&mut self) {
         if let Some((id, _)) = self.controller.take() {
             self.said
@@ -264,7 +264,7 @@ impl Rover {
         }
     }
 
-    /// When `handle_timeout` is to be called next.
+    /// When to call `handle_timeout` next.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let streams = self.streams.values().map(|stream| stream.next);

@@ -39,7 +39,7 @@ impl VehicleProcess {
         vehicle
     }
 
-    /// The number of its process.
+    /// The process id.
     pub fn id(&self) -> u32 {
         self.child.id()
     }
@@ -51,7 +51,7 @@ impl VehicleProcess {
         assert!(sent.unwrap().success(), "{name} to {id}");
     }
 
-    /// Waits until it has printed a line that contains this, after its introduction.
+    /// Waits until it has printed a line that contains this text, after its introduction.
     pub fn says(&self, text: &str) {
         block_until(|| {
             let lines = self.lines.lock().unwrap();
@@ -70,7 +70,7 @@ impl VehicleProcess {
 
 impl Drop for VehicleProcess {
     fn drop(&mut self) {
-        // It may have ended already.
+        // It may have exited already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -3,17 +3,17 @@
 use std::panic::Location;
 use std::time::{Duration, Instant};
 
-/// Timeout of every wait: far more than anything takes on a busy machine, reached only by a failing
-/// test. No test measures time with it.
+/// Timeout of every wait: far longer than any wait on a busy machine, so that only a failing test
+/// reaches it. No test measures time with it.
 pub const LIMIT: Duration = Duration::from_secs(60);
 
-/// Pause between two looks at a condition.
+/// Interval between two checks of a condition.
 const PERIOD: Duration = Duration::from_millis(5);
 
 /// Waits for a future.
 ///
 /// # Panics
-/// If it takes longer than [`LIMIT`], with the place that waits.
+/// If it takes longer than [`LIMIT`]; the panic names the caller.
 #[track_caller]
 pub fn within_limit<T>(future: impl Future<Output = T>) -> impl Future<Output = T> {
     let place = Location::caller();
@@ -26,7 +26,7 @@ pub fn within_limit<T>(future: impl Future<Output = T>) -> impl Future<Output = 
 /// Waits until a condition holds.
 ///
 /// # Panics
-/// If it takes longer than [`LIMIT`], with the place that waits.
+/// If it takes longer than [`LIMIT`]; the panic names the caller.
 #[track_caller]
 pub fn until(mut holds: impl FnMut() -> bool) -> impl Future<Output = ()> {
     within_limit(async move {

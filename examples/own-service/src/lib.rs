@@ -13,12 +13,13 @@ pub mod messages {
 use messages::report_lamp::Brightness;
 use messages::{QueryLamp, ReportLamp, SetLamp, lamp};
 
-/// The service: it keeps the brightness that the client in control sets, and reports it to anyone.
+/// The service: it stores the brightness set by the client in control, and reports it to any
+/// client.
 pub fn service() -> Handlers {
     let brightness = Arc::new(AtomicU8::new(0));
     let shown = brightness.clone();
     Handlers::new(lamp::LATEST)
-        // A real lamp would be dimmed here. Register a command that moves something with `command`
+        // A real lamp would be dimmed here. To move something, register a command with `command`
         // instead, and stop it with `on_stop`.
         .configure(move |set: SetLamp, _, _| brightness.store(set.brightness.raw(), Relaxed))
         .answer(move |_: QueryLamp| ReportLamp {

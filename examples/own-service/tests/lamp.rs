@@ -1,4 +1,4 @@
-//! The service, as a client sees it.
+//! Tests the service through a client.
 
 use jaus::component::{AccessControl, Component, Kind};
 use jaus::node::{Config, Node};

@@ -1,6 +1,6 @@
-//! Writes seeds for every target to `corpus/<target>`: small inputs that reach far.
+//! Writes seeds for every target to `corpus/<target>`: small inputs with a wide coverage.
 //!
-//! Most are made from the embedded definitions, so that they need not be kept: run it again when
+//! Most are made from the embedded definitions and need not be stored: run this program again when
 //! the definitions have changed.
 
 use std::fs;
@@ -85,7 +85,7 @@ fn framed(payload: &[u8]) -> [Vec<u8>; 3] {
         .map(|framing| framing.encode(&frame).expect("a short message").into())
 }
 
-/// What a component writes to its host's node: its first record, a message, and a long one.
+/// A component's output to its host's node: its first record, a message, and a long one.
 fn component() -> Vec<u8> {
     use jaus::address::JausId;
     use jaus::link::local::record::{Head, Record};
@@ -107,7 +107,7 @@ fn component() -> Vec<u8> {
     ])
 }
 
-/// What the node writes to a component: welcome, a message from the network, and outcomes.
+/// The node's output to a component: welcome, a message from the network, and outcomes.
 fn node() -> Vec<u8> {
     use jaus::address::JausId;
     use jaus::endpoint::{LinkId, Path, Unacknowledged};

@@ -57,7 +57,7 @@ fn what_no_line_can_have_is_refused_with_the_port() {
         }])
         .contains("choose from 1 to 2")
     );
-    assert!(error(&[line(), line()]).contains("/dev/ttyUSB0 is named twice"));
+    assert!(error(&[line(), line()]).contains("/dev/ttyUSB0 appears twice"));
 }
 
 #[cfg(feature = "serde")]

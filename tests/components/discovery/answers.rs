@@ -28,7 +28,7 @@ fn asked(to: JausId, query: &[u8]) -> Vec<Received> {
     answers(&mut world, asker, to, query)
 }
 
-/// The reports that come back. Codes of queries begin with 0 or 2, those of reports with 4.
+/// The received reports. Codes of queries begin with 0 or 2, those of reports with 4.
 fn answers(world: &mut World, asker: Place, to: JausId, query: &[u8]) -> Vec<Received> {
     world.run(Duration::from_secs(1));
     world.received(asker);
@@ -95,7 +95,7 @@ fn the_subsystem_list_names_the_component_to_ask() {
     let answers = asked(JausId::new(101, 1, 255), &[0x02, 0x2B]);
     let octets = only(&answers);
     assert_eq!(octets[..2], [0x02, 0x4B]);
-    // The own subsystem: 101 in two octets, node 1, component 33.
+    // The component's own subsystem: 101 in two octets, node 1, component 33.
     assert!(
         octets[3..].chunks(4).any(|entry| entry == [101, 0, 1, 33]),
         "{octets:?}"
@@ -261,7 +261,8 @@ fn the_service_list_of_1_1_is_filtered_by_text() {
     assert_eq!(uris, ["urn:jaus:jss:core:Liveness"; 2]);
 }
 
-/// JAUS++ registers its services with everybody who identifies himself, and expects no answer.
+/// JAUS++ registers its services with every component that identifies itself, and expects no
+/// answer.
 #[test]
 fn registered_services_are_known_without_asking() {
     let mut world = World::new();

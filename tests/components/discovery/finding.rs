@@ -160,7 +160,7 @@ fn newcomers_are_found_at_once_while_many_others_have_fallen_silent() {
     for dead in fleet {
         world.kill(dead);
     }
-    // From before the first notices until all are given up.
+    // From before the first losses are noticed until all silent components are given up.
     for newcomer in 1..=12 {
         world.run(seconds(4));
         let id = JausId::new(100 + newcomer, 1, 1);

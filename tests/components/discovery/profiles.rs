@@ -1,4 +1,4 @@
-//! Discovery with peers that depart from the standard.
+//! Discovery with peers that deviate from the standard.
 
 use std::time::Duration;
 
@@ -24,7 +24,7 @@ fn service(urn: &str) -> register_services::ServiceRec {
     }
 }
 
-/// A component, and a peer that has called it.
+/// A component, and a peer that has queried its identification.
 fn met() -> (World, Place, Place) {
     let mut world = World::new();
     let us = world.start(stack(OWN, "rover", Vec::new()));
@@ -55,7 +55,7 @@ fn services_are_asked_for_by_number_and_never_by_wildcard() {
     }
 }
 
-/// JAUS++ registers with everybody, every five seconds.
+/// JAUS++ registers with every component, every five seconds.
 #[test]
 fn a_registration_from_another_subsystem_is_learned_and_not_answered() {
     let (mut world, us, peer) = met();
@@ -109,7 +109,7 @@ fn a_peer_that_only_answers_is_not_lost() {
     assert!(world.stack(us).directory().component(PEER).is_some());
 }
 
-/// As recorded of the judging tool: what is for one component goes to all of its node.
+/// As recorded from the judging tool: messages for one component go to its whole node.
 #[test]
 fn a_question_to_a_whole_node_is_answered_by_unicast() {
     let (mut world, _, peer) = met();

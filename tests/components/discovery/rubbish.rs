@@ -73,8 +73,8 @@ proptest! {
             prop_assert!(stack.directory().len() <= 1 + 8);
             prop_assert!(stack.directory().component(OWN).is_some());
         }
-        // A burst of queries and one per second, the multicasts, and the requested answers of at
-        // most nine reports each.
+        // Allows a burst of queries and one per second, the multicasts, and up to nine reports per
+        // received message.
         let seconds = now.duration_since(start).as_secs();
         prop_assert!(said <= 64 + 2 * seconds + 9 * messages.len() as u64, "{said} messages");
     }

@@ -54,7 +54,7 @@ fn a_flood_of_queries_is_answered_up_to_the_limit_of_a_hundred_a_second() {
     world.received(puppet);
     let mut answers = 0;
     for round in 0..1000_u32 {
-        // They vary, or the endpoint drops them as duplicates.
+        // The queries vary; otherwise the endpoint would drop them as duplicates.
         let query_type = u8::try_from(2 + round % 3).unwrap();
         let query = QueryIdentification {
             query_type: query_type.into(),

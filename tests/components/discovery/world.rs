@@ -15,18 +15,18 @@ use jaus::service::{
 const LINK: LinkId = LinkId(0);
 const DELAY: Duration = Duration::from_millis(1);
 
-/// Everything there is.
+/// The whole network, with its virtual time.
 pub(crate) struct World {
     pub(crate) now: Instant,
     nodes: Vec<Node>,
-    /// Datagrams on their way, by arrival and number.
+    /// Datagrams in flight, by arrival time and number.
     flights: BTreeMap<(Instant, u64), Flight>,
     flown: u64,
-    /// Of how many datagrams the network loses one; 0 for a good network.
+    /// The network loses one of this number of datagrams; 0 for none.
     lost_of: u64,
 }
 
-/// A computer with one component: a stack, or a puppet whose strings the test holds.
+/// A host with one component: a stack, or a puppet that the test controls.
 struct Node {
     address: SocketAddr,
     id: JausId,
@@ -49,7 +49,7 @@ struct Flight {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place(usize);
 
-/// A component as the tests like it.
+/// A component with the default timing.
 pub(crate) fn stack(id: JausId, name: &str, services: Vec<Box<dyn Service>>) -> Stack {
     let profile = Profile::new(Kind::Vehicle, name);
     let timing = Timing::default();
@@ -80,7 +80,7 @@ impl World {
         self.add(stack.id(), Some(stack))
     }
 
-    /// Adds a component that only does what the test makes it do.
+    /// Adds a component that sends only on the test's request.
     pub(crate) fn puppet(&mut self, id: JausId) -> Place {
         self.add(id, None)
     }
@@ -106,12 +106,12 @@ impl World {
         Place(place)
     }
 
-    /// Takes a node off the network, without a word to anyone.
+    /// Takes a node off the network, without a shutdown notice.
     pub(crate) fn kill(&mut self, place: Place) {
         self.nodes[place.0].up = false;
     }
 
-    /// Puts a node back on the network, as if nothing had happened.
+    /// Reconnects a node to the network, with its state unchanged.
     pub(crate) fn revive(&mut self, place: Place) {
         self.nodes[place.0].up = true;
     }
@@ -120,18 +120,17 @@ impl World {
         self.nodes[place.0].stack.as_mut().unwrap()
     }
 
-    /// What a component has noticed since the last call, with the time.
+    /// Changes noticed by a component since the last call, with their times.
     pub(crate) fn changes(&mut self, place: Place) -> Vec<(Instant, Change)> {
         std::mem::take(&mut self.nodes[place.0].changes)
     }
 
-    /// What a puppet has received since the last call.
+    /// Messages received by a puppet since the last call.
     pub(crate) fn received(&mut self, place: Place) -> Vec<Received> {
         std::mem::take(&mut self.nodes[place.0].received)
     }
 
-    /// The messages of one type that a puppet has received since the last call; all others are
-    /// thrown away.
+    /// The messages of one type received by a puppet since the last call; all others are discarded.
     pub(crate) fn received_as<M: Message>(&mut self, place: Place) -> Vec<M> {
         let received = self.received(place);
         received
@@ -140,17 +139,17 @@ impl World {
             .collect()
     }
 
-    /// The datagrams that a node has sent so far; one to the group counts once.
+    /// Number of datagrams sent by a node; a multicast counts once.
     pub(crate) fn datagrams(&self, place: Place) -> u64 {
         self.nodes[place.0].datagrams
     }
 
-    /// Has a puppet send a message.
+    /// Sends a message from a puppet.
     pub(crate) fn say<M: Message>(&mut self, place: Place, to: JausId, message: &M) {
         self.say_octets(place, to, message.encode().unwrap());
     }
 
-    /// Has a puppet send octets.
+    /// Sends octets from a puppet.
     pub(crate) fn say_octets(&mut self, place: Place, to: JausId, payload: Bytes) {
         let node = &mut self.nodes[place.0];
         node.endpoint
@@ -162,7 +161,7 @@ impl World {
             .unwrap();
     }
 
-    /// Has the network lose datagrams, one of `many` on average and always the same ones.
+    /// Makes the network lose one of `many` datagrams on average, always the same ones.
     pub(crate) fn lose_every(&mut self, many: u64) {
         self.lost_of = many;
     }
@@ -172,7 +171,7 @@ impl World {
         self.lost_of > 0 && mixed.is_multiple_of(self.lost_of)
     }
 
-    /// Lets time pass.
+    /// Advances time.
     pub(crate) fn run(&mut self, duration: Duration) {
         let end = self.now + duration;
         loop {

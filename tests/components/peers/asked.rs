@@ -6,7 +6,7 @@ use jaus::messages::core::{
     RejectControl, ReleaseControl, RequestControl, SetElement,
 };
 
-/// The codes of what must come back.
+/// The codes of the required answers.
 pub(crate) fn answers_to(code: u16) -> Vec<u16> {
     match code {
         CreateEvent::CODE | CancelEvent::CODE => vec![ConfirmEventRequest::CODE],

@@ -1,4 +1,4 @@
-//! Acknowledges challenges like a peer's transport, which recordings cannot do.
+//! Acknowledges challenges as a peer's transport does; recordings cannot do that.
 
 use bytes::Bytes;
 use jaus::endpoint::{Path, To, Transmit};
@@ -7,7 +7,8 @@ use jaus::wire::{Acknowledgement, Broadcast, Flags, Frame, judp};
 /// Query Heartbeat Pulse.
 const CHALLENGE: &[u8] = b"\x02\x22";
 
-/// If a datagram is a challenge to one peer: whose acknowledgement comes back, and the datagram.
+/// The acknowledgement of a challenge to one peer: its path and its datagram. `None` for other
+/// datagrams.
 pub(crate) fn acknowledgement(transmit: &Transmit) -> Option<(Path, Bytes)> {
     let To::Peer(peer) = transmit.to else {
         return None;

@@ -7,7 +7,7 @@ use jaus::service::{
 use jaus_vehicle::mobility::Vehicle;
 use jaus_vehicle::motion::{Frame, Limits, Pilot, SkidSteer, SkidSteerConfig};
 
-/// A component that can be controlled and driven, as `jaus vehicle` is.
+/// A component that can be controlled and driven, like `jaus vehicle`.
 pub(crate) fn vehicle(id: JausId) -> Stack {
     let platform = SkidSteer::new(SkidSteerConfig {
         limits: Limits::default(),
@@ -29,7 +29,7 @@ pub(crate) fn vehicle(id: JausId) -> Stack {
     Stack::new(discovery(id, Kind::Vehicle, "Rover"), services).management(Management::new())
 }
 
-/// A component that looks for others and cannot be controlled.
+/// A component that discovers others and cannot be controlled.
 pub(crate) fn operator(id: JausId) -> Stack {
     let services: Vec<Box<dyn Service>> = vec![Box::new(Transport), Box::new(Liveness::new())];
     Stack::new(

@@ -1,4 +1,4 @@
-//! Captured JAUS++ messages, replayed in virtual time to a vehicle and an operator of ours: every
+//! Captured JAUS++ messages, replayed in virtual time to our own vehicle and operator: every
 //! request gets a usable answer, within JAUS++'s timeout of 250 ms, at its source address.
 
 use std::collections::{BTreeMap, VecDeque};
@@ -19,12 +19,12 @@ use jaus::wire::Frame;
 use jaus_test_kit::evidence;
 use jaus_view::Dictionary;
 
-/// How long JAUS++ waits for an answer.
+/// JAUS++'s timeout for an answer.
 const PATIENCE: Duration = Duration::from_millis(250);
 /// Offset of the message in a datagram: version and header.
 const MESSAGE: usize = 13;
 
-/// A stream of events, as the recorded vehicle and ours named it.
+/// A stream of events, with its id in the recording and ours.
 #[derive(Debug, Clone, Copy)]
 struct Stream {
     captured: u8,
@@ -32,21 +32,21 @@ struct Stream {
     is_running: bool,
 }
 
-/// A replay: the queried component and the recording.
+/// A replay: the queried node and the recording.
 struct Replay {
     stand_in: StandIn,
     dictionary: Dictionary,
     streams: Vec<Stream>,
     /// The recorded confirmations, by the request that they answer.
     confirmations: VecDeque<ConfirmEventRequest>,
-    /// The state that the next report of it must tell.
+    /// The expected state in the next Report Status.
     state: Option<u8>,
     asked: BTreeMap<u16, usize>,
     unanswered: BTreeMap<u16, usize>,
 }
 
 impl Replay {
-    /// Puts components in the place of those at `address`, and says to them what the others said.
+    /// Puts components in place of those at `address`, and replays the messages to them.
     fn of(file: &str, address: &str, stacks: impl IntoIterator<Item = Stack>) -> Self {
         let all = super::recorded::datagrams(&evidence::captures().join("jauspp").join(file));
         let address: SocketAddr = address.parse().unwrap();
@@ -77,7 +77,7 @@ impl Replay {
         replay
     }
 
-    /// Says one thing, and looks for its answer.
+    /// Replays one message, and looks for its answer.
     fn say(&mut self, datagram: &Recorded) {
         let (frames, _) = datagram.frames();
         let [frame] = &frames[..] else {
@@ -110,7 +110,7 @@ impl Replay {
         self.check(datagram, frame, &answer);
     }
 
-    /// Whether JAUS++ can use an answer.
+    /// Checks that JAUS++ can use an answer.
     fn check(&mut self, asked: &Recorded, question: &Frame, answer: &Said) {
         let octets = &answer.frame.payload;
         let shown = self.dictionary.line(octets).to_json();
@@ -162,7 +162,7 @@ impl Replay {
                 ids.dedup();
                 assert_eq!(report.event_list.len(), ids.len(), "all of them: {shown}");
             }
-            // Queries about poses and velocities name the fields: no other ones come back.
+            // Queries for poses and velocities name the fields: the answer has no others.
             0x2402..=0x2404 => {
                 let vector = |octets: &[u8]| u16::from_le_bytes([octets[2], octets[3]]);
                 let (asked, told) = (vector(&question.payload), vector(octets));
@@ -199,7 +199,7 @@ impl Replay {
         });
     }
 
-    /// The datagram, with our number of the stream in place of the recorded one.
+    /// The datagram, with our stream id in place of the recorded one.
     fn with_our_stream(&self, datagram: &Recorded, frame: &Frame) -> Bytes {
         let at = match frame.code() {
             Some(CancelEvent::CODE) => 3,
@@ -216,7 +216,7 @@ impl Replay {
         octets.freeze()
     }
 
-    /// The numbers of the events that were sent, by stream.
+    /// Sequence numbers of the sent events, by stream.
     fn events(&self) -> BTreeMap<u8, Vec<u8>> {
         let mut events: BTreeMap<u8, Vec<u8>> = BTreeMap::new();
         for said in &self.stand_in.said {
@@ -230,7 +230,7 @@ impl Replay {
         events
     }
 
-    /// Sends a large message to a peer, in the style that it reads.
+    /// Sends a large message to a peer, in the fragmentation that it understands.
     fn large_to(&mut self, us: JausId, peer: &str, address: &str) {
         let before = self.stand_in.said.len();
         let (peer, address) = (peer.parse().unwrap(), address.parse().unwrap());
@@ -348,7 +348,7 @@ fn the_console_with_waypoints_gets_every_answer() {
     replay.large_to(us, "10002.1.1", "10.99.0.2:3794");
 }
 
-/// The scripted operator of the 2010 rules: no JAUS++, but what JAUS++ was asked.
+/// The scripted operator of the 2010 rules: not JAUS++, but with the requests that JAUS++ received.
 #[test]
 fn the_tasks_of_2010_get_every_answer() {
     let stacks = [super::drivable::vehicle(id("152.1.1"))];
@@ -356,8 +356,8 @@ fn the_tasks_of_2010_get_every_answer() {
     assert_eq!(replay.unanswered, NOTHING);
 }
 
-/// JAUS++'s vehicles ask an operator of ours who it is. It has no control and no management to be
-/// asked about, and JAUS++ needs neither to list it.
+/// JAUS++'s vehicles query our operator's identification. It offers neither control nor management,
+/// and JAUS++ needs neither to list it.
 #[test]
 fn an_operator_of_ours_is_what_vehicles_of_jauspp_ask_for() {
     let not_offered = [QueryAuthority::CODE, QueryStatus::CODE];

@@ -1,4 +1,4 @@
-//! Captured discovery and heartbeat requests of the competitions' judging tool, octet for octet,
+//! Captured discovery and heartbeat requests of the competitions' judging tool, octet by octet,
 //! against a node with real sockets on the loopback interface.
 //!
 //! The capture is not part of the project; see `JAUS_SHARED` in CONTRIBUTING.
@@ -15,7 +15,7 @@ use jaus_test_kit::evidence;
 use jaus_test_kit::waiting::LIMIT;
 use jaus_view::{Capture, JAUS_PORT, Network};
 
-/// The subsystem of the vehicle that was judged, and that of ours.
+/// The subsystem of the judged vehicle, and that of ours.
 const JUDGED: u16 = 105;
 const OURS: u16 = 2105;
 
@@ -28,8 +28,8 @@ fn code(datagram: &[u8]) -> u16 {
     u16::from_le_bytes([datagram[CODE.start], datagram[CODE.start + 1]])
 }
 
-/// The judge's requests of one capture, in order, without repetitions, with the judged vehicle's
-/// number replaced by ours.
+/// The judge's requests in one capture, in order, without repetitions, with the judged vehicle's
+/// subsystem replaced by ours.
 fn requests(capture: &Path) -> Vec<Vec<u8>> {
     let judge = SocketAddr::from(([192, 168, 1, 42], JAUS_PORT));
     let mut capture = Capture::new(File::open(capture).unwrap()).unwrap();
@@ -89,7 +89,7 @@ fn wait_for_answer(judge: &UdpSocket, request: &[u8]) {
     }
 }
 
-/// Asks everything that the judge asked, and requires every answer.
+/// Sends all recorded requests of the judge, and requires every answer.
 fn judge(capture: &str, by_multicast: bool) {
     let Some(capture) = evidence::capture(&format!("igvc2015/{capture}")) else {
         return;

@@ -1,5 +1,5 @@
-//! Junior's side of captures, replayed in virtual time to a node of ours in the place of the other:
-//! our octets equal those of the recorded Junior node.
+//! Junior's side of captures, replayed in virtual time to our node in place of the other Junior
+//! node: our octets equal the recorded ones.
 
 use std::net::SocketAddr;
 
@@ -21,14 +21,14 @@ fn address(host: &str) -> SocketAddr {
     format!("10.77.0.{host}:3794").parse().unwrap()
 }
 
-/// What each of the two nodes said.
+/// The datagrams sent by each of the two nodes.
 fn said(file: &str) -> (Vec<Recorded>, Vec<Recorded>) {
     let file = evidence::captures().join(format!("junior/{file}.pcap"));
     let all = super::recorded::datagrams(&file).into_iter();
     all.partition(|datagram| datagram.source == address("1"))
 }
 
-/// A node of ours with one component, whose numbers begin with 1 as Junior's do.
+/// A node with one component, whose sequence numbers begin with 1 like Junior's.
 fn node(id: JausId, host: &str) -> StandIn {
     let config = Config {
         payload_limit: PAYLOAD,
@@ -45,7 +45,7 @@ fn octets(datagrams: &[Recorded]) -> Vec<Bytes> {
 
 #[test]
 fn a_node_in_the_place_of_b_answers_with_b_s_very_octets() {
-    // In 01 node B sends back all that it gets, in the others nothing.
+    // In 01 node B echoes every message, in the others it sends none.
     for (file, echoes) in [
         ("01-discovery-then-unicast", true),
         ("02-acked-small", false),
@@ -112,8 +112,8 @@ fn the_priority_fault_is_counted_and_names_junior() {
     );
 }
 
-/// The first messages go to the group, as Junior's do, and Junior's acknowledgement teaches us
-/// where it is.
+/// The first messages go to the group, like Junior's, and Junior's acknowledgement gives us its
+/// address.
 #[test]
 fn a_node_in_the_place_of_a_calls_as_a_does_and_understands_the_answer() {
     for (file, acknowledge) in [
@@ -139,7 +139,7 @@ fn a_node_in_the_place_of_a_calls_as_a_does_and_understands_the_answer() {
         stand_in.hear(of_b[0].source, of_b[0].payload.clone());
         let told = |event: &Event| matches!(event, Event::Acknowledged { by: B, .. });
         assert_eq!(stand_in.news.iter().any(told), acknowledge, "{file}");
-        // From now on it is addressed by unicast, with the octets that A used.
+        // From now on messages go by unicast, with the octets that A used.
         for next in &of_a[1..] {
             let before = stand_in.said.len();
             let payload = next.frames().0[0].payload.clone();
@@ -150,7 +150,7 @@ fn a_node_in_the_place_of_a_calls_as_a_does_and_understands_the_answer() {
     }
 }
 
-/// 100 kB are cut as Junior cuts them, and Junior's acknowledgements end the delivery.
+/// 100 kB are fragmented as by Junior, and Junior's acknowledgements complete the delivery.
 #[test]
 fn a_large_acknowledged_message_goes_to_junior_as_juniors_own() {
     let (of_a, of_b) = said("03-acked-100KB");
@@ -167,7 +167,7 @@ fn a_large_acknowledged_message_goes_to_junior_as_juniors_own() {
     ));
     for acknowledgement in &of_b[1..] {
         let at = stand_in.at().max(acknowledgement.at);
-        // Junior answers what it has got.
+        // Junior acknowledges only numbers that were sent.
         let number = acknowledgement.frames().0[0].sequence;
         assert!(
             stand_in.said.iter().any(|it| it.frame.sequence == number),

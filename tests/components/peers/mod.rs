@@ -1,4 +1,4 @@
-//! Recorded exchanges with other stacks, with components of ours in the place of one party.
+//! Recorded exchanges with other stacks, with our components in place of one party.
 
 mod asked;
 mod challenged;

@@ -7,7 +7,7 @@ use jaus::address::JausId;
 use jaus::peer::{Certainty, Peer, Recogniser, Verdict};
 use jaus_test_kit::evidence;
 
-/// What is to be thought of each sender of a capture.
+/// The verdict on each sender of a capture.
 fn verdicts(file: &Path) -> BTreeMap<JausId, Verdict> {
     let mut recognisers: BTreeMap<JausId, Recogniser> = BTreeMap::new();
     for datagram in super::recorded::datagrams(file) {
@@ -52,7 +52,7 @@ fn jauspp_is_recognised_for_sure_and_a_plain_vehicle_beside_it_is_not() {
         "jauspp/02-rawvehicle-client.pcap",
         &[
             ("1000.1.7", JausPlusPlus, Certain),
-            // Python, modelled on JAUS++: its numbers start with 0.
+            // Python, modelled on JAUS++: its sequence numbers start with 0.
             ("77.1.1", JausPlusPlus, Certainty::Guess),
         ],
     );
@@ -117,7 +117,7 @@ fn the_judging_tool_is_recognised() {
     }
 }
 
-/// They speak RA, and none of the signs is theirs.
+/// OpenJAUS sends RA, and shows none of the other stacks' signs.
 #[test]
 fn openjaus_is_taken_for_none_of_the_others() {
     for file in ["judp-wire", "opc-wire", "peer-wire"] {

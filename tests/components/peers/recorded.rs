@@ -20,7 +20,7 @@ pub(crate) struct Recorded {
 }
 
 impl Recorded {
-    /// The messages, and how many octets lie behind the last.
+    /// The messages, and the number of octets behind the last.
     pub(crate) fn frames(&self) -> (Vec<Frame>, usize) {
         let Ok(mut frames) = judp::frames(self.payload.clone()) else {
             return (Vec::new(), 0);

@@ -1,5 +1,5 @@
-//! A node of ours in the place of a captured party, in virtual time: its endpoint, its components,
-//! and all messages that it sends.
+//! A node of ours in place of a captured party, in virtual time: its endpoint, its components, and
+//! all messages that it sends.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -19,25 +19,25 @@ use super::challenged::acknowledgement;
 const UDP: LinkId = LinkId(0);
 const TCP: LinkId = LinkId(1);
 
-/// A node of ours.
+/// Our node.
 pub(crate) struct StandIn {
     pub(crate) endpoint: Endpoint,
     inbox: Vec<Received>,
     stacks: BTreeMap<JausId, Stack>,
-    /// Everything that was said.
+    /// All sent messages and fragments.
     pub(crate) said: Vec<Said>,
-    /// What came for components without a stack.
+    /// Received messages for components without a stack.
     pub(crate) heard: Vec<Received>,
-    /// What else the endpoint told.
+    /// The endpoint's other events.
     pub(crate) news: Vec<Event>,
     start: Instant,
     now: Instant,
 }
 
-/// A message or fragment that was said.
+/// A sent message or fragment.
 #[derive(Debug, Clone)]
 pub(crate) struct Said {
-    /// Since the beginning.
+    /// Since the start.
     pub(crate) at: Duration,
     pub(crate) by_udp: bool,
     pub(crate) to: To,
@@ -77,7 +77,7 @@ impl StandIn {
         }
     }
 
-    /// Lets a component live here.
+    /// Adds a component to this node.
     pub(crate) fn stand_in(&mut self, mut stack: Stack) {
         self.endpoint.attach(stack.id()).expect("an id");
         stack.start(self.now);
@@ -89,12 +89,12 @@ impl StandIn {
         self.stacks.get_mut(&id).expect("a component of ours")
     }
 
-    /// The time since the beginning.
+    /// The time since the start.
     pub(crate) fn at(&self) -> Duration {
         self.now - self.start
     }
 
-    /// Lets time pass until then; it does not run backwards.
+    /// Advances time to `at`; never goes back.
     pub(crate) fn run_until(&mut self, at: Duration) {
         let end = self.now.max(self.start + at);
         while let Some(next) = self.next().filter(|next| *next <= end) {
@@ -113,7 +113,7 @@ impl StandIn {
         stacks.chain(self.endpoint.poll_timeout()).min()
     }
 
-    /// A datagram arrives.
+    /// Receives a datagram.
     pub(crate) fn hear(&mut self, from: SocketAddr, payload: Bytes) {
         let path = Path {
             link: UDP,
@@ -124,7 +124,7 @@ impl StandIn {
         self.pump();
     }
 
-    /// Takes TCP connections too.
+    /// Also accepts TCP connections.
     pub(crate) fn listen(&mut self) {
         let profile = LinkProfile {
             framing: Framing::Jtcp,
@@ -133,7 +133,7 @@ impl StandIn {
         self.endpoint.add_link(TCP, profile);
     }
 
-    /// A message arrives on the TCP connection with this remote address.
+    /// Receives a message on the TCP connection with this remote address.
     pub(crate) fn hear_frame(&mut self, from: SocketAddr, frame: &Frame) {
         let path = Path {
             link: TCP,
@@ -144,14 +144,15 @@ impl StandIn {
         self.pump();
     }
 
-    /// A component without a stack says something.
+    /// Sends a message from a component without a stack.
     pub(crate) fn say(&mut self, message: Outgoing) {
         let sent = self.endpoint.send(self.now, message, &mut self.inbox);
         sent.expect("to be sent");
         self.pump();
     }
 
-    /// Carries messages between components, endpoint and what was said.
+    /// Passes messages between components and endpoint, answers challenges, and records all other
+    /// transmits.
     fn pump(&mut self) {
         loop {
             self.news

@@ -1,5 +1,5 @@
-//! Recorded TCP connections of Junior and JAUS++, replayed to a listening node of ours, which
-//! answers on the same connection.
+//! Recorded TCP connections of Junior and JAUS++, replayed to our listening node, which answers on
+//! the same connection.
 
 use std::net::SocketAddr;
 
@@ -14,7 +14,7 @@ use jaus::wire::jtcp::Decoder;
 use jaus::wire::{Frame, judp};
 use jaus_test_kit::evidence;
 
-/// The messages of the stream that goes to (or comes from) the listening side.
+/// The messages of the stream to (or from) the listening side.
 fn messages(file: &str, to_listener: bool) -> Vec<(SocketAddr, Vec<Frame>)> {
     let all = crate::streams::streams(&evidence::captures().join(file));
     let wanted = all
@@ -72,8 +72,8 @@ fn juniors_64_kb_arrive_whole_over_its_connection() {
     assert_eq!(lengths, [8, 65_536]);
 }
 
-/// JAUS++ reads nothing on the connection that it has opened. Once it is known for what it is, its
-/// next call by UDP, at most five seconds later, tells where it is answered from then on.
+/// JAUS++ reads nothing on a connection that it opened. Once it is recognised, its next UDP
+/// message, at most five seconds later, gives the address for all further answers.
 #[test]
 fn jauspp_is_answered_by_udp_once_it_has_registered_and_called() {
     let captures = evidence::captures();
@@ -109,7 +109,7 @@ fn jauspp_is_answered_by_udp_once_it_has_registered_and_called() {
                     "{code:04X}h by the connection"
                 );
             }
-            // An operator has neither.
+            // An operator offers neither service.
             None => assert!(
                 wanted.is_empty() || [QueryAuthority::CODE, QueryStatus::CODE].contains(&code),
                 "{code:04X}h has no answer"

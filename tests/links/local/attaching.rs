@@ -213,7 +213,7 @@ async fn what_is_to_be_acknowledged_is_refused_where_there_is_no_room_for_it() {
     for _ in 0..limit {
         here.send(message(&here, full.id(), b"x")).unwrap();
     }
-    // After all of these, because components are served in the order of their messages.
+    // Sent after all of these, because components are served in the order of their messages.
     assert_eq!(
         within_limit(here.deliver(message(&here, there.id(), b"x"))).await,
         Ok(())
@@ -233,7 +233,7 @@ async fn a_flush_ends_also_when_another_sender_writes_what_waits() {
     let _node = place.node();
     let port = place.host().attach(33).await.unwrap();
     let nobody = JausId::new(101, 1, 200);
-    // Written at once; the second waits until the task runs.
+    // The first is written at once; the second waits until the task runs.
     port.send(message(&port, nobody, b"one")).unwrap();
     port.send(message(&port, nobody, b"two")).unwrap();
     let sender = port.sender();
@@ -243,7 +243,7 @@ async fn a_flush_ends_also_when_another_sender_writes_what_waits() {
         flushed.as_mut().poll(&mut look).is_pending(),
         "the second still waits"
     );
-    // So much that the sender writes the whole backlog before the task runs.
+    // Enough data that the sender writes the whole backlog before the task runs.
     port.send(message(&port, nobody, [0; 20_000])).unwrap();
     assert!(
         flushed.as_mut().poll(&mut look).is_ready(),

@@ -95,7 +95,7 @@ async fn where_no_node_is_the_component_is_told_how_to_start_one() {
 
 #[tokio::test]
 async fn a_port_of_loopback_serves_as_well() {
-    // A port that was free a moment ago.
+    // A port that was free just now.
     let port = std::net::TcpListener::bind("127.0.0.1:0")
         .unwrap()
         .local_addr()

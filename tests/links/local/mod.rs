@@ -1,5 +1,5 @@
 //! Components of other processes on a host's node: attachment, and failures on either side. Each
-//! test has a directory of its own for sockets; no network is needed.
+//! test has its own directory for sockets; no network is needed.
 #![cfg(unix)]
 
 mod attaching;

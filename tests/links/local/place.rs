@@ -1,4 +1,4 @@
-//! A directory for a socket, a node behind it, and waits with a timeout.
+//! A temporary socket directory with a node, and waits with a timeout.
 
 use std::fs::{DirBuilder, remove_dir_all};
 use std::os::unix::fs::DirBuilderExt;
@@ -38,7 +38,7 @@ impl Place {
         Host::at(self.address())
     }
 
-    /// A node that stays on this host, without multicast.
+    /// Settings of a node that stays on this host, without multicast.
     pub(crate) fn config(&self) -> Config {
         Config::loopback(101, 1)
             .group(Group::Off)

@@ -14,12 +14,12 @@ use tokio::process::{Child, ChildStdout, Command};
 
 use crate::local::place::{Place, component_event, message, receive};
 
-/// Names the part that a child process plays, and the socket.
+/// Environment variables for the role of a child process, and for its socket.
 const ROLE: (&str, &str) = ("JAUS_TEST_ROLE", "JAUS_TEST_SOCKET");
 
 const ECHO: JausId = JausId::new(101, 1, 33);
 
-/// This test binary once more, in a role.
+/// This test binary as a child process, in a role.
 struct Actor {
     child: Child,
     lines: Lines<BufReader<ChildStdout>>,
@@ -52,8 +52,8 @@ impl Actor {
         self.child.id().expect("it runs")
     }
 
-    /// Sends a signal, by its name. The shell has a built-in `kill`, even where no program is
-    /// installed.
+    /// Sends a signal, by its name. The shell's built-in `kill` works even without an installed
+    /// program.
     async fn signal(&self, name: &str) {
         let command = format!("kill -{name} {}", self.pid());
         let status = Command::new("sh").args(["-c", &command]).status().await;
@@ -73,7 +73,7 @@ async fn a_process_that_plays_a_part() {
     };
     let socket = std::path::PathBuf::from(socket);
     let address = jaus::node::Address::Path(socket);
-    // With a limit, in case the test that waits for this process is killed.
+    // Limited in time, in case the waiting test is killed.
     let play = async {
         match role.as_str() {
             "node" => run_node(address).await,
@@ -203,7 +203,7 @@ async fn a_component_that_stops_reading_loses_its_own_messages_and_nobody_elses(
         panic!()
     };
     assert!(dropped > 0);
-    // The newest message was kept: the oldest go first.
+    // The newest message was kept: the oldest are dropped first.
     let last = (FLOOD - 1).to_le_bytes();
     within_limit(async { while receive(&mut here).await.payload[2..6] != last {} }).await;
 }

@@ -1,4 +1,4 @@
-//! Raw connections, whose octets the test reads and writes itself.
+//! Raw connections: the test reads and writes the octets itself.
 
 use std::io::{Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -110,7 +110,7 @@ async fn a_node_of_an_older_release_is_named_as_the_reason() {
         let (mut stream, _) = listener.accept().unwrap();
         let mut hello = [0; 15];
         stream.read_exact(&mut hello).unwrap();
-        // Version 1 reads this far, sees another version, and refuses.
+        // A version 1 node reads up to here, sees another version, and refuses.
         assert_eq!(hello[4..11], *b"\x01JAUS\x02\x01");
         assert_eq!(hello[11..], JausId::new(0, 0, 33).to_wire());
         stream.write_all(b"\x05\0\0\0\x12\x01old").unwrap();
@@ -136,7 +136,7 @@ async fn a_connection_that_begins_with_something_else_is_closed() {
     .await;
     assert_eq!(read, 0);
     assert!(node.components().is_empty());
-    // A message before the first record is one too.
+    // The same for a message before the first record.
     let path = place.path();
     let read = blocking(move || {
         let mut stream = UnixStream::connect(path).unwrap();

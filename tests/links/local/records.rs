@@ -11,7 +11,7 @@ use jaus::wire::Flags;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// Longer records are refused by the assemblers here.
+/// The assemblers here refuse longer records.
 const LIMIT: usize = 300_000;
 
 fn id() -> impl Strategy<Value = JausId> {
@@ -23,7 +23,7 @@ fn flags() -> impl Strategy<Value = Flags> {
     any::<u8>().prop_map(Flags).prop_filter("a scope", known)
 }
 
-/// Mostly short, sometimes long enough for its own buffer.
+/// Mostly short, sometimes long enough for a separate buffer.
 fn payload() -> impl Strategy<Value = Bytes> {
     let length = prop_oneof![8 => 0..100_usize, 2 => 4000..4200_usize, 1 => 8000..LIMIT - 100];
     (length, any::<u8>()).prop_map(|(length, octet)| vec![octet; length].into())
@@ -81,7 +81,7 @@ fn record() -> impl Strategy<Value = Record> {
     (head(), payload()).prop_map(|(head, payload)| Record { head, payload })
 }
 
-/// The octets of records, one after the other.
+/// The octets of records, in sequence.
 fn written(records: &[Record]) -> Vec<u8> {
     let mut octets = Vec::new();
     for record in records {
@@ -106,7 +106,7 @@ fn read(mut octets: &[u8], pieces: &[usize]) -> Result<Vec<Record>, RecordError>
     Ok(records)
 }
 
-/// A path's IPv4 address in the form of IPv6 comes out as IPv4, without scope.
+/// Replaces an IPv4 address in IPv6 form by the IPv4 address, without scope.
 fn canonical(mut records: Vec<Record>) -> Vec<Record> {
     for record in &mut records {
         if let Head::Deliver {
