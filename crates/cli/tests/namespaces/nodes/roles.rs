@@ -191,8 +191,8 @@ const CAR: usize = 3000;
 /// Number of datagrams in the batch.
 pub(crate) const CARS: usize = 20;
 
-/// Sends a batch of datagrams that do not fit a frame, then one of datagrams that fit once the size
-/// limit has been learned.
+/// Sends a batch of datagrams that do not fit a frame, from which the link learns its segment
+/// limit, and then a batch of datagrams that fit.
 pub(crate) async fn train() {
     let mut link = UdpLink::open(&cable(), &udp::Settings::default()).unwrap();
     let mut transmit = Transmit {
