@@ -155,7 +155,7 @@ const fn invented(number: u32) -> JausId {
     JausId::new(4000 + (number / 128) as u16, 1, (number % 128 + 1) as u8)
 }
 
-/// Subscribes with 256 ids, keeps the subscriptions alive, and acknowledges nothing.
+/// Subscribes with 256 ids, keeps the subscriptions alive, and answers nothing.
 fn create_event(attacker: &mut Attacker, number: u32) {
     if number >= 256 {
         return attacker.send(invented(number % 256), &QueryHeartbeatPulse {});
