@@ -1,6 +1,6 @@
-//! A headless Chromium, controlled by its own protocol over a pipe: it needs no driver program and
-//! no port, and runs in a network namespace. User actions are real input events: touches and key
-//! presses.
+//! A headless Chromium, controlled through its DevTools protocol over a pipe: it needs no driver
+//! program and no port, and runs in a network namespace. User actions are real input events:
+//! touches and key presses.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -11,14 +11,14 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-/// Browsers so far: each has its own profile.
+/// Number of browsers started: each has its own profile.
 static BROWSERS: AtomicU32 = AtomicU32::new(0);
-/// Longer than anything takes; reached only when a test fails.
+/// Timeout of any wait; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(60);
-/// How often a condition is looked at.
+/// Polling interval of a condition.
 const PERIOD: Duration = Duration::from_millis(50);
 
-/// A screen to look at the page on.
+/// A screen size and colour scheme for the page.
 #[derive(Clone, Copy)]
 pub(crate) struct Screen {
     pub(crate) name: &'static str,
@@ -26,7 +26,7 @@ pub(crate) struct Screen {
     pub(crate) dark: bool,
 }
 
-/// The screens that the page is made for.
+/// The supported screens.
 pub(crate) const SCREENS: [Screen; 5] = [
     Screen {
         name: "tablet",
@@ -55,7 +55,7 @@ pub(crate) const SCREENS: [Screen; 5] = [
     },
 ];
 
-/// Why there is no browser here, if there is none.
+/// Why no browser can be started, if so.
 pub(crate) fn missing() -> Option<String> {
     let found = Command::new("chromium").arg("--version").output();
     found.err().map(|error| format!("chromium: {error}"))
@@ -86,7 +86,7 @@ impl Browser {
             }
             None => Command::new("sh"),
         };
-        // The browser reads commands from file 3 and answers on file 4.
+        // The browser reads commands from descriptor 3 and answers on descriptor 4.
         command.args([
             "-c",
             "exec chromium \"$@\" 3<&0 4>&1 </dev/null >/dev/null 2>&1",
@@ -150,14 +150,14 @@ impl Browser {
         }
     }
 
-    /// Says a command and waits for its answer.
+    /// Sends a command and waits for its answer.
     #[track_caller]
     fn call(&mut self, method: &str, parameters: &Value) -> Value {
         let answer = self.try_call(method, parameters);
         answer.unwrap_or_else(|error| panic!("{method}: {error}"))
     }
 
-    /// Likewise, where the browser may say no.
+    /// Like [`Self::call`], but returns the browser's error.
     fn try_call(&mut self, method: &str, parameters: &Value) -> Result<Value, Value> {
         self.number += 1;
         let mut command = json!({ "id": self.number, "method": method, "params": parameters });
@@ -182,7 +182,7 @@ impl Browser {
         }
     }
 
-    /// Remembers what goes wrong in the page. That a connection fails is what some tests are about.
+    /// Collects errors of the page, except failed connections: some tests cause them.
     fn note(&mut self, said: &Value) {
         let parameters = &said["params"];
         match said["method"].as_str() {
@@ -199,7 +199,7 @@ impl Browser {
         }
     }
 
-    /// What the page complained about: exceptions, violations of its policy.
+    /// The page's errors so far: exceptions and policy violations.
     pub(crate) fn complaints(&mut self) -> &[String] {
         while let Ok(said) = self.said.try_recv() {
             self.note(&said);
@@ -207,7 +207,7 @@ impl Browser {
         &self.complaints
     }
 
-    /// Shows the page on a screen.
+    /// Switches to a screen size and colour scheme.
     pub(crate) fn look_on(&mut self, screen: Screen) {
         let (width, height) = screen.size;
         let metrics =
@@ -218,7 +218,7 @@ impl Browser {
         self.call("Emulation.setEmulatedMedia", &features);
     }
 
-    /// Opens an address, as soon as something answers there.
+    /// Opens an address, as soon as a server answers there.
     pub(crate) fn open(&mut self, address: &str) {
         let deadline = Instant::now() + LIMIT;
         loop {
@@ -242,7 +242,7 @@ impl Browser {
         answer["result"]["value"].clone()
     }
 
-    /// The text of the first element that a selector finds.
+    /// Text of the first element that matches a selector.
     #[track_caller]
     pub(crate) fn text(&mut self, selector: &str) -> String {
         let value = self.value(&format!(
@@ -252,7 +252,7 @@ impl Browser {
         value.as_str().unwrap_or_default().to_owned()
     }
 
-    /// Waits until an expression holds.
+    /// Waits until an expression is true.
     #[track_caller]
     pub(crate) fn wait(&mut self, expression: &str) {
         assert!(
@@ -262,7 +262,7 @@ impl Browser {
         );
     }
 
-    /// Whether an expression holds before a time is over.
+    /// Whether an expression becomes true within the limit.
     #[track_caller]
     pub(crate) fn holds_within(&mut self, limit: Duration, expression: &str) -> bool {
         let deadline = Instant::now() + limit;
@@ -275,7 +275,7 @@ impl Browser {
         true
     }
 
-    /// What the page shows now, in words, for those who read why a test failed.
+    /// The page's text and errors, for the message of a failed test; takes a screenshot.
     fn situation(&mut self) -> String {
         self.screenshot("failed");
         let page = self.value("document.body.innerText.replace(/\\n+/g, ' | ')");
@@ -286,7 +286,7 @@ impl Browser {
         )
     }
 
-    /// Touches the middle of an element, which must be there to be touched.
+    /// Touches the middle of an element, once it is visible and enabled.
     #[track_caller]
     pub(crate) fn press(&mut self, selector: &str) {
         let place = format!("document.querySelector({})", json!(selector));
@@ -307,7 +307,7 @@ impl Browser {
         self.touch(middle["x"].as_f64().unwrap(), middle["y"].as_f64().unwrap());
     }
 
-    /// Touches a place of the screen.
+    /// Touches a point of the screen.
     pub(crate) fn touch(&mut self, x: f64, y: f64) {
         for kind in ["mousePressed", "mouseReleased"] {
             let event = json!({ "type": kind, "x": x, "y": y, "button": "left", "clickCount": 1 });
@@ -315,8 +315,8 @@ impl Browser {
         }
     }
 
-    /// Puts a finger on the middle of an element and moves it, by shares of half its size to the
-    /// right and down; it stays there.
+    /// Puts a finger on the middle of an element and drags it by fractions of half its size to the
+    /// right and down; the finger stays there.
     #[track_caller]
     pub(crate) fn hold(&mut self, selector: &str, (right, down): (f64, f64)) {
         let place = format!(
@@ -335,14 +335,14 @@ impl Browser {
         self.call("Input.dispatchMouseEvent", &there);
     }
 
-    /// Takes the finger away.
+    /// Lifts the finger.
     pub(crate) fn let_go(&mut self) {
         let event =
             json!({ "type": "mouseReleased", "x": 1, "y": 1, "button": "left", "clickCount": 1 });
         self.call("Input.dispatchMouseEvent", &event);
     }
 
-    /// Writes into a field.
+    /// Writes text into a field.
     #[track_caller]
     pub(crate) fn write(&mut self, selector: &str, text: &str) {
         let field = json!(selector);
@@ -367,7 +367,7 @@ impl Browser {
         );
     }
 
-    /// Keeps a picture of the page in `target/e2e-screenshots`.
+    /// Saves a screenshot in `target/e2e-screenshots`.
     pub(crate) fn screenshot(&mut self, name: &str) {
         // While the page resizes, no screenshot is possible.
         let png = json!({ "format": "png" });
@@ -391,7 +391,7 @@ impl Drop for Browser {
     }
 }
 
-/// Base 64, which is how pictures come.
+/// Decodes Base64, the encoding of screenshots.
 fn from_base64(text: &str) -> Vec<u8> {
     let alphabet = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let digits = text

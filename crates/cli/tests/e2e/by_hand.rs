@@ -8,12 +8,12 @@ use crate::browser::{Browser, SCREENS};
 use crate::steps::{emergency, look_from_all_screens, take_control};
 use crate::system::program;
 
-/// A program that runs until it is dropped.
+/// A process; killed when dropped.
 struct Running(Child);
 
 impl Running {
-    /// Starts a program on a multicast group of this test's own, and waits until it says something
-    /// that begins so, apart from blanks; gives the rest of that line.
+    /// Starts a program on this test's own multicast group and waits for a line that contains
+    /// `beginning`. Returns the trimmed rest of that line.
     fn start(name: &str, flags: &[&str], beginning: &str) -> (Self, String) {
         let group = format!("239.255.77.2:{}", 20_000 + std::process::id() % 40_000);
         let mut command = Command::new(program(name));
@@ -49,7 +49,7 @@ impl Running {
 }
 
 impl Running {
-    /// Stops the program where it is, or lets it go on.
+    /// Suspends the program (SIGSTOP) or resumes it (SIGCONT).
     fn suspend(&self, on: bool) {
         let signal = if on { "-STOP" } else { "-CONT" };
         let pid = self.0.id().to_string();
@@ -65,8 +65,8 @@ impl Drop for Running {
     }
 }
 
-/// Takes control, drives by key and stick, stops in an emergency, and sees what a lost station
-/// looks like and that the page finds the next one.
+/// Takes control, drives with keys and the stick, and stops in an emergency. Then checks the page
+/// when the station is lost, and that the page connects to the next station.
 pub(crate) fn run() {
     let (vehicle, _) = Running::start("jaus", &["vehicle", "--name", "G-Bat"], "Ctrl-C");
     let (station, address) =
@@ -115,7 +115,8 @@ pub(crate) fn run() {
     assert!(page.complaints().is_empty(), "{:?}", page.complaints());
 }
 
-/// While the vehicle is suspended, all that the page shows is old: it says so, and does not drive.
+/// While the vehicle is suspended, all values on the page are stale: the page says so and does not
+/// drive.
 fn refuses_to_drive_without_news(page: &mut Browser, vehicle: &Running) {
     page.key_down("ArrowUp", "ArrowUp");
     page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");

@@ -86,7 +86,7 @@ fn run(system: &System) {
     assert!(page.complaints().is_empty(), "{:?}", page.complaints());
 }
 
-/// Waits until the page is connected, by itself, and shows a vehicle that is all there.
+/// Waits until the page has connected by itself and shows a complete vehicle.
 fn comes_alive(page: &mut Browser) {
     page.wait("document.body.dataset.link === 'live'");
     page.wait("document.querySelectorAll('#parts .part').length >= 4");
@@ -95,14 +95,14 @@ fn comes_alive(page: &mut Browser) {
     page.wait("document.querySelector('#missing').hidden");
 }
 
-/// Touches the map, corrects the place by hand, and waits for a route.
+/// Touches the map, corrects the destination by hand, and waits for a route.
 fn plan(page: &mut Browser, north: f64, east: f64) {
     page.press("[data-show=mission]");
     page.press("#map");
     page.wait("document.querySelector('#destination-x').value !== ''");
     page.write("#destination-x", &north.to_string());
     page.write("#destination-y", &east.to_string());
-    // Right after control is taken the planner may not be ready; the page then says so, and the
+    // Right after control is taken the planner may not be ready. The page then says so, and the
     // operator presses again.
     let planned = "!document.querySelector('#approve').disabled";
     page.press("#plan");
@@ -119,7 +119,7 @@ fn approve(page: &mut Browser) {
     );
 }
 
-/// A planner that dies while it drives is named, and the station stops the vehicle.
+/// When a planner dies while driving, the page names it and the station stops the vehicle.
 fn says_that_the_planner_is_gone(system: &System, page: &mut Browser) {
     system.kill("jaus-planner");
     let line = "document.querySelector('#mission-line').textContent";
@@ -132,7 +132,7 @@ fn says_that_the_planner_is_gone(system: &System, page: &mut Browser) {
     comes_alive(page);
 }
 
-/// Holding a key drives the vehicle, mission or not; letting go stops it.
+/// Holding a key drives the vehicle and ends a mission; releasing the key stops it.
 fn take_over_by_keyboard(page: &mut Browser) {
     page.press("[data-show=drive]");
     page.key_down("KeyW", "w");
@@ -147,7 +147,7 @@ fn take_over_by_keyboard(page: &mut Browser) {
     page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
 }
 
-/// A mission to its end.
+/// Drives a mission to its end.
 fn arrive(page: &mut Browser) {
     take_control(page);
     plan(page, -4.5, -1.5);

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use crate::browser::{Browser, SCREENS};
 
-/// Takes control unless it is held already, and has the vehicle ready.
+/// Takes control unless it is already held or requested, and makes the vehicle Ready.
 pub(crate) fn take_control(page: &mut Browser) {
-    // The request is pending; the button would cancel it.
+    // While a request is pending, the button would cancel it.
     if page.value("document.body.dataset.control") == "none" {
         page.press("#control-button");
     }
@@ -21,7 +21,8 @@ fn resume(page: &mut Browser) {
     page.wait("document.querySelector('#state-word').textContent === 'Ready'");
 }
 
-/// One key stops the vehicle; clearing that takes two touches, and then it still stands by.
+/// One key stops the vehicle. Clearing the emergency takes two touches, and leaves the vehicle in
+/// Standby.
 pub(crate) fn emergency(page: &mut Browser) {
     page.key_down("Escape", "Escape");
     page.key_up("Escape", "Escape");
@@ -35,7 +36,7 @@ pub(crate) fn emergency(page: &mut Browser) {
     take_control(page);
 }
 
-/// Keeps a picture of the page as each screen shows it.
+/// Takes a screenshot on every screen.
 pub(crate) fn look_from_all_screens(page: &mut Browser, name: &str) {
     for screen in SCREENS {
         page.look_on(screen);

@@ -13,7 +13,7 @@ use std::process::{Child, Command, Stdio};
 
 use jaus_test_kit::hosts::ip;
 
-/// Where the operator's page is, on the operator's own host.
+/// Address of the operator's page, on the operator's own host.
 pub(crate) const PAGE: &str = "http://127.0.0.1:8080/";
 
 /// A host of the system.
@@ -27,7 +27,7 @@ enum Host {
 
 const HOSTS: [&str; 4] = ["communicator", "board-a", "board-b", "operator"];
 
-/// The programs, each with its host and its flags, in the order of their start.
+/// The programs with their hosts and flags, in start order.
 const PROGRAMS: [(&str, Host, &[&str]); 9] = [
     ("jaus-communicator", Host::Communicator, &[]),
     ("jaus-primitive-driver", Host::BoardA, &[]),
@@ -44,18 +44,18 @@ const PROGRAMS: [(&str, Host, &[&str]); 9] = [
     ("jaus-ocu", Host::Operator, &["--listen", "127.0.0.1:8080"]),
 ];
 
-/// Which programs have not been built, so that a system cannot be.
+/// Programs that have not been built; the system needs all of them.
 pub(crate) fn missing() -> Vec<&'static str> {
     let programs = PROGRAMS.iter().map(|(name, ..)| *name);
     programs.filter(|name| !program(name).exists()).collect()
 }
 
-/// The path of a program of ours: beside the others.
+/// Path of one of our programs, which are all in one directory.
 pub(crate) fn program(name: &str) -> PathBuf {
     Path::new(env!("CARGO_BIN_EXE_jaus")).with_file_name(name)
 }
 
-/// Four hosts and the processes on them; all gone when dropped.
+/// Four hosts and their processes; all removed when dropped.
 pub(crate) struct System {
     names: [String; 4],
     directory: PathBuf,
@@ -63,10 +63,10 @@ pub(crate) struct System {
 }
 
 impl System {
-    /// Makes the hosts and their networks.
+    /// Creates the hosts and their networks.
     ///
     /// # Errors
-    /// If this machine does not let us.
+    /// If this machine does not permit it.
     pub(crate) fn new() -> Result<Self, String> {
         let number = std::process::id();
         let system = Self {
@@ -119,12 +119,12 @@ impl System {
         &self.names[host as usize]
     }
 
-    /// The namespace in which the operator's browser runs.
+    /// The network namespace of the operator's browser.
     pub(crate) fn operator(&self) -> &str {
         self.name(Host::Operator)
     }
 
-    /// Lays a cable from the communicator's host to another one.
+    /// Connects the communicator's host to another host.
     fn cable(&self, port: &str, to: Host, interface: &str) -> Result<(), String> {
         let (from, to) = (self.name(Host::Communicator), self.name(to));
         ip(&[
@@ -146,13 +146,12 @@ impl System {
         }
     }
 
-    /// All programs, as they were started.
+    /// Names of all programs, in start order.
     pub(crate) fn programs(&self) -> impl Iterator<Item = &'static str> {
         PROGRAMS.iter().map(|(name, ..)| *name)
     }
 
-    /// Starts a program on its host, in a directory where it keeps its files; what it says is kept
-    /// there, too.
+    /// Starts a program on its host, in a directory for its files and its log.
     pub(crate) fn start(&self, wanted: &'static str) {
         let (name, host, flags) = PROGRAMS.iter().find(|(name, ..)| *name == wanted).unwrap();
         let directory = self.directory.join(name);
@@ -185,7 +184,7 @@ impl System {
         assert!(before.is_none(), "{name} runs already");
     }
 
-    /// Kills a program as a power cut would.
+    /// Kills a program without warning, as a power cut would.
     pub(crate) fn kill(&self, name: &str) {
         let mut child = self.running.borrow_mut().remove(name).unwrap();
         assert_eq!(
@@ -198,7 +197,7 @@ impl System {
         child.wait().unwrap();
     }
 
-    /// What a program has said.
+    /// The log of a program.
     pub(crate) fn log(&self, name: &str) -> String {
         std::fs::read_to_string(self.directory.join(name).join("log")).unwrap_or_default()
     }

@@ -3,7 +3,7 @@
 use jaus_test_kit::hosts::on_two_hosts;
 use jaus_test_kit::vehicle_process::VehicleProcess;
 
-/// Without those that take long: `tool::judge` takes all of them, on one host.
+/// Without the slow steps: `tool::judge` runs all steps, on one host.
 const STEPS: &str = "A1-A5,B1-B8,B13-B19";
 
 #[test]

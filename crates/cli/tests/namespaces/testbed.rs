@@ -1,4 +1,4 @@
-//! Four hosts: the vehicle's, and three with a cable to it.
+//! Four hosts: the vehicle's, and three others with a cable to it.
 
 use std::process::Command;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -9,9 +9,9 @@ use jaus_test_kit::hosts::{Process, add_host, ip, lay_cable, on_host};
 pub(crate) enum Host {
     Vehicle,
     Controller,
-    /// Of many components that show up once.
+    /// For many components that appear once.
     Strangers,
-    /// Sees the vehicle, whatever happens to the others.
+    /// Observes the vehicle, unaffected by faults of the others.
     Observer,
 }
 
@@ -36,10 +36,10 @@ impl Host {
 
 /// The vehicle's address on the strangers' cable.
 pub(crate) const TO_STRANGERS: &str = "10.216.2.1";
-/// The network of which the strangers' host has all addresses.
+/// The network whose addresses all belong to the strangers' host.
 const STRANGERS: &str = "10.217.0.0/16";
 
-/// Four network namespaces; gone when dropped.
+/// Four network namespaces; removed when dropped.
 pub(crate) struct Testbed {
     prefix: String,
 }
@@ -78,7 +78,7 @@ impl Testbed {
         Process::start(&self.name(host), role, settings)
     }
 
-    /// The tool on a host.
+    /// The tool `jaus` on a host.
     pub(crate) fn jaus(&self, host: Host, arguments: &[&str]) -> Command {
         self.program(host, env!("CARGO_BIN_EXE_jaus"), arguments)
     }
@@ -90,7 +90,7 @@ impl Testbed {
         command
     }
 
-    /// Takes the controller's cable out at one end, or puts it in again.
+    /// Pulls the controller's cable at one end, or reconnects it.
     pub(crate) fn cable(&self, end: Host, is_in: bool) {
         let state = if is_in { "up" } else { "down" };
         let cable = Host::Controller.cable();

@@ -8,10 +8,10 @@ use std::process::{Child, Command, Stdio};
 use jaus_test_kit::waiting::block_until;
 use serde_json::Value;
 
-/// A directory for one test, which is also the temporary directory of its programs.
+/// A directory of one test, which is also the temporary directory of its programs.
 fn directory(name: &str) -> PathBuf {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    // Left from an earlier run.
+    // Left over from an earlier run.
     let _ = fs::remove_dir_all(&directory);
     fs::create_dir_all(&directory).unwrap();
     directory
@@ -119,7 +119,7 @@ fn settings_that_cannot_be_are_refused_with_a_reason() {
     }
 }
 
-/// The processes that a process has started.
+/// The child processes of a process.
 fn children(parent: &Child) -> Vec<u32> {
     let id = parent.id();
     let list = fs::read_to_string(format!("/proc/{id}/task/{id}/children")).unwrap_or_default();

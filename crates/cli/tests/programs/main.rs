@@ -1,4 +1,4 @@
-//! Programs as processes: components, whole systems, `jaus-tester load`, the package.
+//! Programs as processes: components, whole systems, `jaus-tester load`, and the package.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

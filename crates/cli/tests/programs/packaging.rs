@@ -12,7 +12,7 @@ fn packaging(path: &str) -> PathBuf {
     workspace("packaging").join(path)
 }
 
-/// The names of files or folders, up to a suffix.
+/// The names of files or folders, without prefix and suffix.
 fn named(folder: &Path, prefix: &str, suffix: &str) -> BTreeSet<String> {
     let entries = std::fs::read_dir(folder).unwrap();
     let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
@@ -23,10 +23,10 @@ fn named(folder: &Path, prefix: &str, suffix: &str) -> BTreeSet<String> {
     names.filter_map(middle).collect()
 }
 
-/// The service that joins two networks, and so belongs to no machine that is a whole system.
+/// The service that joins two networks; it does not belong on a machine that runs a whole system.
 const BETWEEN_NETWORKS: &str = "ra-gateway";
 
-/// What follows `jaus-` in the names of our programs.
+/// Names of our programs without `jaus-`.
 fn programs() -> BTreeSet<String> {
     named(&workspace("crates/cli/src/bin"), "jaus-", ".rs")
 }
@@ -65,7 +65,7 @@ fn every_settings_file_is_understood_by_its_program() {
         let file = packaging(&format!("etc/{part}.toml"));
         let settings = jaus_cli::settings::read(&file);
         assert!(settings.is_ok(), "{}", settings.unwrap_err());
-        // The file's flags as the program receives them, then its help instead of a start.
+        // The program gets the flags of the file, and `--help` so that it does not start.
         let tool = Path::new(env!("CARGO_BIN_EXE_jaus"));
         let mut program = Command::new(tool.with_file_name(format!("jaus-{part}")));
         let flags = jaus_cli::settings::flags(&file).unwrap();

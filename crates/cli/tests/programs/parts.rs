@@ -18,7 +18,7 @@ use jaus_test_kit::waiting::LIMIT;
 
 const DRIVER: JausId = JausId::new(101, 33, 33);
 
-/// A running program, and what it says on standard error.
+/// A running program and its standard error.
 struct Program {
     child: Child,
     lines: Receiver<String>,

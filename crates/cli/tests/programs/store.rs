@@ -1,4 +1,4 @@
-//! `jaus-vector-knowledge-store`, the real binary, over the loopback interface of this computer.
+//! `jaus-vector-knowledge-store`, the real binary, over the loopback interface.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -6,7 +6,7 @@ use std::process::{Child, Command, Output, Stdio};
 use crate::support::{own_group, run};
 use serde_json::json;
 
-/// A directory of a test, which is gone afterwards.
+/// A test's own directory, removed when dropped.
 struct Directory(PathBuf);
 
 impl Directory {
@@ -28,7 +28,7 @@ impl Drop for Directory {
     }
 }
 
-/// Ends with the test, whatever becomes of that.
+/// A process; killed when dropped.
 struct Running(Child);
 
 impl Drop for Running {

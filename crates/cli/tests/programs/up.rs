@@ -8,7 +8,7 @@ use crate::support::{Run, jaus, own_group, run};
 use jaus_test_kit::waiting::block_until;
 use serde_json::Value as Json;
 
-/// A folder of this test's own.
+/// A test's own directory, removed when dropped.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -19,7 +19,7 @@ impl Folder {
         Self(folder)
     }
 
-    /// A system's file.
+    /// Writes a system file.
     fn system(&self, text: &str) -> String {
         let path = self.0.join("system.toml");
         std::fs::write(&path, text).unwrap();
@@ -34,12 +34,12 @@ impl Drop for Folder {
     }
 }
 
-/// A part that is a shell.
+/// A part that runs a shell script.
 fn shell(name: &str, script: &str, besides: &str) -> String {
     format!("[parts.{name}]\nprogram = \"sh\"\narguments = [\"-c\", '''{script}''']\n{besides}\n")
 }
 
-/// A running `jaus up`, killed at the end of a test if need be.
+/// A running `jaus up`; killed when dropped.
 struct System {
     process: Child,
     output: BufReader<ChildStdout>,
@@ -62,7 +62,7 @@ impl System {
         }
     }
 
-    /// Reads up to a line with this in it, and gives the line.
+    /// Reads up to a line that contains `wanted`, and returns that line.
     #[track_caller]
     fn expect(&mut self, wanted: &str) -> String {
         loop {
@@ -76,7 +76,7 @@ impl System {
         }
     }
 
-    /// The process number that a part has printed behind a word.
+    /// The process id that a part has printed after a word.
     #[track_caller]
     fn number(&mut self, word: &str) -> u32 {
         let line = self.expect(word);
@@ -90,7 +90,7 @@ impl System {
         assert!(sent.unwrap().success());
     }
 
-    /// Everything that it still has to say, and its exit status.
+    /// Its remaining output, and its exit status.
     fn end(mut self) -> (String, Option<i32>) {
         while self.output.read_line(&mut self.seen).unwrap() > 0 {}
         let status = self.process.wait().unwrap();
@@ -106,7 +106,7 @@ impl Drop for System {
     }
 }
 
-/// Waits until a process is no more, or nothing but an entry for its parent.
+/// Waits until a process has ended, though its parent may not have reaped it.
 fn wait_for_end(process: u32) {
     block_until(|| {
         let stat = std::fs::read_to_string(format!("/proc/{process}/stat"));

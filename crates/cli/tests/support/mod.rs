@@ -20,7 +20,7 @@ use etherparse::PacketBuilder;
 use jaus_test_kit::group;
 use serde_json::Value as Json;
 
-/// What a run of `jaus` printed, and how it ended.
+/// Output and exit status of a run of `jaus`.
 #[derive(Debug)]
 pub struct Run {
     pub status: i32,
@@ -52,7 +52,7 @@ pub fn jaus() -> Command {
     command
 }
 
-/// Flags for loopback and a multicast group of this test's own, which no other program uses.
+/// Flags for loopback and a multicast group of this test alone.
 pub fn own_group() -> Vec<String> {
     let group = group::own_group().to_string();
     ["--loopback", "--port", "0", "--group", &group]
@@ -71,8 +71,8 @@ pub fn run(arguments: &[&str], input: &[u8]) -> Run {
         .unwrap();
     let mut stdin = child.stdin.take().unwrap();
     let input = input.to_vec();
-    // Both pipes must move at once, or one of them fills up. The run may end before it has read
-    // everything.
+    // Both pipes must be served at once, or one of them fills up. The run may end before it has
+    // read all input.
     let writer = std::thread::spawn(move || drop(stdin.write_all(&input)));
     let output = child.wait_with_output().unwrap();
     writer.join().unwrap();
@@ -106,7 +106,7 @@ impl Running {
         Self { child, stdout }
     }
 
-    /// Reads up to the line that contains `text`, and gives all of it.
+    /// Reads up to the line that contains `text`, and returns everything read.
     #[track_caller]
     pub fn read_until(&mut self, text: &str) -> String {
         let mut read = String::new();
@@ -120,7 +120,7 @@ impl Running {
         read
     }
 
-    /// Asks it politely to end, and gives the exit status.
+    /// Asks it to terminate, and returns the exit status.
     pub fn terminate(mut self) -> Option<i32> {
         let pid = self.child.id().to_string();
         assert!(Command::new("kill").arg(pid).status().unwrap().success());
@@ -136,7 +136,7 @@ impl Drop for Running {
     }
 }
 
-/// The octets of every golden vector in a file, a line each.
+/// The octets of every golden vector in a file, one per line.
 pub fn vectors(file: &Path) -> String {
     let text = std::fs::read_to_string(file).unwrap();
     let hex = |line: &str| {
@@ -158,7 +158,7 @@ pub struct Message {
 }
 
 impl Message {
-    /// From 42.1.1 to 105.1.255, as the competitions' judging tool sends it.
+    /// From 42.1.1 to 105.1.255, as in the competitions' judging tool.
     pub fn new(payload: &[u8]) -> Self {
         Self {
             source: 42 << 16 | 0x0101,
@@ -183,13 +183,13 @@ impl Message {
         .concat()
     }
 
-    /// The datagram that holds just this message.
+    /// A datagram with only this message.
     pub fn datagram(&self) -> Vec<u8> {
         [vec![2], self.octets()].concat()
     }
 }
 
-/// An IPv4 packet from 192.168.1.42 to 239.255.0.1, both at port 3794.
+/// An IPv4 packet from 192.168.1.42 to 239.255.0.1, port 3794 at both ends.
 pub fn ip_packet(datagram: &[u8]) -> Vec<u8> {
     let mut packet = Vec::new();
     PacketBuilder::ipv4([192, 168, 1, 42], [239, 255, 0, 1], 16)
@@ -199,7 +199,7 @@ pub fn ip_packet(datagram: &[u8]) -> Vec<u8> {
     packet
 }
 
-/// The link type of frames that are bare IP packets.
+/// Link type of frames that are bare IP packets.
 pub const RAW: u16 = 101;
 
 /// A pcap file, little-endian, with microseconds: the frames at 2015-06-08T16:36:58.436918Z.

@@ -11,7 +11,7 @@ use crate::support::{
 };
 use serde_json::Value as Json;
 
-/// 42.1.1 asks the component 105.1.255 for its subsystem's identification.
+/// 42.1.1 queries the identification of 105.1.255's subsystem.
 const QUERY_IDENTIFICATION: &[u8] = &[0x00, 0x2B, 0x02];
 
 fn decode(capture: &[u8]) -> crate::support::Run {
@@ -110,7 +110,7 @@ fn a_damaged_pcapng_block_costs_no_other() {
         enhanced_packet(0, 0, &frame),
         // Names that do not exist.
         block(4, &[1, 0, 0xFF, 0xFF]),
-        // Interface 0, no time, and 100 octets of which there are 8.
+        // Interface 0, no time, and a claimed length of 100 octets, of which 8 are present.
         block(
             6,
             &[&[0; 12][..], &[100, 0, 0, 0, 100, 0, 0, 0], &[7; 8]].concat(),
@@ -315,7 +315,7 @@ fn messages_of_the_reference_architecture_are_read_and_written_without_their_hea
     let line = read.only_line();
     assert_eq!(line["service"], "urn:jaus-rs:ra33:GlobalPoseSensor");
     assert_eq!(line["body"]["Latitude"], 30.0);
-    // The line names the service; a message that does not needs the flag.
+    // A decoded line names its service; a line without a service needs the flag.
     assert_eq!(run(&["encode"], read.stdout.as_bytes()).stdout, pose);
     let named = br#"{"message":"ReportGlobalPose","body":{"Latitude":30}}"#;
     assert_eq!(run(&["encode", "--ra"], named).stdout, pose);
@@ -411,10 +411,10 @@ fn every_recorded_capture_is_read_and_its_messages_are_named() {
     }
 }
 
-/// File, lines, and lines among them that are errors.
+/// File, number of lines, and number of error lines.
 ///
-/// What cannot be read is wrong in the recording: answers of the judged team (igvc2015) and Junior's
-/// test payloads.
+/// The unreadable messages are wrong in the recording: answers of the judged team (igvc2015) and
+/// Junior's test payloads.
 const RECORDED: &[(&str, usize, usize)] = &[
     ("SAE_Management_PacketCapture.pcap", 22, 0),
     ("igvc2015/interface_test_1_13pts.pcapng", 3657, 13),

@@ -3,7 +3,7 @@
 use crate::support::{Message, RAW, ip_packet, pcap, pcapng};
 use jaus_view::{Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network};
 
-/// A small generator, the same in every run (xorshift64*).
+/// A small generator with the same sequence in every run (xorshift64*).
 struct Random(u64);
 
 impl Random {
@@ -16,7 +16,7 @@ impl Random {
     }
 }
 
-/// All lines that a capture gives.
+/// All lines decoded from a capture.
 fn lines(capture: &[u8], dictionary: &Dictionary) -> Vec<String> {
     let mut capture = match Capture::new(capture) {
         Ok(capture) => capture,
@@ -39,7 +39,8 @@ fn lines(capture: &[u8], dictionary: &Dictionary) -> Vec<String> {
     lines
 }
 
-/// Packets of every kind: plain, several in one, fragments, acknowledgements, the older headers.
+/// Packets of every kind: one message, several messages, fragments, acknowledgements, older
+/// headers.
 fn packets() -> Vec<Vec<u8>> {
     let query = Message::new(&[0x00, 0x2B, 0x02]);
     let report = Message::new(&[0x00, 0x4B, 2, 0x11, 0x27, 5, b'R', b'o', b'v', b'e', b'r']);

@@ -7,7 +7,7 @@ use std::time::Duration;
 use crate::support::{Running, own_group, run};
 use serde_json::Value as Json;
 
-/// The findings about one thing.
+/// The findings of one check.
 fn of<'j>(report: &'j Json, check: &str) -> Vec<&'j Json> {
     let findings = report["findings"].as_array().unwrap();
     findings.iter().filter(|f| f["check"] == check).collect()
@@ -43,10 +43,10 @@ fn a_sound_network_is_found_sound_and_the_neighbours_are_named() {
     assert_eq!(ids[0]["what"], "no other node has the id 108.1.1");
 }
 
-/// No AS5669A program receives OpenJAUS, which has its own multicast group.
+/// No AS5669A program receives OpenJAUS's messages, which use another multicast group.
 #[test]
 fn a_system_of_the_reference_architecture_is_named_with_the_way_to_it() {
-    // Report Heartbeat Pulse of 20.1.35.1 to all node managers, as OpenJAUS sends it each second.
+    // Report Heartbeat Pulse of 20.1.35.1 to all node managers, as OpenJAUS sends it every second.
     let beat = b"JAUS01.0\x06\x02\x02\x42\x01\x01\xFF\xFF\x01\x23\x01\x14\0\0\0\0";
     let heart = UdpSocket::bind("127.0.0.1:0").unwrap();
     let over = AtomicBool::new(false);

@@ -23,7 +23,7 @@ fn examine(peer: &str, network: &[String], more: &[&str]) -> (i32, Json) {
     (run.status, run.only_line())
 }
 
-/// The names of the exchanges with such a result.
+/// The names of the exchanges with this result.
 fn with_result<'j>(report: &'j Json, result: &str) -> Vec<&'j str> {
     let all = report["exchanges"].as_array().unwrap().iter();
     let of_it = all.filter(|exchange| exchange["result"] == result);
@@ -87,7 +87,7 @@ fn who_says_nothing_is_waited_for_as_long_as_is_said() {
     assert_eq!(report["profile"], Json::Null, "{report:#}");
     let mut heard = [0; 100];
     let (octets, _) = silent.recv_from(&mut heard).unwrap();
-    // Query Heartbeat Pulse, in a datagram of AS5669A.
+    // Query Heartbeat Pulse in an AS5669A datagram.
     assert_eq!(
         (heard[0], &heard[13..15], octets),
         (2, &[0x02, 0x22][..], 17)

@@ -4,7 +4,7 @@ use crate::support::{run, vectors};
 use jaus_test_kit::evidence;
 use serde_json::json;
 
-/// Decodes and encodes again; says how many lines there were.
+/// Decodes and encodes again. Returns the number of lines.
 #[track_caller]
 fn assert_identity(vectors: &str, definitions: &[&str]) -> usize {
     let decoded = run(

@@ -7,7 +7,7 @@ use jaus_cli::settings;
 
 const PAGE: &str = include_str!("../../../../docs/interoperability.md");
 
-/// The blocks of a language, without their fences.
+/// The code blocks of a language, without their fences.
 fn blocks(language: &str) -> Vec<&'static str> {
     let fence = format!("```{language}\n");
     let behind = PAGE.split(&fence).skip(1);
@@ -23,7 +23,7 @@ fn every_settings_block_can_be_read_by_a_node() {
     for (number, block) in blocks.iter().enumerate() {
         let name = format!("jaus-interoperability-{}-{number}.toml", std::process::id());
         let file = std::env::temp_dir().join(name);
-        // A block without an id gets one, as by a flag.
+        // A block without an id gets one, as if from a flag.
         std::fs::write(&file, block).unwrap();
         let read = settings::read(&file);
         std::fs::remove_file(&file).unwrap();
@@ -81,7 +81,7 @@ fn settings_of_others_are_well_formed() {
     }
 }
 
-/// The tags that are open at the end.
+/// The tags that are still open at the end.
 fn left_open(text: &str) -> Vec<String> {
     let mut open = Vec::new();
     for tag in text.split('<').skip(1) {

@@ -10,7 +10,7 @@ const TYPES: &str = r#"<declared_type_set name="T" id="urn:me:Types" version="1.
 </declared_type_set>
 "#;
 
-/// A directory of this test's own, with one definition.
+/// A test's own directory, with one definition.
 fn folder(name: &str, text: &str) -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = fs::remove_dir_all(&folder);

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::support::run;
 use serde_json::Value as Json;
 
-/// A recorded datagram: 1000.1.7 asks everyone who they are.
+/// A recorded datagram: 1000.1.7 broadcasts Query Identification.
 const DATAGRAM: &str = "02 00 11 00 09 ff ff ff ff 07 01 e8 03 00 2b 02 00 00";
 
 #[test]
@@ -49,7 +49,7 @@ fn a_datagram_is_recognised_and_its_header_explained() {
 
 #[test]
 fn older_headers_stale_octets_and_files_of_octets_are_explained_as_well() {
-    // The same question in AS5669's first edition, and three octets that do not belong to it.
+    // The same query in the first edition of AS5669, and three surplus octets.
     let octets: Vec<u8> = [
         &[1, 0, 0, 0, 17][..],
         &[
@@ -79,8 +79,8 @@ fn older_headers_stale_octets_and_files_of_octets_are_explained_as_well() {
     );
 }
 
-/// Recorded of OpenJAUS 3.3.1, which sets all bits of a presence vector: 20.1.35.1 confirms an event
-/// to 10.1.1.1.
+/// Recorded from OpenJAUS 3.3.1, which sets all bits of a presence vector: 20.1.35.1 confirms an
+/// event to 10.1.1.1.
 #[test]
 fn messages_of_openjaus_are_explained_by_the_definitions_of_the_reference_architecture() {
     let message = "f301 ff 00 014b 00 0000 00";

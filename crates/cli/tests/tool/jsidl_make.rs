@@ -10,7 +10,7 @@ use crate::support::{Run, run};
 /// The definition of the example crate.
 const LAMP: &str = "examples/own-service/services/Lamp.xml";
 
-/// An empty directory of one test's own.
+/// An empty directory of one test.
 fn directory(test: &str) -> PathBuf {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR"))
         .join("jsidl_make")
@@ -30,7 +30,7 @@ fn lamp() -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// A definition that refers to a type which does not exist.
+/// A definition that refers to a missing type.
 fn broken(directory: &Path) -> String {
     let path = directory.join("Broken.xml");
     let text = fs::read_to_string(lamp()).unwrap();

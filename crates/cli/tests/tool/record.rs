@@ -8,7 +8,7 @@ use crate::support::{own_group, run};
 use etherparse::PacketBuilder;
 use jaus_view::{CaptureWriter, LinkType, Timestamp};
 
-/// A file of this test's own, removed at the end.
+/// A test's own file, removed when dropped.
 struct File(std::path::PathBuf);
 
 impl File {
@@ -51,7 +51,7 @@ fn what_goes_to_the_group_is_recorded_and_can_be_decoded() {
         let recording: Vec<_> = recording.iter().map(String::as_str).collect();
         run(&recording, b"")
     });
-    // Any traffic during the recording; a node sends discovery queries at its start.
+    // Any traffic during the recording will do; a node sends discovery queries when it starts.
     while !recorder.is_finished() {
         run(
             &[&["discover", "--seconds", "0.3"], &*network].concat(),
@@ -105,10 +105,10 @@ fn an_interface_that_is_not_there_is_refused_with_those_that_are() {
     assert!(!file.0.exists());
 }
 
-/// 42.1.1 asks 101.1.1 for its heartbeat.
+/// 42.1.1 queries the heartbeat of 101.1.1.
 const QUERY: &[u8] = b"\x02\x00\x10\x00\x01\x01\x01\x65\x00\x01\x01\x2A\x00\x02\x22\x07\x00";
 
-/// A capture with a query, something that is not JAUS, and the query again.
+/// A capture with a query, a datagram that is not JAUS, and the query again.
 #[expect(clippy::unwrap_used, reason = "writing to memory")]
 fn capture() -> Vec<u8> {
     let mut file = Vec::new();

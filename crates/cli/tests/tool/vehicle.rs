@@ -54,7 +54,7 @@ fn a_split_vehicle_has_two_components_and_only_the_second_drives() {
     ] {
         let told = ask(component, "QueryIdentification", "{\"QueryType\":4}");
         assert!(told.contains(name), "{told}");
-        // By its number only, because the name would match the other one too.
+        // By its number only, because the other component matches the name too.
         let number = &component[6..];
         let own = format!(
             "[{{\"NodeRec\":{{\"NodeID\":1}},\"ComponentList\":[{{\"ComponentID\":{number}}}]}}]"

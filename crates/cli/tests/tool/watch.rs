@@ -24,14 +24,14 @@ use tokio::time::timeout;
 use tokio_tungstenite::tungstenite::{Error, Message};
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
 
-/// Longer than anything takes; reached only when a test fails.
+/// Timeout of any wait; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(30);
 
 /// Query Heartbeat Pulse, and the report.
 const QUERY: &[u8] = &[0x02, 0x22];
 const REPORT: &[u8] = &[0x02, 0x42];
 
-/// A node of the vehicle that joins UDP and TCP, an operator beyond UDP, and a board beyond TCP.
+/// A vehicle's node that joins UDP and TCP, an operator on UDP, and a board on TCP.
 fn two_networks() -> (Node, Port, Port) {
     let group = own_group();
     let listen: SocketAddr = ([127, 0, 0, 1], 0).into();
@@ -48,14 +48,14 @@ fn two_networks() -> (Node, Port, Port) {
     (vehicle, ports.0, ports.1)
 }
 
-/// Sends until received: there may be no connection yet.
+/// Sends until received: the connection may not exist yet.
 async fn say_until_heard(from: &Port, payload: &'static [u8], to: &mut Port) {
     let say = async {
         loop {
             let said = Outgoing::new(from.id(), to.id(), Bytes::from_static(payload));
             from.send(said).unwrap();
             let heard = timeout(Duration::from_millis(50), to.recv()).await;
-            // Others may have sent something before.
+            // Earlier messages may arrive first.
             if heard.is_ok_and(|m| m.is_some_and(|m| m.payload == payload)) {
                 return;
             }
@@ -64,7 +64,7 @@ async fn say_until_heard(from: &Port, payload: &'static [u8], to: &mut Port) {
     timeout(LIMIT, say).await.expect("it is heard");
 }
 
-/// A directory of one test's own, removed at the end.
+/// A test's own directory, removed when dropped.
 struct Scratch(PathBuf);
 
 impl Scratch {
@@ -158,7 +158,7 @@ async fn look_on(address: SocketAddr, query: &str) -> Viewer {
     timeout(LIMIT, connect_async(url)).await.unwrap().unwrap().0
 }
 
-/// The next object, without looking longer than a test may take.
+/// The next object, within the time limit of the test.
 async fn next(viewer: &mut Viewer) -> Json {
     loop {
         let message = timeout(LIMIT, viewer.next())
@@ -192,7 +192,7 @@ async fn a_slow_viewer_loses_messages_and_is_told_how_many_while_the_traffic_goe
         }
     }
     let last = [&[0xEE, 0xEE][..], &COUNT.to_le_bytes()].concat();
-    // Now the viewer reads everything sent to it, and the number of lost lines.
+    // Now the viewer reads all lines, and the number of lost ones.
     let (mut seen, mut lost, mut before) = (0, 0, None);
     loop {
         one.send(Outgoing::new(one.id(), other.id(), last.clone().into()))
@@ -254,7 +254,7 @@ async fn a_viewer_can_only_look_and_mistakes_and_crowds_are_refused() {
         .await
         .unwrap();
     let giant = Message::binary(vec![0; 100_000]);
-    // It may be closed in between.
+    // The connection may be closed meanwhile.
     let _ = talker.send(giant).await;
     let closed = async { while let Some(Ok(_)) = talker.next().await {} };
     timeout(LIMIT, closed)

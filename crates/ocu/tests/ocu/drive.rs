@@ -55,7 +55,7 @@ async fn a_vehicle_is_driven_while_the_page_says_so_and_stops_300_ms_after_its_l
     page.until(|state| state["drive"]["active"] == true).await;
     let state = page.until(|state| driver_of(state)["ours"] == true).await;
     assert_eq!(driver_of(&state)["authority"], 200);
-    // Silence from now on.
+    // The page is silent from now on.
     scene.until(|scene| scene.speed() == 0.0).await;
     page.until(|state| state["drive"]["active"] == false).await;
 }
@@ -170,7 +170,7 @@ async fn of_two_stations_with_the_same_authority_the_second_is_told_who_is_in_co
         .until(|state| state["control"]["wanted"] == true)
         .await;
     assert_eq!(state["control"]["held"], false);
-    // Any client may stop; only the one that did may clear it.
+    // Any client may set an emergency; only the client that set it may clear it.
     other
         .ask(json!({"type": "emergency", "on": true}))
         .await
@@ -193,7 +193,8 @@ async fn of_two_stations_with_the_same_authority_the_second_is_told_who_is_in_co
 
 #[tokio::test]
 async fn a_vehicle_that_starts_again_is_taken_and_made_ready_again() {
-    // With control that is renewed past the vehicle's end, and without.
+    // With control that is renewed beyond the end of the first component, and with control that
+    // times out.
     for timeout in [0, 2] {
         let mut scene = Scene::with(Station::default(), timeout).await;
         let mut page = scene.driver().await;

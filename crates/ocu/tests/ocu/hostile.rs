@@ -25,7 +25,7 @@ async fn guarded(token_to_read: bool) -> Scene {
     .await
 }
 
-/// Asks with plain HTTP; the whole answer.
+/// Sends a plain HTTP request. Returns the complete response.
 async fn get(scene: &Scene, path: &str, header: &str) -> String {
     let mut stream = TcpStream::connect(scene.address).await.unwrap();
     let request = format!("GET {path} HTTP/1.1\r\n{header}Connection: close\r\n\r\n");
@@ -41,7 +41,7 @@ async fn health(scene: &Scene) -> Value {
     serde_json::from_str(body).unwrap()
 }
 
-/// Why the station ends a connection.
+/// The close frame with which the station ends a connection.
 async fn parting(page: &mut Page) -> CloseFrame {
     loop {
         match within_limit(page.socket.next()).await {
@@ -121,7 +121,7 @@ async fn a_giant_frame_ends_the_connection_that_sent_it_and_no_other() {
     let scene = Scene::new().await;
     let mut good = scene.driver().await;
     let mut giant = scene.page().await;
-    // It may be refused before all of it is sent.
+    // The station may refuse it before all of it is sent.
     let _ = giant.socket.send(Message::text("x".repeat(1 << 20))).await;
     loop {
         match within_limit(giant.socket.next()).await {
@@ -213,7 +213,7 @@ async fn of_a_thousand_sockets_most_are_refused_and_the_pages_that_stand_keep_wo
         .drive_until(&scene, |scene| scene.speed() > 0.3)
         .await;
     driver.ask(json!({"type": "drive_end"})).await.unwrap();
-    // None of them reads, and there is room again when they are gone.
+    // None of these pages reads. Once they are closed, new pages are accepted again.
     drop(taken);
     within_limit(async {
         while Page::try_open(scene.address, &[]).await.is_err() {

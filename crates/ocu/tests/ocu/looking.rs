@@ -15,7 +15,7 @@ use crate::scene::Scene;
 async fn the_map_of_the_store_is_shown_with_all_its_cells() {
     let scene = Scene::with(Station::default(), 0).await;
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ocu-map.redb");
-    // Left from an earlier run.
+    // Left over from an earlier run.
     let _ = std::fs::remove_file(&file);
     let (raster, picture) = KnowledgeStore::demo_map();
     let store = KnowledgeStore {
@@ -41,7 +41,7 @@ async fn the_map_of_the_store_is_shown_with_all_its_cells() {
     running.abort();
 }
 
-/// Asks for something: the head of the answer in small letters, and its body.
+/// Sends a GET request. Returns the head of the response in lower case, and its body.
 async fn get(scene: &Scene, path: &str) -> (String, Vec<u8>) {
     let mut stream = TcpStream::connect(scene.address).await.unwrap();
     let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");

@@ -1,5 +1,5 @@
 //! The operator's station over real sockets on the loopback interface: pages that control, drive
-//! and stop a vehicle, two of them at once, and hostile ones.
+//! and stop a vehicle, two pages at once, and hostile pages.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

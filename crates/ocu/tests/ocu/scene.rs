@@ -24,7 +24,7 @@ use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 use tokio_tungstenite::tungstenite::{Error, Message};
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
 
-/// A vehicle that is one component, and a station that looks at it.
+/// A vehicle that is one component, and a station that observes it.
 pub(crate) struct Scene {
     pub(crate) vehicle: Vehicle,
     rover: Option<Component>,
@@ -41,12 +41,12 @@ impl Scene {
         Self::with(Station::default(), 0).await
     }
 
-    /// With a pose sensor that repeats its last sample while the switch is on.
+    /// With a pose sensor that repeats its last sample while `switch` is set.
     pub(crate) async fn with_frozen_pose(switch: Arc<AtomicBool>) -> Self {
         Self::start(Station::default(), 0, Some(switch)).await
     }
 
-    /// With a vehicle whose control times out after this many seconds; 0 for never.
+    /// With a vehicle whose control times out after this many seconds; 0 disables the timeout.
     pub(crate) async fn with(station: Station, timeout: u8) -> Self {
         Self::start(station, timeout, None).await
     }
@@ -75,7 +75,8 @@ impl Scene {
         }
     }
 
-    /// Another operator's station in the same network: its address, and what keeps it alive.
+    /// Starts another operator's station on the same network. Returns its address, and handles that
+    /// keep it alive.
     pub(crate) async fn another_station(&self) -> (SocketAddr, JoinHandle<()>, Node) {
         let station = Station {
             listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
@@ -88,7 +89,7 @@ impl Scene {
         Page::open(self.address).await
     }
 
-    /// The page of an operator in control of a vehicle that is ready.
+    /// The page of an operator who controls a vehicle that is Ready.
     pub(crate) async fn driver(&self) -> Page {
         let mut page = self.page().await;
         page.until(|state| !state["vehicle"]["pose"].is_null())
@@ -100,7 +101,7 @@ impl Scene {
         page
     }
 
-    /// The vehicle's component ends, and another one begins that knows nothing of the first.
+    /// Ends the vehicle's component and starts a new one without its state.
     pub(crate) async fn restart_rover(&mut self) {
         self.end_rover();
         self.start_rover().await;
@@ -111,7 +112,7 @@ impl Scene {
     }
 
     pub(crate) async fn start_rover(&mut self) {
-        // Its number is free once it has taken leave.
+        // The component number is free once the old one has detached.
         let is_gone = || {
             let components = self.nodes[0].components();
             components.iter().all(|it| it.id.component() != 1)
@@ -126,7 +127,7 @@ impl Scene {
         standing.is_some_and(|it| it.controller.is_some())
     }
 
-    /// A place for another part of the vehicle.
+    /// A slot for another part of the vehicle.
     pub(crate) fn slot(&self, component: u8) -> Slot {
         let node = &self.nodes[0];
         Slot {
@@ -137,7 +138,7 @@ impl Scene {
         }
     }
 
-    /// Another part of the vehicle that is made of services.
+    /// Attaches another component to the vehicle's node.
     pub(crate) fn attach(&self, component: u8, builder: Builder) -> Component {
         builder.attach(&self.nodes[0], component).unwrap()
     }
@@ -146,7 +147,7 @@ impl Scene {
         self.vehicle.motion().velocity.x
     }
 
-    /// Waits until the vehicle is as wanted.
+    /// Waits until the condition on the vehicle holds.
     pub(crate) async fn until(&self, wanted: impl Fn(&Self) -> bool) {
         until(|| wanted(self)).await;
     }
@@ -158,7 +159,7 @@ impl Drop for Scene {
     }
 }
 
-/// A component with what it takes to be driven.
+/// A component with the services needed to drive it.
 fn rover(
     vehicle: &Vehicle,
     node: &Node,
@@ -177,7 +178,7 @@ fn rover(
     rover.attach(node, 1).unwrap()
 }
 
-/// A pose sensor whose samples advance unless the switch is on.
+/// A pose sensor whose samples advance unless `switch` is set.
 fn pose_that_freezes(switch: Arc<AtomicBool>) -> Handlers {
     let start = Instant::now();
     let mut sampled = Duration::ZERO;
@@ -221,7 +222,7 @@ async fn start(
 
 pub(crate) type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
 
-/// What a browser does.
+/// A browser's WebSocket connection.
 pub(crate) struct Page {
     pub(crate) socket: Socket,
     pub(crate) hello: Value,
@@ -252,7 +253,7 @@ impl Page {
         Ok(page)
     }
 
-    /// What the station says next.
+    /// The next message from the station.
     pub(crate) async fn next(&mut self) -> Value {
         loop {
             match within_limit(self.socket.next())
@@ -282,7 +283,7 @@ impl Page {
         }
     }
 
-    /// The first state from now on that is as wanted.
+    /// The next state that satisfies the condition.
     pub(crate) async fn until(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
         let mut last = Value::Null;
         let found = tokio::time::timeout(LIMIT, async {
@@ -299,13 +300,13 @@ impl Page {
         }
     }
 
-    /// Says something and forgets it.
+    /// Sends a request without waiting for its result.
     pub(crate) async fn say(&mut self, request: &Value) {
         let said = self.socket.send(Message::text(request.to_string()));
         within_limit(said).await.unwrap();
     }
 
-    /// Wishes something, and waits for what becomes of it.
+    /// Sends a request, and waits for its result.
     pub(crate) async fn ask(&mut self, mut request: Value) -> Result<(), String> {
         self.last_id += 1;
         request["id"] = self.last_id.into();
@@ -321,7 +322,8 @@ impl Page {
         }
     }
 
-    /// Drives until the vehicle is as wanted, as a page does: a word every 100 ms.
+    /// Sends a drive request every 100 ms, as a page does, until the condition on the vehicle
+    /// holds.
     pub(crate) async fn drive_until(&mut self, scene: &Scene, wanted: impl Fn(&Scene) -> bool) {
         within_limit(async {
             while !wanted(scene) {
@@ -334,7 +336,7 @@ impl Page {
     }
 }
 
-/// The primitive driver, as a state tells of it.
+/// The primitive driver in a state.
 pub(crate) fn driver_of(state: &Value) -> &Value {
     let parts = state["vehicle"]["parts"].as_array();
     let driver = parts.and_then(|it| it.iter().find(|it| it["role"] == "primitive_driver"));

@@ -1,3 +1,5 @@
+//! Id tables: rules, settings, claims and conflicts.
+
 use std::collections::HashMap;
 
 use proptest::collection::vec;

@@ -1,4 +1,4 @@
-//! Recorded traffic of OpenJAUS 3.3.1 node managers, with a node of ours in the place of one: our
+//! Recorded traffic of OpenJAUS 3.3.1 node managers, with our node in place of one of them: our
 //! answers equal those of the replaced node.
 
 #![expect(clippy::expect_used, reason = "helpers of tests")]
@@ -17,9 +17,9 @@ use jaus_view::{Capture, Network};
 const A: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 0, 1));
 const B: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 0, 2));
 
-/// A datagram, recorded or sent by ours.
+/// A recorded datagram.
 struct Datagram {
-    /// Since 1970.
+    /// Time since 1970-01-01.
     time: Duration,
     from: IpAddr,
     octets: Bytes,
@@ -43,7 +43,7 @@ fn recorded(file: &str) -> Vec<Datagram> {
     datagrams
 }
 
-/// What a datagram says: framing, source, destination, code and data.
+/// The message in a datagram: framing, source, destination, code and data.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Said {
     framing: u8,
@@ -69,15 +69,15 @@ impl Said {
         }
     }
 
-    /// Whether it is an answer to the same question as another.
+    /// Whether both answer the same question.
     fn answers_as(&self, other: &Self) -> bool {
         let same_field = self.code != 0x4B00 || self.data[0] == other.data[0];
         let who = |said: &Self| (said.source, said.destination, said.code);
         same_field && who(self) == who(other)
     }
 
-    /// Its data without what may differ: OpenJAUS sets bits of the confirmation's presence vector
-    /// that mean nothing, and each describes its own services.
+    /// The data without legitimate differences: OpenJAUS sets meaningless bits in the
+    /// confirmation's presence vector, and each side describes its own services.
     fn comparable(&self) -> Bytes {
         match self.code {
             0x01F3 => self.data.slice(1..),
@@ -87,7 +87,7 @@ impl Said {
     }
 }
 
-/// A subsystem of one node, as its node manager described it.
+/// A subsystem of one node, as described by its node manager.
 fn subsystem(id: u8, names: [&str; 4], others: &[(u8, &str)]) -> Subsystem {
     let [name, node, manager, communicator] = names;
     let both = [(1, manager), (35, communicator)];
@@ -111,11 +111,11 @@ fn subsystem(id: u8, names: [&str; 4], others: &[(u8, &str)]) -> Subsystem {
     }
 }
 
-/// What came of a replay.
+/// Result of a replay.
 struct Replay {
     node: RaNode,
     events: Vec<Event>,
-    /// What the replaced one answered, and what ours did.
+    /// The answers of the replaced node, and all messages of ours.
     expected: Vec<Said>,
     said: Vec<Said>,
 }
@@ -166,7 +166,7 @@ impl Replay {
             .extend(std::iter::from_fn(|| self.node.poll_event()));
     }
 
-    /// That each answer of the replaced one was given by ours.
+    /// Checks that our node gave each answer of the replaced one.
     fn check_answers(&self) {
         assert!(!self.expected.is_empty());
         for expected in &self.expected {
@@ -220,7 +220,7 @@ fn in_place_of_the_first_one_ours_answers_the_storm_of_questions() {
     ];
     let ours = subsystem(10, ["OJ_a", "OJNode_a", manager, communicator], &others);
     let mut replay = replay("openjaus33-opc-wire.pcap", A, ours);
-    // The vehicle joined later there; ours was complete from the start.
+    // In the recording the vehicle joined later; our subsystem was complete from the start.
     replay.expected.retain(|said| said.code != 0x4B01);
     replay.check_answers();
     assert_eq!(replay.appeared().name, "OJ_b");

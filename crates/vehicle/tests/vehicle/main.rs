@@ -1,4 +1,4 @@
-//! The reference vehicle: missions, the store under power cuts, faults, hostile clients.
+//! The reference vehicle: missions, the store under power cuts, faults, and hostile clients.
 
 mod mission;
 mod part_faults;

@@ -40,7 +40,7 @@ const PRIMITIVE: JausId = JausId::new(101, 33, 33);
 const POSE: JausId = JausId::new(101, 41, 41);
 const VELOCITY: JausId = JausId::new(101, 42, 42);
 const VECTOR: JausId = JausId::new(101, 44, 44);
-/// A client, and a group for it and the parts.
+/// A client and the multicast group that it shares with the parts.
 struct Scene {
     group: Group,
     client: Component,
@@ -91,7 +91,7 @@ impl Scene {
         Running(node, task)
     }
 
-    /// Takes control, and makes the component ready.
+    /// Takes control and makes the component Ready.
     async fn control(&self, id: JausId, urn: &str) -> Control {
         self.until("control", || async {
             if self.client.find(urn).await.is_err() {
@@ -120,7 +120,7 @@ impl Scene {
         (report.left, report.right)
     }
 
-    /// Waits until both wheels stand; how far they have come.
+    /// Waits until both wheels stand still. Returns their travel.
     async fn comes_to_rest(&self) -> (f64, f64) {
         let mut before = self.wheels().await;
         within_limit(async {
@@ -135,7 +135,7 @@ impl Scene {
         .await
     }
 
-    /// Tries until there is an answer.
+    /// Repeats an attempt until it returns a value.
     async fn until<T, F: Future<Output = Option<T>>>(
         &self,
         what: &str,
@@ -151,7 +151,7 @@ impl Scene {
         }
     }
 
-    /// Repeats a command until a component is in a state.
+    /// Repeats a command until a component is in a given state.
     async fn until_state(
         &self,
         id: JausId,
@@ -292,7 +292,7 @@ async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
     scene
         .until_state(PRIMITIVE, State::Emergency, &control, &ahead())
         .await;
-    // Another one, whose setter does not come back.
+    // A second emergency; the client that set it does not clear it.
     scene.client.set_emergency(PRIMITIVE).await.unwrap();
     let before = scene.comes_to_rest().await;
     button.release();
@@ -307,7 +307,7 @@ async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
     running.stop().await;
 }
 
-/// A drive that shows what it was commanded last.
+/// An actuator that stores its last command.
 struct Shown(std::sync::Arc<std::sync::Mutex<jaus_vehicle::actuator::Command>>);
 
 impl Actuator for Shown {
@@ -349,7 +349,7 @@ async fn motors_are_commanded_to_stop_when_the_part_is_stopped() {
         .await;
 }
 
-/// Lets a writer go that waits for a reader of this file, so that a test that fails ends.
+/// Unblocks a writer that waits for a reader of this file, so that a failed test ends.
 struct Stall(PathBuf);
 
 impl Drop for Stall {
@@ -373,8 +373,8 @@ async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_st
     let directory = std::env::temp_dir().join(format!("jaus-stall-{}", std::process::id()));
     std::fs::create_dir_all(&directory).unwrap();
     let file: PathBuf = directory.join("pose.toml");
-    // The sensor writes a new file beside the old one. Opening this one blocks until it is opened
-    // for reading too.
+    // The sensor writes a new file beside the old one. Opening this pipe blocks until it is also
+    // opened for reading.
     let stalled = directory.join("pose.toml.new");
     let made = Command::new("mkfifo").arg(&stalled).status().unwrap();
     assert!(made.success());
@@ -399,12 +399,12 @@ async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_st
     scene
         .until("stamps that advance by 3 s", || async {
             let stamped = ask().await? - first;
-            // At midnight they begin again.
+            // Time stamps restart at midnight.
             (!(0..=3000).contains(&stamped)).then_some(())
         })
         .await;
     assert!(!file.exists(), "the disk did stall");
-    // Read it, so that the writer can end.
+    // Read it, so that the writer can finish.
     let reader = std::thread::spawn(move || {
         let _ = std::fs::read(&stalled);
         std::fs::remove_file(&stalled)

@@ -29,7 +29,7 @@ const CLIENTS: [JausId; 3] = [
     JausId::new(42, 2, 1),
     JausId::new(43, 1, 1),
 ];
-/// Longer than the brakes take.
+/// Longer than braking takes.
 const BRAKING: Duration = Duration::from_millis(1100);
 
 /// A vehicle with all its services.
@@ -37,7 +37,7 @@ struct Rover {
     vehicle: Vehicle,
     stack: Stack,
     now: Instant,
-    /// Since when it may not act.
+    /// Start of the time without permission to act.
     idle_since: Option<Instant>,
 }
 
@@ -75,7 +75,7 @@ impl Rover {
         }
     }
 
-    /// A client says something; nothing is answered with more than a handful of messages.
+    /// Handles a message from a client. The vehicle sends at most 60 messages in response.
     fn hear(&mut self, source: JausId, payload: Bytes) {
         let received = Received {
             source,
@@ -108,7 +108,7 @@ impl Rover {
         self.check();
     }
 
-    /// What must always hold.
+    /// Checks the invariants.
     fn check(&mut self) {
         while self.stack.poll_event().is_some() {}
         let may_act = self.stack.standing().may_act();
@@ -142,7 +142,7 @@ fn anything(random: &mut Random, infos: &[&'static MessageInfo]) -> Bytes {
     message.encode().unwrap()
 }
 
-/// Something that gets a vehicle going.
+/// A message that is likely to make the vehicle move.
 fn purposeful(random: &mut Random, infos: &[&'static MessageInfo]) -> Bytes {
     let octets = match random.below(5) {
         0 => RequestControl {

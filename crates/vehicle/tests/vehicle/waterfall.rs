@@ -1,5 +1,5 @@
-//! The chain of drivers as a whole: a client sends a path to the path segment driver, and the
-//! vehicle reaches its end through all stages, even if any part restarts on the way; an emergency
+//! The chain of drivers as a whole. A client sends a path to the path segment driver, and the
+//! vehicle reaches its end through all stages, even if any part restarts on the way. An emergency
 //! at the last stage ends the motion permanently.
 #![allow(
     clippy::disallowed_methods,
@@ -40,7 +40,7 @@ const POSE: JausId = JausId::new(101, 41, 41);
 const VELOCITY: JausId = JausId::new(101, 42, 42);
 const VECTOR: JausId = JausId::new(101, 44, 44);
 const PATH: JausId = JausId::new(101, 48, 48);
-/// A vehicle of five parts, each on a node of its own, and a client.
+/// A vehicle of five parts, each on its own node, and a client.
 struct Scene {
     group: Group,
     state: PathBuf,
@@ -63,7 +63,7 @@ impl Scene {
             client: client.attach(&desk, 1).unwrap(),
             _desk: desk,
         };
-        // In an order in which no part finds its dependencies at first.
+        // In this order no part finds its dependencies when it starts.
         for id in [PATH, VECTOR, POSE, VELOCITY, PRIMITIVE] {
             scene.start(id);
         }
@@ -105,7 +105,7 @@ impl Scene {
         self.parts.push((id, node, task));
     }
 
-    /// Kills a part without any farewell, and starts it again.
+    /// Aborts a part, shuts down its node, and starts it again.
     async fn restart(&mut self, id: JausId) {
         let place = self.parts.iter().position(|part| part.0 == id).unwrap();
         let (_, node, task) = self.parts.swap_remove(place);
@@ -132,7 +132,7 @@ impl Scene {
         report.left + report.right
     }
 
-    /// Takes control of the path driver, and has it drive along straight lines to these points.
+    /// Takes control of the path driver, and makes it drive in straight lines through these points.
     async fn drive(&self, points: &[(f64, f64)]) -> Control {
         let client = &self.client;
         client
@@ -162,7 +162,7 @@ impl Scene {
         control
     }
 
-    /// Waits until something is so, and tells how all are if it never is.
+    /// Waits until a condition holds. On timeout it panics with the pose and all stages.
     async fn until<F: Future<Output = bool>>(&self, what: &str, mut is_so: impl FnMut() -> F) {
         let start = Instant::now();
         while !is_so().await {
@@ -202,7 +202,7 @@ impl Drop for Scene {
     }
 }
 
-/// Set Local Path Segment (0410h), which has the layout of the report: a straight line.
+/// Set Local Path Segment (0410h), a straight line. It has the layout of the report.
 fn segment((x, y): (f64, f64)) -> bytes::Bytes {
     let mut line = ReportLocalPathSegment::default();
     line.set_p1_x_m(x).unwrap();
@@ -276,7 +276,7 @@ async fn after_an_emergency_at_the_last_stage_nothing_moves_by_itself() {
 }
 
 impl Scene {
-    /// Has the path driver go on with its list.
+    /// Makes the path driver execute its list again, from its first element.
     async fn drive_again(&self, control: &Control) {
         let mut execute = ExecuteList {
             element_uid: Some(1),

@@ -10,13 +10,13 @@ use crate::suite::scenario::{KEEP, LOAD, Scenario};
 use crate::suite::settings::{Party, Side};
 use crate::suite::verdict::{Cell, Column, Verdict};
 
-/// What who keeps asking prints for each answer.
+/// Text that a continuous query prints for each answer.
 const ANSWERED: &str = "report";
-/// Answers in a row after which things go on as before.
+/// Consecutive answers that prove that answers continue.
 const ENOUGH: usize = 3;
-/// Between two tries of what may be tried again.
+/// Pause between two attempts of a scenario that may be retried.
 const PAUSE: Duration = Duration::from_millis(300);
-/// Beyond this a recording ends, so that long runs do not fill the disk.
+/// Size limit of a recording, so that long runs do not fill the disk.
 const MEGABYTES: &str = "100";
 
 /// Two parties on their hosts.
@@ -25,14 +25,14 @@ struct Encounter<'a> {
     answerer: Place<'a>,
     hosts: &'a Hosts,
     directory: &'a Path,
-    /// What has gone wrong already.
+    /// Scenarios that have failed so far.
     failed: Vec<Scenario>,
 }
 
-/// Tries all of these scenarios. What is left of the run is in the directory.
+/// Runs these scenarios. The files of the run stay in `directory`.
 ///
 /// # Errors
-/// If there can be no network or no files.
+/// If the network or the files cannot be created.
 pub(crate) fn run(
     (peer, actor, answerer): (&str, &Party, &Party),
     scenarios: &[Scenario],
@@ -60,7 +60,7 @@ pub(crate) fn run(
 }
 
 impl Encounter<'_> {
-    /// Fills one cell of the table.
+    /// Runs a scenario: one cell of the table.
     fn cell(&mut self, scenario: Scenario) -> Cell {
         let start = Instant::now();
         let mut recording = None;
@@ -93,7 +93,7 @@ impl Encounter<'_> {
         }
     }
 
-    /// The other's side and the actor's arguments, or why the encounter is impossible.
+    /// The answerer's side and the actor's act, or why the scenario does not apply.
     fn way(&self, scenario: Scenario) -> Result<(Side, &'static str), String> {
         let (actor, answerer) = (self.actor.party, self.answerer.party);
         let excuse = actor.excuse_of_actor(scenario);
@@ -128,7 +128,7 @@ impl Encounter<'_> {
             MEGABYTES,
         ];
         let log: PathBuf = self.directory.join("observer.log");
-        // The run is valid without it.
+        // The recording is optional.
         Process::start(&self.hosts.switch(), &command.map(str::to_owned), &log).ok()
     }
 
@@ -144,7 +144,7 @@ impl Encounter<'_> {
         }
     }
 
-    /// Has the actor do something, again if that is fair, until it is as it must be.
+    /// Runs the act, repeatedly if the scenario permits it, until it succeeds.
     fn try_until_right(&self, scenario: Scenario, act: &str) -> Result<(), String> {
         let deadline = Instant::now() + patience();
         loop {
@@ -162,12 +162,12 @@ impl Encounter<'_> {
             ..Values::default()
         };
         let process = self.actor.act(act, &values, &scenario.key())?;
-        // It may need a moment to print what it did not receive.
+        // The actor needs a moment to print what it did not receive.
         let said = process.ends(patience() + Duration::from_secs(10))?;
         self.check(scenario, &said)
     }
 
-    /// Whether the actor has found out what is to be found.
+    /// Checks that the actor's output names the expected ids or services.
     fn check(&self, scenario: Scenario, said: &str) -> Result<(), String> {
         let (actor, answerer) = (self.actor.party, self.answerer.party);
         if let Some(words) = actor.finds.get(&scenario.key()) {
@@ -188,7 +188,7 @@ impl Encounter<'_> {
         }
     }
 
-    /// Has the actor keep asking, until it has been answered for a while.
+    /// Starts continuous queries and waits for the first answers.
     fn keep(&self, act: &str) -> Result<Process, String> {
         let mut keep = self.actor.act(act, &Values::default(), "keep")?;
         goes_on(&mut keep)?;
@@ -223,7 +223,7 @@ impl Encounter<'_> {
         goes_on(&mut keep)
     }
 
-    /// One does not stop asking, while another does in turn everything that has not failed alone.
+    /// Runs continuous queries and, in turn, every scenario that did not fail on its own.
     fn mix(&self, side: Side, act: &str) -> Result<(), String> {
         let end =
             Instant::now() + Duration::from_secs(crate::suite::number("JAUS_INTEROP_MIXED", 10));
@@ -257,7 +257,7 @@ impl Encounter<'_> {
     }
 }
 
-/// Whether all of these words were said.
+/// Checks that all these words were printed.
 fn find_all(words: &[String], said: &str) -> Result<(), String> {
     match words.iter().find(|word| !said.contains(word.as_str())) {
         Some(missing) => Err(format!("{missing} is missing from what was found")),
@@ -265,7 +265,7 @@ fn find_all(words: &[String], said: &str) -> Result<(), String> {
     }
 }
 
-/// Waits until enough answers have come.
+/// Waits for [`ENOUGH`] answers.
 fn goes_on(keep: &mut Process) -> Result<(), String> {
     (0..ENOUGH).try_for_each(|_| keep.says(ANSWERED, patience()))
 }

@@ -6,15 +6,15 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use jaus_test_kit::hosts::ip;
 
-/// The name of the cable on either host.
+/// Name of the network interface on both hosts.
 pub(crate) const INTERFACE: &str = "jaus0";
 
 /// One of the two hosts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Host {
-    /// Of the party that acts.
+    /// The acting party's.
     Actor,
-    /// Of the party that answers.
+    /// The answering party's.
     Answerer,
 }
 
@@ -29,7 +29,7 @@ impl Host {
         }
     }
 
-    /// The end of its cable at the switch.
+    /// The switch's end of its cable.
     const fn port(self) -> &'static str {
         match self {
             Self::Actor => "port-actor",
@@ -53,10 +53,10 @@ pub(crate) struct Hosts {
 }
 
 impl Hosts {
-    /// Makes them.
+    /// Creates the hosts and the switch.
     ///
     /// # Errors
-    /// If this machine does not let us.
+    /// If this machine does not permit it.
     pub(crate) fn new() -> Result<Self, String> {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
@@ -113,7 +113,7 @@ impl Hosts {
             "-n", &name, "address", "add", &address, "brd", "+", "dev", INTERFACE,
         ])?;
         ip(&["-n", &name, "link", "set", INTERFACE, "up"])?;
-        // For programs that leave the choice of the interface to the system.
+        // For programs that let the system choose the interface.
         ip(&["-n", &name, "route", "add", "224.0.0.0/4", "dev", INTERFACE])
     }
 
@@ -130,19 +130,19 @@ impl Hosts {
         format!("{}-s", self.prefix)
     }
 
-    /// The interface where the observer sees all that the answering host receives and sends.
+    /// The interface on which the observer sees all traffic of the answering host.
     pub(crate) const fn observed() -> &'static str {
         Host::Answerer.port()
     }
 
-    /// Pulls the cable of the answering host, or puts it back.
+    /// Pulls the cable of the answering host, or reconnects it.
     pub(crate) fn cable(&self, is_in: bool) -> Result<(), String> {
         let state = if is_in { "up" } else { "down" };
         let port = Host::Answerer.port();
         ip(&["-n", &self.switch(), "link", "set", port, state])
     }
 
-    /// Kills all that runs on a host, daemons too.
+    /// Kills every process on a host, daemons too.
     pub(crate) fn cut_power(&self, host: Host) {
         kill_all(&self.name(host));
     }
@@ -171,7 +171,7 @@ fn kill_all(name: &str) {
     let pids = String::from_utf8_lossy(&output.stdout);
     let pids: Vec<&str> = pids.split_whitespace().collect();
     if !pids.is_empty() {
-        // They may have ended in between.
+        // They may have ended meanwhile.
         let _ = Command::new("kill").arg("-9").args(pids).output();
     }
 }

@@ -26,8 +26,7 @@ const PEERS: &str = "ours,scripted-jauspp,scripted-junior,scripted-judge";
 /// The one test of this binary.
 const TEST: &str = "interop";
 
-/// Does what the command line says, which is what cargo says to tests, or what this suite says to
-/// itself.
+/// Executes the command line: that of cargo, or a role in which this suite restarts itself.
 pub(crate) fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if let [flag, role @ ..] = &arguments[..]
@@ -50,7 +49,7 @@ pub(crate) fn main() -> ExitCode {
     ExitCode::from(u8::from(!is_right))
 }
 
-/// Tries every scenario with every peer, and tells whether nothing has failed.
+/// Runs every scenario with every peer. Returns whether none failed.
 fn try_all() -> bool {
     match run() {
         Ok(is_right) => is_right,
@@ -79,7 +78,8 @@ fn run() -> Result<bool, String> {
     Ok(!cells.any(|cell| matches!(cell.verdict, Verdict::Failed(_))))
 }
 
-/// Both directions with every peer, all at once but for those that must be alone.
+/// Runs both directions with every peer, all in parallel, except the two directions of a peer that
+/// is marked `alone`.
 fn meet(
     subject: &Party,
     peers: &[Party],
@@ -123,7 +123,7 @@ fn meet(
     })
 }
 
-/// What the parties say their versions are.
+/// The versions that the parties report.
 fn versions(subject: &Party, peers: &[Party]) -> Vec<report::Version> {
     let mut versions: Vec<report::Version> = Vec::new();
     for party in std::iter::once(subject).chain(peers) {
@@ -134,7 +134,7 @@ fn versions(subject: &Party, peers: &[Party]) -> Vec<report::Version> {
     versions
 }
 
-/// The scenarios that are wanted: all, or those whose keys begin as one of those in
+/// The selected scenarios: all, or those whose keys start with one of the prefixes in
 /// `JAUS_INTEROP_ONLY`.
 fn chosen() -> Result<Vec<Scenario>, String> {
     let only = setting("JAUS_INTEROP_ONLY", "");
@@ -153,7 +153,7 @@ fn chosen() -> Result<Vec<Scenario>, String> {
     Ok(chosen)
 }
 
-/// Where the results go.
+/// The directory of the results.
 fn directory() -> Result<PathBuf, String> {
     let usual = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("interop");
     let directory = std::env::var_os("JAUS_INTEROP_OUT").map_or(usual, PathBuf::from);
@@ -162,7 +162,7 @@ fn directory() -> Result<PathBuf, String> {
     Ok(directory)
 }
 
-/// A name as a file may have it.
+/// A name as a file name.
 fn file_name(name: &str) -> String {
     let allowed = |character: char| {
         if character.is_alphanumeric() {
@@ -174,7 +174,7 @@ fn file_name(name: &str) -> String {
     name.to_lowercase().chars().map(allowed).collect()
 }
 
-/// What the environment says, or else the usual.
+/// An environment variable, or its default.
 fn setting(name: &str, usual: &str) -> String {
     std::env::var(name)
         .ok()
@@ -182,7 +182,7 @@ fn setting(name: &str, usual: &str) -> String {
         .unwrap_or_else(|| usual.to_owned())
 }
 
-/// A number in the environment, or else the usual one.
+/// A number from the environment, or its default.
 fn number(name: &str, usual: u64) -> u64 {
     let value = setting(name, &usual.to_string());
     value

@@ -9,19 +9,19 @@ use crate::suite::hosts::{Host, Hosts, INTERFACE};
 use crate::suite::process::Process;
 use crate::suite::settings::{Party, Side, Start, with_environment};
 
-/// How long anything that is waited for may take. Reached only when something fails.
+/// Timeout of any wait. Reached only when something fails.
 pub(crate) fn patience() -> Duration {
     Duration::from_secs(crate::suite::number("JAUS_INTEROP_PATIENCE", 40))
 }
 
-/// A party that is on the network.
+/// A party on its host.
 #[derive(Debug)]
 pub(crate) struct Place<'a> {
     pub(crate) party: &'a Party,
     other: &'a Party,
     host: Host,
     hosts: &'a Hosts,
-    /// Where the words of its processes are kept.
+    /// Directory of the logs of its processes.
     logs: PathBuf,
     background: Vec<Process>,
     side: Option<(Side, Process)>,
@@ -46,7 +46,7 @@ impl<'a> Place<'a> {
         }
     }
 
-    /// Has what it always needs run, and an answering party answer as this side.
+    /// Starts the background processes and, for an answering party, the wanted side.
     pub(crate) fn be(&mut self, wanted: Option<Side>) -> Result<(), String> {
         self.prepare()?;
         let Some(wanted) = wanted else {
@@ -69,7 +69,7 @@ impl<'a> Place<'a> {
         Ok(())
     }
 
-    /// Has what it always needs run.
+    /// Starts the background processes that are not running.
     fn prepare(&mut self) -> Result<(), String> {
         self.background.retain_mut(|process| !process.has_ended());
         if self.background.len() < self.party.background.len() {
@@ -82,19 +82,19 @@ impl<'a> Place<'a> {
         Ok(())
     }
 
-    /// Ends what answers.
+    /// Ends the answering process.
     pub(crate) fn leave(&mut self) {
         self.side = None;
     }
 
-    /// Kills all that it runs, as a power cut would; gives what it was.
+    /// Kills all its processes, as a power cut would. Returns the side that was running.
     pub(crate) fn crash(&mut self) -> Option<Side> {
         self.hosts.cut_power(self.host);
         self.background.clear();
         self.side.take().map(|(side, _)| side)
     }
 
-    /// What has happened to what answers, if it has ended by itself.
+    /// An error text if the answering process has ended by itself.
     pub(crate) fn trouble(&mut self) -> Option<String> {
         let (side, process) = self.side.as_mut()?;
         let has_ended = process.has_ended();
@@ -124,7 +124,7 @@ impl<'a> Place<'a> {
         Process::start(&self.hosts.name(self.host), &command?, &log)
     }
 
-    /// A word of a command with its places filled.
+    /// A word of a command with its placeholders replaced.
     fn filled(&self, word: &str, values: &Values) -> Result<String, String> {
         let other_host = match self.host {
             Host::Actor => Host::Answerer,
@@ -162,12 +162,12 @@ impl<'a> Place<'a> {
     }
 }
 
-/// What changes from act to act.
+/// Values that change from act to act.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Values {
     /// The size of a message.
     pub(crate) octets: usize,
-    /// How long it may take.
+    /// Timeout.
     pub(crate) seconds: u64,
 }
 
@@ -180,7 +180,7 @@ impl Default for Values {
     }
 }
 
-/// An id as some programs want it: one number.
+/// An id as one hexadecimal number, as some programs expect it.
 fn hexadecimal(id: JausId) -> String {
     format!(
         "0x{:04X}{:02X}{:02X}",
@@ -190,7 +190,7 @@ fn hexadecimal(id: JausId) -> String {
     )
 }
 
-/// What a party says its version is: the first line that it prints.
+/// The version that a party reports: the first line that its version command prints.
 pub(crate) fn version(party: &Party) -> String {
     let Some((program, arguments)) = party.version.split_first() else {
         return "version not told".to_owned();

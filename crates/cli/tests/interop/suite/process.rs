@@ -1,5 +1,5 @@
-//! Processes of the parties in their namespaces: their output is kept in a file and can be waited
-//! for, and they end with all their children.
+//! Processes of the parties in their namespaces. Their output is kept in a file and can be waited
+//! for; they end with all their children.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -13,9 +13,9 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
 
-/// How long a process may take to end when it is asked to.
+/// How long a process may take to end after it is asked to.
 const FAREWELL: Duration = Duration::from_secs(2);
-/// Between two looks at a process that is to end.
+/// Polling interval while a process ends.
 const LOOK: Duration = Duration::from_millis(10);
 
 /// A process in a namespace; killed with its children when dropped.
@@ -28,7 +28,7 @@ pub(crate) struct Process {
 }
 
 impl Process {
-    /// Starts a command in a namespace. What it says goes to the end of the file `log`, too.
+    /// Starts a command in a namespace. Its output is also appended to the file `log`.
     pub(crate) fn start(namespace: &str, command: &[String], log: &Path) -> Result<Self, String> {
         let name = short(command);
         let wrong = |error| format!("`{name}` could not be started: {error}");
@@ -64,7 +64,7 @@ impl Process {
         })
     }
 
-    /// Waits until it says a line with this in it, from now on.
+    /// Waits for the next output line that contains `what`.
     pub(crate) fn says(&mut self, what: &str, within: Duration) -> Result<(), String> {
         let deadline = Instant::now() + within;
         loop {
@@ -88,14 +88,14 @@ impl Process {
         }
     }
 
-    /// Forgets what it has said until now.
+    /// Skips all output so far.
     pub(crate) fn forget(&mut self) {
         while let Ok(line) = self.lines.try_recv() {
             self.said.push(line);
         }
     }
 
-    /// Waits until it ends by itself, and gives what it has said; an error if it failed.
+    /// Waits until it ends by itself, and returns its output; an error if it failed.
     pub(crate) fn ends(mut self, within: Duration) -> Result<String, String> {
         let deadline = Instant::now() + within;
         let status = loop {
@@ -110,7 +110,7 @@ impl Process {
                 Err(error) => return Err(format!("`{}`: {error}", self.name)),
             }
         };
-        // Until both ends are closed, unless a surviving child holds them open.
+        // Reads until both pipes are closed; a surviving child may hold them open.
         while let Ok(line) = self.lines.recv_timeout(FAREWELL) {
             self.said.push(line);
         }
@@ -120,12 +120,12 @@ impl Process {
         Err(self.complaint(&in_words(status)))
     }
 
-    /// Whether it ended unexpectedly.
+    /// Whether it has ended.
     pub(crate) fn has_ended(&mut self) -> bool {
         !matches!(self.child.try_wait(), Ok(None))
     }
 
-    /// What it has to do with a failure: the last thing it said.
+    /// An error text with the last line that it printed.
     fn complaint(&self, what: &str) -> String {
         let last = self.said.iter().rev().find(|line| !line.trim().is_empty());
         let last = last.map_or_else(
@@ -139,7 +139,7 @@ impl Process {
         let Ok(group) = i32::try_from(self.child.id()) else {
             return;
         };
-        // It may be gone.
+        // The process group may be gone.
         let _ = killpg(Pid::from_raw(group), signal);
     }
 }
@@ -157,22 +157,22 @@ impl Drop for Process {
     }
 }
 
-/// Passes on what a process says, line by line.
+/// Forwards the output of a process, line by line.
 fn listen(from: impl Read + Send + 'static, to: Sender<String>, log: Arc<Mutex<File>>) {
     std::thread::spawn(move || {
         for line in BufReader::new(from).split(b'\n').map_while(Result::ok) {
             let line = String::from_utf8_lossy(&line).into_owned();
             if let Ok(mut log) = log.lock() {
-                // The log is for people; the test continues without it.
+                // The log is only for readers; the test continues without it.
                 let _ = writeln!(log, "{line}");
             }
-            // The reader is gone, but the process must not block.
+            // The receiver may be gone, but the process must not block on a full pipe.
             let _ = to.send(line);
         }
     });
 }
 
-/// A command as people would call it: in one line, and without the place of its program.
+/// A command as a user would type it: in one line, and without the path of its program.
 fn short(command: &[String]) -> String {
     let Some((program, arguments)) = command.split_first() else {
         return String::new();

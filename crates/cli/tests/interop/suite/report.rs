@@ -8,10 +8,10 @@ use jaus_cli::junit::{self, Case, CaseResult, Suite};
 use crate::suite::scenario::Scenario;
 use crate::suite::verdict::{Cell, Column, Verdict};
 
-/// A party and the version that it says it has.
+/// A party's name and the version that it reports.
 pub(crate) type Version = (String, String);
 
-/// Writes both files into the directory, and gives the table.
+/// Writes both files into the directory, and returns the table.
 pub(crate) fn write(
     directory: &Path,
     versions: &[Version],
@@ -25,7 +25,7 @@ pub(crate) fn write(
     Ok(table)
 }
 
-/// The table: a row for each scenario, a column for each direction, the reasons below.
+/// The table: a row for each scenario, a column for each direction, and the reasons below.
 fn markdown(directory: &Path, versions: &[Version], columns: &[Column]) -> String {
     let mut text = String::from("# Interoperability\n\n");
     for (name, version) in versions {
@@ -71,13 +71,13 @@ fn markdown(directory: &Path, versions: &[Version], columns: &[Column]) -> Strin
     text
 }
 
-/// Whether there is anything in a column.
+/// Whether any scenario of a column applies.
 fn is_applicable(column: &Column) -> bool {
     let mut cells = column.cells.iter();
     cells.any(|cell| !matches!(cell.verdict, Verdict::NotApplicable(_)))
 }
 
-/// The scenarios that any column has, in order.
+/// The scenarios of these columns, in order.
 fn scenarios(columns: &[&Column]) -> impl Iterator<Item = Scenario> {
     let has = |scenario: &Scenario| {
         let mut cells = columns.iter().flat_map(|column| &column.cells);
@@ -86,12 +86,12 @@ fn scenarios(columns: &[&Column]) -> impl Iterator<Item = Scenario> {
     Scenario::all().into_iter().filter(has)
 }
 
-/// The reasons, each of them once.
+/// The reasons, each once.
 #[derive(Default)]
 struct Notes(Vec<String>);
 
 impl Notes {
-    /// The words of a cell.
+    /// Text of a cell.
     fn of(&mut self, directory: &Path, cell: &Cell) -> String {
         match &cell.verdict {
             Verdict::Passed => format!("pass, {:.1} s", cell.took.as_secs_f64()),

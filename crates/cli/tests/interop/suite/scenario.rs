@@ -5,37 +5,37 @@ use crate::suite::settings::Side;
 /// One row of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Scenario {
-    /// Find the other by discovery.
+    /// Discovers the other party.
     Discover,
-    /// List its services.
+    /// Lists its services.
     Services,
-    /// Ask for its velocity.
+    /// Queries its velocity.
     Query,
-    /// Have its velocity reported again and again.
+    /// Subscribes to its velocity at a rate.
     Periodic,
-    /// Have its velocity reported whenever it changes.
+    /// Subscribes to its velocity on change.
     OnChange,
-    /// Take control, and lose it to a client with more authority.
+    /// Takes control, and loses it to a client with more authority.
     Control,
-    /// Take control, and have it move by wrench effort.
+    /// Takes control, and moves it by wrench effort.
     Drive,
-    /// Send a message, and get it back as it was.
+    /// Sends a message, and expects it back unchanged.
     Large(Size, Transport),
-    /// The other is killed and started again, and its reports come again.
+    /// The answerer is killed and restarted; its reports must resume.
     AnswererRestarts,
-    /// Who asks is killed and started again, and gets its reports again.
+    /// The actor is killed and restarted; it must receive reports again.
     ActorRestarts,
-    /// The cable is pulled and put back, and the reports come again.
+    /// The cable is pulled and reconnected; the reports must resume.
     Cable,
     /// All of this for a while.
     Mixed,
 }
 
-/// How long a message is.
+/// Size of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Size {
     name: &'static str,
-    /// Octets, the message code included.
+    /// Octets, including the message code.
     pub(crate) octets: usize,
 }
 
@@ -58,14 +58,14 @@ const SIZES: [Size; 4] = [
     },
 ];
 
-/// How a message goes.
+/// How a message is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Transport {
-    /// By UDP, acknowledged.
+    /// UDP, acknowledged.
     Acknowledged,
-    /// By UDP, not acknowledged: the sender repeats lost messages a few times.
+    /// UDP, not acknowledged: the sender repeats lost messages a few times.
     Unacknowledged,
-    /// By TCP.
+    /// TCP.
     Tcp,
 }
 
@@ -89,14 +89,14 @@ impl Transport {
     }
 }
 
-/// What keeps asking while things happen: of a vehicle, and of an echo.
+/// Acts that query continuously during disturbances: of a vehicle, and of an echo.
 pub(crate) const KEEP: [(Side, &str); 2] = [(Side::Vehicle, "keep"), (Side::Echo, "keep-echo")];
 
-/// What sends large messages to whatever side there is, amid mixed traffic.
+/// The act that sends large messages to either side during mixed traffic.
 pub(crate) const LOAD: &str = "load";
 
 impl Scenario {
-    /// All of them, in order.
+    /// All scenarios, in order.
     pub(crate) fn all() -> Vec<Self> {
         let large = Transport::ALL
             .into_iter()
@@ -120,7 +120,7 @@ impl Scenario {
         all
     }
 
-    /// Everything that a party may be told to do.
+    /// Every act that a party may have a command for.
     pub(crate) fn acts() -> Vec<&'static str> {
         let mut acts: Vec<&str> = Self::all().into_iter().filter_map(Self::act).collect();
         acts.dedup();
@@ -129,7 +129,7 @@ impl Scenario {
         acts
     }
 
-    /// What it is called in settings and files.
+    /// Its name in settings and file names.
     pub(crate) fn key(self) -> String {
         match self {
             Self::Large(size, transport) => format!("{}-{}", transport.key(), size.name),
@@ -141,7 +141,7 @@ impl Scenario {
         }
     }
 
-    /// What it is called in the table.
+    /// Its name in the table.
     pub(crate) fn title(self) -> String {
         match self {
             Self::Discover => "discover".to_owned(),
@@ -161,7 +161,7 @@ impl Scenario {
         }
     }
 
-    /// The act of the acting party; `None` if it is to keep querying.
+    /// The act of the acting party; `None` for continuous queries.
     pub(crate) const fn act(self) -> Option<&'static str> {
         match self {
             Self::Discover => Some("discover"),
@@ -176,7 +176,7 @@ impl Scenario {
         }
     }
 
-    /// What the other party has to be for it, if that is certain.
+    /// The side that the answering party plays; `None` if either will do.
     pub(crate) const fn side(self) -> Option<Side> {
         match self {
             Self::Large(..) => Some(Side::Echo),
@@ -194,11 +194,11 @@ impl Scenario {
         )
     }
 
-    /// The size of the message that is sent, in octets.
+    /// Size of the message that is sent, in octets.
     pub(crate) const fn octets(self) -> usize {
         match self {
             Self::Large(size, _) => size.octets,
-            // Mixed traffic besides queries.
+            // The messages of mixed traffic.
             _ => 10 << 10,
         }
     }

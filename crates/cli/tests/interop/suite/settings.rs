@@ -13,60 +13,60 @@ use crate::suite::scenario::Scenario;
 /// A name without a file here is treated as a path.
 pub(crate) const PEERS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/interop/peers");
 
-/// One who takes part: the subject, or a peer.
+/// A party: the subject, or a peer.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Party {
-    /// What it is called in the table.
+    /// Its name in the table.
     pub(crate) name: String,
-    /// Whom others speak to.
+    /// Its id as the answering side.
     #[serde(deserialize_with = "id")]
     pub(crate) id: JausId,
-    /// The component that reports the velocity, if it is a different one.
+    /// The component that reports the velocity, if different.
     #[serde(default, deserialize_with = "some_id")]
     pub(crate) sensor: Option<JausId>,
-    /// Who speaks to others.
+    /// Its id as the acting side.
     #[serde(deserialize_with = "id")]
     pub(crate) actor: JausId,
-    /// What it needs of others, as a settings file of this project's says it; `{needs}` in their
-    /// commands.
+    /// Node settings that it requires of other parties, in the format of this project's settings
+    /// file; `{needs}` in their commands.
     #[serde(default)]
     pub(crate) needs: String,
     /// A command that prints the version.
     #[serde(default)]
     pub(crate) version: Vec<String>,
-    /// Whether its two directions cannot run at once, because it keeps things outside its
-    /// namespace.
+    /// Whether its two directions cannot run at the same time, because it uses resources outside
+    /// its namespace.
     #[serde(default)]
     pub(crate) alone: bool,
-    /// What runs whatever it does, such as its node manager.
+    /// Processes that always run, such as its node manager.
     #[serde(default)]
     pub(crate) background: Vec<Start>,
-    /// What answers.
+    /// Commands of the answering side.
     #[serde(default)]
     pub(crate) side: BTreeMap<Side, Start>,
-    /// What acts, by the key of what it does.
+    /// Commands of the acting side, by the key of the act.
     #[serde(default)]
     pub(crate) act: BTreeMap<String, Vec<String>>,
-    /// Its words for what it must find, by the key of the scenario, where these are not ids and
-    /// the names of services.
+    /// Texts that its output must contain, by the key of the scenario, if not the ids and names of
+    /// services.
     #[serde(default)]
     pub(crate) finds: BTreeMap<String, Vec<String>>,
-    /// What it does not answer, by the key of the scenario, and why.
+    /// Scenarios that it does not answer, by key, with the reason.
     #[serde(default)]
     pub(crate) not_answering: BTreeMap<String, String>,
-    /// What it does not do by itself, and why.
+    /// Scenarios that it does not act in, with the reason.
     #[serde(default)]
     pub(crate) not_acting: BTreeMap<String, String>,
 }
 
-/// What a party answers as.
+/// Role of an answering party.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Side {
     /// A component with services: discovery, events, control, velocity, wrench effort.
     Vehicle,
-    /// A component that sends every test message back as it came.
+    /// A component that sends every test message back unchanged.
     Echo,
 }
 
@@ -85,9 +85,9 @@ impl fmt::Display for Side {
 pub(crate) struct Start {
     /// The program and its arguments.
     pub(crate) command: Vec<String>,
-    /// What it prints once it can be spoken to; without it, it is spoken to at once.
+    /// What it prints once it is ready; without this, it counts as ready at once.
     pub(crate) ready: Option<String>,
-    /// The services that its list must have: the last parts of their URNs.
+    /// Services that it must list: the last parts of their URNs.
     #[serde(default)]
     pub(crate) services: Vec<String>,
 }
@@ -124,7 +124,7 @@ impl Party {
         Ok(party)
     }
 
-    /// Whether everything is about a scenario that exists.
+    /// Checks that every key belongs to an existing scenario or act.
     fn check(&self) -> Result<(), String> {
         let keys: Vec<String> = Scenario::all()
             .iter()
@@ -149,18 +149,18 @@ impl Party {
         Ok(())
     }
 
-    /// Why it does not answer a scenario, if it says so.
+    /// Why it does not answer a scenario, if it declares so.
     pub(crate) fn excuse_of_answerer(&self, scenario: Scenario) -> Option<&str> {
         excuse(&self.not_answering, scenario)
     }
 
-    /// Why it does not do what a scenario asks for, if it says so.
+    /// Why it does not act in a scenario, if it declares so.
     pub(crate) fn excuse_of_actor(&self, scenario: Scenario) -> Option<&str> {
         excuse(&self.not_acting, scenario)
     }
 }
 
-/// Puts the values of variables in the place of `${NAME}`.
+/// Replaces each `${NAME}` by the value of that environment variable.
 pub(crate) fn with_environment(word: &str) -> Result<String, String> {
     let mut filled = String::new();
     let mut rest = word;

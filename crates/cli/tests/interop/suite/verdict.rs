@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use crate::suite::scenario::Scenario;
 
-/// What became of a scenario.
+/// Result of a scenario.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Verdict {
     Passed,
-    /// With the reason in words.
+    /// With the reason.
     Failed(String),
-    /// With the reason in words: one of the two does not do such things.
+    /// With the reason: one of the two parties does not support it.
     NotApplicable(String),
 }
 
@@ -21,11 +21,11 @@ pub(crate) struct Cell {
     pub(crate) scenario: Scenario,
     pub(crate) verdict: Verdict,
     pub(crate) took: Duration,
-    /// What was recorded, if it failed.
+    /// The recording, if it failed.
     pub(crate) recording: Option<PathBuf>,
 }
 
-/// A column of the table: one acts, the other answers.
+/// A column of the table: one party acts, the other answers.
 #[derive(Debug, Clone)]
 pub(crate) struct Column {
     pub(crate) peer: String,

@@ -10,10 +10,10 @@ use jaus::wire::{Frame, judp};
 use super::clients::{ECHO, VEHICLE};
 use crate::testbed::TO_STRANGERS;
 
-/// Sends in any id, and counts what comes back.
+/// Sends with any source id, and counts the octets received.
 pub(crate) struct Attacker {
     socket: UdpSocket,
-    /// Gets a copy of everything, if there is one.
+    /// Sends a copy of everything to the echo socket, if set.
     echo: Option<UdpSocket>,
     sequence: u16,
     pub(crate) packets: u64,
@@ -39,7 +39,7 @@ impl Attacker {
         }
     }
 
-    /// The echo socket on the vehicle's host gets the same.
+    /// Sends every datagram also to the echo socket on the vehicle's host.
     pub(crate) fn with_echo(mut self) -> Self {
         let echo = UdpSocket::bind(("10.217.0.10", 0)).unwrap();
         echo.connect((TO_STRANGERS, ECHO)).unwrap();
@@ -69,7 +69,7 @@ impl Attacker {
         }
     }
 
-    /// Counts what has come; it is not answered.
+    /// Counts received octets; nothing is answered.
     pub(crate) fn listen(&mut self) {
         let mut buffer = [0; 65_535];
         while let Ok(length) = self.socket.recv(&mut buffer) {
@@ -96,7 +96,7 @@ impl Attacker {
         }
     }
 
-    /// Counts what another one has sent and got as its own.
+    /// Adds the counters of another attacker.
     pub(crate) fn add(&mut self, other: &Self) {
         self.packets += other.packets;
         self.octets += other.octets;

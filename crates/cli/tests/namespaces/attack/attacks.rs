@@ -26,18 +26,18 @@ use super::clients::{CLIENT, VEHICLE};
 use crate::testbed::TO_STRANGERS;
 use jaus_test_kit::rover;
 
-/// Longer than the client needs for two looks and a newcomer to be found.
+/// Enough for the client's two reports and for a newcomer to be found.
 const LONG: Duration = Duration::from_secs(20);
 
 const TIME: Duration = Duration::from_secs(6);
-/// Datagrams a second of a flood: fewer for an unoptimised vehicle, which shares its processor with
-/// other tests.
+/// Datagrams per second of a flood: fewer for an unoptimised vehicle, which shares its processor
+/// with other tests.
 const FLOOD: u32 = if cfg!(debug_assertions) { 5000 } else { 20_000 };
 
 pub(crate) async fn run(attack: &str) {
     let mut attacker = match attack {
         "services" => return services().await,
-        // The echo socket sees these too.
+        // Copied to the echo socket.
         "flood" | "unending" | "gapped" => Attacker::new().with_echo(),
         "forged-id6" => ip6(9),
         "ra-flood" | "ra-forged" => on_cable(),
@@ -109,7 +109,7 @@ fn fragment(source: JausId, sequence: u32, data: DataControl, octets: usize) -> 
     }
 }
 
-/// Messages of 200 ids that have a beginning, no end, and every second time no octets.
+/// First and middle fragments from 200 ids, never a last one; every second fragment is empty.
 fn unending(attacker: &mut Attacker, number: u32) {
     let (id, position) = (number % 200, number / 200);
     let data = match position {
@@ -121,7 +121,7 @@ fn unending(attacker: &mut Attacker, number: u32) {
     attacker.send_frame(&fragment(id, position + 1, data, octets));
 }
 
-/// Every second fragment of messages of 20 ids, the last ones first.
+/// Every second middle fragment from 20 ids, in descending order.
 fn gapped(attacker: &mut Attacker, number: u32) {
     let (id, position) = (number % 20, number / 20);
     let id = JausId::new(7001, 1, (id + 1) as u8);
@@ -129,18 +129,18 @@ fn gapped(attacker: &mut Attacker, number: u32) {
     attacker.send_frame(&fragment(id, sequence, DataControl::Middle, 64));
 }
 
-/// All numbers in an order in which any span of them is hit soon.
+/// All numbers, in an order that soon hits any range of them.
 const fn scattered(number: u32) -> u32 {
     number.wrapping_mul(40_503)
 }
 
-/// Fragments in the client's id with any number, that overlap what it sends itself.
+/// Fragments with the client's id and any sequence number, which overlap the client's own.
 fn overlapping(attacker: &mut Attacker, number: u32) {
     let data = [DataControl::Middle, DataControl::Last, DataControl::First][number as usize % 3];
     attacker.send_frame(&fragment(CLIENT, scattered(number / 3), data, 1000));
 }
 
-/// Acknowledgements and refusals in the client's id of any number.
+/// Acknowledgements and refusals with the client's id and any sequence number.
 fn answers(attacker: &mut Attacker, number: u32) {
     let answer = [Acknowledgement::Negative, Acknowledgement::Positive][number as usize % 2];
     attacker.send_frame(&Frame {
@@ -150,12 +150,12 @@ fn answers(attacker: &mut Attacker, number: u32) {
     });
 }
 
-/// One of many ids.
+/// One of many unused ids.
 const fn invented(number: u32) -> JausId {
     JausId::new(4000 + (number / 128) as u16, 1, (number % 128 + 1) as u8)
 }
 
-/// Subscribes in 256 ids, keeps them alive, and answers nothing.
+/// Subscribes with 256 ids, keeps the subscriptions alive, and answers nothing.
 fn create_event(attacker: &mut Attacker, number: u32) {
     if number >= 256 {
         return attacker.send(invented(number % 256), &QueryHeartbeatPulse {});
@@ -170,7 +170,7 @@ fn create_event(attacker: &mut Attacker, number: u32) {
     attacker.send(invented(number), &create);
 }
 
-/// An attacker with an address of a network of which all addresses are its own.
+/// An attacker with one address of an IPv4 network that belongs to it entirely.
 fn ip4(number: u32) -> Attacker {
     let [.., high, low] = number.to_be_bytes();
     let own = SocketAddr::from(([10, 217, 100 + high, low], judp::PORT));
@@ -178,7 +178,7 @@ fn ip4(number: u32) -> Attacker {
     Attacker::between(own, SocketAddr::new(victim, judp::PORT))
 }
 
-/// An attacker with an IPv6 address of one network, of which all addresses are its own.
+/// An attacker with one address of an IPv6 network that belongs to it entirely.
 fn ip6(number: u32) -> Attacker {
     let own = format!("fd00:217::{number:x}").parse().unwrap();
     let victim = TO_STRANGERS6.parse().unwrap();
@@ -188,7 +188,7 @@ fn ip6(number: u32) -> Attacker {
     )
 }
 
-/// The same as with one address, but each id has its own.
+/// Like `create_event`, but each id has its own address.
 fn events6(attacker: &mut Attacker) {
     let mut others: Vec<_> = (1..=256).map(ip6).collect();
     attacker.repeat(TIME, 256, |_, number| {
@@ -200,7 +200,7 @@ fn events6(attacker: &mut Attacker) {
     }
 }
 
-/// 1100 ids in turn from 500 addresses in turn.
+/// 1100 ids in turn, from 500 addresses in turn.
 fn many_addresses(attacker: &mut Attacker, from: impl Fn(u32) -> Attacker) {
     let mut others: Vec<_> = (1..=500).map(from).collect();
     attacker.repeat(LONG, 550, |_, number| {
@@ -215,7 +215,7 @@ const fn cycling(number: u32) -> JausId {
     JausId::new(2000 + (number / 250) as u16, 1, (number % 250 + 1) as u8)
 }
 
-/// Messages for unused ids, and broadcasts, from ids that are unused too.
+/// Messages to unused ids, and broadcasts, also from unused ids.
 fn to_nobody(attacker: &mut Attacker, number: u32) {
     let nobody = JausId::new(200, 1, (number % 200 + 1) as u8);
     let (destination, flags) = match number % 4 {
@@ -237,7 +237,7 @@ fn to_nobody(attacker: &mut Attacker, number: u32) {
     });
 }
 
-/// Claims to know five nodes of 205 components each.
+/// Reports five nodes of 205 components each, for two subsystems.
 fn configuration(attacker: &mut Attacker) {
     let component = |component_id| ComponentRec {
         component_id,
@@ -256,7 +256,7 @@ fn configuration(attacker: &mut Attacker) {
     std::thread::sleep(Duration::from_secs(1));
 }
 
-/// Reports as many services as a message can hold, four times.
+/// Reports as many services as a message can hold, from four subsystems.
 async fn services() {
     let service = |number: u32| ServiceRec {
         uri: format!("u{number}").into(),
@@ -287,7 +287,7 @@ async fn services() {
             acknowledge: true,
             ..Outgoing::new(port.id(), VEHICLE, payload.clone())
         };
-        // It may be refused.
+        // The vehicle may refuse it.
         let sent = port.deliver(message);
         let _ = tokio::time::timeout(Duration::from_secs(8), sent).await;
         node.shutdown().await;
@@ -295,16 +295,17 @@ async fn services() {
     println!("\nattack messages=4");
 }
 
-/// The last octet of the attacker's address there.
+/// Last octet of the attacker's address on the controller's cable.
 pub(crate) const BESIDE: u8 = 9;
 
-/// An attacker on the cable of the controller's host, beside what runs there.
+/// An attacker on the cable of the controller's host, beside the programs there.
 fn on_cable() -> Attacker {
     let address = |host| SocketAddr::from(([10, 216, 1, host], judp::PORT));
     Attacker::between(address(BESIDE), address(1))
 }
 
-/// Everything of everybody, also in the number of the vehicle that is there.
+/// Messages of many codes from any source id to all nodes, also with the vehicle's own subsystem
+/// id.
 fn ra_flood(attacker: &mut Attacker, number: u32) {
     let number = scattered(number) as u16;
     let [one, two] = number.to_le_bytes();
@@ -315,7 +316,8 @@ fn ra_flood(attacker: &mut Attacker, number: u32) {
     attacker.send_octets(&rover::datagram(source, all, code, &data));
 }
 
-/// Takes the vehicle from the operator 20.1.32.1 in that operator's name.
+/// Sends Standby, Release Control and efforts in the name of the operator 20.1.32.1, to take the
+/// vehicle away from it.
 fn ra_forged(attacker: &mut Attacker, number: u32) {
     const STANDBY: u16 = 0x0003;
     const RELEASE: u16 = 0x000E;

@@ -5,7 +5,7 @@ use jaus_test_kit::hosts::{self, lay_cable};
 
 /// The vehicle's address on the strangers' cable.
 pub(crate) const TO_STRANGERS6: &str = "fd00:216:2::1";
-/// The network of which the strangers' host has all addresses.
+/// The network whose addresses all belong to the strangers' host.
 const STRANGERS6: &str = "fd00:217::/64";
 
 impl Testbed {
@@ -14,13 +14,13 @@ impl Testbed {
         hosts::ip(&[&["-n", &self.name(host)], arguments].concat()).unwrap();
     }
 
-    /// Lays a further cable between two hosts, with addresses .1 and .2 of the network.
+    /// Lays another cable between two hosts, with addresses .1 and .2 of the network.
     pub(crate) fn connect(&self, ends: [Host; 2], cable: &str, network: &str) {
         lay_cable(&ends.map(|it| self.name(it)), cable, network).unwrap();
     }
 
-    /// Gives the cables IPv6 addresses, numbered as those of IPv4, and the strangers' host all of a
-    /// network.
+    /// Gives the cables IPv6 addresses, numbered like the IPv4 ones, and the strangers' host a
+    /// whole network.
     pub(crate) fn add_ip6(&self) {
         let others = [Host::Controller, Host::Strangers, Host::Observer];
         for (number, other) in (1..).zip(others) {
@@ -40,7 +40,7 @@ impl Testbed {
         assert!(status.unwrap().success());
     }
 
-    /// How many packets a host has sent on its cables.
+    /// Number of packets that a host has sent on its cables.
     pub(crate) fn packets_sent(&self, host: Host) -> u64 {
         let counts = "cd /sys/class/net; for it in *; do [ $it = lo ] || \
                       cat $it/statistics/tx_packets; done";
@@ -50,7 +50,7 @@ impl Testbed {
     }
 }
 
-/// A file with settings of a node; its path.
+/// Writes a node's settings file; returns its path.
 pub(crate) fn settings(name: &str, text: &str) -> String {
     let path = format!("{}/attack-{name}.toml", env!("CARGO_TARGET_TMPDIR"));
     std::fs::write(&path, text).unwrap();

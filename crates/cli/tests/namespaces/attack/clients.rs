@@ -15,21 +15,21 @@ use jaus_test_kit::hosts::SETTINGS;
 
 pub(crate) const VEHICLE: JausId = JausId::new(101, 1, 1);
 pub(crate) const CLIENT: JausId = JausId::new(102, 1, 1);
-/// Where a socket on the vehicle's host gives back what it gets.
+/// Port of the echo socket on the vehicle's host.
 pub(crate) const ECHO: u16 = 9999;
 /// The vehicle's address on the client's cable.
 const TO_CLIENT: &str = "10.216.1.1";
-/// The same on the observer's cable.
+/// The vehicle's address on the observer's cable.
 const TO_OBSERVER: &str = "10.216.3.1";
 const NEWCOMER: u16 = 104;
-/// How long the vehicle may be looked for.
+/// Timeout of finding the vehicle.
 const SEARCH: Duration = Duration::from_secs(20);
-/// How long the client looks before it says what it has seen.
+/// Interval of the client's reports.
 const SPAN: Duration = Duration::from_secs(3);
-/// What takes longer counts as lost.
+/// An answer later than this counts as lost.
 const LOST: Duration = Duration::from_millis(500);
 
-/// A node with the usual settings, but for those that the role was started with.
+/// The default settings, with the changes that the role was started with.
 fn config(subsystem: u16) -> Config {
     let config = Config::new(subsystem, 1);
     match std::env::var(SETTINGS).unwrap_or_default().as_str() {
@@ -47,7 +47,8 @@ fn config(subsystem: u16) -> Config {
     }
 }
 
-/// Asks the vehicle and the echo socket twenty times a second, and subscribes to 25 poses a second.
+/// Queries the vehicle and the echo socket 20 times per second, and subscribes to 25 poses per
+/// second.
 pub(crate) async fn client() {
     let node = Node::start(config(CLIENT.subsystem())).unwrap();
     let builder = Component::builder(Kind::OperatorControlUnit, "Client");
@@ -110,7 +111,7 @@ pub(crate) async fn client() {
     }
 }
 
-/// Starts, finds the vehicle, asks it something, says how long that took, and stays.
+/// Starts, finds the vehicle, queries it, prints how long that took, and stays.
 pub(crate) async fn newcomer() {
     let begun = Instant::now();
     let node = Node::start(config(NEWCOMER)).unwrap();
@@ -130,7 +131,7 @@ pub(crate) async fn newcomer() {
     std::future::pending::<()>().await;
 }
 
-/// Subscribes to a thousand poses a second, and reads them until it is stopped.
+/// Subscribes to 1000 poses per second, and reads them until killed.
 pub(crate) async fn subscriber() {
     let node = Node::start(config(NEWCOMER)).unwrap();
     let builder = Component::builder(Kind::OtherSubsystem, "Subscriber");
@@ -149,7 +150,7 @@ pub(crate) async fn subscriber() {
     }
 }
 
-/// Gives back what comes, until it is killed.
+/// Echoes datagrams until killed.
 pub(crate) fn echo() {
     let socket = UdpSocket::bind(("0.0.0.0", ECHO)).unwrap();
     println!("\nechoes");

@@ -18,16 +18,16 @@ const CONNECTIONS: usize = 160;
 const TIME: Duration = Duration::from_secs(12);
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// What a connection does.
+/// Behaviour of a connection.
 #[derive(Clone, Copy)]
 enum Habit {
     Silent,
-    /// Says one valid thing at the beginning.
+    /// Sends one valid message at the beginning.
     Idle,
-    /// Says something valid, one octet at a time.
+    /// Sends valid messages, one octet at a time.
     Dribbles,
     Rubbish,
-    /// Asks again and again, and reads no answer.
+    /// Queries again and again, and reads no answer.
     NeverReads,
 }
 
@@ -72,7 +72,7 @@ async fn connect(number: usize) -> Option<Connection> {
     Some(Connection { stream, written: 0 })
 }
 
-/// Writes what the connection writes next; whether it is still open.
+/// Writes the next octets. Returns whether the connection is still open.
 fn go_on(connection: &mut Connection, number: usize) -> bool {
     let id = JausId::new(8000, 1, (number + 1) as u8);
     let query = QueryHeartbeatPulse {}.encode().unwrap();
@@ -89,7 +89,7 @@ fn go_on(connection: &mut Connection, number: usize) -> bool {
         Ok(octets) => connection.written += octets,
         Err(error) => return error.kind() == ErrorKind::WouldBlock,
     }
-    // It is open unless there is nothing left to read.
+    // An end of file means that it is closed.
     let mut octet = [0];
     let reads = !matches!(HABITS[number / 4 % HABITS.len()], Habit::NeverReads);
     !reads || !matches!(connection.stream.try_read(&mut octet), Ok(0))

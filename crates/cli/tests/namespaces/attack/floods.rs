@@ -3,7 +3,8 @@
 use super::scene::{GAP, MEMORY, Scene, figures, on_scene, on_testbed};
 use crate::testbed::Host;
 
-/// A flood costs the client no more than an echo socket loses, and stays within the memory limit.
+/// In a flood the client loses no more than an echo socket does, and the vehicle stays within the
+/// memory limit.
 fn a_flood_costs_nothing(attack: &str) {
     on_testbed(|bed| {
         let echo = bed.start(Host::Vehicle, "echo", "");
@@ -38,8 +39,8 @@ fn reports_of_many_services_stay_within_the_memory_limit() {
     });
 }
 
-/// Two nodes that send each other acknowledged messages, one of them on the attacked host: each
-/// message arrives once and whole, and each is known to have arrived.
+/// Two nodes exchange acknowledged messages, one of them on the attacked host. Each message arrives
+/// once and complete, and the sender receives its acknowledgement.
 fn acknowledged_messages_arrive(attack: &str) {
     on_testbed(|bed| {
         let ids = ["101.1.1", "102.1.1"];

@@ -38,7 +38,7 @@ fn no_events_stream_to_an_address_that_has_proved_nothing() {
     on_scene(&[], |scene| {
         let attack = scene.attack("events");
         println!("| 256 forged Create Events | {attack:?} |");
-        // 4 KiB at once and 1 KiB a second, for 6 s.
+        // 4 KiB at once, then 1 KiB per second for 6 s.
         assert!(attack["octets"] <= 12_000, "{attack:?}");
         assert!(scene.client()["lost"] <= 2);
     });
@@ -69,7 +69,7 @@ fn queries_are_not_amplified_to_an_address_that_has_proved_nothing() {
     on_scene(&[], |scene| {
         let attack = scene.attack("queries");
         println!("| Query Services of 256 forged ids | {attack:?} |");
-        // 4 KiB at once and 1 KiB a second, for 6 s.
+        // 4 KiB at once, then 1 KiB per second for 6 s.
         assert!(attack["octets"] <= 12_000, "{attack:?}");
         assert!(scene.client()["lost"] <= 2);
     });

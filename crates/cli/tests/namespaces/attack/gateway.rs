@@ -9,7 +9,7 @@ use crate::testbed::{Host, Testbed};
 use jaus_test_kit::hosts::Process;
 use jaus_test_kit::vehicle_process::VehicleProcess;
 
-/// A gateway on the vehicle's host, with RA systems on the controller's.
+/// A gateway on the vehicle's host, with RA systems on the controller's host.
 fn gateway(bed: &Testbed) -> Gateway {
     let beside = format!("10.216.1.{BESIDE}/24");
     let cable = Host::Controller.cable();

@@ -4,7 +4,7 @@ use super::bed::settings;
 use super::scene::{GAP, Scene, figures, on_testbed};
 use crate::testbed::Host;
 
-/// A vehicle and a client with IPv6 alone.
+/// A vehicle and a client that use IPv6 only.
 fn on_ip6_scene(body: impl Fn(Scene<'_>)) {
     // Uses global addresses, which off-link attackers reach; by default a node uses link-local
     // ones.
@@ -34,7 +34,7 @@ fn no_events_stream_to_a_network_that_has_proved_nothing() {
     on_ip6_scene(|scene| {
         let attack = scene.attack("events6");
         println!("| IPv6: Create Events from 256 addresses | {attack:?} |");
-        // 4 KiB at once and 1 KiB a second, for 6 s.
+        // 4 KiB at once, then 1 KiB per second for 6 s.
         assert!(attack["octets"] <= 12_000, "{attack:?}");
         assert!(scene.client()["lost"] <= 2);
     });

@@ -15,8 +15,8 @@ fn start(bed: &Testbed, host: Host, id: &str, text: &str) -> VehicleProcess {
     VehicleProcess::start(&mut bed.jaus(host, &arguments))
 }
 
-/// Checks that the routers' packets are bounded while attackers send to unused ids, and almost
-/// cease soon afterwards.
+/// Checks that the routers send a bounded number of packets while attackers send to unused ids, and
+/// almost none soon afterwards.
 fn is_quiet_after_an_attack(bed: &Testbed, most_copies: u64) {
     let sent = || ROUTERS.iter().map(|&it| bed.packets_sent(it)).sum::<u64>();
     std::thread::sleep(Duration::from_secs(2));
@@ -44,8 +44,8 @@ fn three_routers_in_a_circle_pass_each_message_on_once() {
         let routers: Vec<_> = (ROUTERS.iter().zip(ids))
             .map(|(&host, id)| start(bed, host, id, text))
             .collect();
-        // The first crosses two cables, and each of the others the one between them. Their answers
-        // to every fourth message take five more.
+        // The first router sends on two cables, and each of the other two on the cable between
+        // them. The routers' answers to every fourth message take five more packets.
         is_quiet_after_an_attack(bed, 6);
         routers.into_iter().for_each(|it| drop(it.terminate()));
     });

@@ -7,11 +7,11 @@ use crate::testbed::{Host, Testbed};
 use jaus_test_kit::hosts::{Process, on_hosts};
 use jaus_test_kit::vehicle_process::VehicleProcess;
 
-/// What `MemoryMax` of the packaged services allows, in KiB.
+/// `MemoryMax` of the packaged services, in KiB.
 pub(crate) const MEMORY: u64 = 64 * 1024;
 
-/// The longest time without one of 25 events a second, in ms: more than a busy machine takes, and less
-/// than a peer whose address was taken over goes without.
+/// Longest permitted gap between events at 25 Hz, in ms: longer than on a busy machine, and shorter
+/// than the gap of a peer whose address was taken over.
 pub(crate) const GAP: u64 = 2500;
 
 /// A vehicle and a client that has found it.
@@ -45,25 +45,25 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// Runs an attack to its end; what it says of itself.
+    /// Runs an attack to its end. Returns the attacker's figures.
     pub(crate) fn attack(&self, name: &str) -> Figures {
         let attacker = self.bed.start(Host::Strangers, name, "");
         figures(&attacker.says("attack"))
     }
 
-    /// What the client has seen since the last time.
+    /// The client's next complete report.
     pub(crate) fn client(&self) -> Figures {
         self.client.says("client");
         figures(&self.client.says("client"))
     }
 
-    /// The most memory that the vehicle has had, in KiB.
+    /// Peak memory of the vehicle, in KiB.
     pub(crate) fn memory(&self) -> u64 {
         memory(self.vehicle.id())
     }
 
-    /// Starts a newcomer; checks that it finds the vehicle and is answered within ten seconds, and
-    /// waits until the vehicle's directory has it. Ends the vehicle.
+    /// Starts a newcomer. Checks that it finds the vehicle and gets an answer within 10 s, and
+    /// waits until the vehicle's directory lists it. Ends the vehicle.
     pub(crate) fn welcomes_newcomer(self, settings: &str) -> u64 {
         let newcomer = self.bed.start(Host::Observer, "newcomer", settings);
         let ms = figures(&newcomer.says("newcomer"))["ms"];
@@ -95,8 +95,8 @@ pub(crate) fn on_scene(flags: &[&str], body: impl Fn(Scene<'_>)) {
     on_testbed(|bed| body(Scene::start(bed, flags, "")));
 }
 
-/// The most memory that a process has had, in KiB, without the pages of its program: an unoptimised
-/// one has many, and the kernel need not keep them.
+/// Peak memory of a process in KiB, without the pages of its program file: an unoptimised program
+/// has many, and the kernel need not keep them.
 pub(crate) fn memory(process: u32) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap();
     let number = |name| {

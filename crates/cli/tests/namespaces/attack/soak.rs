@@ -1,5 +1,5 @@
-//! Soak test: consecutive attacks on one vehicle, for an hour by hand:
-//! `JAUS_SOAK_SECONDS=3600 cargo test --test namespaces -- --ignored --nocapture soak`
+//! Soak test: consecutive attacks on one vehicle. By hand for an hour: `JAUS_SOAK_SECONDS=3600
+//! cargo test --test namespaces -- --ignored --nocapture soak`
 
 use std::time::{Duration, Instant};
 
@@ -7,7 +7,7 @@ use super::scene::{MEMORY, Scene, on_testbed};
 use crate::testbed::Host;
 use jaus_test_kit::hosts::SOAK;
 
-/// With their results in the table of the other tests.
+/// The table of the other tests has their results.
 const ATTACKS: [&str; 10] = [
     "flood",
     "forged-id",

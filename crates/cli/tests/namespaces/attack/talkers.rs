@@ -12,13 +12,13 @@ use tokio::time::sleep;
 
 use jaus_test_kit::hosts::SETTINGS;
 
-/// The prefix of our messages, which no other component sends.
+/// Prefix of these messages, which no other component sends.
 const CODE: [u8; 2] = [0x01, 0xD7];
-/// The number of the message that says that there will be no more.
+/// Number of the last message.
 const END: u32 = u32::MAX;
 const LARGE: usize = 64_000;
 const SMALL: usize = 170;
-/// How long it sends, how many wait for their acknowledgements, and how soon the next one follows.
+/// How long it sends, the limit of unacknowledged messages, and the pause between messages.
 const TIME: Duration = Duration::from_secs(10);
 const MOST_WAITING: usize = 8;
 const PAUSE: Duration = Duration::from_millis(5);
@@ -54,7 +54,7 @@ impl Tally {
     }
 }
 
-/// Sends for a while; how many messages were acknowledged, and how many not.
+/// Sends for [`TIME`]. Returns how many messages were acknowledged, and how many were lost.
 async fn send(sender: Sender, from: JausId, to: JausId) -> (u32, u32) {
     let outgoing = |number| Outgoing {
         acknowledge: true,
@@ -116,6 +116,6 @@ pub(crate) async fn talk() {
         "\ntalker acknowledged={acknowledged} lost={lost} heard={heard} doubles={doubles} \
          corrupt={corrupt}"
     );
-    // The other may still wait for acknowledgements.
+    // The peer may still wait for acknowledgements.
     std::future::pending::<()>().await;
 }

@@ -25,18 +25,18 @@ impl Gateway {
         Self(command.stdout(stdout).spawn().unwrap())
     }
 
-    /// The number of its process.
+    /// Its process id.
     pub(crate) fn id(&self) -> u32 {
         self.0.id()
     }
 
-    /// Kills it without a word.
+    /// Kills it without warning.
     fn kill(mut self) {
         self.0.kill().unwrap();
         self.0.wait().unwrap();
     }
 
-    /// Ends it; what it has printed.
+    /// Ends it. Returns its output.
     fn end(mut self) -> String {
         let id = self.0.id().to_string();
         let told = Command::new("kill").args(["-TERM", &id]).status();
@@ -73,7 +73,8 @@ fn an_ra_vehicle_that_multicast_does_not_reach_is_driven_when_it_is_named() {
     on_two_hosts(|hosts| watch_and_drive(hosts, &unicast));
 }
 
-/// An RA vehicle on the first host, seen and driven from the second through a gateway with these flags.
+/// An RA vehicle on the first host, observed and driven from the second through a gateway with
+/// these flags.
 fn watch_and_drive(hosts: &TwoHosts, flags: &[&str]) {
     let running = gateway(hosts, &[flags, &["--stats", "--json"]].concat());
     let vehicle = hosts.start(0, "ra-vehicle");
@@ -106,7 +107,8 @@ fn driving(hosts: &TwoHosts) -> (Gateway, Process, Process) {
     (gateway, vehicle, operator)
 }
 
-/// The vehicle stands and is free; another client drives it, and nothing has moved it meanwhile.
+/// The vehicle stands still and has no controller; another client then drives it, and nothing has
+/// moved it meanwhile.
 fn is_driven_by_the_next_client_alone(hosts: &TwoHosts, vehicle: &Process) {
     std::thread::sleep(Duration::from_secs(3));
     let operator = hosts.start(1, "operator");

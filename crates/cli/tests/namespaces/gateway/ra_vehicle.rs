@@ -1,5 +1,5 @@
-//! An RA vehicle, 20, on a socket; it is also an operator that queries and drives the JAUS vehicle
-//! 101, if present.
+//! An RA vehicle, subsystem 20, on a socket. It is also an operator that queries and drives the
+//! JAUS vehicle 101, if present.
 
 use std::future::poll_fn;
 use std::time::{Duration, Instant};
@@ -24,17 +24,17 @@ struct RaVehicle {
     node: RaNode,
     rover: Rover,
     link: UdpLink,
-    /// When the JAUS vehicle gets its next effort.
+    /// When the next effort to the JAUS vehicle is due.
     next_effort: Option<Instant>,
     controller: Option<RaId>,
     driven: bool,
     moves: bool,
-    /// Whether the RA vehicle drives, and how often it has begun to.
+    /// Whether the RA vehicle drives, and how often it has started to.
     drives: bool,
     drives_begun: u32,
 }
 
-/// Plays it on an interface.
+/// Runs it on an interface.
 pub(crate) async fn play(interface: &str) {
     let named = Interfaces::Only(vec![interface.to_owned()]);
     let interface = named.choose(Ip::V4).unwrap().remove(0);
@@ -119,7 +119,7 @@ impl RaVehicle {
             }
         }
         for message in self.rover.take_said() {
-            // A lost peer does not count.
+            // Sending to a lost peer may fail.
             let _ = self.node.send(now, &message);
         }
         self.tell();
@@ -132,7 +132,7 @@ impl RaVehicle {
         }
     }
 
-    /// Says what has become of the vehicle.
+    /// Prints changes of the vehicle's controller and motion.
     fn tell(&mut self) {
         let controller = self.rover.controller.map(|(id, _)| id);
         if controller != self.controller {
@@ -157,7 +157,7 @@ impl RaVehicle {
         }
     }
 
-    /// Another subsystem is there.
+    /// Starts to query and drive the JAUS vehicle when its subsystem appears.
     fn look_at(&mut self, now: Instant, subsystem: &Subsystem) {
         if subsystem.components().any(|(id, _)| id == DRIVER) && self.next_effort.is_none() {
             println!("listed {} {}", subsystem.id, subsystem.name);
@@ -166,7 +166,7 @@ impl RaVehicle {
         }
     }
 
-    /// What JAUS components answer.
+    /// Handles answers of JAUS components.
     fn hear(&mut self, now: Instant, message: &Message) {
         match (message.code, message.source) {
             (0x4402, POSE) => println!("{POSE} latitude"),

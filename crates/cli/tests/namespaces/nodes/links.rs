@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::roles::CARS;
 use jaus_test_kit::hosts::{TwoHosts, on_two_hosts};
 
-/// A caller on host 1 is answered by an echo that runs on host 0.
+/// A caller on host 1 gets an answer from an echo on host 0.
 fn answers(hosts: &TwoHosts, settings: &str, address: &str) {
     let caller = hosts.start_with(1, "caller", settings);
     assert_eq!(
@@ -90,7 +90,7 @@ fn nodes_that_know_addresses_need_neither_multicast_nor_broadcast() {
         }
         let _echo = hosts.start_with(0, "echo", "broadcast=off peer=10.213.77.2");
         answers(hosts, "broadcast=off peer=10.213.77.1", "10.213.77.1:3794");
-        // The caller moves; it still knows the other's address.
+        // The caller's address changes; it still knows the address of its peer.
         hosts.ip(1, &["address", "flush", "dev", "jaus0"]);
         hosts.ip(1, &["address", "add", "10.213.77.9/24", "dev", "jaus0"]);
         answers(hosts, "broadcast=off peer=10.213.77.1", "10.213.77.1:3794");
@@ -136,8 +136,8 @@ fn an_interface_is_used_as_soon_as_it_has_an_address() {
             hosts.ip(0, &["address", "flush", "dev", "jaus0"]);
             while follower.says("links at").contains(&address) {}
         }
-        // The changes come when the node has just looked: each would take almost the interval of
-        // its polling. Without it they take some 10 ms.
+        // The changes come right after the node has polled, so each would take almost a polling
+        // interval. With change notifications they take some 10 ms.
         let polled = 2 * ROUNDS as u32 * POLLING;
         assert!(started.elapsed() < polled / 2, "{:?}", started.elapsed());
     });

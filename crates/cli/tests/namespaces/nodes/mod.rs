@@ -92,7 +92,7 @@ fn what_comes_through_two_cables_is_delivered_once() {
     });
 }
 
-/// Not a test of its own: does nothing unless another test starts it in a role.
+/// Not a test by itself: does nothing unless another test starts it in a role.
 #[test]
 fn a_process_that_plays_a_node() {
     jaus_test_kit::hosts::play(async |role| match role {

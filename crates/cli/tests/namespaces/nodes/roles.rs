@@ -15,7 +15,7 @@ use jaus::wire::Priority;
 
 use jaus_test_kit::hosts::SETTINGS;
 
-/// The usual settings, but for those in the environment.
+/// The default settings, with the changes given in the environment.
 fn config(subsystem: u16) -> Config {
     let mut config = Config::new(subsystem, 1);
     let settings = std::env::var(SETTINGS).unwrap_or_default();
@@ -35,10 +35,10 @@ fn config(subsystem: u16) -> Config {
     config
 }
 
-/// Messages that the flood is made of.
+/// Number of messages in the flood.
 pub(crate) const FLOOD: usize = 2000;
 
-/// Answers every message, until it is killed.
+/// Echoes every message until killed.
 pub(crate) async fn echo() {
     let node = Node::start(config(101)).unwrap();
     let mut port = node.attach(33).unwrap();
@@ -50,7 +50,7 @@ pub(crate) async fn echo() {
     }
 }
 
-/// Says where it has links, each time that this changes.
+/// Prints the addresses of its links at every change.
 pub(crate) async fn follow() {
     let node = Node::start(config(101)).unwrap();
     let mut known = String::new();
@@ -89,7 +89,7 @@ pub(crate) async fn call() {
     node.shutdown().await;
 }
 
-/// Counts what comes, and says when the urgent message came.
+/// Counts received messages, and prints when the urgent one arrives.
 pub(crate) async fn sink() {
     let node = Node::start(config(101)).unwrap();
     let mut port = node.attach(33).unwrap();
@@ -109,7 +109,7 @@ pub(crate) async fn sink() {
     std::future::pending::<()>().await;
 }
 
-/// Sends far more than the network takes, and then something urgent.
+/// Sends far more than the network can carry, then an urgent message.
 pub(crate) async fn flood() {
     let node = Node::start(config(102)).unwrap();
     let port = node.attach(1).unwrap();
@@ -127,7 +127,7 @@ pub(crate) async fn flood() {
     std::future::pending::<()>().await;
 }
 
-/// Messages that an announcer sends.
+/// Number of messages that an announcer sends.
 pub(crate) const ANNOUNCEMENTS: u8 = 10;
 
 /// Prints the number of every announcement received.
@@ -140,7 +140,7 @@ pub(crate) async fn listen() {
     }
 }
 
-/// Announces a number to everyone, and then the next.
+/// Broadcasts consecutive numbers.
 pub(crate) async fn announce() {
     let node = Node::start(config(102)).unwrap();
     let port = node.attach(1).unwrap();
@@ -153,7 +153,7 @@ pub(crate) async fn announce() {
     std::future::pending::<()>().await;
 }
 
-/// A vehicle that offers the core services, until it is killed.
+/// A vehicle that offers the core services. Runs until killed.
 pub(crate) async fn vehicle() {
     let node = Node::start(config(101)).unwrap();
     let rover = Component::builder(Kind::Vehicle, "Rover")
@@ -162,7 +162,7 @@ pub(crate) async fn vehicle() {
     tell_changes(&rover).await;
 }
 
-/// An operator that looks for vehicles, until it is killed.
+/// An operator that looks for vehicles. Runs until killed.
 pub(crate) async fn operator() {
     let node = Node::start(config(102)).unwrap();
     let desk = Component::builder(Kind::OperatorControlUnit, "Desk")
@@ -171,7 +171,7 @@ pub(crate) async fn operator() {
     tell_changes(&desk).await;
 }
 
-/// Prints who is found, once its services are known, and who is lost.
+/// Prints each subsystem that is found, once its services are known, and each that is lost.
 async fn tell_changes(component: &Component) {
     let mut changes = component.watch();
     println!("\nstarted");
@@ -186,12 +186,13 @@ async fn tell_changes(component: &Component) {
     }
 }
 
-/// Octets of a datagram of the train: more than fit a frame.
+/// Octets per datagram of the batch: more than fit a frame.
 const CAR: usize = 3000;
-/// Datagrams of the train.
+/// Number of datagrams in the batch.
 pub(crate) const CARS: usize = 20;
 
-/// Sends a train of datagrams that do not fit a frame, and one that would if that has been learned.
+/// Sends a batch of datagrams that do not fit a frame, from which the link learns its segment
+/// limit, and then a batch of datagrams that fit.
 pub(crate) async fn train() {
     let mut link = UdpLink::open(&cable(), &udp::Settings::default()).unwrap();
     let mut transmit = Transmit {
@@ -214,7 +215,7 @@ pub(crate) async fn train() {
     std::future::pending::<()>().await;
 }
 
-/// Counts the datagrams of both trains.
+/// Counts the datagrams of both batches.
 pub(crate) async fn station() {
     let mut link = UdpLink::open(&cable(), &udp::Settings::default()).unwrap();
     println!("\nlistening on {}", link.local());

@@ -53,7 +53,7 @@ fn a_vehicle_that_is_terminated_stops_before_it_ends() {
     check_termination();
 }
 
-/// Not a test of its own: does nothing unless another test starts it in a role.
+/// Not a test by itself: does nothing unless another test starts it in a role.
 #[test]
 fn a_process_that_plays_a_node() {
     jaus_test_kit::hosts::play(async |role| match role {

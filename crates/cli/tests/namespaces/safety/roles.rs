@@ -22,23 +22,23 @@ use crate::testbed::TO_STRANGERS;
 use jaus_test_kit::hosts::SETTINGS;
 
 pub(crate) const VEHICLE: JausId = JausId::new(101, 1, 1);
-/// Where the node of the controller's host serves components.
+/// Where the node on the controller's host accepts local components.
 pub(crate) const LOCAL: &str = "127.0.0.1:37940";
-/// Components that show up once and vanish.
+/// Number of components that appear once and vanish.
 pub(crate) const STRANGERS: u16 = 600;
-/// How fast the vehicle is driven, in m/s: as fast as it can.
+/// Speed of the vehicle in m/s: its maximum.
 const SPEED: f64 = 2.0;
-/// Metres to the goal: more than the vehicle covers in any case.
+/// Distance to the goal in metres: more than the vehicle covers in any case.
 const FAR: f64 = 400.0;
-/// Between two efforts of the controller, and between two samples of the observer.
+/// Interval of the controller's efforts and of the observer's samples.
 const BEAT: Duration = Duration::from_millis(100);
-/// How long the vehicle may be looked for.
+/// Timeout of finding the vehicle.
 const SEARCH: Duration = Duration::from_secs(20);
 
-/// What the controller drives the vehicle with.
+/// The commands with which the controller drives the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Drive {
-    /// An effort, ten times a second.
+    /// An effort, ten times per second.
     Effort,
     /// One vector.
     Vector,
@@ -61,8 +61,8 @@ impl Drive {
     }
 }
 
-/// Takes control of the vehicle, drives it, and does not look at what becomes of its control. The
-/// settings say with what it drives, and whether it lives `behind-node`.
+/// Takes control of the vehicle, drives it, and ignores a loss of control. The settings name the
+/// kind of command, and say whether the controller is attached `behind-node`.
 pub(crate) async fn control() {
     let settings = std::env::var(SETTINGS).unwrap();
     let (drive, place) = settings.split_once(' ').unwrap();
@@ -95,7 +95,7 @@ pub(crate) async fn control() {
     std::future::pending::<()>().await;
 }
 
-/// Gives the orders that are given once.
+/// Sends the commands that are sent only once.
 async fn order(control: &Control, drive: Drive) {
     match drive {
         Drive::Effort => {}
@@ -153,10 +153,10 @@ fn list() -> SetElement {
     }
 }
 
-/// What the observer sees of the vehicle.
+/// One observation of the vehicle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sample {
-    /// Since the beginning of 1970.
+    /// Time since 1970-01-01.
     pub(crate) at: Duration,
     /// Position, in metres.
     pub(crate) x: f64,
@@ -187,13 +187,13 @@ impl Sample {
     }
 }
 
-/// The time since the beginning of 1970, the same for all processes.
+/// Time since 1970-01-01, the same for all processes.
 pub(crate) fn wall_clock() -> Duration {
     let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     since_1970.unwrap()
 }
 
-/// Queries the vehicle's pose, velocity and controller ten times a second.
+/// Queries the vehicle's pose, velocity and controller ten times per second.
 pub(crate) async fn observe() {
     let node = Node::start(Config::new(103, 1)).unwrap();
     let builder = Component::builder(Kind::OtherSubsystem, "Observer");
@@ -226,7 +226,7 @@ pub(crate) async fn observe() {
     }
 }
 
-/// Many components appear, each at its own address, and then stay silent.
+/// Many components appear, each at its own address, and then fall silent.
 pub(crate) async fn show_up() {
     const HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x22]);
     const IDENTIFICATION: Bytes = Bytes::from_static(&[0x00, 0x2B, 0x02]);

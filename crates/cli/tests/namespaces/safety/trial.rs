@@ -11,24 +11,24 @@ use jaus_test_kit::evidence::this_test;
 use jaus_test_kit::hosts::{Process, on_hosts};
 use jaus_test_kit::vehicle_process::VehicleProcess;
 
-/// What happens to the controller.
+/// The fault of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fault {
     /// kill -9.
     Killed,
-    /// kill -9, and it lives on the node of another process.
+    /// kill -9, while attached to the node of another process.
     KilledBehindNode,
-    /// kill -9 of the node that it lives on.
+    /// kill -9 of the node to which it is attached.
     NodeKilled,
-    /// kill -9, after many strangers have shown up and vanished.
+    /// kill -9, after many strangers have appeared and vanished.
     KilledAmongStrangers,
-    /// SIGSTOP, and later SIGCONT.
+    /// SIGSTOP, later SIGCONT.
     Suspended,
-    /// The same, attached to the node of another process, which keeps running.
+    /// SIGSTOP, later SIGCONT, while attached to the node of another process, which keeps running.
     SuspendedBehindNode,
-    /// Its cable is out at its own end, and later in again.
+    /// Its cable is pulled at its own end, and later reconnected.
     CutAtController,
-    /// Its cable is out at the vehicle's end, and later in again.
+    /// Its cable is pulled at the vehicle's end, and later reconnected.
     CutAtVehicle,
 }
 
@@ -51,25 +51,25 @@ impl fmt::Display for Fault {
     }
 }
 
-/// Faster than this is driven, in m/s.
+/// Speed above which the vehicle counts as driven, in m/s.
 const DRIVEN: f64 = 1.9;
-/// Slower than this is at rest, in m/s.
+/// Speed up to which the vehicle counts as at rest, in m/s.
 const REST: f64 = 0.01;
-/// What a vehicle at rest may seem to move, in metres.
+/// Apparent movement of a vehicle at rest, in metres.
 const STILL: f64 = 0.02;
-/// How long a vehicle may take until it is driven.
+/// Timeout until the vehicle is driven.
 const START: Duration = Duration::from_secs(15);
-/// How long a vehicle is watched after a fault, if it does not stop earlier.
+/// How long a vehicle is observed after a fault, if it does not stop earlier.
 const PATIENCE: Duration = Duration::from_secs(12);
-/// How long it must stay at rest, then and when the controller is back.
+/// How long it must stay at rest after the stop, and after the controller is back.
 const QUIET: Duration = Duration::from_secs(1);
 const BACK: Duration = Duration::from_secs(3);
-/// Control may last so long, with a second for a busy machine.
+/// Longest duration of control after a fault, with 1 s for a busy machine.
 const CONTROL: Duration = Duration::from_secs(5 + 1);
 
 impl Drive {
-    /// How long the vehicle may take to come to rest: until the setpoint ends, a second of braking,
-    /// and a second for a busy machine.
+    /// Longest time until the vehicle is at rest: until the setpoint expires, 1 s of braking, and 1
+    /// s for a busy machine.
     const fn limit(self) -> Duration {
         Duration::from_secs(match self {
             Self::Effort => 1 + 2,
@@ -79,7 +79,7 @@ impl Drive {
     }
 }
 
-/// Runs the cases of some faults at the same time, prints their rows of the table, and checks them.
+/// Runs one trial per fault in parallel, prints their rows of the table, and checks them.
 pub(crate) fn check(drive: Drive, faults: &[Fault]) {
     let beds = || faults.iter().map(|_| Testbed::new()).collect();
     on_hosts(beds, |beds: &Vec<Testbed>| {
@@ -98,7 +98,7 @@ pub(crate) fn check(drive: Drive, faults: &[Fault]) {
     });
 }
 
-/// A vehicle that is terminated while it is driven stops its drives before it ends.
+/// A vehicle that is terminated while driven stops its drives before it ends.
 pub(crate) fn check_termination() {
     on_hosts(Testbed::new, |bed| {
         let trial = Trial::start(bed, Drive::Effort, Fault::Killed);
@@ -112,8 +112,8 @@ struct Trial<'a> {
     drive: Drive,
     controller: Process,
     observer: Process,
-    /// The node that the controller lives on, if that is another process. It introduces itself in
-    /// the same words as a vehicle.
+    /// The node to which the controller is attached, if in another process. Its first output is the
+    /// same as a vehicle's.
     node: Option<VehicleProcess>,
     vehicle: VehicleProcess,
     samples: Vec<Sample>,
@@ -156,14 +156,14 @@ impl<'a> Trial<'a> {
         trial
     }
 
-    /// The next sample.
+    /// Waits for the next sample.
     fn look(&mut self) -> Sample {
         let sample = Sample::parse(&self.observer.says("sample"));
         self.samples.push(sample);
         sample
     }
 
-    /// Lets the fault happen, and watches the vehicle to its rest.
+    /// Causes the fault, and observes the vehicle until it is at rest.
     fn run(mut self, fault: Fault) -> Row {
         if fault == Fault::KilledAmongStrangers {
             let strangers = self.bed.start(Host::Strangers, "strangers", "");
@@ -192,7 +192,7 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Lets the controller go on, if it can.
+    /// Undoes the fault. Returns whether that is possible.
     fn undo(&self, fault: Fault) -> bool {
         match fault {
             Fault::Suspended | Fault::SuspendedBehindNode => self.controller.signal("CONT"),
@@ -206,7 +206,8 @@ impl<'a> Trial<'a> {
         true
     }
 
-    /// Watches until the vehicle is quiet and free, or for long enough; says when it was free.
+    /// Observes until the vehicle is at rest without a controller, or until the time limit. Returns
+    /// when control ended.
     fn watch(&mut self, fault: Duration) -> Option<Duration> {
         let mut free = None;
         let mut moved = fault;
@@ -245,7 +246,7 @@ impl<'a> Trial<'a> {
             drive: self.drive,
             fault,
             stopped: rest.map(|it| it.at - at),
-            // It drives in a straight line.
+            // It drives straight ahead.
             metres: before.distance(end),
             free: free.map(|it| it - at),
         }
@@ -256,7 +257,7 @@ impl<'a> Trial<'a> {
 struct Row {
     drive: Drive,
     fault: Fault,
-    /// From the fault to the first sample at rest, and on for good.
+    /// From the fault to the first sample from which on it stays at rest.
     stopped: Option<Duration>,
     metres: f64,
     /// From the fault to the first sample without a controller.

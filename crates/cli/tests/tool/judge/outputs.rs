@@ -8,7 +8,7 @@ use jaus::messages::core::{access_control, liveness};
 use crate::judge::peer::{Peer, free_port, network};
 use crate::support::run;
 
-/// A file of one test's own, removed at the end.
+/// A test's own file, removed when dropped.
 struct Paper(PathBuf);
 
 impl Paper {

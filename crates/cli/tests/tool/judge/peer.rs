@@ -22,16 +22,16 @@ use jaus::messages::core::{
 };
 use jaus::node::{Config, Node};
 
-/// Who the peers of these tests are.
+/// Id of the peers in these tests.
 pub(crate) const PEER: JausId = JausId::new(105, 1, 1);
 
-/// Any UDP port that is free just now.
+/// A UDP port that is free now.
 pub(crate) fn free_port() -> u16 {
     let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     socket.local_addr().unwrap().port()
 }
 
-/// Flags for a network of one test's own on the loopback interface; the last is the group.
+/// Flags for a test's own network on the loopback interface; the last is the group.
 pub(crate) fn network() -> Vec<String> {
     let group = format!("239.255.78.1:{}", free_port());
     ["--loopback", "--group", &group]
@@ -42,28 +42,28 @@ pub(crate) fn network() -> Vec<String> {
 /// A peer's message and its receiver; `None` is the sender of the query.
 type Answer = (Option<JausId>, Bytes);
 
-/// What a peer is to do.
+/// Configuration of a peer.
 #[derive(Default)]
 pub(crate) struct Peer {
     services: Vec<&'static str>,
-    /// Answers by the code of the request: the first to the first request, and so on; the last
-    /// one is given again and again.
+    /// Answers by the code of the request, in the order of the requests; the last one is repeated.
     answers: BTreeMap<u16, Vec<Vec<Answer>>>,
     delay: Duration,
     behaviour: Option<Behaviour>,
 }
 
-/// What a peer does with a message, before it looks for an answer of its list.
+/// Handles a message before the peer looks for a listed answer.
 pub(crate) type Behaviour = Box<dyn FnMut(&Received) -> Option<Bytes> + Send>;
 
-/// A peer on the network; gone when dropped.
+/// A peer on the network; stopped when dropped.
 pub(crate) struct Running {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Peer {
-    /// A peer that lists these services, and answers only what finds them out.
+    /// A peer that lists these services. By default it answers only discovery, and heartbeat
+    /// queries if it offers Liveness.
     pub(crate) fn offering(services: &[&'static str]) -> Self {
         let mut peer = Self::default();
         peer.services.extend(services);
@@ -72,32 +72,33 @@ impl Peer {
         peer
     }
 
-    /// Answers the next request of this kind so.
+    /// Adds the answer to the next request of this type.
     pub(crate) fn answers<Q: Message>(self, answer: &impl Message) -> Self {
         self.answers_octets(Q::CODE, answer.encode().unwrap())
     }
 
-    /// Answers the next request with this code so.
+    /// Adds the answer to the next request with this code.
     pub(crate) fn answers_octets(mut self, code: u16, octets: Bytes) -> Self {
         let answers = self.answers.entry(code).or_default();
         answers.push(vec![(None, octets)]);
         self
     }
 
-    /// Answers the next request of this kind to another component.
+    /// Adds the answer to the next request of this type, sent to another component.
     pub(crate) fn answers_to<Q: Message>(mut self, to: JausId, answer: &impl Message) -> Self {
         let answers = self.answers.entry(Q::CODE).or_default();
         answers.push(vec![(Some(to), answer.encode().unwrap())]);
         self
     }
 
-    /// Takes its time for everything that is not about who it is.
+    /// Delays the listed answers.
     pub(crate) fn late(mut self, delay: Duration) -> Self {
         self.delay = delay;
         self
     }
 
-    /// Does this with each message; what it does not answer is answered as by other peers.
+    /// Passes each message to `behaviour` first; messages that it does not answer are answered as
+    /// by other peers.
     pub(crate) fn behaves(
         mut self,
         behaviour: impl FnMut(&Received) -> Option<Bytes> + Send + 'static,
@@ -106,7 +107,7 @@ impl Peer {
         self
     }
 
-    /// Puts the peer on the loopback interface, into the group that the flags name.
+    /// Starts the peer on the loopback interface, in the group that the flags name.
     pub(crate) fn start(self, flags: &[String]) -> Running {
         let group: Group = flags.last().unwrap().parse().unwrap();
         let stop = Arc::new(AtomicBool::new(false));

@@ -24,7 +24,7 @@ fn a_service_of_the_ground_vehicle_passes_its_steps() {
     assert!(judged.contains("QueryStage is answered"), "{judged}");
 }
 
-/// Judges a component with these services, and returns the report: no step may fail.
+/// Judges a component with these services, and returns the report. No step may fail.
 fn judge(services: fn(Builder) -> Builder, arguments: &[&str]) -> String {
     let flags = network();
     let group: Group = flags.last().unwrap().parse().unwrap();

@@ -20,11 +20,11 @@ use jaus::messages::mobility::{
 use crate::judge::peer::{Peer, network};
 use crate::support::run;
 
-/// What a vehicle ignores of the rules.
+/// The rule that a vehicle violates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Ignores {
     Nothing,
-    /// It obeys every client, in control or not, before and after.
+    /// It obeys every client, in control or not, before and after control.
     Control,
     /// It drives in standby.
     Standby,
@@ -41,7 +41,7 @@ enum State {
     Emergency,
 }
 
-/// A vehicle that moves at once, and stops at once.
+/// A vehicle that starts and stops at once.
 struct Rover {
     ignores: Ignores,
     /// How long an effort is valid.
@@ -131,7 +131,7 @@ impl Rover {
     }
 }
 
-/// The verdicts of steps C1 to C5, and why steps failed.
+/// The verdicts of steps C1 to C5, and the reasons of failed steps.
 fn judge(ignores: Ignores, validity: Duration) -> (Vec<String>, String) {
     let flags = network();
     let mut rover = Rover::new(ignores, validity);
@@ -155,9 +155,9 @@ fn judge(ignores: Ignores, validity: Duration) -> (Vec<String>, String) {
     (verdicts.collect(), reasons.join("; "))
 }
 
-/// Shorter than the judge's rounds never are, as efforts expire in this stack.
+/// Efforts expire, as in this stack; the judge repeats them within this time.
 const EXPIRES: Duration = Duration::from_millis(500);
-/// Longer than a run.
+/// Efforts outlast the run.
 const LASTS: Duration = Duration::from_secs(3600);
 
 #[track_caller]

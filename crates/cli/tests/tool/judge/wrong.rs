@@ -23,7 +23,7 @@ use crate::support::run;
 /// The judge's second component.
 const FIRST: JausId = JausId::new(42, 2, 1);
 
-/// Judges a peer by one step and those that it rests on; gives the reason why it failed.
+/// Runs one step, with its prerequisites, against a peer. Returns the reason of the failure.
 #[track_caller]
 fn reason(step: &str, peer: Peer) -> String {
     reason_with(&["--only", step], step, peer)

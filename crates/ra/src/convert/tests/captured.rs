@@ -1,4 +1,4 @@
-//! Messages sent by OpenJAUS 3.3.1 with their expected meaning, and all messages of the capture, if
+//! Messages sent by OpenJAUS 3.3.1 with their expected meaning, and all messages of the capture if
 //! it is available.
 
 use super::*;

@@ -1,3 +1,5 @@
+//! Tests of message conversion, and their helpers.
+
 mod captured;
 mod differences;
 mod random;

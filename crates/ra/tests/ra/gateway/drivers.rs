@@ -16,8 +16,8 @@ use jaus_test_kit::rover::bytes;
 const GLOBAL: JausId = JausId::new(20, 1, 34);
 const LOCAL: JausId = JausId::new(20, 1, 44);
 
-/// What an RA driver is asked when a JAUS client asks its counterpart, and the client's answer when
-/// the driver has given its own.
+/// Sends a JAUS client's query to an RA driver, and the driver's report back. Returns the data of
+/// the query that reaches the driver, and the report that reaches the client.
 fn ask<R: jaus::codec::Message>(
     driver: JausId,
     query: &impl jaus::codec::Message,

@@ -35,7 +35,7 @@ fn says(world: &mut World, ra: usize, code: u16, hex: &str) {
     world.ra_says(ra, &Message::new(COMMANDER, RA_POSE, code, bytes(hex)));
 }
 
-/// Global poses, latitude and longitude, ten in a second: the rate, and then the query.
+/// Query for global poses, latitude and longitude, at 10 Hz: the rate comes first, then the query.
 const POSES: &str = "c0 09 0244 00 5802 02000000 0300";
 
 fn create(world: &mut World, ra: usize, hex: &str) -> Message {
@@ -50,7 +50,7 @@ fn create(world: &mut World, ra: usize, hex: &str) -> Message {
 fn reports_come_at_the_rate_until_the_event_is_cancelled() {
     let (mut world, ra) = world();
     let confirmed = create(&mut world, ra, POSES);
-    // The request, the report, the event, the rate, and that it is granted.
+    // Request, report, event, rate, and the response code for granted.
     assert_eq!(
         confirmed.data,
         bytes("01090244005802 00".replace(' ', "").as_str())
@@ -59,7 +59,7 @@ fn reports_come_at_the_rate_until_the_event_is_cancelled() {
     world.run(Duration::from_secs(5));
     let events = world.ra_heard(ra, 0x41F1);
     assert!((48..=52).contains(&events.len()), "{}", events.len());
-    // The event, the report, its own number, and the data of a ten-octet report.
+    // Event, report, sequence number, and the data of a ten-octet report.
     let first = &events[0].data;
     assert_eq!(
         (first[0], &first[1..3], first.len()),
@@ -82,7 +82,7 @@ fn an_event_that_is_asked_for_twice_is_one_and_an_update_changes_its_rate() {
     let (mut world, ra) = world();
     create(&mut world, ra, POSES);
     create(&mut world, ra, POSES);
-    // The same twice in a second.
+    // The same event, now twice per second.
     says(
         &mut world,
         ra,

@@ -51,7 +51,7 @@ fn rubbish_from_a_component_that_is_known_is_refused_and_counted() {
     let us = RaId::new(250, 1, 32, 1);
     // Every code with mostly invalid data.
     for code in 0..=u16::MAX {
-        // Messages that the nodes answer among themselves.
+        // The nodes answer these messages themselves.
         if matches!(code, 0x4B00..=0x4B03 | 0x4202 | 0x41F1) {
             continue;
         }

@@ -107,7 +107,7 @@ fn its_pose_is_told_when_it_is_asked_for() {
 #[test]
 fn a_service_connection_runs_at_its_rate_until_it_is_terminated() {
     let (mut world, ra, _) = world();
-    // Global poses, ten in a second.
+    // Global poses at 10 Hz.
     world.ra_says(ra, &says(RA_POSE, 0x0008, "02445802ff000000"));
     world.run(Duration::from_secs(5));
     let heard = std::mem::take(&mut world.ra[ra].heard);
@@ -150,7 +150,7 @@ fn it_is_driven_by_the_ra_component_that_controls_it() {
     world.ra_says(ra, &says(RA_DRIVER, 0x0004, ""));
     assert_eq!(world.jaus[rover].stack.standing().state, State::Ready);
     for _ in 0..10 {
-        // Half of the propulsion forward.
+        // Half of the propulsive effort, forward.
         world.ra_says(ra, &says(RA_DRIVER, 0x0405, "0100ff3f"));
         world.run(Duration::from_millis(100));
     }

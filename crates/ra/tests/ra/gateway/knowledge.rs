@@ -20,7 +20,7 @@ const JAUS_STORE: JausId = JausId::new(101, 1, 9);
 const RA_STORE: RaId = RaId::new(101, 1, 61, 9);
 const OPERATOR: RaId = RaId::new(30, 1, 32, 1);
 
-/// Create VKS Objects with this number of points, to be confirmed.
+/// Create VKS Objects with this number of points, with confirmation requested.
 fn create(points: u16) -> Bytes {
     let mut data = BytesMut::new();
     data.put_slice(&[0, 1, 77]);
@@ -73,7 +73,7 @@ fn a_jaus_client_uses_an_ra_store() {
     world.run(Duration::from_secs(10));
     let (ra_store, store) = (RaId::new(20, 1, 61, 1), JausId::new(20, 1, 61));
 
-    // A large message to it, and its answer to the sender.
+    // The operator sends a large message; the answer reaches the operator.
     let mut payload = BytesMut::from(&[0x20, 0x0A][..]);
     payload.put_slice(&create(1000));
     let stack = &mut world.jaus[operator].stack;
@@ -99,7 +99,7 @@ fn a_jaus_client_uses_an_ra_store() {
     let (from, payload) = told(&world).unwrap();
     assert_eq!((from, &payload[..2]), (store, &[0x20, 0x4A][..]));
 
-    // Its own query.
+    // A query by the operator.
     let query = QueryVksBounds {
         request_id: 5,
         feature_class_id: 65535,

@@ -1,5 +1,4 @@
-//! Lists of places: of a JAUS client at an RA waypoint driver, and of an RA client at a JAUS
-//! driver.
+//! Lists of places: a JAUS client's at an RA waypoint driver, and an RA client's at a JAUS driver.
 
 use std::time::Duration;
 
@@ -30,7 +29,7 @@ const RA_WAYPOINTS: RaId = RaId::new(101, 1, 45, 7);
 /// The RA operator.
 const COMMANDER: RaId = RaId::new(30, 1, 32, 1);
 
-/// The element with that number in a list of this length.
+/// Element `uid` of a list with `count` elements.
 fn element(uid: u16, count: u16, latitude: f64) -> ElementRec {
     let mut waypoint = SetGlobalWaypoint::default();
     waypoint.set_latitude_deg(latitude).unwrap();
@@ -55,7 +54,7 @@ fn execute(element_uid: Option<u16>, speed: f64) -> ExecuteList {
     execute
 }
 
-/// The codes of the messages that a component was sent without asking.
+/// Codes of the unsolicited messages that a component has received.
 fn told(world: &World, who: usize) -> Vec<u16> {
     let events = world.jaus[who].events.iter();
     let codes = events.filter_map(|event| match event {
@@ -65,7 +64,7 @@ fn told(world: &World, who: usize) -> Vec<u16> {
     codes.map(u16::from_le_bytes).collect()
 }
 
-/// An operator and an RA waypoint driver that have found each other.
+/// An operator and an RA waypoint driver that have discovered each other.
 fn driver_of_ra() -> (World, usize, usize) {
     let mut world = World::new(Settings::default());
     let parts = [(45, 1, "Waypoints")];
@@ -89,7 +88,7 @@ fn take_control(world: &mut World, operator: usize) {
     }
 }
 
-/// Three waypoints, one north of the other.
+/// Three waypoints in a line to the north.
 fn three_waypoints() -> SetElement {
     SetElement {
         element_list: (1..=3)
@@ -135,7 +134,7 @@ fn an_ra_waypoint_driver_gets_the_list_of_a_jaus_client_in_order_and_its_speed()
     let rover = world.ra[ra].rover.as_ref().unwrap();
     assert_eq!((rover.waypoints.len(), rover.speeds.len()), (3, 2));
 
-    // No client is left that could stop it.
+    // The client is gone and cannot stop the driver.
     world.jaus[operator].up = false;
     world.run(Duration::from_secs(20));
     let rover = world.ra[ra].rover.as_ref().unwrap();
@@ -222,7 +221,7 @@ fn an_ra_client_drives_a_jaus_vehicle_along_its_waypoints_and_changes_the_speed_
     world.ra_says(ra, &says(0x000D, "7f"));
     world.run(Duration::from_secs(1));
     world.ra_says(ra, &says(0x0004, ""));
-    // About 11 m from one to the next.
+    // About 11 m apart.
     for number in 0..3 {
         world.ra_says(ra, &waypoint(number, 52.5 + f64::from(number + 1) * 0.0001));
     }
@@ -242,7 +241,7 @@ fn an_ra_client_drives_a_jaus_vehicle_along_its_waypoints_and_changes_the_speed_
         let report: ReportActiveElement = world.ask(operator, VEHICLE, &query).unwrap();
         report.element_uid
     };
-    // 2 m/s, until it is on its way to the second.
+    // 2 m/s, until the vehicle is on its way to the second waypoint.
     world.ra_says(ra, &says(0x040A, "0d00"));
     assert_eq!(active(&mut world), 1);
     for _ in 0..30 {

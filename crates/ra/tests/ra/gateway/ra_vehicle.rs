@@ -23,7 +23,7 @@ const JAUS_DRIVER: JausId = JausId::new(20, 1, 33);
 const JAUS_POSE: JausId = JausId::new(20, 1, 38);
 const JAUS_VELOCITY: JausId = JausId::new(20, 1, 42);
 
-/// An operator and an RA vehicle that have found each other.
+/// An operator and an RA vehicle that have discovered each other.
 fn world() -> (World, usize, usize) {
     let mut world = World::new(Settings::default());
     let parts = [
@@ -143,7 +143,7 @@ fn a_subscription_runs_at_its_rate_over_one_service_connection() {
     assert!(rover.connections.is_empty(), "{:?}", rover.connections);
 }
 
-/// Takes control; what became of it.
+/// Takes control and sends Resume. Returns what the client learned about its control.
 fn take_control(world: &mut World, who: usize, authority: u8) -> Vec<ControlNews> {
     let (now, patience) = (world.now, Patience::default());
     let stack = &mut world.jaus[who].stack;
@@ -241,7 +241,7 @@ fn whoever_has_less_authority_than_its_controller_is_refused_and_a_controller_is
 {
     let (mut world, ra, operator) = world();
     let rover = world.ra[ra].rover.as_mut().unwrap();
-    // One of its own subsystem.
+    // A controller in its own subsystem.
     rover.controller = Some((jaus_ra::RaId::new(SUBSYSTEM, 1, 45, 1), 200));
     let news = take_control(&mut world, operator, 127);
     let refused = ControlNews::Refused(ControlRefused::InsufficientAuthority(127));

@@ -1,5 +1,5 @@
-//! Recorded traffic of OpenJAUS 3.3.1, with the gateway in the place of one peer: every request
-//! gets a usable answer.
+//! Recorded traffic of OpenJAUS 3.3.1, with the gateway in place of one peer: every request gets a
+//! usable answer.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -22,7 +22,7 @@ use redb::backends::InMemoryBackend;
 
 use crate::gateway::world::{World, address, stack};
 
-/// A recorded datagram: when, from where, to where.
+/// A recorded datagram: time, source, destination and content.
 struct Datagram {
     time: Duration,
     from: SocketAddr,
@@ -49,7 +49,7 @@ fn recorded(file: &str, port: u16) -> Vec<Datagram> {
     datagrams
 }
 
-/// What a datagram says: source, destination, code and data.
+/// The message in a datagram: source, destination, code and data.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Said {
     source: RaId,
@@ -81,7 +81,7 @@ fn vehicle(id: JausId) -> Stack {
     stack(id, Kind::Vehicle, "Rover", services).access_control(AccessControl::new())
 }
 
-/// Lets the datagrams come at their times.
+/// Delivers the datagrams to the gateway at their recorded times.
 fn replay(world: &mut World, datagrams: &[(Duration, Bytes)]) {
     let (Some((first, _)), start) = (datagrams.first(), world.now) else {
         panic!("nothing was recorded");
@@ -133,7 +133,7 @@ fn in_place_of_a_node_manager_every_question_of_the_other_is_answered() {
     }
 }
 
-/// What a Report Services lists: the types with the codes that they understand.
+/// The services in a Report Services: types, each with the codes that it accepts.
 fn services(mut data: Bytes) -> Vec<(u16, Vec<u16>)> {
     let commands = |data: &mut Bytes| {
         let code = |data: &mut Bytes| (data.get_u16_le(), data.get_u32_le()).0;
@@ -147,12 +147,12 @@ fn services(mut data: Bytes) -> Vec<(u16, Vec<u16>)> {
     listed.collect()
 }
 
-/// Whether a message answers the question with what OpenJAUS can list.
+/// Whether a message answers the question in a form that OpenJAUS can list.
 fn is_of_use(question: &Said, answer: &Said) -> bool {
     let (asked, data) = (&question.data, &answer.data);
     let back = (question.destination, question.source) == (answer.source, answer.destination);
     back && match (question.code, answer.code) {
-        // The same kind of name, and one that is not empty.
+        // The same kind of name, and not empty.
         (0x2B00, 0x4B00) => data.len() == 84 && data[0] == asked[0] && data[4] != 0,
         (0x2B01, 0x4B01) => lists_all_components(data),
         (0x2B03, 0x4B03) => lists_what_belongs_to(question.destination.component, data),
@@ -162,7 +162,7 @@ fn is_of_use(question: &Said, answer: &Said) -> bool {
     }
 }
 
-/// One node, with its manager, its communicator and both parts of the component.
+/// One node with its manager, its communicator and both parts of the component.
 fn lists_all_components(configuration: &Bytes) -> bool {
     let (nodes, listed) = configuration.split_at(3);
     let listed: BTreeSet<&[u8]> = listed.chunks(2).collect();
@@ -187,7 +187,7 @@ fn what_openjaus_asks_a_newcomer_is_answered_so_that_it_can_list_all_of_it() {
     let of_it = recorded.into_iter().filter(|it| it.from.ip() == openjaus);
     let of_it: Vec<_> = of_it.map(|it| (it.time, it.octets)).collect();
     let mut world = World::new(Settings::default());
-    // As the newcomer of the recording: a primitive driver and a knowledge store.
+    // Like the newcomer in the recording: a primitive driver and a knowledge store.
     let driver = Vehicle::new(Pilot::new(
         SkidSteer::new(SkidSteerConfig::default()),
         Frame::at(52.5, 13.4),
@@ -214,18 +214,20 @@ fn what_openjaus_asks_a_newcomer_is_answered_so_that_it_can_list_all_of_it() {
         );
     }
     assert_eq!(asked, 12);
-    // And its answers suffice to expose its components.
+    // Its answers suffice to expose its components.
     assert_eq!(world.attached(), ["10.1.1", "10.1.35", "250.1.1"]);
 }
 
-/// A message between components of one host, as it would come over the network to our vehicle.
+/// A message between components of one host, readdressed as if it came over the network to our
+/// vehicle.
 fn to_our_vehicle(octets: &Bytes) -> Option<(Said, Bytes)> {
     let mut framed = BytesMut::from(&b"JAUS01.0"[..]);
     framed.extend_from_slice(octets);
     let said = read(&framed.clone().freeze());
     let client = RaId::new(10, 1, 45, 1);
     let meant = said.source == client && [33, 38, 42].contains(&said.destination.component);
-    // The destination's instance, component, node and subsystem follow eight and four octets.
+    // The destination's instance, component, node and subsystem follow the eight octets of the
+    // framing and four of the header.
     framed[12] = 7;
     framed[15] = 101;
     meant.then(|| (said, framed.freeze()))
@@ -251,7 +253,7 @@ fn in_place_of_its_vehicle_openjaus_waypoint_driver_is_told_and_obeyed() {
     let said: Vec<Said> = world.sent.iter().map(read).collect();
     let of_code = |code: u16| said.iter().filter(move |it| it.code == code);
 
-    // The three reports and the status that it connects to.
+    // The three reports and the status to which it connects.
     for report in [0x4402_u16, 0x4404, 0x4405] {
         let confirmed = of_code(0x0009)
             .filter(|it| it.data[..2] == report.to_le_bytes())
@@ -259,7 +261,7 @@ fn in_place_of_its_vehicle_openjaus_waypoint_driver_is_told_and_obeyed() {
         assert!(confirmed, "{report:04X}h");
         assert!(of_code(report).count() > 100, "{report:04X}h");
     }
-    // Control, and then its efforts.
+    // Control first, then its efforts.
     let accepted = of_code(0x000F).any(|it| it.data[..] == [0]);
     assert_eq!(accepted, asked.contains_key(&0x000D));
     let efforts = asked.get(&0x0405).copied().unwrap_or_default();

@@ -21,8 +21,8 @@ fn millis(millis: u64) -> Duration {
 
 // An RA vehicle and its JAUS client.
 
-/// An RA driver of this type, and an operator who has found it. The operator keeps no lease of its
-/// own: it requests control by message, and renews that or not.
+/// An RA driver of this type and an operator that has discovered it. The operator has no automatic
+/// lease: it sends Request Control itself, and may stop renewing it.
 struct Drive {
     world: World,
     ra: usize,
@@ -76,8 +76,8 @@ impl Drive {
         self.world.run(millis(200));
     }
 
-    /// Sends an effort ten times a second; says whether it ever drove, and how long after the
-    /// beginning for the last time.
+    /// Sends an effort ten times per second. Returns the time from the start to the last motion, or
+    /// `None` if it never moved.
     fn push(&mut self, time: Duration) -> Option<Duration> {
         let begin = self.world.now;
         self.watch(time, |drive| {
@@ -91,7 +91,7 @@ impl Drive {
         })
     }
 
-    /// Looks ten times a second whether it drives.
+    /// Calls `act` and checks for motion ten times per second. Returns the time of the last motion.
     fn watch(&mut self, time: Duration, mut act: impl FnMut(&mut Self)) -> Option<Duration> {
         let begin = self.world.now;
         let mut last = None;
@@ -178,7 +178,7 @@ fn a_restarted_gateway_stops_a_driver_that_drives_on_without_a_controller() {
 fn a_component_that_is_being_reclaimed_initializes_and_is_not_available() {
     use jaus::messages::core::{QueryStatus, ReportStatus};
     let mut drive = Drive::of(33);
-    // It does not report control.
+    // It does not report its controller.
     drive.world.power = Power::Killed;
     drive.world.restart_gateway();
     while !drive.world.attached().contains(&"20.1.33".to_owned()) {
@@ -262,7 +262,7 @@ fn a_vector_lasts_as_long_as_its_client_shows_life() {
     vector.set_speed_m_per_s(2.0).unwrap();
     vector.set_heading_rad(0.75).unwrap();
     drive.tell(&vector);
-    // It is sent once. The client renews its control, and answers probes.
+    // The vector is sent once. The client renews its control and answers probes.
     for _ in 0..5 {
         drive.request_control();
         assert_eq!(drive.idle(millis(1000)), Some(millis(1000)));
@@ -372,7 +372,7 @@ struct Remote {
     ra: usize,
     vehicle: Vehicle,
     rover: usize,
-    /// Whether the RA client answers when it is asked for its status.
+    /// Whether the RA client answers status queries.
     answers: bool,
 }
 
@@ -402,7 +402,7 @@ impl Remote {
 
     fn says(&mut self, to: RaId, code: u16, hex: &str) {
         let message = Message::new(OPERATOR, to, code, bytes(hex));
-        // The gateway may not be there.
+        // The gateway may be absent.
         let _ = self.world.ra[self.ra].node.send(self.world.now, &message);
         self.world.settle();
     }
@@ -422,7 +422,7 @@ impl Remote {
         self.vehicle.motion().velocity.x.abs() > 0.02
     }
 
-    /// Lets time pass; when it moved for the last time.
+    /// Lets time pass. Returns the time of the last motion.
     fn watch(&mut self, time: Duration) -> Option<Duration> {
         let begin = self.world.now;
         let mut last = None;

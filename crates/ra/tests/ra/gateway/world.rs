@@ -1,6 +1,6 @@
-//! Two networks in virtual time with a gateway between them. Datagrams and messages arrive at once;
-//! time advances from timer to timer. The gateway can be killed, suspended, restarted, and cut off
-//! on either side.
+//! Two networks in virtual time with a gateway between them. Datagrams and messages arrive at once,
+//! and time advances from timer to timer. The gateway can be killed, suspended, restarted, and cut
+//! off on either side.
 
 use std::collections::BTreeSet;
 use std::net::SocketAddr;
@@ -21,7 +21,7 @@ use jaus_ra::{Message, RaId};
 use jaus_test_kit::rover::Rover;
 
 pub(crate) const GATEWAY: JausId = JausId::new(250, 1, 1);
-/// The gateway among RA systems: its commander.
+/// The gateway's commander among the RA systems.
 pub(crate) const COMMANDER: RaId = RaId::new(250, 1, 32, 1);
 pub(crate) const OPERATOR: JausId = JausId::new(42, 1, 1);
 
@@ -34,27 +34,27 @@ pub(crate) struct World {
     /// RA datagrams that the gateway has sent.
     pub(crate) sent: Vec<Bytes>,
     pub(crate) power: Power,
-    /// Whether no datagram passes between the gateway and RA systems.
+    /// Whether all datagrams between the gateway and RA systems are lost.
     pub(crate) ra_cut: bool,
-    /// Whether no message passes between the gateway and JAUS components.
+    /// Whether all messages between the gateway and JAUS components are lost.
     pub(crate) jaus_cut: bool,
 }
 
-/// Whether the gateway runs.
+/// State of the gateway's process.
 pub(crate) enum Power {
     On,
     Killed,
-    /// What comes meanwhile.
+    /// With everything that arrives meanwhile.
     Suspended(Vec<Arrival>),
 }
 
-/// What comes to the gateway.
+/// Input of the gateway.
 pub(crate) enum Arrival {
     Datagram(SocketAddr, Bytes),
     Message(Received),
 }
 
-/// An RA system: its node, what its components have received, and perhaps a vehicle.
+/// An RA system: its node, the messages that its components have received, and perhaps a vehicle.
 pub(crate) struct RaPeer {
     pub(crate) node: RaNode,
     pub(crate) address: SocketAddr,
@@ -63,7 +63,7 @@ pub(crate) struct RaPeer {
     pub(crate) seen: Vec<node::Event>,
 }
 
-/// A JAUS component, and what it was told.
+/// A JAUS component and its events.
 pub(crate) struct JausPeer {
     pub(crate) stack: Stack,
     pub(crate) events: Vec<Event>,
@@ -74,7 +74,7 @@ pub(crate) fn address(host: u8) -> SocketAddr {
     SocketAddr::from(([10, 77, 0, host], 3794))
 }
 
-/// A component as the tests like it.
+/// A component with Discovery, Transport, Liveness and these services.
 pub(crate) fn stack(id: JausId, kind: Kind, name: &str, services: Vec<Box<dyn Service>>) -> Stack {
     let profile = Profile::new(kind, name);
     let seed = id.to_u32().into();
@@ -106,7 +106,7 @@ impl World {
         }
     }
 
-    /// Starts a gateway with the same id in place of one that was killed.
+    /// Starts a gateway with the same id in place of a killed one.
     pub(crate) fn restart_gateway(&mut self) {
         self.gateway = Gateway::new(GATEWAY, Settings::default()).unwrap();
         self.attached.clear();
@@ -114,7 +114,7 @@ impl World {
         self.power = Power::On;
     }
 
-    /// Lets a suspended gateway go on, which finds all that has come meanwhile.
+    /// Resumes a suspended gateway, which then handles everything that arrived meanwhile.
     pub(crate) fn resume_gateway(&mut self) {
         let before = std::mem::replace(&mut self.power, Power::On);
         if let Power::Suspended(waiting) = before {
@@ -145,7 +145,7 @@ impl World {
         }
     }
 
-    /// Adds an RA system; its number.
+    /// Adds an RA system. Returns its index.
     pub(crate) fn add_ra(&mut self, subsystem: Subsystem, rover: Option<Rover>) -> usize {
         let mut node = RaNode::new(node::Settings::default());
         node.announce(self.now, subsystem).unwrap();
@@ -159,7 +159,7 @@ impl World {
         self.ra.len() - 1
     }
 
-    /// Adds a JAUS component; its number.
+    /// Adds a JAUS component. Returns its index.
     pub(crate) fn add_jaus(&mut self, mut stack: Stack) -> usize {
         stack.start(self.now);
         self.jaus.push(JausPeer {
@@ -170,13 +170,13 @@ impl World {
         self.jaus.len() - 1
     }
 
-    /// Adds an operator, 42.1.1.
+    /// Adds the operator 42.1.1.
     pub(crate) fn add_operator(&mut self) -> usize {
         let kind = Kind::OperatorControlUnit;
         self.add_jaus(stack(OPERATOR, kind, "Operator", Vec::new()))
     }
 
-    /// Lets time pass.
+    /// Advances time, and runs all timers that expire meanwhile.
     pub(crate) fn run(&mut self, time: Duration) {
         let end = self.now + time;
         self.settle();
@@ -215,7 +215,7 @@ impl World {
         }
     }
 
-    /// Carries what is on its way until nothing is.
+    /// Delivers datagrams and messages until none is in transit.
     pub(crate) fn settle(&mut self) {
         while self.carry_ra() | self.carry_jaus() {}
     }
@@ -251,7 +251,7 @@ impl World {
             let said = peer.rover.as_mut().map(Rover::take_said);
             for message in said.unwrap_or_default() {
                 moved = true;
-                // A lost peer does not count.
+                // Sending to a lost peer may fail.
                 let _ = peer.node.send(now, &message);
             }
             while let Some(transmit) = peer.node.poll_transmit() {
@@ -330,7 +330,7 @@ impl World {
         self.gateway.counters().get(counter)
     }
 
-    /// A JAUS component asks; the answer, if one comes within two seconds.
+    /// Sends a JAUS component's query. Returns the answer, if one arrives within 2 s.
     pub(crate) fn ask<R: jaus::codec::Message>(
         &mut self,
         who: usize,
@@ -369,7 +369,8 @@ impl World {
         self.settle();
     }
 
-    /// The messages with this code that RA components of a system have received, and forgets all.
+    /// Returns the messages with this code that the components of an RA system have received, and
+    /// clears all received messages.
     pub(crate) fn ra_heard(&mut self, who: usize, code: u16) -> Vec<Message> {
         let heard = std::mem::take(&mut self.ra[who].heard);
         heard.into_iter().filter(|it| it.code == code).collect()

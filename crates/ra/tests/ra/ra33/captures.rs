@@ -14,10 +14,10 @@ use jaus_view::{Capture, Datagram, Network};
 
 use super::{Definitions, through_both};
 
-/// Where OpenJAUS's node manager and its components talk, without any framing.
+/// Port between OpenJAUS's node manager and its components, used without framing.
 const INNER_PORT: u16 = 24629;
 
-/// The messages of a capture, code and data of each.
+/// The messages of a capture, each as code and data.
 fn messages(file: &Path) -> Vec<Bytes> {
     let mut capture = Capture::new(File::open(file).unwrap()).unwrap();
     let mut network = Network::new([judp::PORT, INNER_PORT]);
@@ -30,7 +30,7 @@ fn messages(file: &Path) -> Vec<Bytes> {
     messages
 }
 
-/// The message in a datagram: OpenJAUS sends one in each.
+/// The message in a datagram: OpenJAUS sends one per datagram.
 fn message(datagram: &Datagram<'_>) -> Option<Bytes> {
     let octets = Bytes::copy_from_slice(&datagram.payload);
     if datagram.source.port() != INNER_PORT && datagram.destination.port() != INNER_PORT {
@@ -57,7 +57,7 @@ fn every_recorded_message_is_read_and_written_again_by_both_codecs() {
             let (again, _) = through_both(&definition, &mended);
             assert_eq!(again, mended);
             if definition.generated.name == "ConfirmEventRequest" {
-                // Seven bits of its presence vector belong to no field.
+                // Seven bits of its presence vector have no field.
                 assert_eq!((message[2], mended[2]), (0xFF, 0x01));
                 assert_eq!(message[3..], mended[3..]);
             } else {

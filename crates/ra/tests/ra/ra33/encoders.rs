@@ -9,7 +9,7 @@ use super::{Definitions, octets, payload, through_both};
 
 const VECTORS: &str = include_str!("openjaus-3.3.1.tsv");
 
-/// Messages whose encoders do not work: this one copies what it should write over the text.
+/// Messages whose encoder is broken: this one copies its output over the text field.
 const BROKEN: [u16; 1] = [0x0A21];
 
 /// A row of the table.
@@ -71,7 +71,7 @@ fn every_message_was_compared_but_what_openjaus_cannot_write() {
     assert_eq!(missing, BROKEN);
 }
 
-/// Numbers are alike if they differ by no more than the last digits of a short decimal.
+/// Compares values; numbers may differ by about half a step of the coarsest scale.
 fn assert_same(name: &str, shown: &Value, given: &Value) {
     match (shown, given) {
         (Value::Number(shown), Value::Number(given)) => {

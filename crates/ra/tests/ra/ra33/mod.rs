@@ -1,5 +1,5 @@
 //! The definitions of the Reference Architecture against OpenJAUS 3.3.1: octets of its encoders,
-//! kept beside this file, and recorded traffic.
+//! stored beside this file, and recorded traffic.
 
 #![allow(
     clippy::unwrap_used,
@@ -25,7 +25,7 @@ struct Definition {
     dynamic: Arc<Message>,
 }
 
-/// The definitions, to be looked up by code.
+/// The definitions, found by code.
 struct Definitions(Library);
 
 impl Definitions {
@@ -44,7 +44,8 @@ impl Definitions {
     }
 }
 
-/// What both codecs make of a message, which is the same: its octets again, and its JSON view.
+/// Decodes and encodes a message with both codecs, and requires equal results. Returns the octets
+/// and the JSON view.
 fn through_both(definition: &Definition, payload: &Bytes) -> (Bytes, String) {
     let generated = (definition.generated.decode)(payload);
     let dynamic = jsidl::dynamic::decode(&definition.dynamic, payload);
@@ -60,7 +61,7 @@ fn through_both(definition: &Definition, payload: &Bytes) -> (Bytes, String) {
     (octets, view)
 }
 
-/// A message as it stands in a frame: code, then data.
+/// A message as in a frame: code, then data.
 fn payload(code: u16, data: &[u8]) -> Bytes {
     [&code.to_le_bytes()[..], data].concat().into()
 }

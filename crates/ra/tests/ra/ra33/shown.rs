@@ -1,5 +1,5 @@
 //! Display of frames with the older headers: by the Reference Architecture's definitions if the
-//! source is one of its ids, as before otherwise.
+//! source is one of its ids, and unchanged otherwise.
 
 use std::fs::File;
 
@@ -73,7 +73,7 @@ fn messages_of_junior_through_the_older_headers_are_not_taken_for_others() {
     }
 }
 
-/// A datagram "JAUS01.0" from 10.1.38.1 to 20.1.32.1.
+/// A "JAUS01.0" datagram from 10.1.38.1 to 20.1.32.1.
 fn datagram(code: u16, data: &[u8]) -> Bytes {
     let mut octets = b"JAUS01.0\x06\x02".to_vec();
     octets.extend(code.to_le_bytes());
@@ -118,7 +118,7 @@ fn what_does_not_fit_says_so_and_what_is_unknown_stays_octets() {
     );
     let unknown = shown(&datagram(0xD123, &[1, 2]));
     assert_eq!(unknown["octets"], "23d10102");
-    // A code of the services that the Reference Architecture does not have.
+    // A code of the JAUS services that the Reference Architecture lacks.
     let other = shown(&datagram(0x4407 + 0x20, &[1]));
     assert!(other.get("body").is_none(), "{other}");
 }

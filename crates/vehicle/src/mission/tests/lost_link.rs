@@ -68,7 +68,7 @@ fn a_client_that_is_dead_has_the_vehicle_drive_back_the_way_it_came() {
         ((2.0, 0.0), (0.0, 0.0))
     );
     assert_eq!(world.reason(), format!("returns: {WHY}"));
-    // If it is blocked on the return it stops: another attempt would drive to the destination.
+    // If it is blocked on the return, it stops: another attempt would drive to the destination.
     world.hand_over();
     world.set_back("blocked");
     assert_eq!(world.stage(), Stage::Failed);

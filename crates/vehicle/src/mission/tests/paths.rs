@@ -28,7 +28,7 @@ fn wide(width: f64) -> Vehicle {
     Vehicle { width, margin: 0.0 }
 }
 
-/// The distance of the path from the nearest centre of a closed cell.
+/// Distance of the path from the nearest centre of a closed cell.
 fn closest(path: &Path, terrain: &Terrain) -> f64 {
     let columns = usize::from(terrain.columns());
     let closed = terrain.cells().iter().enumerate();

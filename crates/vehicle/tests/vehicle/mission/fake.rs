@@ -22,10 +22,10 @@ use jaus_vehicle::motion::{Frame, Limits, Pilot, SkidSteer, SkidSteerConfig};
 use jaus_vehicle::parts::{Part, Planner, Slot};
 use tokio::task::JoinHandle;
 
-/// The side of the map, whose cells are 1 m wide and which begins at the origin.
+/// Side length of the map in cells of 1 m; its corner is the origin.
 const SIDE: u16 = 16;
 
-/// A stage that a test sets.
+/// A stage whose state the test sets.
 #[derive(Clone, Default)]
 pub(crate) struct Switch(Arc<Mutex<ReportStage>>);
 
@@ -50,7 +50,7 @@ impl Switch {
             let mut report = self.0.lock().unwrap();
             report.state = state;
             report.reason = reason.into();
-            // As if it commanded the next one; otherwise it has suspended motion.
+            // As if it commanded the next stage; without one, it has suspended motion.
             report.next_subsystem_id = 1;
         }
         component.changed::<QueryStage>().await;
@@ -63,7 +63,7 @@ pub(crate) struct Driver {
     pub(crate) stage: Switch,
 }
 
-/// The vehicle, and an operator.
+/// The vehicle and an operator.
 pub(crate) struct World {
     nodes: Vec<Node>,
     pub(crate) path: Driver,
@@ -79,7 +79,7 @@ pub(crate) struct World {
 }
 
 impl World {
-    /// Everything runs, and the operator has the planner under control.
+    /// Starts everything; the operator has control of the planner.
     pub(crate) async fn new(subsystem: u16) -> Self {
         let group = own_group();
         let start = |subsystem| Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
@@ -156,7 +156,7 @@ impl World {
         self.control.deliver(&to).await.unwrap();
     }
 
-    /// Waits until the mission is as wanted; gives the report.
+    /// Waits until the mission report satisfies the condition, and returns it.
     pub(crate) async fn until(&mut self, wanted: impl Fn(&ReportMission) -> bool) -> ReportMission {
         let peer = self.control.peer();
         let mut last = ReportMission::default();
@@ -185,7 +185,7 @@ impl World {
         self.until(|report| report.stage == stage).await
     }
 
-    /// The drivers get going, one after the other.
+    /// Makes the drivers active, one after the other.
     pub(crate) async fn engage(&mut self) {
         self.until_stage(MissionStage::PATH).await;
         self.until_ready().await;
@@ -201,7 +201,7 @@ impl World {
         }
     }
 
-    /// The path segment driver has been made ready by the planner and has its list.
+    /// Waits until the planner has made the path segment driver Ready and sent its list.
     async fn until_ready(&self) {
         let mut standing = self.path.component.watch_standing();
         let ready = standing.wait_for(|standing| standing.may_act());
@@ -226,7 +226,7 @@ impl World {
     }
 }
 
-/// The planner of a subsystem.
+/// Finds the planner of a subsystem.
 async fn planner_of(operator: &Component, subsystem: u16) -> JausId {
     let mut changes = operator.watch();
     loop {

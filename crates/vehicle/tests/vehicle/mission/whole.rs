@@ -1,4 +1,4 @@
-//! The whole chain with all real parts, each on its own node: the tester's mission, and its
+//! A complete mission with the real parts, each on its own node: the tester's mission, and its
 //! reaction to the death of a part.
 
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use jaus::node::{Config, Node};
 use jaus_vehicle::parts::tester::steps::{Step, all_pass};
 use jaus_vehicle::parts::tester::{Alone, MissionTest};
 
-/// A directory of a test's own, which goes with it.
+/// A test's own directory, removed when dropped.
 struct Directory(PathBuf);
 
 impl Directory {

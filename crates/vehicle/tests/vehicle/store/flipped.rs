@@ -1,5 +1,5 @@
-//! A single bit error on the disk: the store is refused or repaired, or the bit was unused. An
-//! opened store has exactly the written content.
+//! A single bit error on the disk: the store is refused or repaired, or the bit was unused. A store
+//! that opens has exactly the written content.
 
 use std::panic::catch_unwind;
 
@@ -8,18 +8,18 @@ use jaus_vehicle::world::World;
 use crate::store::torn::Disk;
 use crate::store::{chance, cuts, ledger};
 
-/// The last step before the store is closed.
+/// Number of steps before the store is closed.
 const LAST: u32 = 3;
 const PAGE: usize = 4096;
-/// The octets of the header and of its two commit slots.
+/// Octets of the header including its two commit slots.
 const HEADER: usize = 320;
 
-/// What has become of a store with a flipped bit.
+/// Result of opening a store with a flipped bit.
 #[derive(Debug, PartialEq)]
 enum Outcome {
     Refused,
     Unharmed,
-    /// It was opened, and holds something else than what was kept.
+    /// It opened with other content than was written.
     Changed,
 }
 
@@ -33,7 +33,7 @@ fn a_store_of_a_killed_process_with_a_flipped_bit_is_refused_or_unharmed() {
     flip_bits("killed", &image(false));
 }
 
-/// Flips each bit of the header, and some of every page that is used.
+/// Flips each bit of the header, and some bits of every used page.
 fn flip_bits(test: &str, image: &[u8]) {
     let mut chance = chance(test);
     let mut bits: Vec<usize> = (0..HEADER * 8).collect();
@@ -69,7 +69,7 @@ fn flip(image: &[u8], bit: usize) -> Outcome {
     }
 }
 
-/// A store with [`LAST`] steps, closed in order or not.
+/// A store with [`LAST`] steps, properly closed or not.
 fn image(is_closed: bool) -> Vec<u8> {
     let disk = Disk::new(Vec::new(), u64::MAX);
     let mut world = World::on(disk.clone()).unwrap();

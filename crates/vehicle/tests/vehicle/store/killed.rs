@@ -1,4 +1,4 @@
-//! A process that writes at full speed is killed at random instants.
+//! A process that writes at full speed is killed at random times.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -19,7 +19,7 @@ fn nothing_acknowledged_is_lost_when_the_writer_is_killed() {
     let file = directory.join("world.redb");
     let mut last = 0;
     for cut in 0..cuts(25) {
-        // The first instants are those in which the file is made or put right.
+        // The earliest kills hit the creation or repair of the file.
         let instant = Duration::from_micros(chance.number() % 60_000);
         let acknowledged = write_until_killed(&file, instant).max(last);
         let world = World::open(&file).unwrap_or_else(|error| panic!("cut {cut}: {error}"));
@@ -35,7 +35,7 @@ fn nothing_acknowledged_is_lost_when_the_writer_is_killed() {
     std::fs::remove_dir_all(&directory).unwrap();
 }
 
-/// The last step that the writer has acknowledged before it was killed, 0 if none.
+/// The last step that the writer acknowledged before it was killed; 0 if none.
 fn write_until_killed(file: &Path, instant: Duration) -> u32 {
     let this = std::env::current_exe().unwrap();
     let mut child = Command::new(this)

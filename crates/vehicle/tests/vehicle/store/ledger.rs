@@ -1,4 +1,4 @@
-//! Verifiable writes: each step is one write that changes objects, cells and a description, and the
+//! Verifiable writes: each step is one write that changes objects, cells and a description. The
 //! expected world after a step follows from its number.
 
 use bytes::Bytes;
@@ -7,14 +7,14 @@ use jaus_vehicle::world::{
     Window, World,
 };
 
-/// How many objects are there; older ones are removed.
+/// Number of objects kept; older ones are removed.
 const OBJECTS: u32 = 20;
-/// The side of the map, which has several tiles.
+/// Side length of the map, which has several tiles.
 const SIDE: u16 = 100;
 const MAP: MapId = MapId(1);
 const CLASS: u16 = 3;
 
-/// Makes the map if there is none.
+/// Creates the map if it is missing.
 pub(crate) fn begin(world: &mut World) {
     if world.rasters().is_empty() {
         let raster = Raster {
@@ -32,7 +32,7 @@ pub(crate) fn begin(world: &mut World) {
     }
 }
 
-/// Takes step `n`, the first of which is 1. Whether it was acknowledged.
+/// Takes step `n`, counted from 1. Returns whether it was acknowledged.
 pub(crate) fn step(world: &mut World, n: u32) -> bool {
     let object = Object {
         classes: vec![FeatureClass {
@@ -60,7 +60,7 @@ pub(crate) fn step(world: &mut World, n: u32) -> bool {
     world.apply(changes).is_ok()
 }
 
-/// The last step that is there. Panics if anything else is than what follows from it.
+/// The last step in the store. Panics if any content differs from that of this step.
 pub(crate) fn last_step(world: &World) -> u32 {
     let Some(description) = world.classes().get(&CLASS) else {
         assert!(world.objects().is_empty());
@@ -91,7 +91,7 @@ fn cells(world: &World) -> Vec<u8> {
         .expect("on the map")
 }
 
-/// The steps go around the map in this many windows, each overwritten a lap later.
+/// Number of windows on the map; each is overwritten one lap later.
 const LAP: u32 = 50;
 
 fn expected_cells(last: u32) -> Vec<u8> {
@@ -106,7 +106,7 @@ fn expected_cells(last: u32) -> Vec<u8> {
     cells
 }
 
-/// A window that crosses the borders of tiles.
+/// A window that crosses tile borders.
 fn window(n: u32) -> Window {
     let place = (n % LAP) as u16;
     Window {

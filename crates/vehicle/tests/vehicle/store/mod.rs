@@ -1,7 +1,7 @@
 //! Power cuts during writes: nothing acknowledged is lost, and the store can always be opened
 //! again.
 //!
-//! Some tens of cuts by default; `JAUS_POWER_CUTS=1000` makes 1000 of each kind, and `JAUS_SEED`
+//! Some tens of cuts by default. `JAUS_POWER_CUTS=1000` makes 1000 of each kind, and `JAUS_SEED`
 //! selects them.
 #![allow(
     clippy::unwrap_used,
@@ -18,12 +18,12 @@ mod torn;
 
 use jaus_test_kit::random::Random;
 
-/// How many cuts to make.
+/// Number of power cuts.
 fn cuts(usual: u32) -> u32 {
     number("JAUS_POWER_CUTS").map_or(usual, |cuts| cuts as u32)
 }
 
-/// Where chance begins: printed, so that a failure can be had again.
+/// The random generator; prints its seed, so that a failure can be reproduced.
 fn chance(test: &str) -> Random {
     let seed = number("JAUS_SEED").unwrap_or_else(|| u64::from(std::process::id()));
     println!("{test}: JAUS_SEED={seed}");

@@ -1,4 +1,4 @@
-//! A disk that loses power: of the unflushed writes it keeps some, complete or partial, in any
+//! A disk that loses power: it keeps some of the unflushed writes, complete or partial, in any
 //! order.
 
 use std::io;
@@ -9,7 +9,7 @@ use jaus_vehicle::world::{StorageBackend, World};
 
 use crate::store::{chance, cuts, ledger};
 
-/// What a disk writes whole.
+/// Unit of an atomic disk write.
 const SECTOR: usize = 512;
 
 #[test]
@@ -30,7 +30,7 @@ fn nothing_acknowledged_is_lost_when_the_power_fails() {
     println!("{last} steps");
 }
 
-/// A store that has been made whole: a file gets its name only then.
+/// A completely created store: a file gets its name only then.
 fn first_image() -> Vec<u8> {
     let disk = Disk::new(Vec::new(), u64::MAX);
     let mut world = World::on(disk.clone()).unwrap();
@@ -39,7 +39,7 @@ fn first_image() -> Vec<u8> {
     disk.seen()
 }
 
-/// The last step that was acknowledged.
+/// Writes until the power fails. Returns the last acknowledged step.
 fn write_until_cut(disk: &Disk, before: u32) -> u32 {
     // The power may fail during the repair.
     let Ok(mut world) = World::on(disk.clone()) else {
@@ -59,13 +59,13 @@ pub(crate) struct Disk(Arc<Mutex<State>>);
 
 #[derive(Debug)]
 struct State {
-    /// What reads see.
+    /// Content seen by reads.
     seen: Vec<u8>,
-    /// What is kept for certain.
+    /// Content that survives a power cut.
     kept: Vec<u8>,
-    /// What has been written since.
+    /// Writes since the last flush.
     unsure: Vec<Write>,
-    /// So many writes go through before the power fails.
+    /// Number of writes and flushes before the power fails.
     left: u64,
 }
 
@@ -85,12 +85,12 @@ impl Disk {
         })))
     }
 
-    /// What reads see.
+    /// Content seen by reads.
     pub(crate) fn seen(&self) -> Vec<u8> {
         self.0.lock().unwrap().seen.clone()
     }
 
-    /// What is found once there is power again.
+    /// Content after the power cut.
     fn after_the_cut(&self, chance: &mut Random) -> Vec<u8> {
         let mut state = self.0.lock().unwrap();
         let mut image = std::mem::take(&mut state.kept);
@@ -114,7 +114,7 @@ impl Disk {
     }
 }
 
-/// All of it, nothing, or some sectors.
+/// Writes all sectors, none, or a random selection.
 fn tear(image: &mut Vec<u8>, offset: usize, octets: &[u8], chance: &mut Random) {
     let kind = chance.below(3);
     let mut at = offset;
@@ -173,7 +173,7 @@ impl StorageBackend for Disk {
     fn write(&self, offset: u64, data: &[u8]) -> io::Result<()> {
         let mut state = self.0.lock().unwrap();
         let power = state.spend();
-        // The write during the power failure may be torn too.
+        // The write during the power failure may also be torn.
         state.unsure.push(Write::Octets(offset, data.to_vec()));
         power?;
         let begin = offset as usize;

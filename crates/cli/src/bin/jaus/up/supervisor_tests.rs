@@ -196,7 +196,7 @@ fn what_waits_to_be_started_again_is_not_started_once_all_is_to_end() {
     assert_eq!(bench.orders(), [Order::Terminate(0)]);
     bench.exit(0, Exit::Status(0));
     assert!(bench.supervisor.is_over() && bench.orders().is_empty());
-    // Nor does a part start that was due at the same moment.
+    // A part that was due at the same moment does not start either.
     let mut bench = Bench::new(&[Restart::Always]);
     bench.supervisor.handle_timeout(bench.now);
     bench.supervisor.stop(bench.now);

@@ -97,7 +97,7 @@ fn a_program_that_is_not_there_is_told_with_where_it_was_looked_for() {
     }
     let said = only_mistake("[parts.a]\nprogram = \"./planner\"");
     assert!(said.contains("/etc/jaus/./planner"), "{said}");
-    // A file without execute permission is no program.
+    // A file without execute permission is not a program.
     let said = only_mistake("[parts.a]\nprogram = \"/etc/passwd\"");
     assert!(said.contains("/etc/passwd"), "{said}");
 }

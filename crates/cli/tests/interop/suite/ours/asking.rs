@@ -7,12 +7,12 @@ use super::{Outcome, RoleArguments};
 
 /// The query for the forward velocity alone, which every vehicle reports.
 pub(super) const FORWARD: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
-/// Reports in a row that make a subscription.
+/// Consecutive reports that prove a subscription.
 const ENOUGH: usize = 10;
-/// Reports in a second.
+/// Report rate.
 const HZ: f64 = 10.0;
 
-/// Subscribes to the velocity, and hears enough of it.
+/// Subscribes to the velocity and waits for [`ENOUGH`] reports.
 pub(super) async fn periodic(arguments: &RoleArguments) -> Outcome {
     let (_node, component) = arguments.component()?;
     let mut reports = component
@@ -33,11 +33,11 @@ pub(super) async fn periodic(arguments: &RoleArguments) -> Outcome {
     Ok(())
 }
 
-/// Tells each report of the velocity, for ever.
+/// Prints each velocity report until killed.
 pub(super) async fn keep(arguments: &RoleArguments) -> Outcome {
     let (_node, component) = arguments.component()?;
     loop {
-        // Retry if it has not started yet.
+        // Retry if the peer has not started yet.
         let subscribed = component
             .subscribe::<ReportVelocityState, _>(arguments.sensor(), &FORWARD, When::hz(HZ))
             .await;

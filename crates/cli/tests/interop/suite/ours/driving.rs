@@ -10,22 +10,22 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::asking::FORWARD;
 use super::{Outcome, RoleArguments, operator};
 
-/// Less and more authority.
+/// Authority codes of the two clients, lower first.
 const AUTHORITIES: [u8; 2] = [100, 200];
-/// Between two commands.
+/// Interval of the commands.
 const BEAT: Duration = Duration::from_millis(100);
-/// How hard it is pushed, in percent.
+/// Wrench effort, in percent.
 const EFFORT: f64 = 60.0;
-/// What is motion, in metres a second.
+/// Least speed that counts as motion, in m/s.
 const MOTION: f64 = 0.1;
-/// Different velocities that show that changes are reported.
+/// Number of different velocities that proves reports on change.
 const CHANGES: usize = 3;
 
 fn in_words(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
-/// Takes control, loses it to somebody of more authority, who then gives it back.
+/// Takes control, loses it to a client with more authority, which then releases it.
 pub(super) async fn control(arguments: &RoleArguments) -> Outcome {
     let (node, weak) = arguments.component()?;
     let strong = operator(&node, arguments.colleague())?;
@@ -75,7 +75,7 @@ async fn controller_is(
     ))
 }
 
-/// Takes control, has it move, and stops it.
+/// Takes control, moves the vehicle, and stops it.
 pub(super) async fn drive(arguments: &RoleArguments) -> Outcome {
     let (_node, component) = arguments.component()?;
     let control = ready(&component, arguments).await?;
@@ -95,7 +95,7 @@ pub(super) async fn drive(arguments: &RoleArguments) -> Outcome {
     stop(control).await
 }
 
-/// Subscribes to the velocity on change, has it change, and hears of that.
+/// Subscribes to the velocity on change, changes it, and waits for the reports.
 pub(super) async fn on_change(arguments: &RoleArguments) -> Outcome {
     let (_node, component) = arguments.component()?;
     let mut reports = component
@@ -117,7 +117,7 @@ pub(super) async fn on_change(arguments: &RoleArguments) -> Outcome {
     stop(control).await
 }
 
-/// Control over a vehicle that obeys.
+/// Takes control of the vehicle and makes it Ready.
 async fn ready(component: &Component, arguments: &RoleArguments) -> Result<Control, String> {
     let control = component
         .control(arguments.other, AUTHORITIES[0])
@@ -127,7 +127,7 @@ async fn ready(component: &Component, arguments: &RoleArguments) -> Result<Contr
     Ok(control)
 }
 
-/// Pushes it forward until something has happened.
+/// Sends forward effort until `happened` completes.
 async fn push_until(control: &Control, happened: impl Future<Output = Outcome>) -> Outcome {
     let mut effort = SetWrenchEffort::default();
     effort
@@ -144,7 +144,7 @@ async fn push_until(control: &Control, happened: impl Future<Output = Outcome>) 
     }
 }
 
-/// Stops it, and gives control back.
+/// Stops the vehicle and releases control.
 async fn stop(control: Control) -> Outcome {
     let mut effort = SetWrenchEffort::default();
     effort

@@ -13,17 +13,17 @@ use super::{Outcome, RoleArguments};
 /// The code of a test message: user-defined (AS5710 leaves D000h and above to users), so that no
 /// service acts on it.
 const TEST: u16 = 0xD7F0;
-/// Octets of the message that makes each side known to the other.
+/// Size of the message by which both sides learn each other's address, in octets.
 const GREETING: usize = 16;
-/// After this long without an answer, what may have been lost is sent again.
+/// Time without an answer after which a possibly lost message is sent again.
 const AGAIN: Duration = Duration::from_secs(3);
-/// Between two calls of everybody, and the words: Query Identification of the subsystem.
+/// Interval of the broadcasts and their content: Query Identification of the subsystem.
 const CALL: Duration = Duration::from_secs(2);
 const WHO: [u8; 3] = [0x00, 0x2B, 2];
-/// Between two messages of [`keep`].
+/// Interval of the messages of [`keep`].
 const BEAT: Duration = Duration::from_millis(200);
 
-/// A test message: its code, and octets that are never the same in two packets.
+/// A test message: its code, and octets that differ from packet to packet.
 fn test(size: usize) -> Bytes {
     let octet = |index: usize| (index.wrapping_mul(7) + index / 251) as u8;
     let mut message: Vec<u8> = (0..size).map(octet).collect();
@@ -31,7 +31,7 @@ fn test(size: usize) -> Bytes {
     message.into()
 }
 
-/// Sends a message, gets it back as it was, and takes leave.
+/// Sends a message, expects it back unchanged, and shuts the node down.
 pub(super) async fn send(arguments: &RoleArguments) -> Outcome {
     let (node, port) = open(arguments)?;
     let outcome = there_and_back(port, arguments).await;
@@ -61,7 +61,7 @@ async fn there_and_back(mut port: Port, arguments: &RoleArguments) -> Outcome {
     }
 }
 
-/// Has messages come back again and again, and tells of each.
+/// Sends a message again and again, and prints each echo.
 pub(super) async fn keep(arguments: &RoleArguments) -> Outcome {
     let (_node, mut port) = open(arguments)?;
     let message = test(GREETING);
@@ -78,8 +78,8 @@ pub(super) async fn keep(arguments: &RoleArguments) -> Outcome {
     }
 }
 
-/// Sends every test message back, acknowledged. Calls everybody now and then, as discovery does, so
-/// that who calls nobody knows where we are.
+/// Echoes every test message, acknowledged. Broadcasts a query from time to time, as discovery
+/// does, so that a peer that never broadcasts learns our address.
 pub(super) async fn echo(arguments: &RoleArguments) -> Outcome {
     let everywhere = "0.0.0.0".parse().map_err(|error| format!("{error}"))?;
     let node = Node::start(arguments.config()?.tcp_listen(everywhere));
@@ -108,7 +108,7 @@ pub(super) async fn echo(arguments: &RoleArguments) -> Outcome {
             acknowledge: true,
             ..Outgoing::new(port.id(), source, message.payload)
         };
-        // A late answer is ignored.
+        // A failed echo is ignored.
         let _ = port.send(back);
     }
 }
@@ -128,7 +128,8 @@ fn open(arguments: &RoleArguments) -> Result<(Node, Port), String> {
     Ok((node, port))
 }
 
-/// Makes both known to each other, so that what is large does not go to everybody.
+/// Exchanges a small message, so that both sides know each other's address and large messages are
+/// not multicast.
 async fn greet(port: &mut Port, arguments: &RoleArguments) -> Outcome {
     let greeting = test(GREETING);
     loop {
@@ -147,7 +148,7 @@ async fn deliver(port: &Port, arguments: &RoleArguments, message: Bytes) -> Outc
         .map_err(|error| error.to_string())
 }
 
-/// Waits until the message has come back, and nothing else of its size.
+/// Waits for the message to come back; another one of its size is an error.
 async fn returns(port: &mut Port, arguments: &RoleArguments, message: &Bytes) -> Outcome {
     while let Some(received) = port.recv().await {
         if received.source != arguments.other || received.payload.len() != message.len() {

@@ -1,5 +1,5 @@
 //! Actions of this project's side for which the tool `jaus` has no command: roles in which this
-//! binary is restarted, over the library's public API. `ours.toml` lists them.
+//! binary is restarted, using the library's public API. `ours.toml` lists them.
 
 mod asking;
 mod driving;
@@ -14,31 +14,31 @@ use jaus::node::{Config, Node};
 
 use crate::suite::scripted;
 
-/// Says what went wrong, in a line.
+/// Result of a role, with the failure in one line.
 pub(crate) type Outcome = Result<(), String>;
 
-/// Arguments of a role on the command line: `KEY=VALUE` each.
+/// Arguments of a role on the command line, each `KEY=VALUE`.
 #[derive(Debug, Clone)]
 pub(crate) struct RoleArguments {
-    /// Who we are.
+    /// Own id.
     pub(crate) id: JausId,
-    /// Whom to speak to.
+    /// Id of the other party.
     pub(crate) other: JausId,
-    /// The component that reports the velocity, if it is a different one.
+    /// The component that reports the velocity, if different.
     sensor: Option<JausId>,
-    /// An address: of the other for ours, of its own for a scripted peer.
+    /// An address: the other party's for our roles, its own for a scripted peer.
     pub(crate) address: String,
-    /// The octets of a message.
+    /// Size of a message, in octets.
     pub(crate) size: usize,
-    /// How long it may take.
+    /// Timeout.
     pub(crate) within: Duration,
-    /// How messages go: `udp`, `unacknowledged` or `tcp`.
+    /// Transport: `udp`, `unacknowledged` or `tcp`.
     pub(crate) by: String,
-    /// What the other needs of a node: settings as in a file.
+    /// Node settings that the other party requires, as TOML.
     needs: String,
 }
 
-/// Plays the role that the arguments name: one of ours, or `PEER PART` of a scripted peer.
+/// Plays the role named by the arguments: one of ours, or `PEER PART` of a scripted peer.
 pub(crate) fn play(arguments: &[String]) -> ExitCode {
     let outcome = match arguments {
         [scripted, peer, part, rest @ ..] if scripted == "scripted" => {
@@ -74,7 +74,7 @@ async fn play_within(arguments: &[String]) -> Outcome {
             "control" => driving::control(&arguments).await,
             "drive" => driving::drive(&arguments).await,
             "large" => large::send(&arguments).await,
-            // These go on until they are killed.
+            // These run until they are killed.
             "keep" => return Some(asking::keep(&arguments).await),
             "keep-echo" => return Some(large::keep(&arguments).await),
             "echo" => return Some(large::echo(&arguments).await),
@@ -123,18 +123,18 @@ impl RoleArguments {
         Ok(read)
     }
 
-    /// Another component on the same node.
+    /// Id of another component on the same node.
     pub(crate) fn colleague(&self) -> JausId {
         let (subsystem, node) = (self.id.subsystem(), self.id.node());
         JausId::new(subsystem, node, self.id.component() + 1)
     }
 
-    /// Who tells the velocity.
+    /// The component that reports the velocity.
     fn sensor(&self) -> JausId {
         self.sensor.unwrap_or(self.other)
     }
 
-    /// A node as it is by default, but for what the other needs.
+    /// The default node settings, with those that the other party requires.
     fn config(&self) -> Result<Config, String> {
         let needed = toml::from_str(&self.needs);
         let mut config: Config = needed.map_err(|error| format!("{}: {error}", self.needs))?;
@@ -142,7 +142,7 @@ impl RoleArguments {
         Ok(config.or_any_free_port())
     }
 
-    /// A node with a component without own services.
+    /// A node with a component without services of its own.
     fn component(&self) -> Result<(Node, Component), String> {
         let node = Node::start(self.config()?).map_err(|error| error.to_string())?;
         let component = operator(&node, self.id)?;
@@ -150,7 +150,7 @@ impl RoleArguments {
     }
 }
 
-/// A component without own services.
+/// A component without services of its own.
 fn operator(node: &Node, id: JausId) -> Result<Component, String> {
     Component::builder(Kind::OperatorControlUnit, "Interoperability")
         .attach(node, id.component())

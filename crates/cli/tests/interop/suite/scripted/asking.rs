@@ -9,22 +9,22 @@ use super::body;
 use super::speaker::Speaker;
 use super::vehicle::SERVICES;
 
-/// After this long without an answer it asks again.
+/// Time without an answer after which a query is repeated.
 const AGAIN: Duration = Duration::from_millis(500);
-/// Between two commands.
+/// Interval of the commands.
 const BEAT: Duration = Duration::from_millis(100);
-/// Between two looks at its events, and at its control.
+/// Intervals of checking its events and renewing control.
 const UPKEEP: Duration = Duration::from_secs(5);
 const RENEWAL: Duration = Duration::from_millis(1250);
-/// Reports in a row that make a subscription, and changes that make one on change.
+/// Consecutive reports that prove a subscription, and changes that prove one on change.
 const ENOUGH: usize = 10;
 const CHANGES: usize = 3;
-/// Reports in a second.
+/// Report rate.
 const HZ: f64 = 10.0;
-/// Metres a second that are motion, and the push for it in percent.
+/// Least speed that counts as motion, in m/s, and the effort for it in percent.
 const MOTION: f64 = 0.1;
 const PUSH: f64 = 60.0;
-/// The authority of the judging tool, and a little more.
+/// The judging tool's authority code, and the next higher one.
 const AUTHORITIES: [u8; 2] = [127, 128];
 /// The status of a component that accepts commands.
 const READY: u8 = 1;
@@ -39,12 +39,13 @@ pub(super) struct Asker {
 }
 
 impl Asker {
-    /// Says something until there is an answer that will do, and gives what it was taken for.
+    /// Repeats a message until `take` accepts an answer, and returns its value.
     fn ask<T>(&mut self, message: &[u8], take: impl Fn(&[u8]) -> Option<T>) -> Result<T, String> {
         self.ask_from(self.other, message, take)
     }
 
-    /// The same to another component, or broadcast; only the other's answers count.
+    /// The same for a message to another component or a broadcast; only the other party's answers
+    /// count.
     fn ask_from<T>(
         &mut self,
         whom: JausId,
@@ -61,7 +62,8 @@ impl Asker {
         Err(format!("{code:04X}h was not answered"))
     }
 
-    /// Waits for something of the other; answers its questions about us meanwhile.
+    /// Waits for a message of the other party that `take` accepts; answers its identification
+    /// queries meanwhile.
     fn wait<T>(&mut self, time: Duration, take: impl Fn(&[u8]) -> Option<T>) -> Option<T> {
         let deadline = Instant::now() + time;
         loop {
@@ -85,7 +87,7 @@ impl Asker {
         self.speaker.say(to, &report);
     }
 
-    /// Calls everybody, and asks who answers for its components and services.
+    /// Broadcasts Query Identification, then queries the other party's configuration and services.
     pub(super) fn discover(&mut self) -> Result<(), String> {
         let who = body::message(body::QUERY_IDENTIFICATION, &[&[2]]);
         self.ask_from(
@@ -104,18 +106,18 @@ impl Asker {
         let list = [1, self.other.node(), 1, self.other.component()];
         let services = body::message(body::QUERY_SERVICES, &[&list]);
         let report = self.ask(&services, answer_to(body::QUERY_SERVICES))?;
-        // The answer contains the names unchanged.
+        // The answer contains the service names as plain text.
         println!("{}", String::from_utf8_lossy(&report));
         Ok(())
     }
 
-    /// Asks for the velocity.
+    /// Queries the velocity.
     pub(super) fn query(&mut self) -> Result<f64, String> {
         let report = self.ask(&FORWARD, answer_to(body::QUERY_VELOCITY))?;
         body::velocity_in(&report).ok_or("a report without the velocity".to_owned())
     }
 
-    /// Creates an event for the velocity; gives its number.
+    /// Creates an event for the velocity. Returns its id.
     fn subscribe(&mut self, hz: Option<f64>) -> Result<u8, String> {
         let create = body::create_event(1, hz, &FORWARD);
         self.ask(&create, |answer| match answer {
@@ -141,7 +143,7 @@ impl Asker {
         })
     }
 
-    /// Subscribes to the velocity at a rate, and expects enough reports.
+    /// Subscribes to the velocity at a rate, and expects [`ENOUGH`] reports.
     pub(super) fn periodic(&mut self) -> Result<(), String> {
         let id = self.subscribe(Some(HZ))?;
         for number in 0..ENOUGH {
@@ -172,7 +174,7 @@ impl Asker {
         }
     }
 
-    /// Asks for the event by its number; creates it again if it is not in the answer.
+    /// Queries the event by its id; creates it again if it is not listed.
     fn look_after_events(&mut self) {
         let query = body::message(body::QUERY_EVENTS, &[&[2, 0]]);
         self.speaker.say(self.other, &query);
@@ -200,7 +202,7 @@ impl Asker {
         self.ask(&release, is_rejected)
     }
 
-    /// Takes control, loses it to a colleague of more authority, who gives it back.
+    /// Takes control, loses it to a second client with more authority, which releases it.
     pub(super) fn control(&mut self, colleague: &mut Self) -> Result<(), String> {
         self.request(AUTHORITIES[0])?;
         colleague.request(AUTHORITIES[1])?;
@@ -218,7 +220,7 @@ impl Asker {
         ))
     }
 
-    /// Takes control, has it move, and stops it.
+    /// Takes control, moves the vehicle, and stops it.
     pub(super) fn drive(&mut self) -> Result<(), String> {
         self.make_ready()?;
         self.push_until(|asker| Ok(asker.query()? > MOTION))?;
@@ -255,7 +257,7 @@ impl Asker {
         Err("it was told to resume, and is not ready".to_owned())
     }
 
-    /// Pushes it forward until something is so; renews control as it goes.
+    /// Sends forward effort until the condition holds; renews control meanwhile.
     fn push_until(
         &mut self,
         mut is_so: impl FnMut(&mut Self) -> Result<bool, String>,
@@ -283,12 +285,12 @@ impl Asker {
     }
 }
 
-/// Takes the report that answers a query.
+/// Accepts the report that answers a query.
 fn answer_to(query: u16) -> impl Fn(&[u8]) -> Option<Vec<u8>> {
     move |answer| (body::code(answer)? == body::report(query)).then(|| answer.to_vec())
 }
 
-/// Takes the response code of Confirm Control.
+/// Accepts Confirm Control and returns its response code.
 fn answer_to_request(answer: &[u8]) -> Option<u8> {
     (body::code(answer)? == body::CONFIRM_CONTROL)
         .then(|| answer.get(2).copied())

@@ -27,49 +27,49 @@ pub(super) const QUERY_SERVICES: u16 = 0x2B03;
 pub(super) const EVENT: u16 = 0x41F1;
 pub(super) const TEST: u16 = 0xD7F0;
 
-/// The report that answers a query.
+/// Code of the report that answers a query.
 pub(super) const fn report(query: u16) -> u16 {
     query + 0x2000
 }
 
-/// Full scale of Set Wrench Effort: 100 percent and as much the other way.
+/// Full scale of Set Wrench Effort: ±100 percent.
 const EFFORT: f64 = 100.0;
-/// The velocity that 0 stands for, and the step.
+/// The velocity encoded as 0, and the step.
 const SLOWEST: f64 = -327.68;
 const STEP: f64 = 655.35 / u32::MAX as f64;
 
-/// A message: its code, and what is in it.
+/// A message: its code, then its fields.
 pub(super) fn message(code: u16, parts: &[&[u8]]) -> Vec<u8> {
     let mut message = code.to_le_bytes().to_vec();
     parts.iter().for_each(|part| message.extend(*part));
     message
 }
 
-/// The code of a message, if it has one.
+/// The code of a message, if there is one.
 pub(super) fn code(message: &[u8]) -> Option<u16> {
     Some(u16::from_le_bytes(*message.first_chunk()?))
 }
 
-/// Report Velocity State with the forward velocity alone, in metres a second.
+/// Report Velocity State with the forward velocity only, in m/s.
 pub(super) fn velocity(x: f64) -> Vec<u8> {
     let raw = ((x - SLOWEST) / STEP).round() as u32;
     message(report(QUERY_VELOCITY), &[&[1, 0], &raw.to_le_bytes()])
 }
 
-/// The forward velocity of a report that begins with it.
+/// The forward velocity in a report whose first field it is.
 pub(super) fn velocity_in(report: &[u8]) -> Option<f64> {
     let present = report.get(2)? & 1 == 1;
     let raw = u32::from_le_bytes(*report.get(4..)?.first_chunk()?);
     present.then_some(SLOWEST + f64::from(raw) * STEP)
 }
 
-/// Set Wrench Effort with the forward push alone, in percent.
+/// Set Wrench Effort with the forward effort only, in percent.
 pub(super) fn push(percent: f64) -> Vec<u8> {
     let raw = ((percent + EFFORT) / (2.0 * EFFORT) * f64::from(u16::MAX)).round() as u16;
     message(SET_WRENCH_EFFORT, &[&[1, 0], &raw.to_le_bytes()])
 }
 
-/// The forward push of a command that begins with it, in percent.
+/// The forward effort of a command whose first field it is, in percent.
 pub(super) fn push_in(command: &[u8]) -> Option<f64> {
     let present = command.get(2)? & 1 == 1;
     let raw = u16::from_le_bytes(*command.get(4..)?.first_chunk()?);
@@ -78,7 +78,7 @@ pub(super) fn push_in(command: &[u8]) -> Option<f64> {
 
 /// Create Event for a query: periodic at a rate in hertz, or on every change.
 pub(super) fn create_event(request: u8, hz: Option<f64>, query: &[u8]) -> Vec<u8> {
-    // 0 periodic, 1 on every change; the rate is from 0 to 1092.
+    // 0 is periodic, 1 on every change; the rate ranges from 0 to 1092 Hz.
     let rate = (hz.unwrap_or(0.0) / 1092.0 * f64::from(u16::MAX)).round() as u16;
     let head = [request, u8::from(hz.is_none())];
     let length = (query.len() as u32).to_le_bytes();
@@ -90,7 +90,7 @@ pub(super) fn report_in(event: &[u8]) -> Option<&[u8]> {
     event.get(8..)
 }
 
-/// A test message: octets that are never the same in two packets.
+/// A test message: octets that differ from packet to packet.
 pub(super) fn test(size: usize) -> Vec<u8> {
     let octet = |index: usize| (index.wrapping_mul(7) + index / 251) as u8;
     let mut test: Vec<u8> = (0..size).map(octet).collect();
@@ -98,7 +98,7 @@ pub(super) fn test(size: usize) -> Vec<u8> {
     test
 }
 
-/// A service list of one component, as Register Services and Report Services have it.
+/// A service list of one component, as in Register Services and Report Services.
 pub(super) fn services(urns: &[&str]) -> Vec<u8> {
     let mut list = vec![urns.len() as u8];
     for urn in urns {
@@ -110,7 +110,7 @@ pub(super) fn services(urns: &[&str]) -> Vec<u8> {
     list
 }
 
-/// A report about this component alone: one node, one component, instance 0.
+/// A report about this component only: one node, one component, instance 0.
 pub(super) fn alone(code: u16, id: JausId, rest: &[u8]) -> Vec<u8> {
     message(code, &[&[1, id.node(), 1, id.component(), 0], rest])
 }

@@ -6,16 +6,16 @@ use super::asking::Asker;
 use super::body;
 use super::speaker::{Heard, Speaker};
 
-/// Octets of the message that makes each side known to the other.
+/// Size of the message by which both sides learn each other's address, in octets.
 const GREETING: usize = 16;
-/// After this long without an answer, what may have been lost is sent again.
+/// Time without an answer after which a possibly lost message is sent again.
 const AGAIN: Duration = Duration::from_secs(2);
-/// Between two messages of [`keep`].
+/// Interval of the messages of [`Asker::keep_echo`].
 const BEAT: Duration = Duration::from_millis(200);
 /// Longer than any wait.
 const FOR_EVER: Duration = Duration::from_secs(3600);
 
-/// Sends every test message back as it came.
+/// Sends every test message back unchanged.
 pub(super) fn echo(mut speaker: Speaker) -> Result<(), String> {
     println!("listening");
     loop {
@@ -30,7 +30,7 @@ pub(super) fn echo(mut speaker: Speaker) -> Result<(), String> {
 }
 
 impl Asker {
-    /// Sends a message, and gets it back as it was.
+    /// Sends a message, and expects it back unchanged.
     pub(super) fn send(&mut self, size: usize, is_acknowledged: bool) -> Result<(), String> {
         self.there_and_back(GREETING, false)?;
         self.there_and_back(size, is_acknowledged)?;
@@ -67,7 +67,7 @@ impl Asker {
         Ok(false)
     }
 
-    /// Has messages come back again and again, and tells of each.
+    /// Sends a message again and again, and prints each echo.
     pub(super) fn keep_echo(&mut self) -> Result<(), String> {
         let message = body::test(GREETING);
         loop {

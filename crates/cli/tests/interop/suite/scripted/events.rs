@@ -1,5 +1,5 @@
-//! Events with the behaviour of JAUS++: ids start again for each kind of query, the first report
-//! arrives twice, and a repeated request of a client gives the same event.
+//! Events with the behaviour of JAUS++: event ids start at 0 for each kind of query, the first
+//! report is sent twice, and a repeated request of a client returns the same event.
 
 use std::time::{Duration, Instant};
 
@@ -7,11 +7,11 @@ use jaus::address::JausId;
 
 use super::body;
 
-/// The type of an event that comes on every change.
+/// Event type: on every change.
 const EVERY_CHANGE: u8 = 1;
-/// How many copies of the first report are sent.
+/// Number of copies of the first report.
 const COPIES: usize = 2;
-/// What a rate of 0 becomes.
+/// The interval used for a rate of 0.
 const SLOWEST: Duration = Duration::from_secs(1);
 
 #[derive(Debug)]
@@ -30,7 +30,7 @@ struct Event {
 pub(super) struct Events(Vec<Event>);
 
 impl Events {
-    /// Creates, cancels or lists events; gives the answers, the first reports among them.
+    /// Creates, cancels or lists events. Returns the answers, including the first reports.
     pub(super) fn handle(
         &mut self,
         client: JausId,
@@ -50,7 +50,7 @@ impl Events {
                 answers
             }
             (Some(body::CANCEL_EVENT), &[request, id]) => {
-                // The first with this number.
+                // The first event of the client with this id.
                 let found = self
                     .0
                     .iter()
@@ -87,7 +87,7 @@ impl Events {
         &mut self.0[index]
     }
 
-    /// Report Events: all of the client.
+    /// Report Events with all events of the client.
     fn list(&self, client: JausId) -> Vec<u8> {
         let of_client: Vec<&Event> = self
             .0
@@ -106,7 +106,7 @@ impl Events {
         list
     }
 
-    /// The events whose time has come, each with its client.
+    /// The due events, each with its client.
     pub(super) fn due(
         &mut self,
         now: Instant,
@@ -130,7 +130,7 @@ impl Events {
 }
 
 impl Event {
-    /// The message that brings a report.
+    /// The Event message with a report.
     fn bring(&mut self, report: &[u8]) -> Vec<u8> {
         let head = [self.id, self.sequence];
         self.sequence = self.sequence.wrapping_add(1);

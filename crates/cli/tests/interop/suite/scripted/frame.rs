@@ -3,13 +3,13 @@
 
 use jaus::address::JausId;
 
-/// The first octet of a datagram.
+/// First octet of a datagram.
 const VERSION: u8 = 2;
-/// Octets of a frame before its payload, and in all.
+/// Octets of a frame before its payload, and in total.
 const HEAD: usize = 12;
 const LEAST: usize = 14;
 
-/// What a frame says of acknowledgements.
+/// Acknowledgement field of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Receipt {
     None,
@@ -18,7 +18,7 @@ pub(super) enum Receipt {
     Given,
 }
 
-/// Which piece of a message it carries.
+/// Data control field: which part of a message the frame carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Piece {
     Whole,
@@ -30,7 +30,7 @@ pub(super) enum Piece {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Frame {
     pub(super) priority: u8,
-    /// 0 to one, 1 to the subsystem, 2 to all.
+    /// 0 for one destination, 1 for the subsystem, 2 for all.
     pub(super) broadcast: u8,
     pub(super) receipt: Receipt,
     pub(super) piece: Piece,
@@ -41,7 +41,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// The datagram that carries it alone.
+    /// A datagram with this frame only.
     pub(super) fn datagram(&self) -> Vec<u8> {
         let flags = self.priority
             | self.broadcast << 2
@@ -58,7 +58,7 @@ impl Frame {
         datagram
     }
 
-    /// The frames of a datagram, up to the first that cannot be one.
+    /// The frames of a datagram, up to the first invalid one.
     pub(super) fn all(datagram: &[u8]) -> Vec<Self> {
         let mut frames = Vec::new();
         let Some((&VERSION, mut rest)) = datagram.split_first() else {
@@ -72,7 +72,7 @@ impl Frame {
         frames
     }
 
-    /// Reads a frame of the right size.
+    /// Decodes a frame of the right size.
     fn read(octets: &[u8]) -> Self {
         let flags = octets[3];
         let end = octets.len() - 2;
@@ -99,7 +99,7 @@ impl Frame {
     }
 }
 
-/// The size of the frame that these octets begin with, if they do with one.
+/// The size of the frame at the start of these octets, if there is a valid one.
 fn size(octets: &[u8]) -> Option<usize> {
     let (kind, size) = (*octets.first()?, octets.get(1..3)?);
     let size = usize::from(u16::from_le_bytes([size[0], size[1]]));

@@ -1,37 +1,39 @@
 //! Differences between known peers, as seen in captures.
 
-/// How a peer speaks.
+/// Protocol behaviour of a peer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Habits {
-    /// What it is called in the network.
+    /// Its name in discovery.
     pub(super) name: &'static str,
-    /// Each datagram is as long as the longest before it, filled with what that had.
+    /// Each datagram is at least as long as the longest one before it to that address; the rest is
+    /// stale octets.
     pub(super) leaves_stale_octets: bool,
-    /// Octets of a message in one frame.
+    /// Message octets per frame.
     pub(super) fragment: usize,
-    /// Each fragment begins with the message code, and others are not understood.
+    /// Each fragment begins with the message code; other fragments are not understood.
     pub(super) repeats_code: bool,
     /// How frames are numbered.
     pub(super) numbering: Numbering,
-    /// Whom it does not know it reaches by multicast, and wants an acknowledgement for that.
+    /// Requests an acknowledgement of messages that it multicasts because it does not know the
+    /// peer's address.
     pub(super) insists: bool,
-    /// Priorities that its messages have in turn.
+    /// Priorities of its messages, in turn.
     pub(super) priorities: &'static [u8],
-    /// Tells its services to everybody who tells who they are.
+    /// Registers its services with the peer that it discovers.
     pub(super) registers: bool,
-    /// Asks every few seconds what has become of its events.
+    /// Queries its events every few seconds.
     pub(super) looks_after_events: bool,
 }
 
-/// Where the numbers of frames come from.
+/// Source of the sequence numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Numbering {
-    /// One counter for all, which begins with this at each start.
+    /// One counter for all destinations, which starts at this number.
     From(u16),
-    /// The same, but fragments are numbered one too high, so that the last of them and the next
+    /// The same, but fragments are numbered one too high, so that the last fragment and the next
     /// message have the same number.
     OneTooHigh,
-    /// A counter for each destination.
+    /// One counter per destination.
     PerDestination,
 }
 
@@ -75,7 +77,7 @@ pub(super) const JUDGE: Habits = Habits {
 };
 
 impl Habits {
-    /// Those of a peer, by its name on the command line.
+    /// The behaviour of a peer, by its name on the command line.
     pub(super) fn of(peer: &str) -> Option<Self> {
         match peer {
             "jauspp" => Some(JAUSPP),

@@ -12,13 +12,13 @@ use super::habits::{Habits, Numbering};
 const GROUP: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 const PORT: u16 = 3794;
 const TTL: u32 = 16;
-/// How long an acknowledgement is waited for, and how often a frame is sent.
+/// Timeout of an acknowledgement, and number of transmissions of a frame.
 const RECEIPT: Duration = Duration::from_millis(200);
 const TRIES: usize = 40;
-/// A receive buffer as large as a peer would ask for.
+/// Receive buffer size that a peer would request.
 const BUFFER: usize = 4 << 20;
 
-/// A message that has come, whole.
+/// A complete received message.
 #[derive(Debug, Clone)]
 pub(super) struct Heard {
     pub(super) source: JausId,
@@ -31,9 +31,9 @@ pub(super) struct Speaker {
     pub(super) habits: Habits,
     socket: UdpSocket,
     addresses: BTreeMap<JausId, SocketAddr>,
-    /// The next number: of all, or of each destination.
+    /// The next sequence number: of all frames, or per destination.
     numbers: BTreeMap<Option<JausId>, u16>,
-    /// What the last datagrams left behind, by address.
+    /// Octets of the previous datagrams, by address.
     stale: BTreeMap<SocketAddr, Vec<u8>>,
     fragments: BTreeMap<JausId, BTreeMap<u16, Frame>>,
     sent: usize,
@@ -41,7 +41,7 @@ pub(super) struct Speaker {
 }
 
 impl Speaker {
-    /// Opens its socket on the network where it has this address.
+    /// Opens its socket on the network of this address.
     pub(super) fn open(id: JausId, habits: Habits, address: Ipv4Addr) -> std::io::Result<Self> {
         // A second actor on the host takes any free port.
         let at = |port| UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port));
@@ -50,7 +50,7 @@ impl Speaker {
         socket.set_multicast_ttl_v4(TTL)?;
         let options = socket2::SockRef::from(&socket);
         options.set_multicast_if_v4(&address)?;
-        // As much as the system allows.
+        // The system may grant less.
         let _ = options.set_recv_buffer_size(BUFFER);
         Ok(Self {
             id,
@@ -65,14 +65,14 @@ impl Speaker {
         })
     }
 
-    /// Says something to one component, or to all that an id with wildcards means.
+    /// Sends a message to one component, or to all that an id with wildcards matches.
     pub(super) fn say(&mut self, to: JausId, message: &[u8]) {
         for frame in self.frames(to, message, Receipt::None) {
             self.transmit(&frame);
         }
     }
 
-    /// Says it, and has each frame acknowledged before the next one goes.
+    /// Sends a message, and waits for the acknowledgement of each frame before the next one.
     pub(super) fn assure(&mut self, to: JausId, message: &[u8]) -> Result<(), String> {
         for frame in self.frames(to, message, Receipt::Wanted) {
             self.assure_frame(&frame)?;
@@ -98,7 +98,7 @@ impl Speaker {
         Err(format!("frame {} was not acknowledged", frame.sequence))
     }
 
-    /// The next message for us until the deadline.
+    /// The next message for us before the deadline.
     pub(super) fn hear(&mut self, deadline: Instant) -> Option<Heard> {
         loop {
             if !self.heard.is_empty() {
@@ -109,7 +109,7 @@ impl Speaker {
         }
     }
 
-    /// What a message becomes on its way.
+    /// The frames of a message.
     fn frames(&mut self, to: JausId, message: &[u8], receipt: Receipt) -> Vec<Frame> {
         let is_repeated = self.habits.repeats_code && message.len() > self.habits.fragment;
         let (code, body) = message.split_at(if is_repeated { 2 } else { 0 });
@@ -144,7 +144,7 @@ impl Speaker {
         pieces.iter().enumerate().map(frame).collect()
     }
 
-    /// Takes as many numbers, and gives the first.
+    /// Reserves `count` sequence numbers and returns the first.
     fn reserve(&mut self, to: JausId, count: usize) -> u16 {
         let (of, start, ahead) = match self.habits.numbering {
             Numbering::From(start) => (None, start, 0),
@@ -170,15 +170,15 @@ impl Speaker {
             datagram.extend(stale.get(datagram.len()..).unwrap_or_default());
             stale.clone_from(&datagram);
         }
-        // Sending fails while the cable is out; the missing answers show it.
+        // Sending fails while the cable is out; the missing answers reveal it.
         let _ = self.socket.send_to(&datagram, to);
         if frame.piece != Piece::Whole && frame.receipt == Receipt::None {
-            // No receiver keeps up with a whole message at once.
+            // No receiver keeps up with a whole message sent at once.
             std::thread::sleep(Duration::from_micros(100));
         }
     }
 
-    /// The next frame for us.
+    /// The next frame for us before the deadline.
     fn frame(&mut self, deadline: Instant) -> Option<Frame> {
         let mut buffer = [0; 65_536];
         loop {
@@ -188,7 +188,7 @@ impl Speaker {
             let Ok((length, from)) = self.socket.recv_from(&mut buffer) else {
                 continue;
             };
-            // No peer was seen to pack two messages; the rest is ignored.
+            // No captured peer packs two messages into a datagram; further frames are ignored.
             let frame = Frame::all(&buffer[..length]).into_iter().next();
             let Some(frame) = frame.filter(|frame| frame.destination.matches(self.id)) else {
                 continue;
@@ -201,7 +201,7 @@ impl Speaker {
         }
     }
 
-    /// Acknowledges a frame, and keeps it or what it completes.
+    /// Acknowledges a frame, and stores it or the message that it completes.
     fn take(&mut self, frame: Frame) {
         match frame.receipt {
             Receipt::Wanted => self.acknowledge(&frame),
@@ -217,7 +217,7 @@ impl Speaker {
         }
         let fragments = self.fragments.entry(source).or_default();
         if frame.piece == Piece::First {
-            // One large message at a time.
+            // One fragmented message at a time.
             fragments.retain(|number, _| *number >= frame.sequence);
         }
         fragments.insert(frame.sequence, frame);
@@ -242,7 +242,7 @@ impl Speaker {
     }
 }
 
-/// The message that fragments make, if none is missing.
+/// The message of these fragments, if complete.
 fn whole(fragments: &BTreeMap<u16, Frame>, repeats_code: bool) -> Option<Vec<u8>> {
     if !fragments.values().any(|frame| frame.piece == Piece::Last) {
         return None;

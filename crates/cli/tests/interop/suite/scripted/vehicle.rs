@@ -9,7 +9,7 @@ use super::body;
 use super::events::Events;
 use super::speaker::{Heard, Speaker};
 
-/// What it offers, in the words of its time.
+/// Its services, named as at that time.
 pub(super) const SERVICES: [&str; 9] = [
     "urn:jaus:jss:core:Transport",
     "urn:jaus:jss:core:Events",
@@ -21,15 +21,15 @@ pub(super) const SERVICES: [&str; 9] = [
     "urn:jaus:jss:mobility:VelocityStateSensor",
     "urn:jaus:jss:mobility:PrimitiveDriver",
 ];
-/// How often it calls everybody.
+/// Interval of its broadcasts.
 const CALL: Duration = Duration::from_secs(5);
-/// Between two looks at the clock.
+/// Interval of the time steps.
 const TURN: Duration = Duration::from_millis(20);
-/// Control lasts as long as this without another Request Control; nothing else renews it.
+/// Control lasts this long without another Request Control; nothing else renews it.
 const HOLD: Duration = Duration::from_millis(6250);
-/// Seconds that it says control lasts.
+/// The timeout of control that it reports, in seconds.
 const TIMEOUT: u8 = 5;
-/// Metres a second at full push, and how fast that is reached, per turn.
+/// Speed at full effort in m/s, and the change per time step.
 const FASTEST: f64 = 2.0;
 const STEP: f64 = 0.05;
 /// Status codes.
@@ -125,7 +125,7 @@ impl Vehicle {
         Ok(())
     }
 
-    /// The answer to a question about itself.
+    /// The answer to a query about itself.
     fn report(&self, code: u16, rest: &[u8]) -> Option<Vec<u8>> {
         let id = self.speaker.id;
         let answer = |parts: &[&[u8]]| Some(body::message(body::report(code), parts));
@@ -145,7 +145,7 @@ impl Vehicle {
             }
             body::QUERY_IDENTIFICATION => {
                 let about = *rest.first()?;
-                // No type for systems. A vehicle, or a component.
+                // There is no system type: a vehicle, or a component.
                 let kind: u16 = match about {
                     2 => 10_001,
                     3 => 40_001,
@@ -227,7 +227,7 @@ impl Vehicle {
         }
     }
 
-    /// Time passes: it speeds up or slows down, tells its clients, and may lose its controller.
+    /// Advances one time step: changes speed, sends reports, and may end control.
     fn move_on(&mut self, now: Instant) {
         if self
             .controller
@@ -253,7 +253,7 @@ impl Vehicle {
     }
 }
 
-/// The answer to a query, if it is for the velocity.
+/// The answer to a query, if it asks for the velocity.
 fn velocity_report(query: &[u8], velocity: f64) -> Option<Vec<u8>> {
     (body::code(query) == Some(body::QUERY_VELOCITY)).then(|| body::velocity(velocity))
 }

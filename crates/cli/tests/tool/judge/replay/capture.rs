@@ -15,15 +15,15 @@ use jaus_view::{Capture, JAUS_PORT, Network, Timestamp};
 /// Offset of the destination in a datagram: version, then type, size and flags.
 const DESTINATION: std::ops::Range<usize> = 5..9;
 
-/// A datagram that a client sent.
+/// A datagram sent by a client.
 #[derive(Debug, Clone)]
 pub(crate) struct Said {
-    /// The time since the one before.
+    /// The time since the client's previous datagram.
     pub(crate) pause: Duration,
     pub(crate) datagram: Vec<u8>,
     /// The first message in the datagram.
     pub(crate) frame: Frame,
-    /// For Create Event: the id that the captured vehicle gave to the stream.
+    /// For Create Event: the event id that the captured vehicle assigned.
     pub(crate) event_id: Option<u8>,
 }
 
@@ -32,15 +32,15 @@ impl Said {
         self.frame.code().unwrap()
     }
 
-    /// Puts another destination into the header; nothing else changes.
+    /// Replaces the destination in the header; nothing else changes.
     fn address_to(&mut self, destination: JausId) {
         self.datagram[DESTINATION].copy_from_slice(&destination.to_wire());
         self.frame.destination = destination;
     }
 }
 
-/// Everything that a client (or the clients of one node) sent, in order, with the captured
-/// vehicle's subsystem replaced by another component's id.
+/// All datagrams that a client (or the clients of one node) sent, in order, readdressed from the
+/// captured vehicle's subsystem to the component `ours`.
 pub(crate) fn said_by(
     capture: &Path,
     client: impl Fn(JausId) -> bool,
@@ -70,7 +70,7 @@ pub(crate) fn said_by(
         };
         let to = said.frame.destination;
         if to.subsystem() == vehicle {
-            // One of several components is ours; all of them means all of ours.
+            // A single component becomes ours; the wildcard stays a wildcard.
             let is_all = to.component() == JausId::ANY_COMPONENT;
             let component = if is_all {
                 to.component()
@@ -85,7 +85,7 @@ pub(crate) fn said_by(
     all
 }
 
-/// Writes down which id the captured vehicle gave to the stream of each Create Event.
+/// Adds to each Create Event the event id that the captured vehicle assigned.
 fn name_streams(all: &mut [Said], mut confirmations: VecDeque<ConfirmEventRequest>) {
     for said in all {
         let Ok(creation) = CreateEvent::decode(&said.frame.payload) else {
@@ -98,7 +98,7 @@ fn name_streams(all: &mut [Said], mut confirmations: VecDeque<ConfirmEventReques
     }
 }
 
-/// The datagrams of a capture with their first messages, and their time in seconds.
+/// The datagrams of a capture, each with its time in seconds and its first message.
 fn messages(capture: &Path) -> Vec<(f64, Vec<u8>, Frame)> {
     let mut capture = Capture::new(File::open(capture).unwrap()).unwrap();
     let mut network = Network::new([JAUS_PORT]);

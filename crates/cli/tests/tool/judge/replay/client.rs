@@ -21,24 +21,24 @@ use crate::judge::replay::vehicle::{VEHICLE, Vehicle};
 /// Offset of the message in a datagram: version and header.
 const MESSAGE: usize = 13;
 
-/// Where the pauses of the capture are kept, and how long they are at most.
+/// Keeps the pauses of the capture, up to this limit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pauses(pub(crate) Duration);
 
-/// What was said, and what came of it before the next thing was said.
+/// A message, and the answers received before the next one was sent.
 #[derive(Debug)]
 pub(crate) struct Exchange {
     pub(crate) said: Frame,
-    /// Who was answered what; events, and the vehicle's own questions, are not among it.
+    /// The vehicle's messages to any client, except events and its own queries.
     pub(crate) answers: Vec<Frame>,
 }
 
-/// A stream that was confirmed.
+/// A confirmed event stream.
 #[derive(Debug, Clone, Copy)]
 struct Stream {
-    /// The id that the captured vehicle gave it.
+    /// The id that the captured vehicle assigned.
     captured: u8,
-    /// The id that ours gave it.
+    /// The id that our vehicle assigned.
     ours: u8,
     is_running: bool,
 }
@@ -51,15 +51,16 @@ fn acknowledgement_of(query: &Frame) -> Frame {
     }
 }
 
-/// The client, and what it knows about event streams.
+/// The client and its event streams.
 pub(crate) struct Client {
     socket: UdpSocket,
     vehicle: Vehicle,
     streams: Vec<Stream>,
-    /// The sequence numbers of the events that came, by stream.
+    /// The sequence numbers of the received events, by stream.
     events: BTreeMap<u8, Vec<u8>>,
     heard: VecDeque<Frame>,
-    /// Whether it acknowledges what asks for that, as JAUS++ does and the judging tool does not.
+    /// Whether it acknowledges messages that request it, as JAUS++ does and the judging tool does
+    /// not.
     pub(crate) acknowledges: bool,
 }
 
@@ -78,7 +79,7 @@ impl Client {
         }
     }
 
-    /// Says everything in its order, each time when the answer to the one before is there.
+    /// Sends all messages in order, each after the answer to the one before.
     pub(crate) fn replay(&mut self, all: &[Said], pauses: Pauses) -> Vec<Exchange> {
         let mut exchanges = Vec::new();
         for (number, said) in all.iter().enumerate() {
@@ -90,7 +91,7 @@ impl Client {
         exchanges
     }
 
-    /// Says one thing, and listens for this time, and until the answer has come.
+    /// Sends one message. Receives until the answer has arrived and the pause is over.
     fn say(&mut self, said: &Said, pause: Duration) -> Exchange {
         let start = Instant::now();
         let datagram = self.with_our_stream(said);
@@ -122,7 +123,7 @@ impl Client {
         }
     }
 
-    /// The next answer until the deadline. Events are counted, and questions passed over.
+    /// The next answer before the deadline. Events are counted, and queries skipped.
     fn hear(&mut self, deadline: Instant) -> Option<Frame> {
         let mut buffer = [0; 65_536];
         loop {
@@ -155,7 +156,7 @@ impl Client {
         }
     }
 
-    /// Listens to events alone for a while; gives the numbers of those that came of each stream.
+    /// Receives only events for a while. Returns their sequence numbers by stream.
     pub(crate) fn listen(&mut self, time: Duration) -> BTreeMap<u8, Vec<u8>> {
         self.events.clear();
         let deadline = Instant::now() + time;
@@ -163,7 +164,7 @@ impl Client {
         std::mem::take(&mut self.events)
     }
 
-    /// The datagram, with the captured vehicle's stream id replaced by our vehicle's for the same.
+    /// The datagram, with the captured vehicle's event id replaced by our vehicle's.
     fn with_our_stream(&self, said: &Said) -> Vec<u8> {
         let mut datagram = said.datagram.clone();
         let Some((at, captured)) = stream_in(&said.frame.payload) else {
@@ -206,14 +207,14 @@ impl Client {
         }
     }
 
-    /// The ids of the streams that our vehicle has confirmed and were not cancelled.
+    /// The ids of the streams that our vehicle has confirmed and that were not cancelled.
     pub(crate) fn running(&self) -> BTreeSet<u8> {
         let running = self.streams.iter().filter(|stream| stream.is_running);
         running.map(|stream| stream.ours).collect()
     }
 }
 
-/// Where a message names an event stream, and which.
+/// The event id in a message and its offset.
 fn stream_in(message: &Bytes) -> Option<(usize, u8)> {
     let at = match u16::from_le_bytes(*message.first_chunk()?) {
         // Code, request id, type, rate.
@@ -230,14 +231,14 @@ fn stream_in(message: &Bytes) -> Option<(usize, u8)> {
     Some((at, *message.get(at)?))
 }
 
-/// The codes of what must come: nothing for commands, and for what answers the vehicle's own
-/// questions.
+/// The codes of which one must answer; none for commands and for answers to the vehicle's own
+/// queries.
 pub(crate) fn answers_to(code: u16) -> Vec<u16> {
     match code {
         CreateEvent::CODE => vec![ConfirmEventRequest::CODE, RejectEventRequest::CODE],
         UpdateEvent::CODE | CancelEvent::CODE => vec![ConfirmEventRequest::CODE],
         RequestControl::CODE => vec![ConfirmControl::CODE],
-        // The client that resets is in control, and is released.
+        // The client that resets is in control and loses it.
         ReleaseControl::CODE | Reset::CODE => vec![RejectControl::CODE],
         SetElement::CODE => vec![ConfirmElementRequest::CODE],
         query if query >> 12 == 2 => vec![query + 0x2000],
@@ -245,7 +246,7 @@ pub(crate) fn answers_to(code: u16) -> Vec<u16> {
     }
 }
 
-/// Whether the exchange has the answer that it must have.
+/// Whether the exchange has the required answer.
 pub(crate) fn is_answered(exchange: &Exchange) -> bool {
     let wanted = answers_to(exchange.said.code().unwrap());
     let to: JausId = exchange.said.source;

@@ -15,11 +15,11 @@ use crate::judge::replay::capture::said_by;
 use crate::judge::replay::client::{Client, Exchange, Pauses, is_answered};
 use crate::judge::replay::vehicle::{VEHICLE, Vehicle};
 
-/// The subsystem that was judged.
+/// Subsystem of the judged vehicle.
 const JUDGED: u16 = 105;
-/// The judge's.
+/// Subsystem of the judge.
 const JUDGE: u16 = 42;
-/// The services that the contest asked for.
+/// The services that the contest required.
 const CONTEST: [&str; 11] = [
     "Transport",
     "Events",
@@ -33,14 +33,14 @@ const CONTEST: [&str; 11] = [
     "LocalPoseSensor",
     "PrimitiveDriver",
 ];
-/// Set to rewrite the files; review them afterwards.
+/// Variable that makes the test rewrite the files; review them afterwards.
 const RENEW: &str = "JAUS_RENEW_SNAPSHOTS";
-/// Long enough for a reset, during which the tool waited 1.5 s.
+/// Short pauses: still long enough for a reset, during which the tool waited 1.5 s.
 const SHORT: Pauses = Pauses(Duration::from_millis(20));
-/// As the tool did.
+/// Pauses of the tool.
 const ORIGINAL: Pauses = Pauses(Duration::from_secs(30));
 
-/// Says everything that the tool said; gives the whole exchange.
+/// Sends all messages of the tool. Returns the exchanges.
 fn replay(capture: &str, pauses: Pauses) -> Option<Vec<Exchange>> {
     let capture = evidence::capture(&format!("igvc2015/{capture}"))?;
     let of_judge = |id: jaus::address::JausId| id.subsystem() == JUDGE;
@@ -52,7 +52,7 @@ fn replay(capture: &str, pauses: Pauses) -> Option<Vec<Exchange>> {
     Some(exchanges)
 }
 
-/// Requires every answer, and compares the exchange with the one that is kept.
+/// Requires every answer, and compares the exchanges with the stored ones.
 #[track_caller]
 fn check(exchanges: &[Exchange], snapshot: &str) {
     let dictionary = Dictionary::new();
@@ -80,7 +80,7 @@ fn kept(snapshot: &str) -> PathBuf {
     here.join(snapshot)
 }
 
-/// An exchange as people read it.
+/// An exchange in readable form.
 fn line(dictionary: &Dictionary, exchange: &Exchange) -> Json {
     let answers = exchange.answers.iter();
     let answers: Vec<_> = answers
@@ -105,8 +105,8 @@ fn message(dictionary: &Dictionary, frame: &Frame, role: &str) -> Json {
     shown
 }
 
-/// The same without the time of day, which is another one each time, and without services that
-/// the contest did not ask for.
+/// The value without the time of day, which differs in every run, and without services that the
+/// contest did not require.
 fn what_matters(value: &Json) -> Json {
     match value {
         Json::Object(object) => {
@@ -122,7 +122,7 @@ fn what_matters(value: &Json) -> Json {
     }
 }
 
-/// A list of services, with those alone that the contest asked for.
+/// The services of a list that the contest required.
 fn of_the_contest(services: &Json) -> Json {
     let is_asked_for = |service: &&Json| {
         let name = service["URI"]

@@ -14,10 +14,10 @@ use crate::judge::replay::capture::{Said, said_by};
 use crate::judge::replay::client::{Client, Exchange, Pauses, is_answered};
 use crate::judge::replay::vehicle::{VEHICLE, Vehicle};
 
-/// The clients waited for seconds now and then.
+/// The clients paused for seconds at times.
 const SHORT: Pauses = Pauses(Duration::from_millis(50));
 
-/// What a JAUS++ client of this id said in a capture to a vehicle of this subsystem.
+/// The messages in a capture from a JAUS++ client of this id to a vehicle of this subsystem.
 fn said(capture: &str, client: JausId, vehicle: u16) -> Vec<Said> {
     let capture = evidence::captures().join("jauspp").join(capture);
     let said = said_by(&capture, |id| id == client, vehicle, VEHICLE);
@@ -38,7 +38,8 @@ fn all_answered(exchanges: &[Exchange]) {
     }
 }
 
-/// Requires that the same subscription always is the same stream; gives the rates of the streams.
+/// Requires that the same subscription always gets the same stream. Returns the rates of the
+/// streams.
 #[track_caller]
 fn one_stream_for_each_subscription(exchanges: &[Exchange]) -> BTreeMap<u8, f64> {
     let mut streams: BTreeMap<(u8, Vec<u8>), BTreeSet<u8>> = BTreeMap::new();
@@ -70,7 +71,7 @@ fn one_stream_for_each_subscription(exchanges: &[Exchange]) -> BTreeMap<u8, f64>
     rates
 }
 
-/// Replays a client up to its first cancellation, looks at the streams, and then replays the rest.
+/// Replays a client up to its first cancellation, checks the streams, and then replays the rest.
 fn events_do_not_multiply(capture: &str, vehicle: u16) {
     const LISTENING: f64 = 2.0;
     let said = said(capture, JausId::new(1000, 1, 7), vehicle);

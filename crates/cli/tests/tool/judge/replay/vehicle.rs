@@ -7,7 +7,7 @@ use jaus::address::JausId;
 use crate::support::jaus;
 use jaus_test_kit::vehicle_process::VehicleProcess;
 
-/// Who the vehicle is.
+/// Id of the vehicle.
 pub(crate) const VEHICLE: JausId = JausId::new(2105, 1, 1);
 
 /// A vehicle on the loopback interface; killed when dropped.
@@ -18,7 +18,7 @@ pub(crate) struct Vehicle {
 }
 
 impl Vehicle {
-    /// Starts it, and waits until it is there.
+    /// Starts it, and waits until it is ready.
     pub(crate) fn start() -> Self {
         let port = free_port();
         let group = SocketAddrV4::new(Ipv4Addr::new(239, 255, 79, 1), free_port());

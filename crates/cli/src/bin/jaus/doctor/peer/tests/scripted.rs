@@ -53,7 +53,7 @@ pub(super) struct Vehicle {
     pub(super) doubles: bool,
     pub(super) twin: Option<SocketAddr>,
     pub(super) old_services: bool,
-    /// Maximum number of fragments of an echoed message without effect.
+    /// Maximum number of fragments of an echoed D7F0h message; 0 echoes none.
     pub(super) echoes_up_to: usize,
     /// The accepted message types.
     pub(super) takes_type: fn(u8) -> bool,
