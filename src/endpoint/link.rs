@@ -84,7 +84,7 @@ impl fmt::Display for Remote {
     }
 }
 
-/// Where a message came from and where answers go: a remote end, seen through a link.
+/// The path of a message: a remote end as seen through a link. Replies take the same path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Path {
     /// The link.

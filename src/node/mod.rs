@@ -364,7 +364,7 @@ pub struct LinkReport {
     pub interface: Interface,
     /// The address that it sends from, and that peers reply to.
     pub local: SocketAddr,
-    /// The multicast group that it has joined.
+    /// The multicast group that it has joined, or the broadcast address that it uses instead.
     pub group: Option<SocketAddr>,
     /// Counts of traffic.
     pub counters: udp::Counters,

@@ -1,4 +1,5 @@
-//! Arbitrary input in arbitrary order: no panic, no growth, and every message accounted for.
+//! Arbitrary input in arbitrary order: no panic, bounded memory, and every message is accounted
+//! for.
 
 use proptest::collection::vec;
 use proptest::prelude::*;

@@ -47,7 +47,7 @@ fn said(number: u32) -> Frame {
 }
 
 /// Floods an endpoint from `hosts` addresses, 100 packets per millisecond, while [`PEER`] and
-/// [`US`] talk. Each of the peer's messages arrives twice, for want of an acknowledgement.
+/// [`US`] talk. Each of the peer's messages arrives twice, as if not acknowledged.
 fn flood(hosts: u32, config: Config) -> Rig {
     let mut rig = Rig::with(config);
     rig.hear(&from_peer(QUERY_HEARTBEAT));

@@ -1,4 +1,5 @@
-//! Interoperation with Junior: its memory of sequence numbers, its restarts and its calls.
+//! Interoperation with Junior: its duplicate detection, its restarts, and its messages for unknown
+//! ids.
 
 use std::collections::HashMap;
 
@@ -51,7 +52,7 @@ fn a_node_that_is_started_again_and_again_uses_no_number_that_junior_remembers()
             dropped: 0,
         };
         let begin = Rig::new().now;
-        // A command that runs again and again: greeting, 1 MiB, end.
+        // A command that is run repeatedly: greeting, 1 MiB, end.
         for run in 0..40 {
             let alive = Duration::from_millis(200) * run;
             let mut rig = Rig::with(Config {
@@ -124,7 +125,7 @@ fn lengths_of(rig: &mut Rig, frames: &[Frame]) -> Vec<usize> {
 
 #[test]
 fn a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_come_again() {
-    // Whether it is recognised by its fragments or counts as standard.
+    // The peer may be recognised by its fragments, or count as standard.
     let anybody = Assignment {
         id: PEER,
         profile: Known::Standard,
