@@ -48,7 +48,7 @@ impl LinkProfile {
 pub enum Remote {
     /// The address of a UDP socket, or of the remote end of one TCP connection.
     Socket(SocketAddr),
-    /// The remote end of a serial line.
+    /// The remote end of a serial line, or Junior's node manager.
     Line,
 }
 

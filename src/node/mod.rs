@@ -271,8 +271,8 @@ impl Node {
         self.shared().lock().components.taps.open(limit)
     }
 
-    /// The name of a link: its interface, its serial device, or `tcp` for the connections. `None`
-    /// if the link is gone.
+    /// The name of a link: its interface, its serial device, `tcp` or `junior`. `None` if the link
+    /// is gone.
     #[must_use]
     pub fn link_name(&self, link: LinkId) -> Option<String> {
         let core = self.shared().lock();

@@ -97,8 +97,8 @@ fn flood(hosts: u32, config: Config) -> Rig {
     rig
 }
 
-/// Checks the default bounds: 1024 peers, 1024 buckets, 40 960 fingerprints and 16 MiB of
-/// fragments.
+/// Checks the default bounds: 1024 peers, 1024 buckets, 40 960 fingerprints and 32 MiB of
+/// fragments. [`PEER`] must still be known.
 fn is_bounded(rig: &Rig) {
     let config = Config::default();
     assert!(rig.endpoint.peers().count() <= config.max_peers);

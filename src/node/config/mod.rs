@@ -104,7 +104,7 @@ pub struct Config {
     pub group6: Group6,
     /// When to use a network's broadcast address instead of the group, or in addition to it.
     pub broadcast: Broadcasts,
-    /// The limit of routers that multicast may pass.
+    /// The TTL of multicast datagrams; 0 keeps them on this host.
     pub ttl: u8,
     /// The receive buffer to request from the kernel for each socket, in octets.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
@@ -303,7 +303,7 @@ impl Config {
         Ok(self.udp().validate()?)
     }
 
-    /// The endpoint's settings. Its limits leave room for two of the longest messages.
+    /// The endpoint's settings. The reassembly buffer has room for two of the longest messages.
     pub(super) fn endpoint(&self, first_sequence: u16) -> endpoint::Config {
         let usual = endpoint::Config::default();
         let (delivery, limits) = (&self.delivery, &self.limits);

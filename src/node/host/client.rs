@@ -149,7 +149,7 @@ impl Client {
         Ok(())
     }
 
-    /// Ready when the node has taken all messages sent so far, or is lost.
+    /// Ready when all messages sent so far are written to the connection, or it is lost.
     pub(in super::super) async fn flushed(&self) {
         // Created before the check, so that no signal is missed. An empty queue means that
         // everything sent before is written, even if others have added more since.
