@@ -195,7 +195,7 @@ proptest! {
         }
         prop_assert!(rig.events().len() <= 6 * LIMIT);
         prop_assert!(rig.transmits().len() <= 4 * LIMIT);
-        // Without further input, it comes to rest.
+        // Without further input, all timers end.
         for _wake in 0..100 {
             let Some(timeout) = rig.endpoint.poll_timeout() else { break };
             rig.now = rig.now.max(timeout);

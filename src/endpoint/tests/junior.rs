@@ -154,7 +154,7 @@ fn a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_c
 fn what_junior_sends_again_is_delivered_once_also_while_the_message_is_put_together() {
     let mut rig = Rig::new();
     let frames = of_junior(1, &message(102_400));
-    // Each of them four times, as if no acknowledgement arrived.
+    // Each fragment four times, as if no acknowledgement arrived.
     for frame in &frames {
         for _try in 0..4 {
             rig.hear(frame);
@@ -178,7 +178,7 @@ fn a_program_of_junior_that_is_started_again_beside_its_engine_is_heard() {
             profiles: vec![Assignment { id: PEER, profile }],
             ..Config::default()
         });
-        // Its engine knows our address: nothing is broadcast.
+        // Junior's engine knows our address: nothing is broadcast.
         let first = Frame {
             flags: WANTED,
             ..from_peer(QUERY_HEARTBEAT)

@@ -34,8 +34,8 @@ impl UdpLink {
         }
     }
 
-    /// Sends a datagram to one peer. While the kernel's send buffer is full it stays queued, most
-    /// urgent first.
+    /// Sends a datagram to one peer. While the kernel's send buffer is full, the datagram waits in
+    /// the priority queue.
     pub fn send_to(&mut self, peer: SocketAddr, priority: Priority, datagram: &Bytes) {
         self.enqueue(peer, priority, datagram, None);
         self.flush();

@@ -135,7 +135,7 @@ pub struct Config {
     pub serial: Vec<SerialLine>,
     /// Acknowledged messages, packing and pacing.
     pub delivery: Delivery,
-    /// The profiles of peers that cannot be recognised by what they send.
+    /// The profiles of peers that cannot be recognised by their messages.
     pub profile: Vec<Assignment>,
     /// Whether to forward messages for other nodes between the links.
     pub routing: Routing,
