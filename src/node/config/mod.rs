@@ -90,7 +90,7 @@ pub struct Config {
     /// The node number within the subsystem, 1 to 254.
     pub node: u8,
     /// The interfaces to open UDP links on. An empty list disables UDP, which is allowed with TCP
-    /// connections or serial lines.
+    /// connections, serial lines or a local address.
     pub interfaces: Interfaces,
     /// The IP versions to use on them.
     pub ip: Ip,
@@ -344,7 +344,7 @@ impl Config {
     }
 
     /// Whether UDP is in use. Junior replaces it, and an empty list of interfaces disables it if
-    /// another link is configured.
+    /// another link or a local address is configured.
     pub(super) fn uses_udp(&self) -> bool {
         #[cfg(unix)]
         if self.junior.is_some() {
