@@ -63,13 +63,14 @@ pub struct Config {
     /// Profiles of peers, where known in advance; the first entry that matches an id applies. Other
     /// peers are [recognised](crate::peer::Recogniser) by their messages.
     pub profiles: Vec<Assignment>,
-    /// The most octets buffered for unfinished messages of one sender, plus 64 for each fragment
-    /// and 256 for each gap. The oldest are dropped first.
+    /// The most octets buffered for unfinished messages of one sender, counting an overhead of 64
+    /// for each fragment and 256 for each run of consecutive fragments. The oldest runs are dropped
+    /// first.
     pub max_reassembly_per_sender: usize,
     /// The same limit for all senders together.
     pub max_reassembly: usize,
-    /// How long a part of an unfinished message is kept without progress. It must be longer than
-    /// senders pause between retransmissions or keep trying: they do not repeat acknowledged
+    /// The timeout of an unfinished message without progress. It must exceed the senders'
+    /// retransmission interval and the time for which they retry: they do not repeat acknowledged
     /// fragments, so a message whose beginning was dropped here would look delivered to them.
     pub reassembly_timeout: Duration,
     /// The most entries of each queue (outgoing datagrams, per priority; events). Entries beyond it
@@ -85,7 +86,7 @@ pub struct Config {
     pub retransmission_window: Duration,
     /// The same for messages that were broadcast because our address was unknown. It is shorter,
     /// because a restarted peer begins with such messages, and with the same numbers as before.
-    /// Endpoints repeat them every 0.4 s.
+    /// Endpoints repeat them at least every 0.4 s.
     pub first_contact_window: Duration,
     /// How long to expect echoes of our own multicast.
     pub echo_window: Duration,

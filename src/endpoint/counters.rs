@@ -20,7 +20,7 @@ counters! {
     AcknowledgementsSent = "acknowledgements sent",
     /// Acknowledgements that no component waits for.
     UnawaitedAcknowledgement = "acknowledgements that nobody waits for",
-    /// Packets retransmitted for want of an acknowledgement.
+    /// Packets retransmitted because no acknowledgement arrived.
     Retransmissions = "retransmissions",
     /// Messages given up because no acknowledgement arrived.
     MessagesGivenUp = "messages given up, not acknowledged",
@@ -75,7 +75,7 @@ counters! {
     ReceiverBusy = "dropped: receiver busy, not acknowledged",
     /// Challenges sent to verify paths.
     ChallengesSent = "challenges sent",
-    /// Challenges that confirmed the known path of an id heard on two paths.
+    /// Challenges of an id heard on two paths after which it kept its known path.
     PeerConflicts = "ids heard at two addresses",
     /// Not sent: a datagram to an unverified address that has used up its budget.
     UnverifiedBudget = "not sent: too much for an unproven address",

@@ -27,8 +27,9 @@ pub(super) enum Novelty {
 impl Endpoint {
     /// Runs the duplicate check and records the message.
     ///
-    /// Peers with the older headers leave the sequence number at 0. Their messages can be told
-    /// apart only if they request an acknowledgement, and so may be retransmitted.
+    /// Peers with the older headers leave the sequence number at 0, so equal messages look alike.
+    /// Without an acknowledgement request such a message counts as a copy only if this endpoint
+    /// forwards and the message arrives on another path.
     pub(super) fn recall(&mut self, arrival: Arrival<'_>, seen: Fingerprint) -> Novelty {
         let Arrival { frame, now, .. } = arrival;
         let forwarding = self.config.forwarding;

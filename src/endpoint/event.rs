@@ -84,7 +84,7 @@ pub enum Event {
         /// Its new address.
         to: Path,
     },
-    /// An id was heard at two addresses, and a challenge has shown which of them the peer keeps.
+    /// An id was heard at two addresses, and a challenge did not show that the peer has moved.
     PeerConflict {
         /// The shared id.
         id: JausId,

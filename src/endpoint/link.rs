@@ -48,7 +48,7 @@ impl LinkProfile {
 pub enum Remote {
     /// The address of a UDP socket, or of the remote end of one TCP connection.
     Socket(SocketAddr),
-    /// The remote end of a serial line.
+    /// The remote end of a serial line, or Junior's node manager.
     Line,
 }
 
@@ -84,7 +84,7 @@ impl fmt::Display for Remote {
     }
 }
 
-/// Where a message came from and where answers go: a remote end, seen through a link.
+/// The path of a message: a remote end as seen through a link. Replies take the same path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Path {
     /// The link.

@@ -234,7 +234,7 @@ impl Endpoint {
                 }
             }
         });
-        // A datagram held back for want of a verified address has queued a challenge instead.
+        // A datagram held back for an unverified address may have queued a challenge instead.
         next.or_else(|| self.dequeue(now, Level::whole(CHALLENGE_FLAGS.priority())))
     }
 

@@ -13,7 +13,7 @@ use crate::wire::{
     Acknowledgement, Broadcast, EncodeError, Flags, Frame, Priority, Version, as5669a,
 };
 
-/// Why a cannot send the message. No part of it was sent.
+/// Why the endpoint cannot send a message. No part of it was sent.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SendError {
@@ -34,8 +34,8 @@ pub enum SendError {
     TooLong {
         /// Octets of the payload.
         length: usize,
-        /// [`Config::max_message`](super::Config::max_message); to a receiver with an older header
-        /// [`Config::payload_limit`](super::Config::payload_limit).
+        /// [`Config::max_message`](super::Config::max_message), or less if 65535 fragments to this
+        /// receiver cannot carry that.
         limit: usize,
     },
     /// An acknowledgement was requested from many receivers.
@@ -223,8 +223,8 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Whether the destination's address is unknown, or unverified and the message too long to send
-    /// there without a proof.
+    /// Whether the destination's address is unknown; or unverified, although the message is too
+    /// long to send without a proof, or its cutting depends on what the peer is.
     fn seeks_proof(&self, destination: JausId, length: usize) -> bool {
         let much = length > self.config.unverified_address.burst as usize / 2;
         self.route(destination).is_none_or(|(path, _)| {

@@ -1,5 +1,4 @@
-//! The accounts of bounded tables: how much each network address holds, and what it has held for
-//! longest.
+//! The accounts of bounded tables: how much each network address holds, and its oldest entries.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap};

@@ -59,8 +59,8 @@ impl<T> Backlog<T> {
         self.len() + items <= self.bounds.items && self.octets() <= self.bounds.octets / 2
     }
 
-    /// Whether items of this or a higher priority take less than half of the room. If so, a new
-    /// item of this priority is never dropped in favour of less urgent ones.
+    /// Whether items of this or a higher priority take less than half of the room. The other half
+    /// is a reserve for items that are pushed without this check.
     pub(crate) fn has_reserve(&self, priority: Priority) -> bool {
         let level = usize::from(priority.bits());
         let items: usize = self.levels[level..].iter().map(VecDeque::len).sum();

@@ -93,9 +93,9 @@ pub enum Error {
     GroupRefused {
         /// The group and its port.
         group: SocketAddr,
-        /// Where it was to be used.
+        /// The interface on which it was refused.
         interface: Interface,
-        /// The operating system's words.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// Another program listens at that address.

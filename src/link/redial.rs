@@ -1,4 +1,4 @@
-//! Opens a lost connection or device again: attempts with growing pauses.
+//! Reopens a lost connection or device, with growing pauses between attempts.
 
 use std::fmt;
 use std::hash::{BuildHasher, RandomState};
@@ -11,21 +11,20 @@ use std::time::{Duration, Instant};
 /// An attempt to open a connection or device.
 pub(super) type Attempt<T> = Pin<Box<dyn Future<Output = io::Result<T>> + Send>>;
 
-/// When to open one connection or device, and the attempt to do so.
+/// The reconnection of one connection or device: its schedule and the current attempt.
 #[derive(Debug)]
 pub(super) struct Redial<T> {
     /// The timeout of an attempt; [`Duration::MAX`] for none.
     timeout: Duration,
-    /// The pause after the first failure, which doubles with each further one, to the longest. Each
-    /// is changed by ± 25 % at random, so that many nodes do not return to a restarted peer at the
-    /// same time.
+    /// The first and the longest pause. The pause doubles with each failure, ± 25 % at random, so
+    /// that many nodes do not reconnect to a restarted peer at the same time.
     pauses: RangeInclusive<Duration>,
     state: State<T>,
     failures: u32,
 }
 
 enum State<T> {
-    /// It is open.
+    /// The connection or device is open.
     Up,
     Attempting {
         attempt: Attempt<T>,
@@ -46,7 +45,7 @@ impl<T> fmt::Debug for State<T> {
 }
 
 impl<T> Redial<T> {
-    /// Of what is still to be opened.
+    /// For a closed connection or device. The first attempt is due at once.
     pub(super) const fn new(timeout: Duration, pauses: RangeInclusive<Duration>) -> Self {
         Self {
             timeout,
@@ -56,7 +55,7 @@ impl<T> Redial<T> {
         }
     }
 
-    /// Of what is open.
+    /// For an open connection or device.
     #[cfg(feature = "serial")]
     pub(super) fn up(timeout: Duration, pauses: RangeInclusive<Duration>) -> Self {
         Self {
@@ -69,12 +68,12 @@ impl<T> Redial<T> {
         matches!(self.state, State::Up)
     }
 
-    /// Whether the next attempt is some time away.
+    /// Whether it pauses after a failure or a loss.
     pub(super) const fn is_pausing(&self) -> bool {
         matches!(self.state, State::Pausing(Some(_)))
     }
 
-    /// When to poll again if nothing happens before.
+    /// When to poll even if nothing happens.
     pub(super) const fn deadline(&self) -> Option<Instant> {
         match self.state {
             State::Up => None,
@@ -82,7 +81,8 @@ impl<T> Redial<T> {
         }
     }
 
-    /// What an attempt has opened, or its error. `attempt` begins one.
+    /// Polls the current attempt, and starts one with `attempt` when due. Ready with the opened
+    /// connection or device, or with the error.
     pub(super) fn poll(
         &mut self,
         cx: &mut Context<'_>,
@@ -113,7 +113,7 @@ impl<T> Redial<T> {
         Poll::Ready(outcome)
     }
 
-    /// Handles a loss; `was_good` if the connection had been of use.
+    /// Handles a loss. `was_good` means that the connection had worked, which resets the pause.
     pub(super) fn lost(&mut self, now: Instant, was_good: bool) {
         if was_good {
             self.failures = 0;

@@ -1,4 +1,4 @@
-//! What the node sends to a component process beside its messages.
+//! The node's replies to a component process: the outcomes of its messages.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

@@ -109,7 +109,7 @@ impl fmt::Display for Departure {
     }
 }
 
-/// The attached components of a node, and the taps: the receivers of the endpoint's messages.
+/// The attached components of a node, to which the endpoint delivers messages, and the taps.
 #[derive(Debug)]
 pub(super) struct Components {
     attached: BTreeMap<JausId, Attached>,

@@ -310,7 +310,7 @@ impl Core {
         .min()
     }
 
-    /// Sends queued datagrams and publishes events; returns whether any went to a link.
+    /// Sends queued datagrams and publishes events; returns whether there were any datagrams.
     fn pump(&mut self, now: Instant) -> bool {
         let mut transmitted = false;
         self.gathered = 0;

@@ -7,7 +7,8 @@ use tokio::sync::broadcast::error::RecvError;
 /// Events kept for a slow listener.
 const KEPT: usize = 256;
 
-/// A stream of events from now on. A listener that lags by more than 256 events misses the oldest.
+/// A stream of the events since it was opened. A listener that lags by more than 256 events misses
+/// the oldest.
 #[derive(Debug)]
 pub struct EventStream<T> {
     receiver: broadcast::Receiver<T>,

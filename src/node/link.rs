@@ -61,7 +61,7 @@ impl Link {
         }
     }
 
-    /// Its name for people: that of the interface or device.
+    /// Its display name: the interface or device, `tcp` or `junior`.
     pub(super) fn name(&self) -> String {
         match self {
             Self::Udp(link) => link.interface().name.clone(),

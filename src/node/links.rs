@@ -2,8 +2,8 @@
 //! link for all TCP connections, one for Junior, and one per serial line.
 //!
 //! A board may start its node before its network is up, and Wi-Fi may return with another address.
-//! So on each change a [`Follower`](super::follower::Follower) makes a [`Survey`] of the host,
-//! without the node's lock, and passes it to the links.
+//! So on each change the [follower](super::follower) makes a [`Survey`] of the host, without the
+//! node's lock, and passes it to the links.
 
 use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};

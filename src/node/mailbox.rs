@@ -15,7 +15,7 @@ use crate::endpoint::Received;
 use crate::link::backlog::{Backlog, Bounds};
 use crate::wire::Priority;
 
-/// Progress of the reader is signalled when the number of messages is a multiple of this.
+/// Progress of the reader is signalled when the number of waiting messages is a multiple of this.
 const SIGNAL_READ: usize = 128;
 
 /// The limits of a mailbox.
@@ -43,7 +43,7 @@ impl Default for MailboxLimits {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct MailboxCounters {
-    /// Messages received.
+    /// Messages received, including those dropped.
     pub delivered: u64,
     /// Messages dropped because the component did not read in time.
     pub dropped: u64,

@@ -271,8 +271,8 @@ impl Node {
         self.shared().lock().components.taps.open(limit)
     }
 
-    /// The name of a link: its interface, its serial device, or `tcp` for the connections. `None`
-    /// if the link is gone.
+    /// The name of a link: its interface, its serial device, `tcp` or `junior`. `None` if the link
+    /// is gone.
     #[must_use]
     pub fn link_name(&self, link: LinkId) -> Option<String> {
         let core = self.shared().lock();
@@ -364,7 +364,7 @@ pub struct LinkReport {
     pub interface: Interface,
     /// The address that it sends from, and that peers reply to.
     pub local: SocketAddr,
-    /// The multicast group that it has joined.
+    /// The multicast group that it has joined, or the broadcast address that it uses instead.
     pub group: Option<SocketAddr>,
     /// Counts of traffic.
     pub counters: udp::Counters,

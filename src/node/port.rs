@@ -198,8 +198,8 @@ impl Sender {
         told.await.unwrap_or(Err(Undelivered::Lost))
     }
 
-    /// Waits until the host's node has taken all messages sent so far. A node of the same process
-    /// takes them at once.
+    /// Waits until all messages sent so far are written to the connection to the host's node, or it
+    /// is lost. For a node of the same process, returns at once.
     pub async fn flushed(&self) {
         if let Attachment::Host(client) = &self.way {
             client.flushed().await;

@@ -1,4 +1,4 @@
-//! Taps: the traffic of a node, for people and logs.
+//! Taps: copies of a node's traffic, for viewers and logs.
 //!
 //! A [`Tap`] sees everything that arrives on a link, leaves on a link, or passes between components
 //! of the node. It sees the raw traffic and not the endpoint's output: including fragments,
@@ -128,10 +128,10 @@ impl Passage {
     }
 }
 
-/// A stream of all traffic of a node: what arrives on a link, what leaves on one, and what passes
-/// between components of the node, before the endpoint processes it.
+/// A stream of all traffic of a node: received traffic before the endpoint processes it, outgoing
+/// traffic, and messages between components of the node.
 ///
-/// Dropping it ends it.
+/// Drop it to end it.
 #[derive(Debug)]
 pub struct Tap {
     queue: Arc<Queue>,

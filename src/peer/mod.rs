@@ -8,8 +8,8 @@
 //!
 //! Most handling suits every peer and applies to all: tolerance for lenient peers never degrades
 //! what strict peers get. Handling that would not suit every peer depends on the [`Peer`] that was
-//! recognised or configured, and is one of its methods: [`Peer::large_style`],
-//! [`Peer::payload_limit`], [`Peer::intake`], [`Peer::reads_zero_as_wildcard`],
+//! recognised or configured, through methods such as [`Peer::large_style`],
+//! [`Peer::payload_limit`], [`Peer::intake`], [`Peer::reads_zero_as_wildcard`] and
 //! [`Peer::is_deaf_on_its_connections`].
 //!
 //! A [`Recogniser`] receives everything that one peer sends, and reports which peer it is, with

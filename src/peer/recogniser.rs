@@ -63,7 +63,8 @@ impl fmt::Display for Reason {
 pub struct Verdict {
     /// The most likely peer; [`Peer::Standard`] without evidence.
     pub peer: Peer,
-    /// How certain that is. Only certain results change how a peer is treated.
+    /// How certain that is. An uncertain result changes how a peer is treated only where a wrong
+    /// guess does little harm.
     pub certainty: Certainty,
     /// All observed signs, including those that point to other peers.
     pub reasons: Vec<Reason>,

@@ -1,4 +1,4 @@
-//! State machines: those of the published definitions, where they are at hand, and a hand-made one.
+//! State machines: those of the published definitions, if available, and a hand-written one.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +28,7 @@ fn transitions(library: &Library) -> Vec<&Transition> {
         .collect()
 }
 
-/// Machines, states, guards, actions, and transitions of each kind.
+/// The number of machines, states, guards and actions, and of transitions of each kind.
 fn counts(library: &Library) -> ([usize; 4], BTreeMap<&'static str, usize>) {
     let machines = library.services().map(|service| service.behaviour.len());
     let (states, transitions) = (states(library), transitions(library));
@@ -92,7 +92,7 @@ fn every_published_guard_reads_back_as_it_is_shown() {
     assert!(guards > 300, "{guards}");
 }
 
-/// No service that inherits them could correct it.
+/// An inheriting service could not correct them.
 #[test]
 fn published_states_without_a_usable_initial_state_are_warned_of() {
     let Some(loaded) = corpus(&["fkie"]) else {
@@ -108,7 +108,7 @@ fn published_states_without_a_usable_initial_state_are_warned_of() {
     assert_eq!((missing.len(), wrong.len(), other.len()), (5, 22, 41));
 }
 
-/// The state and the answers after a message, when the guards that hold are these.
+/// The state and the replies after a message, if exactly the guards in `holds` are true.
 fn step(machine: &Machine<'_>, from: &str, message: &str, holds: &[&str]) -> (String, String) {
     let from = machine
         .find(&Name::parse(from).expect("a path"))
@@ -235,8 +235,8 @@ fn the_published_management_answers_with_all_its_bases() {
     }
 }
 
-/// Our own machines go with the services of the library: after an emergency nothing moves by
-/// itself, and control cannot be released during one.
+/// Our machines match the library's services: after an emergency nothing moves by itself, and
+/// control cannot be released during an emergency.
 #[test]
 fn our_management_differs_from_the_published_one_where_it_says_so() {
     let mut loader = Loader::new();
@@ -466,7 +466,7 @@ fn what_is_wrong_in_a_machine_is_reported_and_leaves_the_service_as_it_is() {
         let found: Vec<_> = loaded.diagnostics.iter().map(ToString::to_string).collect();
         assert_eq!(found.first().map(String::as_str), Some(expected));
         let service = loaded.library.services().next().expect("the service stays");
-        // A machine that was parsed stays, because others extend it.
+        // A parsed machine is kept, because others extend it.
         let read = expected.contains("is not a state");
         assert_eq!(service.behaviour.is_empty(), !read);
     }

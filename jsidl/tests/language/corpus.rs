@@ -1,5 +1,5 @@
-//! Loads the public definitions, where they are at hand: all of them resolve, except those that
-//! are known to be wrong.
+//! Loads the public definitions, if available: all of them resolve, except those known to be
+//! wrong.
 
 use std::f64::consts::PI;
 use std::fs;
@@ -21,7 +21,7 @@ fn load(corpus: &Path, sources: &[&str]) -> Loaded {
     loader.load()
 }
 
-/// The findings of a severity, with the file's name alone.
+/// The findings of a severity, each with its file name but without the directory.
 fn findings(loaded: &Loaded, severity: Severity) -> Vec<String> {
     let found = loaded.diagnostics.iter().filter(|d| d.severity == severity);
     found
@@ -69,7 +69,7 @@ fn every_definition_of_ffi_resolves_without_a_finding() {
     assert_eq!(loaded.diagnostics.to_string(), "");
 }
 
-/// One of them inherits from `Management`, which the examples do not bring along.
+/// One example inherits from `Management`, which the examples do not include.
 #[test]
 fn every_example_resolves_beside_the_core_services() {
     let Some(corpus) = corpus() else { return };
@@ -104,7 +104,7 @@ fn of_fkie_only_what_cannot_be_is_an_error() {
             "CBRNSensorClass.xml: the record `CBRNRec` has 14 optional members, but its `presence_vector` has only 8 bits: use a wider `field_type_unsigned`",
         ]
     );
-    // Findings about state machines are counted elsewhere.
+    // `behaviour.rs` counts the findings about state machines.
     let mut warnings = findings(&loaded, Severity::Warning);
     warnings.retain(|w| !w.contains("`initial_state`") && !w.contains(": start there"));
     warnings.retain(|w| !w.contains("`is_stateless`"));
@@ -118,8 +118,8 @@ fn of_fkie_only_what_cannot_be_is_an_error() {
     );
 }
 
-/// The golden vectors have every message that their generator could encode: all are known under
-/// the same code, name, service and version.
+/// The golden vectors cover every message that their generator could encode. Each is known here
+/// under the same code, name, service and version.
 #[test]
 fn every_message_of_the_golden_vectors_is_known() {
     let Some(corpus) = evidence::outside("jsidl-corpus") else {
@@ -185,7 +185,7 @@ fn what_a_definition_says_arrives_in_the_model() {
             "TimeStamp"
         ]
     );
-    // A reference: its own name and optionality, the target's bits.
+    // A reference has its own name and optionality, and the bits of its target.
     let stamp = record.members.last().expect("nine members");
     assert!(stamp.optional);
     let Shape::Bits(bits) = &stamp.shape else {
@@ -193,7 +193,7 @@ fn what_a_definition_says_arrives_in_the_model() {
     };
     let last = bits.fields.last().expect("five fields");
     assert_eq!((last.name.as_str(), last.from, last.to), ("Day", 27, 31));
-    // A limit that is computed from a constant of another file.
+    // A limit computed from a constant in another file.
     let Shape::Scalar(yaw) = &record.members[6].shape else {
         panic!("yaw is a number");
     };

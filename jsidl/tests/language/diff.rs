@@ -1,4 +1,4 @@
-//! Differences between definitions: each kind, with whether the wire is affected.
+//! Differences between definitions: each kind, and whether it affects the wire format.
 
 use jsidl::diff::compare;
 use jsidl::{Library, Loader};
@@ -34,7 +34,7 @@ fn library(text: &str) -> Library {
     loaded.library
 }
 
-/// The changes, a line each.
+/// The changes, one per line.
 fn changes(before: &str, after: &str) -> Vec<String> {
     let found = compare(&library(before), &library(after), |_| true);
     let line = |change: &jsidl::diff::Change| {

@@ -1,5 +1,5 @@
-//! The documentation that is made of definitions: sound pages whose links lead somewhere, with
-//! nothing of a definition taken for markup, and layouts that agree with the decoder.
+//! The documentation generated from definitions: pages are well-formed, links resolve, texts of
+//! definitions are escaped, and layouts agree with the decoder.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use jsidl::docs::{Format, Page, pages};
 use jsidl::dynamic::{arbitrary, encode};
 use jsidl::explain::{Kind, Row, explain_as};
 
-/// The page as the XML that it is as well, but for its first line.
+/// Parses an HTML page as XML, which it is except for its first line.
 fn parsed(page: &Page) -> roxmltree::Document<'_> {
     let text = page.text.strip_prefix("<!DOCTYPE html>\n").unwrap();
     roxmltree::Document::parse(text).unwrap_or_else(|error| panic!("{}: {error}", page.path))
@@ -143,7 +143,7 @@ fn nothing_in_a_definition_is_taken_for_markup() {
     }
 }
 
-/// The fixed offsets that the page of a service states, by message and by what is there.
+/// The fixed offsets that the page of a service states, by message and field.
 fn offsets(page: &Page) -> BTreeMap<(String, String), usize> {
     let mut offsets = BTreeMap::new();
     let mut message = "";
@@ -163,7 +163,7 @@ fn offsets(page: &Page) -> BTreeMap<(String, String), usize> {
     offsets
 }
 
-/// What the layout calls the octets of an explanation.
+/// The name that the layout gives to the octets of an explanation row.
 fn name(row: &Row) -> String {
     let field = row.field.clone();
     match row.kind {

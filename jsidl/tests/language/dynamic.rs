@@ -1,5 +1,5 @@
-//! What the dynamic codec must hold for definitions made by hand: layout, limits, errors that name
-//! the place, and the JSON view.
+//! The dynamic codec on hand-written definitions: layout, limits, errors with their location, and
+//! the JSON view.
 
 use crate::support::{byte, count, emptiness, everything, framed, group, item, list, message};
 use jsidl::dynamic::{
@@ -9,7 +9,7 @@ use jsidl::dynamic::{
 use jsidl::model::{Message, Unsigned};
 use serde_json::{Value as Json, json};
 
-/// One value of [`everything`], as JSON.
+/// A value of [`everything`], as JSON.
 fn sample() -> Json {
     json!({
         "Numbers": {
@@ -267,7 +267,7 @@ fn an_empty_body_is_an_empty_object() {
     assert!(from_json(&definition, &json!({ "a": 1 })).is_err());
 }
 
-/// The sample with another value at a JSON pointer.
+/// The sample with the value at a JSON pointer replaced.
 fn changed(pointer: &str, value: Json) -> Json {
     let mut json = sample();
     *json.pointer_mut(pointer).unwrap() = value;

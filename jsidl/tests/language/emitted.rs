@@ -1,7 +1,7 @@
-//! The emitter against small definitions, one for each part of the language: what it writes is
-//! kept beside them, to be read. `BLESS=1 cargo test -p jsidl emitted` writes it anew.
+//! Snapshot tests of the Rust emitter, with a small definition for each part of the language. The
+//! snapshots are beside the definitions; `BLESS=1 cargo test -p jsidl emitted` updates them.
 //!
-//! The package `jaus` compiles these texts and sends values through them.
+//! The package `jaus` compiles the snapshots and sends values through them.
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 

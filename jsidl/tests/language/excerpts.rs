@@ -1,4 +1,4 @@
-//! Mistakes that people make, as they are shown: the whole text, with place, reason and remedy.
+//! Common mistakes and their complete error texts, with location, reason and remedy.
 
 use std::path::Path;
 

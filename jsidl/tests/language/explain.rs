@@ -1,5 +1,5 @@
-//! Explanations: every octet is in exactly one row, whatever the octets are, and the rows say what
-//! the message holds.
+//! Explanations of messages: for any octets, each octet is in exactly one row, and the rows show
+//! the content of the message.
 
 use crate::support::catalogue;
 use jaus_test_kit::evidence;
@@ -9,7 +9,7 @@ use jsidl::model::Message;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
-/// The rows hold the octets, once and in order.
+/// Checks that the rows contain the octets once and in order.
 #[track_caller]
 fn covers(rows: &[Row], octets: &[u8]) {
     let mut position = 0;
@@ -21,7 +21,7 @@ fn covers(rows: &[Row], octets: &[u8]) {
     assert_eq!(told, octets, "\n{}", table(rows));
 }
 
-/// What a row says, without its octets.
+/// The text of each row, without its octets.
 fn said(explanation: &Explanation) -> Vec<String> {
     let said = |row: &Row| format!("{}: {} {}", row.label(), row.raw_text(), row.meaning());
     explanation.rows.iter().map(said).collect()

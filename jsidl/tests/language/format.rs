@@ -1,4 +1,4 @@
-//! The canonical layout: stable, and without a change of meaning, for every definition there is.
+//! The formatter: its output is stable and keeps the meaning, for every available definition.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -22,8 +22,8 @@ fn fold(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Everything that a document says, comments included, in its order; white space folded as the
-/// language does.
+/// The content of a document in order, comments included, with white space folded as the language
+/// does.
 fn meaning(text: &str) -> Vec<String> {
     let document = Document::parse(text).expect("well-formed");
     let mut said = Vec::new();

@@ -1,4 +1,4 @@
-//! The dynamic codec against encodings that an independent code generator produced.
+//! The dynamic codec against the encodings of an independent code generator.
 
 use std::collections::BTreeMap;
 
@@ -63,12 +63,12 @@ fn integers_become_the_real_numbers_they_stand_for() {
     assert!(rows.len() > 300);
 }
 
-/// Which number of a scaled field goes into the JSON.
+/// The number of a scaled field to put into the JSON.
 #[derive(Clone, Copy, PartialEq)]
 enum Real {
-    /// What the other generator was given: a quarter of a step above the exact value.
+    /// The input of the other generator: a quarter of a step above the exact value.
     Given,
-    /// What we show for the integer that it gave.
+    /// Our view of the integer that the other generator produced.
     Shown,
 }
 
@@ -225,12 +225,12 @@ fn every_golden_message_is_read_shown_and_written_as_it_is() {
     assert!(total > 2000, "the golden data have 2116 vectors");
 }
 
-/// Messages that are laid out otherwise in our definitions than in those the vectors were made
-/// from; `services.rs` says why.
+/// Messages whose layout differs between our definitions and those of the vectors; `services.rs`
+/// gives the reasons.
 const LAID_OUT_OTHERWISE: &[(&str, &str)] = &[
-    // Its own code, which its query names; theirs has that of another message.
+    // Ours has its own code, which its query names; theirs has the code of another message.
     ("fkie-iop", "CBDetailedMeasurement"),
-    // The singular of a name.
+    // A name in the singular.
     ("fkie-manipulator", "ReportJointPosition"),
     ("fkie-mobility", "ReportLocalVector"),
     ("fkie-mobility", "SetLocalVector"),

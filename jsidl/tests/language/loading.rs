@@ -1,5 +1,5 @@
-//! What a load makes of files, directories and the catalogue: what survives beside mistakes, which
-//! of several declarations counts, and that hostile texts cost little.
+//! Loading of files, directories and the catalogue: which parts survive mistakes, which of several
+//! declarations counts, and bounded cost for hostile texts.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -327,7 +327,7 @@ fn what_cannot_be_read_is_a_finding() {
     );
 }
 
-/// Each line doubles what the line before it is: twenty lines would be a million fields.
+/// Each sequence refers to the previous one twice: twenty of them would be a million fields.
 #[test]
 fn references_that_double_again_and_again_are_stopped() {
     let mut types = format!(r#"<sequence name="S0"><record name="R">{FIELD}</record></sequence>"#);
@@ -349,7 +349,7 @@ fn references_that_double_again_and_again_are_stopped() {
     );
 }
 
-/// A copy costs what its text costs.
+/// A copy counts with the length of its texts.
 #[test]
 fn long_texts_that_are_referred_to_again_and_again_are_stopped() {
     let long = FIELD.replace(

@@ -1,5 +1,4 @@
-//! Merged state machines: how they are drawn, how they run, and that those of the published
-//! definitions are whole.
+//! Merged state machines: their diagrams, how they run, and the soundness of the published ones.
 
 use jaus_test_kit::evidence;
 use jsidl::behaviour::{
@@ -112,7 +111,7 @@ fn a_state_that_is_left_or_entered_does_so_around_the_transition() {
     );
 }
 
-/// The ends of a machine's transitions that are written down.
+/// The end states that a machine's transitions name explicitly.
 fn ends<'a>(machine: &Machine<'a>) -> Vec<(&'a Transition, &'a Name)> {
     let states = machine.states().map(|(_, state)| state);
     let transitions =
@@ -126,7 +125,7 @@ fn ends<'a>(machine: &Machine<'a>) -> Vec<(&'a Transition, &'a Name)> {
         .collect()
 }
 
-/// What does not lead where it should, as `service: what`.
+/// The start states and end states of a service that do not exist, as `service: state`.
 fn broken(library: &Library, service: &Service) -> Vec<String> {
     let mut broken = Vec::new();
     for machine in library.machines(service) {
@@ -157,11 +156,11 @@ fn broken(library: &Library, service: &Service) -> Vec<String> {
     broken
 }
 
-/// Collections, how many of their services have a machine, and what leads nowhere.
+/// The collections, the number of services with a machine in each, and the missing states.
 const PUBLISHED: [(&str, usize, &[&str]); 3] =
     [("jts", 97, &[]), ("ffi", 76, &[]), ("fkie", 129, &[])];
 
-/// Everything that a collection says about machines fits together; what does not is warned of.
+/// The machines of each collection are consistent; a warning reports each missing state.
 #[test]
 fn every_published_machine_starts_and_leads_to_states_that_exist() {
     let Some(corpus) = evidence::outside("jsidl-corpus") else {
@@ -190,7 +189,7 @@ fn every_published_machine_starts_and_leads_to_states_that_exist() {
     }
 }
 
-/// One type for each machine of each service that says something about its behaviour itself.
+/// One type for each machine of each service that declares behaviour of its own.
 #[test]
 fn every_published_machine_can_be_written_as_rust() {
     let Some(corpus) = evidence::outside("jsidl-corpus") else {

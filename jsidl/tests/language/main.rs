@@ -1,5 +1,5 @@
-//! The language: loading and checking of definitions, their behaviour and documentation, the dynamic
-//! codec, and everything that is emitted from a definition.
+//! Tests of the language: loading and checking definitions, behaviour, documentation, the dynamic
+//! codec, and all generated output.
 #![allow(
     clippy::expect_used,
     clippy::panic,

@@ -1,5 +1,5 @@
-//! Random octets and random values through the dynamic codec, for definitions made by hand, the
-//! embedded ones and the public ones: what is accepted comes back exactly.
+//! Round trips of random octets and values through the dynamic codec, with hand-written, embedded
+//! and public definitions: accepted input is reproduced exactly.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use jsidl::{Library, Loader};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
-/// Octets that are refused, or encode back to themselves.
+/// Checks that octets are rejected, or encode back to themselves.
 fn octets_come_back(message: &Message, octets: &[u8]) -> Result<(), TestCaseError> {
     for limits in [Limits::Enforced, Limits::Ignored] {
         if let Ok(value) = decode_with(message, octets, limits) {
@@ -24,7 +24,7 @@ fn octets_come_back(message: &Message, octets: &[u8]) -> Result<(), TestCaseErro
     Ok(())
 }
 
-/// A value that its octets and its JSON text give back.
+/// Checks that a value survives encoding to octets and to JSON text.
 fn values_come_back(message: &Message, entropy: &[u8]) -> Result<(), TestCaseError> {
     let value = arbitrary(message, entropy);
     let octets = encode(message, &value).unwrap();
@@ -41,12 +41,12 @@ fn values_come_back(message: &Message, entropy: &[u8]) -> Result<(), TestCaseErr
     Ok(())
 }
 
-/// Octets after the message's code, small ones more often than others.
+/// Random octets for the part after the message code; small values are more frequent.
 fn body() -> impl Strategy<Value = Vec<u8>> {
     prop::collection::vec(prop_oneof![0_u8..4, any::<u8>()], 0..300)
 }
 
-/// Runs both tests on a definition, with this many random inputs.
+/// Runs both checks on a message with `cases` random inputs.
 fn check(message: &Message, cases: u32) {
     let config = ProptestConfig {
         cases,
@@ -70,7 +70,8 @@ fn check(message: &Message, cases: u32) {
     }
 }
 
-/// Puts every message to both tests; one of those that share code and name, which seldom differ.
+/// Runs both checks on every message, but only on one of those that share code and name, because
+/// they seldom differ.
 fn check_all(library: &Library, cases: u32) {
     let messages = library.services().flat_map(|service| service.messages());
     let unique: BTreeMap<_, _> = messages.map(|m| ((m.code, &m.name), m)).collect();

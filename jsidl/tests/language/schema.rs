@@ -1,4 +1,4 @@
-//! JSON Schemas, held against the JSON view by a validator that is not ours.
+//! Checks the generated JSON Schemas against the JSON view, with an independent validator.
 
 use std::collections::BTreeMap;
 
@@ -71,7 +71,7 @@ fn lines_of_all_our_messages_are_valid_in_the_schema_of_their_service() {
     assert!(total > 500);
 }
 
-/// The least document of a message with another value at a place.
+/// The minimal document of a message with the value at a JSON pointer replaced.
 fn changed(message: &Message, place: &str, value: impl Into<Json>) -> Json {
     let mut json = to_json(message, &arbitrary(message, &[])).unwrap();
     let (parent, key) = place.rsplit_once('/').unwrap();
@@ -79,7 +79,7 @@ fn changed(message: &Message, place: &str, value: impl Into<Json>) -> Json {
     json
 }
 
-/// A document with a mistake: the schema refuses it as the reader does.
+/// Checks that both the reader and the schema reject an invalid document.
 #[track_caller]
 fn refused(message: &Message, place: &str, value: impl Into<Json>) {
     let json = changed(message, place, value);
@@ -88,7 +88,7 @@ fn refused(message: &Message, place: &str, value: impl Into<Json>) {
     assert!(!schema.is_valid(&json), "{json:#}");
 }
 
-/// A document that is unlike what is written, but read.
+/// Checks that both accept a document in a form that the writer does not produce.
 #[track_caller]
 fn admitted(message: &Message, place: &str, value: impl Into<Json>) {
     let json = changed(message, place, value);

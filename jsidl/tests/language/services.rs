@@ -1,5 +1,5 @@
-//! Our own definitions: they are sound, they say on the wire what the public ones say, and they
-//! say it to people in words of their own.
+//! Our own service definitions: they are sound, they have the wire layouts of the public ones, and
+//! their descriptions are not copied from those.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ fn ours() -> Library {
     library
 }
 
-/// The public collections, as they name themselves.
+/// The public collections, each with its name.
 fn public(corpus: &Path) -> [(&'static str, Library); 3] {
     ["ffi", "jts", "fkie"].map(|source| {
         let mut loader = Loader::new();
@@ -69,7 +69,7 @@ fn every_service_of_each_set_is_there() {
             .lineage(service)
             .last()
             .map(|root| root.name.clone());
-        // The Reference Architecture has the transport beside its services.
+        // In the Reference Architecture the transport is not a service.
         let expected = match service.id.urn.strip_prefix("urn:jaus-rs:ra33:") {
             Some(_) => "Core",
             None => "Transport",
@@ -106,11 +106,11 @@ fn every_message_and_field_says_what_it_is_for() {
     }
 }
 
-/// Where a collection has something else under the same name and version: which one, in which
-/// services, and all the messages that differ in each of them. Ours is as the others have it, or as
-/// the comment says.
+/// Differences from a public service of the same name and version: the collection, the services,
+/// and all messages that differ in each of them. Our definition agrees with the other collections,
+/// or is as the comment says.
 const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
-    // Two sources of one version disagree whether a vector's speed is optional.
+    // Two collections disagree on whether a vector's speed is optional.
     (
         "jts",
         &["mobility:GlobalVectorDriver 1.0"],
@@ -182,16 +182,16 @@ const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
         &["manipulator:PrimitiveEndEffector 1.0"],
         &["4632 ReportEndEffectorSpecification"],
     ),
-    // The lights are not in bit order; in the newest version they are.
+    // The lights are not in bit order here, but they are in the newest version.
     (
         "jts",
         &["ugv:IlluminationService 1.0"],
         &["0513 SetIlluminationState", "4513 ReportIlluminationState"],
     ),
-    // It cannot be encoded as published: fourteen optional members, eight presence bits. Theirs is
-    // omitted from the service, ours has a wider presence vector.
+    // The published message cannot be encoded: 14 optional members, 8 presence bits. It is omitted
+    // from their service; ours has a wider presence vector.
     ("fkie", &["iop:CBRNSensor 1.1"], &["F931 CBRNDetection"]),
-    // Two messages of one service with one code: ours has it for one of them, and for the other the
+    // Two messages of a service share a code. Ours keeps it for one of them; the other gets the
     // code that its query names.
     (
         "fkie",
@@ -208,7 +208,7 @@ const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
         &["ugv:IlluminationService 1.0"],
         &["0513 SetIlluminationState", "4513 ReportIlluminationState"],
     ),
-    // Names start with lower-case letters, in the newest version with capitals.
+    // Names start with lower-case letters here, but with capitals in the newest version.
     (
         "jts",
         &["ugv:PlatformSpecifications 1.0"],
@@ -219,8 +219,8 @@ const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
         &["ugv:PlatformSpecifications 1.0"],
         &["4502 ReportPlatformSpecifications"],
     ),
-    // Other capitals, one position instead of two, dimensions from 0 and without a unit, and an
-    // older base: apparently a draft, because the others agree.
+    // Different capitals, one position instead of two, dimensions from 0 and without a unit, and an
+    // older base: apparently a draft, because the other collections agree.
     (
         "fkie",
         &["ugv:StabilizerDriver 1.0"],
@@ -269,7 +269,7 @@ fn every_service_has_the_octets_that_the_public_ones_have() {
     );
 }
 
-/// The messages that two services do not have alike, and the base if it is another.
+/// The messages that differ between two services, and `base` if their base services differ.
 fn differences(ours: &Service, theirs: &Service) -> Vec<String> {
     let (left, right) = (layouts(ours), layouts(theirs));
     let messages: BTreeSet<_> = left.keys().chain(right.keys()).collect();
@@ -285,9 +285,9 @@ fn differences(ours: &Service, theirs: &Service) -> Vec<String> {
     different
 }
 
-/// Whether a public service is omitted: client services have no messages, the first version of
-/// mobility has nothing on the wire that the second lacks, and a misspelt name has its service
-/// under the correct one.
+/// Whether we omit a public service: client services have no messages, version 1.0 of mobility has
+/// nothing on the wire that the next version lacks, and a misspelt service exists under its correct
+/// name.
 fn is_left_out(id: &str) -> bool {
     let is_client = id
         .rsplit_once(' ')
@@ -337,7 +337,7 @@ fn no_sentence_is_taken_from_the_public_definitions() {
     assert_eq!(taken, BTreeMap::new());
 }
 
-/// All runs of six words in a text.
+/// All sequences of six consecutive words in a text.
 fn runs(text: &str) -> impl Iterator<Item = Vec<String>> {
     let words = text
         .split(|c: char| !c.is_alphanumeric())
@@ -386,8 +386,8 @@ fn each_field_of(item: &Item, visit: &mut impl FnMut(&Item)) {
     }
 }
 
-/// What a service says on the wire, in the words of the definitions: everything but the texts and
-/// the limits of counts, in which ours are more tolerant.
+/// The wire layouts of a service's messages: everything except the descriptions and the limits of
+/// counts, in which ours are more tolerant.
 fn layouts(service: &Service) -> BTreeMap<(u16, String), String> {
     let messages = service.messages().map(|message| {
         let body = message.body.as_ref().map(layout);

@@ -1,6 +1,6 @@
-//! Runs valid and invalid definitions, written for another validator, where they are at hand.
+//! Runs valid and invalid definitions written for another validator, if available.
 //!
-//! Most are fragments: the root is the element under test, which a template puts where it belongs.
+//! Most are fragments: the root is the element under test, which a template embeds in a definition.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use jaus_test_kit::evidence;
 use jsidl::{Diagnostic, Diagnostics, Loader};
 
-/// The surroundings of a fragment whose root is this element.
+/// The text before and after a fragment whose root is this element.
 fn surroundings(element: &str) -> (&'static str, &'static str) {
     match element {
         "service_def" | "service_set" => ("", ""),
@@ -90,7 +90,7 @@ fn complete(text: &str) -> String {
     )
 }
 
-/// The valid case that an invalid one inherits from.
+/// The valid case that an invalid case inherits from.
 fn base(file: &Path) -> Option<PathBuf> {
     let base = match file.file_stem()?.to_str()? {
         "ProtocolBehaviorTest2b" => "ProtocolBehaviorTest2a",
@@ -125,11 +125,12 @@ fn cases(kind: &str, folder: &str) -> Vec<PathBuf> {
     files
 }
 
-/// What the compiler is stricter about, on purpose.
+/// Whether a finding on a valid case is expected: this compiler is stricter on purpose, or the case
+/// refers to files that are not loaded.
 fn tolerated(finding: &Diagnostic) -> bool {
     let message = &finding.message;
     [
-        // A message that does not start with its code cannot be distinguished from others.
+        // A message that does not start with its code cannot be told apart from others.
         "the header is empty",
         "the header does not start with the message code",
         // The standard does not say whether such a vector is on the wire.
@@ -142,7 +143,7 @@ fn tolerated(finding: &Diagnostic) -> bool {
     .any(|known| message.contains(known))
 }
 
-/// What a fragment speaks of is not there, because it stands alone.
+/// Whether a finding is about a missing state, machine or start of a fragment on its own.
 fn lonely(finding: &Diagnostic) -> bool {
     let message = &finding.message;
     ["is not a state of", "to start: add it", "has no `start`"]
@@ -172,7 +173,7 @@ fn valid_definitions_have_no_errors() {
     }
 }
 
-/// Invalid cases, and what their mistake is called.
+/// Invalid cases, and part of the expected error text.
 const REJECTED: &[(&str, &str)] = &[
     ("Action1", "`Store In Sequence` cannot be a `name`"),
     (
@@ -296,8 +297,8 @@ const REJECTED: &[(&str, &str)] = &[
     ("VtagField1", "`min_count` is 2"),
 ];
 
-/// Invalid cases that break a rule which published definitions break as well, where the merged
-/// machine or the vocabulary has an answer: what the warning says.
+/// Invalid cases that only cause a warning, with part of its text: published definitions break the
+/// same rule, and the merged machine or the vocabulary is still well defined.
 const WARNED: &[(&str, &str)] = &[
     (
         "ProtocolBehavior7",

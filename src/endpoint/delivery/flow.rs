@@ -2,8 +2,8 @@
 //! lost.
 //!
 //! Each acknowledgement names one packet, so only unacknowledged packets are retransmitted. A
-//! packet counts as lost when enough packets sent after it were acknowledged (the threshold adapts
-//! to needless retransmissions), or when nothing was acknowledged for the retransmission timeout.
+//! packet counts as lost when one sent sufficiently later is acknowledged (the distance adapts to
+//! needless retransmissions), or when nothing was acknowledged for the retransmission timeout.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::time::{Duration, Instant};
@@ -131,7 +131,7 @@ pub(super) struct Flow {
     pub(super) timer: Option<Instant>,
     /// Messages with a packet that has used up its attempts.
     exhausted: Vec<u64>,
-    /// What became of messages, until it is reported.
+    /// The outcomes of messages that are not reported yet.
     pub(super) outcomes: VecDeque<Outcome>,
     /// No message in flight has a lower serial number.
     floor: u64,
@@ -223,9 +223,9 @@ impl Flow {
         pending.is_some_and(|it| it.started.is_none() && it.whole.payload.len() > octets)
     }
 
-    /// The next packet to send: of that priority or, if that must wait for
-    /// sequence numbers, of a lower one. `begin` is called with the length of a message when its
-    /// first packet is due, and returns how to cut it and which header to use.
+    /// The next packet to send: of that priority or, if that must wait for sequence numbers, of a
+    /// lower one. `begin` is called with the length of a message when its first packet is due, and
+    /// returns how to cut it and which header to use.
     pub(super) fn take(
         &mut self,
         now: Instant,
@@ -414,7 +414,7 @@ impl Flow {
         self.window.grow(packet.order, self.in_flight);
     }
 
-    /// Finds packets overtaken by more later packets than tolerated.
+    /// Marks packets as lost if one sent `tolerance` packets later was acknowledged.
     fn find_lost(&mut self, now: Instant) {
         while let Some(&(order, sequence)) = self.order.front() {
             let is_current = |packet: &Packet| packet.order == order && !packet.lost;

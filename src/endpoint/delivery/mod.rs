@@ -3,18 +3,17 @@
 //! Each destination has a [flow](flow) of its own with a sliding window, so that an unresponsive
 //! destination delays no other. A message is given up when its destination has acknowledged nothing
 //! for [`Config::acknowledge_patience`] since the message was queued, or when one of its packets
-//! was retransmitted for that long and [`Config::acknowledge_tries`] times. If a peer never
-//! acknowledges anything, each queued message is therefore given up that long after it was queued.
-//! The silence is remembered: until the peer is heard again, further messages get a sixth of the
-//! time.
+//! was sent [`Config::acknowledge_tries`] times over at least that long. The silence is remembered:
+//! until the peer acknowledges something, its other messages, including those already queued, get
+//! a sixth of the time.
 //!
 //! Frames are created when they are sent; a waiting message costs only its own octets, which are
 //! shared.
 //!
 //! Two limits of Junior as a receiver matter here. It drops all but the latest 50 fragments (or
 //! 100, as configured) although it has acknowledged them, so a message must not have more. And it
-//! reads ten datagrams per millisecond from a buffer of 70000 octets, which the window finds out by
-//! loss.
+//! reads ten datagrams per millisecond from a buffer of 70000 octets, to which the window adapts
+//! through losses.
 
 mod flow;
 mod round_trip;
@@ -39,9 +38,9 @@ const TURN: usize = 32;
 pub struct FlowStatus {
     /// The smoothed round trip; `None` before the first measurement.
     pub round_trip: Option<Duration>,
-    /// How many packets may be unacknowledged at a time.
+    /// How many packets may be in flight at a time.
     pub window: usize,
-    /// How many are unacknowledged now.
+    /// How many are in flight now: sent, and neither acknowledged nor counted as lost.
     pub in_flight: usize,
     /// Messages that are queued or unacknowledged.
     pub messages: usize,
@@ -248,8 +247,7 @@ impl Endpoint {
         self.deliveries.push(now, handle, whole, awaited)
     }
 
-    /// Sends the next packets of this priority, at most one flow's turn. Returns whether any were
-    /// sent.
+    /// Sends the next packets of this priority, at most [`TURN`]. Returns whether any were sent.
     pub(super) fn send_deliveries(&mut self, now: Instant, priority: Priority) -> bool {
         let mut sent = 0;
         while sent < TURN
@@ -359,7 +357,7 @@ impl Endpoint {
         }
     }
 
-    /// Reports what became of messages to a destination, and reschedules its flow.
+    /// Reports the outcomes of messages to a destination, and reschedules its flow.
     fn report_outcomes(&mut self, destination: JausId) {
         while let Some(outcome) = self.deliveries.next_outcome(destination) {
             if outcome.given_up.is_some() {

@@ -1,9 +1,9 @@
 //! The congestion window of one destination, counted in packets: slow start, then additive increase
 //! and multiplicative decrease.
 //!
-//! No receiver announces what it can take, so the window finds out by loss: Junior reads ten
-//! datagrams per millisecond from a buffer that holds some twenty of its full ones, a node on a
-//! slow line less, a node on the same host some hundreds.
+//! No receiver announces its capacity, so the window probes it by loss: Junior reads ten datagrams
+//! per millisecond from a buffer that holds some twenty of its full ones, a node on a slow line
+//! less, a node on the same host some hundreds.
 //!
 //! A radio loses packets at random, and a smaller window does not help. So a loss shrinks the
 //! window only if the round trip has grown, because packets are queueing somewhere, or if a large

@@ -60,7 +60,8 @@ pub(super) struct HopQueue {
 
 impl HopQueue {
     /// Queues a datagram. If it may be packed, it waits for others until `held_until`, or until the
-    /// time already set; otherwise the whole queue stops waiting.
+    /// time already set; otherwise the whole queue stops waiting. A safety-critical datagram never
+    /// waits, and does not change how long the others wait.
     pub(super) fn push(&mut self, priority: Priority, octets: Bytes, held_until: Option<Instant>) {
         self.whole[usize::from(priority.bits())].push_back(octets);
         if priority != Priority::SafetyCritical {

@@ -5,8 +5,8 @@
 //! around, so "before" and "after" are neighbours on a circle. A run that has not grown while the
 //! sender advanced by a quarter of the circle is stale: its numbers are about to be reused.
 //!
-//! Unfinished messages are bounded in octets (including an overhead per piece), per sender and in
-//! total, and in time. The oldest runs are dropped first.
+//! Unfinished messages are bounded in octets (including an overhead per piece and run), per sender
+//! and in total, and in time. The oldest runs are dropped first.
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
@@ -59,7 +59,7 @@ fn part_of_message(frame: &Frame, held: usize) -> Bytes {
 #[derive(Debug)]
 pub(in crate::endpoint) struct Whole {
     pub(in crate::endpoint) payload: Bytes,
-    /// How it was cut, if that can be detected.
+    /// How it was cut; standard unless another style is known or detected.
     pub(in crate::endpoint) style: LargeStyle,
     /// The number and payload of its first fragment.
     pub(in crate::endpoint) first: (u16, Bytes),
@@ -306,8 +306,7 @@ impl Reassembly {
     }
 
     /// Adds a fragment; returns the message if it is complete. `style` is the sender's style, if
-    /// known. Runs dropped to stay within bounds
-    /// are counted.
+    /// known. Runs dropped to stay within bounds are counted.
     pub(in crate::endpoint) fn insert(
         &mut self,
         arrival: Arrival<'_>,

@@ -85,13 +85,13 @@ impl Peers {
         state.is_none_or(|state| state.place.standing == Standing::Heard)
     }
 
-    /// Where and when a peer was last heard.
+    /// A peer's path, and when it was last heard on any path.
     pub(super) fn last_heard(&self, id: JausId) -> Option<(Path, Instant)> {
         let peer = &self.states.get(&id)?.peer;
         Some((peer.path, peer.last_heard))
     }
 
-    /// The paths on a link on which peers were heard, possibly with repetitions.
+    /// The peers' paths on a link, possibly with repetitions.
     pub(super) fn paths_on(&self, link: LinkId) -> impl Iterator<Item = Path> + '_ {
         let paths = self.states.values().map(|state| state.peer.path);
         paths.filter(move |path| path.link == link)

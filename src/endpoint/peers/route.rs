@@ -63,7 +63,7 @@ pub(in crate::endpoint) struct Challenge {
     pub(in crate::endpoint) rival: Option<Probe>,
     /// Whether messages go to the rival in the meantime.
     pub(in crate::endpoint) was_provisional: bool,
-    /// Whether an answer from the rival decides without waiting for the incumbent.
+    /// Whether the first answer decides, without waiting for the other path.
     pub(super) at_once: bool,
     pub(super) incumbent_heard: bool,
     pub(super) tries: u32,

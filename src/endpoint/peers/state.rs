@@ -24,11 +24,11 @@ const LAST_NUMBERS: u16 = 60_000;
 pub struct Peer {
     /// The id.
     pub id: JausId,
-    /// The source of its latest valid message. Peers behind a router have the router's address.
+    /// Its address, to which messages for it go. Peers behind a router have the router's address.
     pub path: Path,
     /// How far that path is verified.
     pub route: RouteState,
-    /// The header of its latest message. Messages to it use the same header.
+    /// The header of its latest message from there. Messages to it use the same header.
     pub version: Version,
     /// When its first message arrived.
     pub first_heard: Instant,
@@ -42,9 +42,9 @@ pub struct Peer {
     pub sent: Traffic,
     /// Duplicates received from it.
     pub duplicates: u64,
-    /// Retransmissions to it for want of an acknowledgement.
+    /// Retransmissions to it, because no acknowledgement arrived.
     pub retransmissions: u64,
-    /// Messages to it given up for want of an acknowledgement.
+    /// Messages to it given up, because no acknowledgement arrived.
     pub lost: u64,
     /// The smoothed round trip from transmission to acknowledgement; `None` before the first
     /// measurement.

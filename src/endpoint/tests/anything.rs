@@ -1,4 +1,5 @@
-//! Arbitrary input in arbitrary order: no panic, no growth, and every message accounted for.
+//! Arbitrary input in arbitrary order: no panic, bounded memory, and every message is accounted
+//! for.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -194,7 +195,7 @@ proptest! {
         }
         prop_assert!(rig.events().len() <= 6 * LIMIT);
         prop_assert!(rig.transmits().len() <= 4 * LIMIT);
-        // Without further input, it comes to rest.
+        // Without further input, all timers end.
         for _wake in 0..100 {
             let Some(timeout) = rig.endpoint.poll_timeout() else { break };
             rig.now = rig.now.max(timeout);

@@ -1,4 +1,4 @@
-//! Neither peers nor components can make an endpoint grow without bound; every drop is counted.
+//! Bounds: peers and components cannot make an endpoint grow without limit; every drop is counted.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Reliable delivery over wires of all kinds.
+//! Reliable delivery over wires with delay, loss, reordering and bottlenecks.
 
 use super::wire::{Conditions, Wire, large, reliable};
 use super::*;

@@ -47,7 +47,7 @@ fn said(number: u32) -> Frame {
 }
 
 /// Floods an endpoint from `hosts` addresses, 100 packets per millisecond, while [`PEER`] and
-/// [`US`] talk. Each of the peer's messages arrives twice, for want of an acknowledgement.
+/// [`US`] talk. Each of the peer's messages arrives twice, as if not acknowledged.
 fn flood(hosts: u32, config: Config) -> Rig {
     let mut rig = Rig::with(config);
     rig.hear(&from_peer(QUERY_HEARTBEAT));
@@ -97,8 +97,8 @@ fn flood(hosts: u32, config: Config) -> Rig {
     rig
 }
 
-/// Checks the default bounds: 1024 peers, 1024 buckets, 40 960 fingerprints and 16 MiB of
-/// fragments.
+/// Checks the default bounds: 1024 peers, 1024 buckets, 40 960 fingerprints and 32 MiB of
+/// fragments. [`PEER`] must still be known.
 fn is_bounded(rig: &Rig) {
     let config = Config::default();
     assert!(rig.endpoint.peers().count() <= config.max_peers);

@@ -493,7 +493,7 @@ fn a_first_fragment_that_is_repeated_late_does_not_undo_the_message() {
     assert_eq!(payloads(&mut rig), [message]);
 }
 
-/// Its node sends more urgent messages first, from any of its components.
+/// The sender's node sends more urgent messages first, from any of its components.
 #[test]
 fn what_was_acknowledged_is_kept_while_its_host_has_something_else_acknowledged() {
     let wish = |mut frame: Frame| {

@@ -1,4 +1,5 @@
-//! Interoperation with Junior: its memory of sequence numbers, its restarts and its calls.
+//! Interoperation with Junior: its duplicate detection, its restarts, and its messages for unknown
+//! ids.
 
 use std::collections::HashMap;
 
@@ -51,7 +52,7 @@ fn a_node_that_is_started_again_and_again_uses_no_number_that_junior_remembers()
             dropped: 0,
         };
         let begin = Rig::new().now;
-        // A command that runs again and again: greeting, 1 MiB, end.
+        // A command that is run repeatedly: greeting, 1 MiB, end.
         for run in 0..40 {
             let alive = Duration::from_millis(200) * run;
             let mut rig = Rig::with(Config {
@@ -124,7 +125,7 @@ fn lengths_of(rig: &mut Rig, frames: &[Frame]) -> Vec<usize> {
 
 #[test]
 fn a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_come_again() {
-    // Whether it is recognised by its fragments or counts as standard.
+    // The peer may be recognised by its fragments, or count as standard.
     let anybody = Assignment {
         id: PEER,
         profile: Known::Standard,
@@ -153,7 +154,7 @@ fn a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_c
 fn what_junior_sends_again_is_delivered_once_also_while_the_message_is_put_together() {
     let mut rig = Rig::new();
     let frames = of_junior(1, &message(102_400));
-    // Each of them four times, as if no acknowledgement arrived.
+    // Each fragment four times, as if no acknowledgement arrived.
     for frame in &frames {
         for _try in 0..4 {
             rig.hear(frame);
@@ -177,7 +178,7 @@ fn a_program_of_junior_that_is_started_again_beside_its_engine_is_heard() {
             profiles: vec![Assignment { id: PEER, profile }],
             ..Config::default()
         });
-        // Its engine knows our address: nothing is broadcast.
+        // Junior's engine knows our address: nothing is broadcast.
         let first = Frame {
             flags: WANTED,
             ..from_peer(QUERY_HEARTBEAT)

@@ -55,8 +55,7 @@ fn a_message_of_jauspp_that_fills_its_fragments_is_whole_with_the_next_message()
         rig.hear(&frame);
     }
     assert_eq!(payloads(&mut rig), Vec::<Bytes>::new());
-    // The numbers that it reserves are one ahead: the next message has the number of the last
-    // fragment.
+    // JAUS++ reuses the number of the last fragment for its next message.
     rig.hear(&Frame {
         sequence: 6,
         destination: JausId::EVERYONE,

@@ -138,7 +138,7 @@ fn every_message_of_a_datagram_is_delivered() {
 #[test]
 fn stale_octets_behind_a_message_are_counted_and_nothing_else() {
     let message = judp::encode(&from_peer(QUERY_IDENTIFICATION)).unwrap();
-    // The end of a name; and octets that look like a message, but have no receiver.
+    // The end of a name, and octets that look like a message but have no receiver.
     let for_nobody = judp::encode(&Frame {
         source: id("42.1.9"),
         destination: id("101.0.1"),

@@ -372,7 +372,7 @@ fn one_address_cannot_lock_newcomers_of_another_out() {
     assert_eq!(rig.received().len(), 1);
     assert_eq!(rig.count(Counter::PeersFull), 0);
     assert!(rig.endpoint.peers().any(|peer| peer.id == PEER));
-    // Nor does the address evict it again.
+    // The other address does not evict it later either.
     for number in 2000..3000 {
         let source = invented(number);
         rig.hear_from(ELSEWHERE, &Frame { source, ..again(1) });

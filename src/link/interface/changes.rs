@@ -46,7 +46,7 @@ mod linux {
         /// Waits until something has changed.
         pub(crate) async fn next(&mut self) {
             if let Some(socket) = &self.0 {
-                // The caller looks up what has changed. An error is as good a reason for that.
+                // The caller looks up the changes itself, after an error too.
                 let _ = socket.readable().await;
             } else {
                 std::future::pending::<()>().await;

@@ -29,7 +29,7 @@ pub struct Interface {
     pub address: IpAddr,
     /// The length of the network prefix in bits.
     pub prefix: u8,
-    /// Whether it is up, as far as the operating system reports it.
+    /// Whether it is up and the address can be bound, as far as the operating system reports it.
     pub up: bool,
     /// Whether it carries multicast. Tunnels (`wg0`, `ppp0`) often do not; loopback does for IPv4
     /// only.

@@ -1,4 +1,4 @@
-//! Where a node's Unix socket is by default.
+//! The default path of a node's Unix socket.
 
 use std::path::PathBuf;
 

@@ -12,10 +12,11 @@
 //! | 17 | Welcome | id u32, longest message u32 | |
 //! | 18 | Refused | reason u8 | why |
 //! | 19 | Deliver | flags u8, source u32, destination u32, path | the message |
-//! | 20 | Outcome | handle u64, outcome u8; if that is 1 to 3, destination u32, acknowledged u32, length u32 | why it was rejected |
+//! | 20 | Outcome | handle u64, outcome u8; 1 to 3: destination, acknowledged, length u32 | why |
 //!
-//! A path is 00h for a message from the same node; 01h and the link u16 for a serial line; 02h, link
-//! u16, IPv6 address (IPv4 mapped), port u16 and scope u32 for a socket.
+//! A path is 00h for a message from the same node; 01h and the link u16 for a serial line or
+//! Junior's node manager; 02h, link u16, IPv6 address (IPv4 mapped), port u16 and scope u32 for a
+//! socket. The payload of an Outcome is the reason for a rejection.
 //!
 //! The component begins with Hello, and the node answers with Welcome or Refused. After that either
 //! side writes at any time. **Hello up to its version, and Refused, are the same in all versions**:
@@ -60,8 +61,8 @@ pub enum Head {
     Hello {
         /// The version of its format. If it is another version, the rest is not read.
         version: u8,
-        /// The requested id. With subsystem and node 0, that component of the node, whatever its
-        /// id.
+        /// The requested id. With subsystem and node 0, the component with that number on the node,
+        /// whatever the node's id.
         id: JausId,
     },
     /// A message from the component. Its source id is that of the connection.

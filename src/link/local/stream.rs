@@ -49,7 +49,8 @@ pub(crate) struct Stream {
 
 #[cfg(unix)]
 mod on_unix {
-    //! Sockets of either kind, watched [only for what is waited for](crate::link::watch).
+    //! Sockets of either kind, watched [for reading only](crate::link::watch), and for writing only
+    //! while they are full.
 
     use std::io::{self, ErrorKind, IoSlice, Write};
     use std::net::Shutdown;

@@ -1,6 +1,6 @@
 //! A node's Unix socket: directory and socket with their permissions.
 //!
-//! The socket is in a directory that only its owner can write to, and is accessible to the owner
+//! The socket is in a directory where no other user can replace it, and is accessible to the owner
 //! alone. In addition the operating system reports the user of each connecting process.
 
 use std::fs::{self, DirBuilder};
@@ -95,9 +95,9 @@ fn parent(path: &Path) -> &Path {
     }
 }
 
-/// Checks that no other user can put files into the directory: it belongs to this user or root, and
-/// its mode has none of the bits in `forbidden`, except that a sticky directory, where only owners
-/// can remove their files, is allowed for 0o022.
+/// Checks that no other user can replace files in the directory: it belongs to this user or root,
+/// and its mode has none of the bits in `forbidden`, except that a sticky directory, where only
+/// owners can remove their files, is allowed for 0o022.
 fn check_directory(directory: &Path, own: u32, forbidden: u32) -> Result<(), Error> {
     let unsafe_because = |why: String, remedy: String| {
         Err(Error::UnsafeDirectory {

@@ -5,8 +5,8 @@
 //! first. When the queue is full, the oldest packet of the lowest priority is dropped.
 //!
 //! The port must be usable when the link is opened. If it disappears later, as USB ports do, it is
-//! reopened, with pauses from [`FIRST_PAUSE`] to [`LONGEST_PAUSE`], ± 25 % at random. Packets sent meanwhile are
-//! dropped and counted, because old commands are useless when the line is back.
+//! reopened, with pauses from [`FIRST_PAUSE`] to [`LONGEST_PAUSE`], ± 25 % at random. Packets sent
+//! meanwhile are dropped and counted, because old commands are useless when the line is back.
 //!
 //! The port is driven through `serial2-tokio`, which needs no C library such as libudev.
 

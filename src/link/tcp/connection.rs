@@ -73,8 +73,8 @@ pub(super) struct Connection {
     write_at: usize,
     /// Messages dropped because the other side was too slow.
     pub(super) overflows: u64,
-    /// Set when messages were dropped and no octet taken since: the time, or `None` in it until the
-    /// time is known.
+    /// Set when messages are dropped, until the kernel takes an octet. The inner value is the time,
+    /// once it is known.
     stuck: Option<Option<Instant>>,
     failed: Option<io::Error>,
     /// Whether the sending direction is shut down.
@@ -115,7 +115,7 @@ impl Connection {
     }
 
     /// Queues the output of [`jtcp::encode`](crate::wire::jtcp::encode). Returns whether it was
-    /// accepted: a connection carries only one version.
+    /// accepted: a connection carries only one version, and nothing after the shutdown.
     pub(super) fn send(&mut self, priority: Priority, encoded: &Bytes) -> bool {
         let (version, message) = split_version(encoded.clone());
         // A peer that sends the version octet before each message may need it there, too (JAUS++).

@@ -70,7 +70,7 @@ const WARNING_PAUSE: Duration = Duration::from_secs(60);
 pub struct Counters {
     /// Accepted connections.
     pub accepted: u64,
-    /// Incoming connections refused because the limit was reached.
+    /// Incoming connections refused because a limit was reached.
     pub refused: u64,
     /// Incoming connections refused because access denies their network address.
     pub denied: u64,
@@ -94,7 +94,8 @@ pub struct Counters {
     pub send_overflows: u64,
     /// Messages dropped because there was no connection for them.
     pub not_connected: u64,
-    /// Messages dropped because the connection carries another version of the transport.
+    /// Messages dropped because the connection carries another version of the transport, or is
+    /// being shut down.
     pub other_version: u64,
 }
 

@@ -1,9 +1,10 @@
-//! Several datagrams with one call into the kernel: Linux's generic segmentation and receive
-//! offload (GSO, GRO), `sendmmsg` and `recvmmsg`.
+//! Batched UDP system calls on Linux: generic segmentation and receive offload (GSO, GRO),
+//! `sendmmsg` and `recvmmsg`.
 //!
-//! A call costs far more than a datagram's octets. So a large message leaves as one batch of equal
-//! datagrams, which the kernel (or the network card) takes apart, and arrives as one, which we take
-//! apart; small datagrams to several peers leave together; and several are fetched at a time.
+//! A system call costs far more than the octets of a datagram. So a large message is sent as one
+//! batch of equal datagrams, which the kernel or the network card splits, and is received as one
+//! batch, which this module splits. Small datagrams share a `sendmmsg` call, whatever their peers,
+//! and one `recvmmsg` call fetches several.
 
 use std::collections::VecDeque;
 use std::io::{self, IoSlice, IoSliceMut};
@@ -24,19 +25,19 @@ use super::socket::Socket;
 use crate::link::Slab;
 use crate::link::slab::LONGEST;
 
-/// Datagrams, or batches of them, that one call fetches. Each needs room for the longest.
+/// Limit of datagrams or batches per `recvmmsg` call. Each needs a slot of [`LONGEST`] octets.
 const FETCHED: usize = 8;
 
-/// Lets the kernel hand over datagrams of one sender in batches.
+/// Enables GRO: the kernel may deliver datagrams of one sender in batches.
 pub(super) fn prepare(socket: &UdpSocket) {
     if let Err(error) = setsockopt(socket, sockopt::UdpGroSegment, &true) {
-        // Linux before 5.0. They come one by one then.
+        // Linux before 5.0, which delivers them one by one.
         tracing::debug!(%error, "batched receive is unavailable");
     }
 }
 
-/// Sends a batch of datagrams of `segment` octets each, of which the last may be shorter. All of
-/// it goes or nothing.
+/// Sends a batch of datagrams of `segment` octets each; the last may be shorter. The kernel takes
+/// all of the batch or nothing.
 pub(super) fn send(
     socket: &UdpSocket,
     peer: SocketAddr,
@@ -56,10 +57,11 @@ pub(super) fn send(
     )?)
 }
 
-/// Sends batches of one datagram each with one call; how many were taken, which is at least one.
+/// Sends batches of one datagram each with one call. Returns how many the kernel took, at least
+/// one.
 ///
 /// # Errors
-/// Of the first; the kernel reports that of a later one with the next call.
+/// The error of the first datagram. The kernel reports that of a later one in the next call.
 pub(super) fn send_many<'a>(
     socket: &UdpSocket,
     datagrams: impl Iterator<Item = &'a GsoBatch> + Clone,
@@ -80,22 +82,22 @@ pub(super) fn send_many<'a>(
     Ok(sendmmsg(socket, &mut headers, SendFlags::DONTWAIT)?)
 }
 
-/// If the error means that a batch was refused because it is one: the most octets of each datagram
-/// of batches that may yet be taken.
+/// The new limit of a batched datagram's length, in octets, if the kernel rejected the batch as
+/// such; `None` for other errors.
 pub(super) fn limit_after(error: &io::Error, segment: usize) -> Option<usize> {
     match Errno::from_raw(error.raw_os_error()?) {
-        // A network card without checksums; an old kernel.
+        // A network card without checksum offload, or an old kernel.
         Errno::EIO | Errno::EOPNOTSUPP | Errno::ENOPROTOOPT => Some(0),
-        // A datagram does not fit a frame, so that it would have to be fragmented.
+        // The datagrams do not fit one frame, and GSO does not fragment them.
         Errno::EINVAL | Errno::EMSGSIZE => Some(segment - 1),
         _ => None,
     }
 }
 
-/// Fetches what has arrived, up to [`FETCHED`] batches.
+/// Receives up to [`FETCHED`] datagrams or batches.
 ///
 /// # Errors
-/// `WouldBlock` if nothing has arrived.
+/// `WouldBlock` if none has arrived.
 pub(super) fn receive(
     socket: &Socket,
     slab: &mut Slab,
@@ -103,7 +105,7 @@ pub(super) fn receive(
 ) -> io::Result<()> {
     let result = socket.try_read(|socket| {
         if fetch(socket, slab, arrived)? < FETCHED {
-            // There is no more, and no need to ask once more to know it.
+            // The socket is empty; this spares a call that would only confirm it.
             return Err(io::ErrorKind::WouldBlock.into());
         }
         Ok(())
@@ -121,7 +123,7 @@ fn fetch(
 ) -> io::Result<usize> {
     let room = slab.room_for(FETCHED);
     let mut slots = slots(room);
-    // Not kept: the kernel writes lengths into them that would have to be put right again.
+    // Not reused: the kernel overwrites their lengths, which would have to be reset.
     let mut headers = MultiHeaders::preallocate(FETCHED, Some(nix::cmsg_space!(i32)));
     let flags = MsgFlags::MSG_DONTWAIT;
     let fetched = recvmmsg(
@@ -154,7 +156,7 @@ fn slots(room: &mut [u8]) -> [[IoSliceMut<'_>; 1]; FETCHED] {
     std::array::from_fn(|_| [IoSliceMut::new(parts.next().unwrap_or_default())])
 }
 
-/// The octets of each datagram of a batch but the last.
+/// The length in octets of each datagram of a batch except the last.
 fn segment(batch: &RecvMsg<'_, '_, SockaddrStorage>) -> usize {
     let segment = batch.cmsgs().ok().and_then(|mut messages| {
         messages.find_map(|message| match message {

@@ -1,4 +1,4 @@
-//! Datagrams that the operating system splits: they leave with one call.
+//! A batch of datagrams to one peer, which one system call sends and the kernel splits (GSO).
 
 use std::net::SocketAddr;
 
@@ -7,7 +7,7 @@ use bytes::Bytes;
 use super::MAX_SEGMENTS;
 use crate::endpoint::MOST_OCTETS;
 
-/// Datagrams to one peer, of `segment` octets each, of which the last may be shorter.
+/// Datagrams to one peer of `segment` octets each; the last may be shorter.
 #[derive(Clone, Debug)]
 pub(super) struct GsoBatch {
     pub(super) peer: SocketAddr,
@@ -16,7 +16,7 @@ pub(super) struct GsoBatch {
 }
 
 impl GsoBatch {
-    /// What leaves with one call, if datagrams of up to `limit` octets may leave together.
+    /// The datagrams to send with the next call, if those of up to `limit` octets may share one.
     pub(super) fn part(&self, limit: usize) -> &[u8] {
         let datagrams = if self.segment <= limit {
             (MOST_OCTETS / self.segment).clamp(1, MAX_SEGMENTS)

@@ -1,9 +1,9 @@
-//! The UDP link of one network interface: a unicast socket, and one for each address by which
-//! everyone is reached: the multicast group, the network's broadcast address, or both.
+//! The UDP link of one network interface: a unicast socket, plus a receiving socket for the
+//! multicast group, the network's broadcast address, or both.
 //!
-//! See the [module above](super) for why there are several. Errors of a single datagram (an ICMP
-//! answer, a full network queue, a route that is missing just now) are counted and traced and
-//! never end the link.
+//! See the [parent module](super) for why these are separate sockets. Errors of a single datagram
+//! (an ICMP error, a full network queue, a temporarily missing route) are counted and traced. They
+//! never close the link.
 
 #[cfg(target_os = "linux")]
 mod batch;
@@ -29,31 +29,31 @@ use super::backlog::{Backlog, Bounds};
 use super::socket_table;
 use super::{Error, Interface};
 
-/// What a link has done since it was opened.
+/// Counts of a UDP link since it was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Counters {
-    /// Datagrams received, without our own.
+    /// Datagrams received, without echoes of our own.
     pub received: u64,
-    /// Octets in them.
+    /// Octets of those datagrams.
     pub received_octets: u64,
-    /// Our own datagrams for everyone, heard again and ignored.
+    /// Our own multicast and broadcast datagrams, received back and ignored.
     pub own_echo: u64,
-    /// Datagrams sent, each copy to a peer counted.
+    /// Datagrams sent; each copy to a peer counts.
     pub sent: u64,
-    /// Octets in them.
+    /// Octets of those datagrams.
     pub sent_octets: u64,
-    /// Calls into the operating system for all that.
+    /// System calls made to send, including failed ones.
     pub send_calls: u64,
-    /// Errors while receiving, such as ICMP answers to what we sent.
+    /// Receive errors, such as ICMP errors caused by our datagrams.
     pub receive_errors: u64,
-    /// Datagrams that the operating system refused to send.
+    /// Datagrams that the operating system rejected.
     pub send_errors: u64,
-    /// Datagrams dropped because the network was slower than this node for too long.
+    /// Queue entries (a datagram, or a batch of them) dropped because the network was too slow.
     pub send_overflows: u64,
 }
 
-/// What waits in a link while the kernel's send buffer is full.
+/// Limits of the queue in front of the kernel's send buffer.
 const OUTBOX: Bounds = Bounds {
     items: 2048,
     octets: 4 << 20,
@@ -61,7 +61,7 @@ const OUTBOX: Bounds = Bounds {
 
 const CAN_BATCH: bool = cfg!(target_os = "linux");
 
-/// The most datagrams to one peer that Linux takes as one batch.
+/// Linux's limit of datagrams in one GSO batch.
 const MAX_SEGMENTS: usize = 64;
 
 /// The sockets of one interface. Must be opened within a tokio runtime.
@@ -69,35 +69,34 @@ const MAX_SEGMENTS: usize = 64;
 pub struct UdpLink {
     interface: Interface,
     local: SocketAddr,
-    /// The unicast socket, which is always there and sends everything, and then those of `groups`,
-    /// which only hear.
+    /// First the unicast socket, which sends everything; then the sockets of `groups`, which only
+    /// receive.
     sockets: Vec<Socket>,
     groups: Vec<SocketAddr>,
-    /// Of the sockets, where the kernel numbers them.
+    /// The sockets' inode numbers, where the kernel reports them.
     inodes: Vec<u64>,
     peers: Vec<SocketAddr>,
     outbox: Backlog<GsoBatch>,
-    /// On its way into the kernel; nothing overtakes it.
+    /// The batches being passed to the kernel; nothing overtakes them.
     leaving: VecDeque<GsoBatch>,
-    /// Whether the kernel has no room for the next of `leaving`.
+    /// Whether the kernel's send buffer is full.
     full: bool,
-    /// Several datagrams to one peer leave with one call if each has no more octets than this.
+    /// The longest datagram, in octets, that is sent in a batch; 0 sends each by itself.
     gso_limit: usize,
-    /// Whether several datagrams are sent and fetched with one call.
+    /// Whether one system call may send or receive several datagrams.
     batch: bool,
-    /// Fetched already; all from one call.
+    /// Received datagrams that are not returned yet; all are from one system call.
     arrived: VecDeque<(SocketAddr, Bytes)>,
-    /// The socket that is read first the next time.
+    /// The socket that the latest fetch tried first.
     turn: usize,
-    /// The socket that the latest came from.
+    /// The socket that `arrived` came from.
     fetched_from: usize,
     last_error: Option<io::ErrorKind>,
     counters: Counters,
 }
 
 impl UdpLink {
-    /// Opens the link of `interface`. An interface without multicast and broadcast gets a link for
-    /// unicast alone.
+    /// Opens the link on `interface`. Without multicast and broadcast the link is unicast only.
     ///
     /// # Errors
     /// [`Error::PortTaken`], [`Error::GroupTaken`], [`Error::InvalidGroup`],
@@ -145,49 +144,50 @@ impl UdpLink {
         })
     }
 
-    /// The address that this link sends from, and that peers answer to.
+    /// The address that this link sends from, and that peers reply to.
     #[must_use]
     pub const fn local(&self) -> SocketAddr {
         self.local
     }
 
-    /// The interface that it was opened on.
+    /// The interface that the link was opened on.
     #[must_use]
     pub const fn interface(&self) -> &Interface {
         &self.interface
     }
 
-    /// The multicast group that it has joined, or the broadcast address that it uses instead.
+    /// The multicast group that the link has joined, or the broadcast address that it uses instead.
     #[must_use]
     pub fn group(&self) -> Option<SocketAddr> {
         self.groups.first().copied()
     }
 
-    /// What it has done so far.
+    /// The counters so far.
     #[must_use]
     pub const fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// How many datagrams to one peer are best given to [`transmit`](Self::transmit) at once.
+    /// The most datagrams to one peer that [`transmit`](Self::transmit) can send as one batch.
     #[must_use]
     pub const fn max_segments(&self) -> usize {
         if self.batch { MAX_SEGMENTS } else { 1 }
     }
 
-    /// The kernel's numbers of its sockets, for [`kernel_drops`]; none where it has no such numbers.
+    /// The sockets' inode numbers, for [`kernel_drops`]; empty if the kernel does not report them.
     #[must_use]
     pub fn inodes(&self) -> &[u64] {
         &self.inodes
     }
 
-    /// Names the peers that get a unicast copy of everything sent to the group, for networks that
+    /// Sets the peers that get a unicast copy of everything sent to the group, for networks that
     /// do not carry multicast.
     pub fn set_peers(&mut self, peers: Vec<SocketAddr>) {
         self.peers = peers;
     }
 
-    /// Warns when the kind of error is a new one, so that a broken network cannot fill a log.
+    /// Logs an error, as a warning only if its kind differs from the last one's, so that a broken
+    /// network cannot fill the log.
     fn report(&mut self, doing: &str, peer: Option<SocketAddr>, error: &io::Error) {
         let interface = &self.interface.name;
         if self.last_error.replace(error.kind()) == Some(error.kind()) {
@@ -198,9 +198,9 @@ impl UdpLink {
     }
 }
 
-/// How many datagrams for each of several links, named by their [`inodes`](UdpLink::inodes), the
-/// kernel dropped because the process did not read them in time, if it says so (Linux does). Reads
-/// a table of all sockets of the host.
+/// The number of datagrams for each link, given by its [`inodes`](UdpLink::inodes), that the kernel
+/// dropped because the process did not read them in time; `None` if the kernel does not report it.
+/// Linux does. Reads a table of all UDP sockets of the host.
 #[must_use]
 pub fn kernel_drops<'a>(links: impl IntoIterator<Item = &'a [u64]>) -> Vec<Option<u64>> {
     let table = socket_table::all();

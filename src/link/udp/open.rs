@@ -1,4 +1,4 @@
-//! Opening the sockets of a UDP link, and what is said when that fails.
+//! Opens the sockets of a UDP link, and maps the errors.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -9,7 +9,7 @@ use super::socket::Socket as Opened;
 use super::{PortTaken, Settings};
 use crate::link::{Error, Holder, Interface};
 
-/// The socket that sends everything, bound to one address for itself alone.
+/// Opens the socket that sends everything, bound exclusively to the interface's address.
 pub(super) fn unicast(interface: &Interface, settings: &Settings) -> Result<Opened, Error> {
     let wanted = interface.at(settings.port);
     let socket = new_socket(wanted)?;
@@ -29,7 +29,7 @@ pub(super) fn unicast(interface: &Interface, settings: &Settings) -> Result<Open
     finish(socket, settings.receive_buffer)
 }
 
-/// Lets a socket send to everyone at `group`.
+/// Enables a socket to send to a multicast or broadcast address.
 fn prepare_sending(
     socket: &Socket,
     group: IpAddr,
@@ -37,7 +37,7 @@ fn prepare_sending(
     settings: &Settings,
 ) -> io::Result<()> {
     let hops = settings.ttl.into();
-    // Other nodes of this host shall hear it too.
+    // Loopback is on so that other nodes of this host receive it too.
     match (group, interface.address) {
         (IpAddr::V6(_), _) => {
             socket.set_multicast_if_v6(interface.index)?;
@@ -53,7 +53,8 @@ fn prepare_sending(
     }
 }
 
-/// A socket that hears what is sent to everyone at `group`, shared with other nodes of the host.
+/// Opens a socket that receives from a multicast or broadcast address, shared with other nodes of
+/// the host.
 pub(super) fn group(
     interface: &Interface,
     group: SocketAddr,
@@ -63,7 +64,7 @@ pub(super) fn group(
     socket
         .set_reuse_address(true)
         .map_err(Error::io("sharing the multicast port"))?;
-    // Bound to the group itself, the socket leaves unicast to this port to the unicast socket.
+    // Bound to the group itself, the socket gets no unicast, which is for the unicast socket.
     let local = match group {
         _ if !cfg!(windows) => group,
         SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, group.port()).into(),
@@ -80,8 +81,8 @@ pub(super) fn group(
     finish(socket, settings.receive_buffer)
 }
 
-/// Joins the group on this interface. Without `multicast_all` Linux would also deliver what other
-/// sockets of this host joined on other interfaces.
+/// Joins the group on this interface. Unless `multicast_all` is disabled, Linux also delivers the
+/// datagrams of groups that other sockets of this host joined on other interfaces.
 fn join(socket: &Socket, group: IpAddr, interface: &Interface) -> io::Result<()> {
     match group {
         IpAddr::V4(v4) if v4.is_multicast() => {
@@ -91,8 +92,8 @@ fn join(socket: &Socket, group: IpAddr, interface: &Interface) -> io::Result<()>
             socket.join_multicast_v4_n(&v4, &on)
         }
         IpAddr::V6(v6) => {
-            // Newer than the rest (Linux 4.20), and not needed where the group's address names the
-            // interface.
+            // It may fail: the option needs Linux 4.20. It is not needed where the group's address
+            // names the interface.
             #[cfg(target_os = "linux")]
             let _ = socket.set_multicast_all_v6(false);
             socket.join_multicast_v6(&v6, interface.index)
@@ -102,7 +103,7 @@ fn join(socket: &Socket, group: IpAddr, interface: &Interface) -> io::Result<()>
     }
 }
 
-/// The operating system has no multicast, or no broadcast, as an emulator or a sandbox may not.
+/// Maps the error of a system without multicast or broadcast, such as an emulator or a sandbox.
 fn refused(group: SocketAddr, interface: &Interface, source: io::Error) -> Error {
     if group.ip().is_multicast() {
         return Error::GroupRefused {
@@ -119,7 +120,7 @@ fn new_socket(address: SocketAddr) -> Result<Socket, Error> {
     let socket = Socket::new(domain, Type::DGRAM, Some(Protocol::UDP))
         .map_err(|e| Error::socket("opening a UDP socket", (address.ip(), 0).into(), e))?;
     if address.is_ipv6() {
-        // The links of IPv4 have sockets of their own.
+        // IPv4 links have their own sockets.
         socket
             .set_only_v6(true)
             .map_err(Error::io("keeping IPv4 out of an IPv6 socket"))?;
@@ -128,7 +129,7 @@ fn new_socket(address: SocketAddr) -> Result<Socket, Error> {
 }
 
 fn finish(socket: Socket, receive_buffer: usize) -> Result<Opened, Error> {
-    // Linux answers with twice the size in force: the other half is its own bookkeeping.
+    // Linux reports twice the usable size: the other half is for its own bookkeeping.
     let granted = socket
         .set_recv_buffer_size(receive_buffer)
         .and_then(|()| socket.recv_buffer_size())

@@ -1,4 +1,4 @@
-//! The receiving half of a UDP link.
+//! The receive path of a UDP link: polls all its sockets in turn, and drops our own echoes.
 
 use std::io;
 use std::net::SocketAddr;
@@ -10,7 +10,7 @@ use super::UdpLink;
 use crate::link::Slab;
 
 impl UdpLink {
-    /// The next datagram and who sent it. Our own, heard again, are left out.
+    /// Receives the next datagram, with its sender's address. Skips echoes of our own datagrams.
     pub fn poll_recv(
         &mut self,
         cx: &mut Context<'_>,
@@ -30,16 +30,16 @@ impl UdpLink {
         }
     }
 
-    /// Whether the latest datagram that was received went to everybody.
+    /// Whether the latest received datagram was sent to the group or broadcast address.
     #[must_use]
     pub const fn went_to_all(&self) -> bool {
-        // The first socket is that for unicast. On Windows the others may get unicast too.
+        // The first socket is the unicast socket. On Windows the others may receive unicast too.
         self.fetched_from > 0 && !cfg!(windows)
     }
 
-    /// Fetches what has arrived at one of the sockets.
+    /// Fetches datagrams from the first socket that has any.
     fn poll_fetch(&mut self, cx: &mut Context<'_>, slab: &mut Slab) -> Poll<()> {
-        // Turn about, so that a flood on one socket does not silence the others.
+        // Rotate the order, so that a flood on one socket does not starve the others.
         self.turn = (self.turn + 1) % self.sockets.len();
         for i in 0..self.sockets.len() {
             let socket = (self.turn + i) % self.sockets.len();
@@ -70,7 +70,7 @@ impl UdpLink {
                 Err(e) => {
                     self.counters.receive_errors += 1;
                     self.report("receiving", None, &e);
-                    // Again soon, but not at the cost of everybody else.
+                    // Retry soon, but let other tasks run first.
                     cx.waker().wake_by_ref();
                     return Poll::Pending;
                 }

@@ -1,8 +1,8 @@
-//! The sending half of a UDP link: one queue, emptied with as few calls into the kernel as it takes.
+//! The send path of a UDP link: one priority queue, flushed with as few system calls as possible.
 //!
-//! Datagrams wait, the urgent first, until the node has nothing more to send just now, or until
-//! enough have come together. Then those to different peers leave with one call (`sendmmsg`), and
-//! several of equal length to one peer as one batch that the kernel segments (GSO).
+//! Datagrams are queued, most urgent first, until the node flushes the link or [`BURST`] entries
+//! wait. Then single datagrams share a `sendmmsg` call, whatever their peers. Several datagrams of
+//! equal length to one peer leave as a batch that the kernel splits (GSO).
 
 use std::io;
 use std::net::SocketAddr;
@@ -17,11 +17,11 @@ use super::socket::Socket;
 use crate::endpoint::{Remote, To, Transmit};
 use crate::wire::Priority;
 
-/// How many messages leave at once, and with one call if they are datagrams to different peers.
+/// Queue length at which the link flushes at once; also the most datagrams per `sendmmsg` call.
 const BURST: usize = 64;
 
 impl UdpLink {
-    /// Queues what the endpoint gives out, for [`flush`](Self::flush).
+    /// Queues a datagram or batch from the endpoint, for [`flush`](Self::flush).
     pub fn transmit(&mut self, transmit: &Transmit) {
         let (priority, octets) = (transmit.priority, &transmit.payload);
         match transmit.to {
@@ -29,13 +29,13 @@ impl UdpLink {
                 self.enqueue(peer, priority, octets, transmit.segment);
             }
             To::Group => self.enqueue_for_all(priority, octets, transmit.segment),
-            // No peer of this link.
+            // Not a peer of this link.
             To::Peer(Remote::Line) => {}
         }
     }
 
-    /// Sends a datagram to one peer. If the network takes nothing just now, the urgent go first
-    /// when it does again.
+    /// Sends a datagram to one peer. While the kernel's send buffer is full, the datagram waits in
+    /// the priority queue.
     pub fn send_to(&mut self, peer: SocketAddr, priority: Priority, datagram: &Bytes) {
         self.enqueue(peer, priority, datagram, None);
         self.flush();
@@ -74,7 +74,8 @@ impl UdpLink {
         }
     }
 
-    /// Sends what waits, unless the kernel has no room; whether nothing waits any more.
+    /// Sends queued datagrams until the kernel's send buffer is full; returns whether the queue is
+    /// empty.
     pub fn flush(&mut self) -> bool {
         while !self.full {
             if self.leaving.is_empty() {
@@ -89,7 +90,7 @@ impl UdpLink {
         false
     }
 
-    /// Sends what waits for the network; ready when nothing waits.
+    /// Sends queued datagrams; ready when none is left.
     pub fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<()> {
         while !self.flush() {
             if ready!(self.sockets[0].poll_room(cx)).is_err() {
@@ -102,7 +103,7 @@ impl UdpLink {
         Poll::Ready(())
     }
 
-    /// Gives the kernel what it takes with one call.
+    /// Makes one system call to send the first batch, or the single datagrams at the front.
     fn send_once(&mut self) {
         self.counters.send_calls += 1;
         #[cfg(target_os = "linux")]
@@ -127,15 +128,15 @@ impl UdpLink {
         }
     }
 
-    /// The kernel has taken so many datagrams of the first batch.
+    /// Removes and counts datagrams of the first batch that the kernel has taken.
     fn complete_first(&mut self, datagrams: usize) {
         let octets = self.drop_first(datagrams);
         self.counters.sent += datagrams as u64;
         self.counters.sent_octets += octets as u64;
     }
 
-    /// The kernel has not taken so many datagrams of the first batch: not now, not together, or not
-    /// at all.
+    /// Handles a send error of datagrams of the first batch: waits for room if the buffer is full,
+    /// lowers the limit for batching if the batch was rejected as such, or else drops them.
     fn handle_refusal(&mut self, datagrams: usize, error: &io::Error) {
         let Some(first) = self.leaving.front() else {
             return;
@@ -161,7 +162,7 @@ impl UdpLink {
         }
     }
 
-    /// Removes so many datagrams from the first batch; how many octets that were.
+    /// Removes datagrams from the first batch; returns their octets.
     fn drop_first(&mut self, datagrams: usize) -> usize {
         let Some(first) = self.leaving.front_mut() else {
             return 0;
@@ -175,11 +176,11 @@ impl UdpLink {
     }
 }
 
-/// Sends what leaves with one call.
+/// Sends one datagram, or several of `segment` octets as a batch.
 fn send(socket: &Socket, peer: SocketAddr, part: &[u8], segment: usize) -> io::Result<usize> {
     #[cfg(target_os = "linux")]
     if part.len() > segment {
-        // Longer ones are not segmented: see `MOST_OCTETS`.
+        // `MOST_OCTETS` is below `u16::MAX`, so longer datagrams never share a batch.
         let segment = u16::try_from(segment).unwrap_or(u16::MAX);
         return super::batch::send(socket.get(), peer, part, segment);
     }

@@ -1,4 +1,4 @@
-//! How the sockets of a UDP link are set up, and whom they reach.
+//! The settings of a UDP link: port, multicast group, broadcast, TTL, buffers.
 
 use std::net::{SocketAddr, SocketAddrV6};
 
@@ -13,28 +13,28 @@ pub enum PortTaken {
     /// Fail with [`Error::PortTaken`](crate::link::Error::PortTaken).
     #[default]
     Refuse,
-    /// Take any free port instead, and say so in the log. Peers learn it from our messages;
-    /// only peers with this node's port in their own configuration cannot reach it.
+    /// Use any free port instead, and log a warning. Peers learn the port from our datagrams.
+    /// Only peers that have this node's port in their configuration cannot reach it.
     UseFree,
 }
 
-/// When what is for everyone goes to the broadcast address of the attached network (such as
-/// `10.0.0.255`), which IPv4 has on Ethernet and its like.
+/// When to send messages for all nodes to the broadcast address of the attached network (such as
+/// `10.0.0.255`). Only IPv4 has one, on Ethernet and similar networks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Broadcasts {
-    /// Where the interface carries no multicast, instead of the group.
+    /// Instead of the group, on interfaces without multicast.
     #[default]
     Auto,
-    /// Always, beside the group: for networks that lose multicast. Peers that take in both get
-    /// everything twice, which Junior and this implementation notice.
+    /// Always, in addition to the group: for networks that lose multicast. Peers that receive both
+    /// get every message twice; Junior and this implementation detect the duplicates.
     On,
     /// Never.
     Off,
 }
 
-/// How the sockets of a link are set up.
+/// The settings of a [`UdpLink`](super::UdpLink).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// The unicast port; 0 takes any free one.
@@ -43,13 +43,13 @@ pub struct Settings {
     pub port_taken: PortTaken,
     /// The multicast group and its port.
     pub group: Group,
-    /// The same where the link's address is an IPv6 one.
+    /// The same for links with an IPv6 address.
     pub group6: Group6,
-    /// When the network's broadcast address is used, with the port of `group` or else 3794.
+    /// When to use the network's broadcast address, with the port of `group`, or 3794 if it is off.
     pub broadcast: Broadcasts,
-    /// How many routers a multicast datagram may pass, 0 to 255; 0 keeps it on this host.
+    /// The TTL of multicast datagrams, 0 to 255; 0 keeps them on this host.
     pub ttl: u8,
-    /// How many octets of received datagrams the kernel is asked to hold for each socket.
+    /// The receive buffer to request from the kernel for each socket, in octets.
     pub receive_buffer: usize,
     /// Whether to send and receive several datagrams with one system call. Linux only.
     pub batch: bool,
@@ -71,30 +71,30 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Whether the groups are groups.
+    /// Checks that the groups are multicast addresses with a port.
     ///
     /// # Errors
-    /// [`InvalidGroup`], with what can be.
+    /// [`InvalidGroup`], with the valid range.
     pub fn validate(&self) -> Result<(), InvalidGroup> {
         self.group.validate()?;
         self.group6.validate()
     }
 
-    /// Whether a node with these settings could not find anybody on the interface although it
-    /// wants to: it has a group and the interface carries none, nor broadcasts.
+    /// Whether discovery cannot work on the interface: a group is configured, but the interface
+    /// carries no multicast, and broadcast is off or unavailable.
     #[must_use]
     pub fn is_deaf_on(&self, interface: &Interface) -> bool {
         self.multicast(interface).is_some() && self.addresses_of_all(interface).is_empty()
     }
 
-    /// The addresses that together reach everyone on the interface's network.
+    /// The multicast and broadcast addresses that reach all nodes on the interface's network.
     pub(super) fn addresses_of_all(&self, interface: &Interface) -> Vec<SocketAddr> {
         let multicast = self.multicast(interface).filter(|_| interface.multicast);
         let broadcast = self.broadcast(interface);
         multicast.into_iter().chain(broadcast).collect()
     }
 
-    /// The group of the interface's version of IP, on this interface.
+    /// The group for the interface's IP version, on this interface.
     fn multicast(&self, interface: &Interface) -> Option<SocketAddr> {
         if interface.address.is_ipv4() {
             return self.group.address();

@@ -1,5 +1,5 @@
-//! One UDP socket, as the runtime watches it: on Unix [for reading alone](crate::link::watch), and
-//! for writing only while it is full.
+//! A UDP socket registered with the runtime: on Unix [for reading only](crate::link::watch), and
+//! for writing only while its send buffer is full.
 
 use std::io;
 use std::net::{SocketAddr, UdpSocket};
@@ -12,11 +12,11 @@ type Watched = tokio::io::unix::AsyncFd<UdpSocket>;
 #[cfg(not(unix))]
 type Watched = tokio::net::UdpSocket;
 
-/// A socket that does not block.
+/// A non-blocking UDP socket.
 #[derive(Debug)]
 pub(super) struct Socket {
     watched: Watched,
-    /// What is waited for while the socket is full.
+    /// A duplicate that is watched for writing while the socket is full.
     #[cfg(unix)]
     full: Option<Watched>,
 }
@@ -30,13 +30,13 @@ impl Socket {
         })
     }
 
-    /// The socket itself.
+    /// The underlying socket.
     pub(super) fn get(&self) -> &UdpSocket {
         self.watched.get_ref()
     }
 
-    /// Reads with `read`, if something has arrived; that it fails with `WouldBlock` says that there
-    /// is no more.
+    /// Calls `read` if the socket is readable. If `read` returns `WouldBlock`, the socket counts as
+    /// empty until more arrives.
     pub(super) fn try_read<R>(
         &self,
         read: impl FnOnce(&UdpSocket) -> io::Result<R>,
@@ -52,7 +52,7 @@ impl Socket {
         self.watched.poll_read_ready(cx).map_ok(drop)
     }
 
-    /// Waits until a socket that was full may have room again.
+    /// Waits until a full socket may have room again.
     pub(super) fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         let full = match &mut self.full {
             Some(full) => full,
@@ -65,7 +65,7 @@ impl Socket {
             .map_ok(|mut ready| ready.clear_ready())
     }
 
-    /// Nothing waits to be sent any more.
+    /// Call this when nothing is left to send.
     pub(super) fn rest(&mut self) {
         self.full = None;
     }
@@ -79,7 +79,7 @@ impl Socket {
         })
     }
 
-    /// The socket itself.
+    /// The underlying socket.
     pub(super) fn get(&self) -> &Watched {
         &self.watched
     }
@@ -92,14 +92,14 @@ impl Socket {
         self.watched.poll_recv_ready(cx)
     }
 
-    /// Waits until a socket that was full may have room again.
+    /// Waits until a full socket may have room again.
     pub(super) fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        // It was full; the runtime does not know yet.
+        // The socket was full; the runtime does not know it yet.
         let full = || Err::<(), _>(io::ErrorKind::WouldBlock.into());
         let _ = self.watched.try_io(Interest::WRITABLE, full);
         self.watched.poll_send_ready(cx)
     }
 
-    /// Nothing waits to be sent any more.
+    /// Call this when nothing is left to send.
     pub(super) fn rest(&mut self) {}
 }

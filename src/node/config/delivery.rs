@@ -51,7 +51,7 @@ pub struct Delivery {
     )]
     pub packing: Packing,
     /// Octets of a receive buffer that the fragments of an unacknowledged large message may fill at
-    /// once; at least 8192. See [`Pacing`].
+    /// once; 8192 to 1 GiB. See [`Pacing`].
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub pace_burst: usize,
     /// Octets of a receive buffer that the receiver is assumed to read per second; 0 disables

@@ -90,7 +90,7 @@ pub struct Config {
     /// The node number within the subsystem, 1 to 254.
     pub node: u8,
     /// The interfaces to open UDP links on. An empty list disables UDP, which is allowed with TCP
-    /// connections or serial lines.
+    /// connections, serial lines or a local address.
     pub interfaces: Interfaces,
     /// The IP versions to use on them.
     pub ip: Ip,
@@ -104,7 +104,7 @@ pub struct Config {
     pub group6: Group6,
     /// When to use a network's broadcast address instead of the group, or in addition to it.
     pub broadcast: Broadcasts,
-    /// The limit of routers that multicast may pass.
+    /// The TTL of multicast datagrams; 0 keeps them on this host.
     pub ttl: u8,
     /// The receive buffer to request from the kernel for each socket, in octets.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
@@ -135,7 +135,7 @@ pub struct Config {
     pub serial: Vec<SerialLine>,
     /// Acknowledged messages, packing and pacing.
     pub delivery: Delivery,
-    /// The profiles of peers that cannot be recognised by what they send.
+    /// The profiles of peers that cannot be recognised by their messages.
     pub profile: Vec<Assignment>,
     /// Whether to forward messages for other nodes between the links.
     pub routing: Routing,
@@ -303,7 +303,7 @@ impl Config {
         Ok(self.udp().validate()?)
     }
 
-    /// The endpoint's settings. Its limits leave room for two of the longest messages.
+    /// The endpoint's settings. The reassembly buffer has room for two of the longest messages.
     pub(super) fn endpoint(&self, first_sequence: u16) -> endpoint::Config {
         let usual = endpoint::Config::default();
         let (delivery, limits) = (&self.delivery, &self.limits);
@@ -344,7 +344,7 @@ impl Config {
     }
 
     /// Whether UDP is in use. Junior replaces it, and an empty list of interfaces disables it if
-    /// another link is configured.
+    /// another link or a local address is configured.
     pub(super) fn uses_udp(&self) -> bool {
         #[cfg(unix)]
         if self.junior.is_some() {

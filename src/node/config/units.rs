@@ -80,7 +80,7 @@ fn parse(text: &str, units: &[(&str, f64)]) -> Option<f64> {
     Some(number.parse::<f64>().ok()? * factor)
 }
 
-/// A setting that may have a unit, as a settings file has it.
+/// A setting that may have a unit, as written in a settings file.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 #[serde(
@@ -93,7 +93,7 @@ enum Raw {
     Text(String),
 }
 
-/// Deserializes a setting as text, whether it is one or a number.
+/// Deserializes a setting as text, whether it is written as text or as a number.
 #[cfg(feature = "serde")]
 pub(super) fn read_text<'de, D: serde::Deserializer<'de>>(d: D) -> Result<String, D::Error> {
     Ok(match serde::Deserialize::deserialize(d)? {

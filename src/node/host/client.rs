@@ -26,7 +26,7 @@ use crate::wire::{Acknowledgement, Flags};
 const MAX_WAITING: usize = 4 << 20;
 /// Limit of messages that wait for an acknowledgement.
 const MAX_AWAITED: usize = 4096;
-/// Required room in the mailbox before a read: nearly the largest number of messages in one read.
+/// Required room in the mailbox before a read: about the largest number of messages in one read.
 const ROOM: usize = 1024;
 /// How long a component that does not read delays what follows, such as the outcomes of its own
 /// messages.
@@ -149,7 +149,7 @@ impl Client {
         Ok(())
     }
 
-    /// Ready when the node has taken all messages sent so far, or is lost.
+    /// Ready when all messages sent so far are written to the connection, or it is lost.
     pub(in super::super) async fn flushed(&self) {
         // Created before the check, so that no signal is missed. An empty queue means that
         // everything sent before is written, even if others have added more since.
@@ -282,9 +282,9 @@ impl Client {
         }
     }
 
-    /// Waits for a component that reads slowly before more is read for it. It does not wait twice
-    /// for a component that does not read at all: the result is the number of messages it had read
-    /// then.
+    /// Delays the next read for a component that reads slowly. If the component does not read at
+    /// all, returns the number of messages that it has read, for the next call, which then does not
+    /// wait again.
     async fn catch_up(&self, stalled_at: Option<u64>) -> Option<u64> {
         let mut before = stalled_at;
         loop {

@@ -1,4 +1,4 @@
-//! Each row of Access Control and Management, with a whole component and in virtual time.
+//! Tests of each transition of Access Control and Management on a whole component, in virtual time.
 
 mod stopping;
 
@@ -30,7 +30,7 @@ impl Rig {
         self.hear(client, &RequestControl { authority_code })
     }
 
-    /// `FIRST` is in control, and has made the component ready.
+    /// A ready component that `FIRST` controls.
     fn ready() -> Self {
         let mut rig = Self::managed();
         rig.request(FIRST, 100);
@@ -39,8 +39,8 @@ impl Rig {
         rig
     }
 
-    /// In the given state, controlled by `FIRST` if the state allows control, with an emergency of
-    /// `THIRD` if the state is Emergency.
+    /// A component in the given state: controlled by `FIRST` if the state allows control, with an
+    /// emergency set by `THIRD` if the state is Emergency.
     fn brought_to(state: State) -> Self {
         let mut rig = Self::with(|stack| stack.management(Management::new().initializes()));
         if state != State::Initialize {
@@ -229,7 +229,7 @@ fn a_client_that_has_answered_before_and_is_silent_for_4_s_is_dead() {
     let mut rig = lasting();
     rig.run(Duration::from_secs(10));
     rig.dead.push(FIRST);
-    // The last answer came at most a second before.
+    // The last reply arrived at most a second before.
     rig.run(Duration::from_millis(4000));
     assert_eq!((rig.controller(), rig.state()), (None, State::Standby));
 }
@@ -581,7 +581,7 @@ fn a_flood_of_forged_emergencies_hides_no_real_one_and_is_cleared_by_the_client_
     rig.hear(FIRST, &CLEAR);
     assert_eq!(rig.state(), State::Emergency, "THIRD is alive");
     rig.hear(THIRD, &CLEAR);
-    // There were more than the table holds; the client in control clears those.
+    // There were more emergencies than the table holds; the client in control clears the rest.
     rig.hear(FIRST, &CLEAR);
     assert_eq!(rig.state(), State::Standby);
 }

@@ -1,4 +1,4 @@
-//! Discovery against floods of components, real and forged, in virtual time.
+//! Tests of discovery under floods of real and forged components, in virtual time.
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
@@ -105,7 +105,7 @@ impl Rig {
         self.discovery.directory().component(id).is_some()
     }
 
-    /// The number of other components it knows.
+    /// The number of other components in the directory.
     fn len(&self) -> usize {
         self.discovery.directory().len() - 1
     }
@@ -138,7 +138,7 @@ fn configuration(ids: impl IntoIterator<Item = JausId>) -> ReportConfiguration {
     }
 }
 
-/// Services for each component, with the given number, named after it.
+/// A report with the given number of services for each component, each named after it.
 fn services(ids: impl IntoIterator<Item = (JausId, u8)>, urn: &str) -> ReportServices {
     let service = |id: JausId, number: u8| report_services::ServiceRec {
         uri: format!("{urn}:{id}:{number}").as_str().into(),

@@ -1,4 +1,4 @@
-//! The elements that a list accepts, and those that it rejects, with the codes.
+//! Tests of the elements that a list accepts, and of those that it rejects, with the reject codes.
 
 use super::*;
 use crate::codec::FormattedBlob;

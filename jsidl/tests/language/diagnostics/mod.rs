@@ -1,4 +1,4 @@
-//! One small definition, or a few, for every rule: what is found, where, and in which words.
+//! Diagnostics: one or a few small definitions per rule, with the exact finding and its location.
 
 mod composites;
 mod fields;
@@ -13,14 +13,14 @@ fn load(text: &str) -> Loaded {
     loader.load()
 }
 
-/// Compares the findings with what is expected, a line each.
+/// Compares the findings with the expected ones, one per line.
 #[track_caller]
 fn check(text: &str, expected: &str) {
     let found = load(text).diagnostics.to_string();
     assert_eq!(found.trim(), expected.trim(), "\nin\n{text}");
 }
 
-/// A service whose type set holds these declarations, which begin on line 3.
+/// A service whose type set contains these declarations, from line 3 on.
 fn types(declarations: &str) -> String {
     format!(
         r#"<service_def name="S" id="urn:s" version="1.0" xmlns="urn:jaus:jsidl:1.0">
@@ -32,7 +32,7 @@ fn types(declarations: &str) -> String {
     )
 }
 
-/// A service that receives these messages, the first of which begins on line 3.
+/// A service with these input messages, from line 3 on.
 fn messages(messages: &str) -> String {
     format!(
         r#"<service_def name="S" id="urn:s" version="1.0" xmlns="urn:jaus:jsidl:1.0">

@@ -1,4 +1,4 @@
-//! What is no JSIDL at all, and what is misspelt.
+//! Texts that are not JSIDL, and misspelt names.
 
 use super::{check, text, types};
 

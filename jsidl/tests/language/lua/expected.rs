@@ -1,4 +1,4 @@
-//! What tshark must print for a message: our own value, field by field in wire order.
+//! The expected tshark output for a message: our decoded value, field by field in wire order.
 
 use jsidl::dynamic::{Raw, Steps, Value};
 use jsidl::model::{Item, Meaning, Message, Scalar, Shape};
@@ -6,12 +6,12 @@ use roxmltree::Node;
 
 use super::tshark::name;
 
-/// A field as our codec sees it.
+/// The content of a field as our codec decodes it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Content {
     Integer(i128),
     Real(f64),
-    /// A real number of which people see any decimal that means it.
+    /// A single-precision number; any decimal that parses to it matches.
     Single(f32),
     Text(String),
     Octets(Vec<u8>),
@@ -21,7 +21,7 @@ pub(crate) enum Content {
 
 pub(crate) type Field = (String, Content);
 
-/// All fields of a message, whose names begin with `prefix`.
+/// All fields of a message; their names begin with `prefix`.
 pub(crate) fn fields(prefix: &str, message: &Message, value: &Value) -> Vec<Field> {
     let mut walk = Walk {
         prefix: format!("{prefix}{}", plain(&message.name)),
@@ -31,7 +31,7 @@ pub(crate) fn fields(prefix: &str, message: &Message, value: &Value) -> Vec<Fiel
         return Vec::new();
     };
     match (&body.shape, value) {
-        // The message's direct members are directly below it.
+        // The members of the body are directly below the message.
         (Shape::Group(group), Value::Group(slots)) => walk.members(&group.members, slots),
         _ => walk.item(body, value),
     }
@@ -146,7 +146,7 @@ pub(crate) fn shown<'a, 'p>(item: Node<'a, 'p>, prefix: &str, fields: &mut Vec<N
     }
 }
 
-/// Whether an item of PDML says what our codec says.
+/// Whether an item of PDML agrees with our codec.
 pub(crate) fn agrees(item: Node<'_, '_>, (filter, content): &Field) -> bool {
     const KINDS: [&str; 8] = [
         "uint", "uint64", "int", "int64", "real", "text", "octets", "none",

@@ -1,4 +1,4 @@
-//! Every golden message in a packet: tshark prints the values that our own codec reads.
+//! The dissector on every golden message: tshark prints the values that our codec decodes.
 
 use std::cmp::Reverse;
 use std::thread;
@@ -16,7 +16,7 @@ use super::packets::Packets;
 use super::tshark;
 use crate::support::golden;
 
-/// Whose messages they are, which their headers tell.
+/// The family of a message, which determines its header.
 #[derive(Clone, Copy)]
 pub(crate) enum Family {
     Services,
@@ -24,7 +24,7 @@ pub(crate) enum Family {
 }
 
 impl Family {
-    /// What the names of all its messages and fields begin with.
+    /// The common prefix of its message and field names.
     const fn prefix(self) -> &'static str {
         match self {
             Self::Services => "jaus.",
@@ -40,7 +40,7 @@ impl Family {
     }
 }
 
-/// How the dissector is to read a message: by the newest definition that fits.
+/// Decodes a message as the dissector should: by the newest definition that fits.
 fn read<'l>(library: &'l Library, octets: &[u8]) -> Option<(&'l Message, Value)> {
     let code = u16::from_le_bytes(*octets.first_chunk()?);
     let mut candidates: Vec<_> = library.by_code(code).collect();
@@ -51,7 +51,7 @@ fn read<'l>(library: &'l Library, octets: &[u8]) -> Option<(&'l Message, Value)>
     })
 }
 
-/// What is different, if anything is.
+/// Compares a packet with our value; the error is the first difference.
 fn compare(
     packet: Node<'_, '_>,
     family: Family,
@@ -113,7 +113,7 @@ fn tshark_prints_the_values_of_every_golden_message() {
     assert!(total > 2000, "the golden data have 2116 messages");
 }
 
-/// Answers how many messages were compared.
+/// Checks the messages of one source; returns how many were compared.
 pub(crate) fn check_source(
     library: &Library,
     source: &str,

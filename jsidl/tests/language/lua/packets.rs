@@ -1,13 +1,13 @@
-//! Captures made by the tests: messages with JUDP headers in UDP datagrams.
+//! Builds pcap captures for the tests: messages in UDP datagrams or TCP segments.
 
 use std::fs;
 use std::path::Path;
 
-/// The port that the dissector listens to.
+/// The port that the dissector registers for.
 const JAUS_PORT: u16 = 3794;
 /// `LINKTYPE_RAW`: packets begin with their IP header.
 const RAW_IP: u32 = 101;
-/// Longer payloads are cut into fragments.
+/// Longer payloads are sent in fragments.
 const LONGEST_PAYLOAD: usize = 1400;
 
 /// The octets of a pcap file.
@@ -31,7 +31,7 @@ impl Packets {
         }
     }
 
-    /// Adds a message, in fragments if it is large; answers the number (from 0) of the packet that
+    /// Adds a message, in fragments if it is large; returns the number (from 0) of the packet that
     /// completes it.
     pub(crate) fn message(&mut self, octets: &[u8]) -> usize {
         let pieces: Vec<_> = octets.chunks(LONGEST_PAYLOAD).collect();

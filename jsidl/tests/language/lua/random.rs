@@ -1,5 +1,5 @@
-//! Random messages of every type that comes with the crate: tshark prints the values that our own
-//! codec reads.
+//! The dissector on random messages of every built-in type: tshark prints the values that our
+//! codec decodes.
 
 use jaus_test_kit::tools::has_tshark;
 use jsidl::Loader;
@@ -7,7 +7,7 @@ use jsidl::dynamic::{arbitrary, encode};
 
 use super::golden::{Family, check_source};
 
-/// Octets that look random and are always the same (an xorshift generator).
+/// Reproducible pseudo-random octets (an xorshift generator).
 fn entropy(seed: u64) -> Vec<u8> {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     let mut octet = || {
@@ -30,7 +30,7 @@ fn tshark_prints_the_values_of_random_messages_of_the_reference_architecture() {
     check_random("random_ra", load, Family::ReferenceArchitecture, 100);
 }
 
-/// Messages of every type that is loaded, more than `least`.
+/// Checks a random message of every loaded type; there must be more than `least`.
 fn check_random(name: &str, load: fn(&mut Loader) -> &mut Loader, family: Family, least: usize) {
     if !has_tshark() {
         return;

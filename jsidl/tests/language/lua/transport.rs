@@ -18,7 +18,7 @@ fn library() -> Library {
     loader.load().library
 }
 
-/// What tshark says about packets; nothing if there is no tshark.
+/// The PDML that tshark prints for the packets; `None` without tshark.
 fn dissect(test: &str, packets: &Packets) -> Option<String> {
     if !has_tshark() {
         return None;
@@ -29,7 +29,7 @@ fn dissect(test: &str, packets: &Packets) -> Option<String> {
     Some(tshark::pdml(&library(), &directory, &capture))
 }
 
-/// Per packet the summaries of its messages.
+/// The summaries of the messages in each packet.
 fn summaries(pdml: &Document<'_>) -> Vec<Vec<String>> {
     let packets = tshark::packets(pdml).into_iter();
     let summary = |item: roxmltree::Node<'_, '_>| item.attribute("showname").unwrap().to_owned();
@@ -93,7 +93,7 @@ fn older_headers_are_read() {
     );
 }
 
-/// As recorded of OpenJAUS: all bits of a presence vector are set, and a name ends early.
+/// As recorded from OpenJAUS: all bits of a presence vector are set, and a name ends early.
 #[test]
 fn messages_of_the_reference_architecture_are_read_by_its_own_definitions() {
     let mut packets = Packets::new();
@@ -200,7 +200,7 @@ fn streams_are_read_however_they_are_cut() {
         position += u32::try_from(octets.len()).unwrap();
     };
     let [one, two] = [as5669a(0, 1, QUERY), as5669a(0, 2, IDENTIFICATION)];
-    // The version once or before each message, alone or not.
+    // The version octet once or before each message, in its own segment or not.
     send(&[2]);
     send(&one);
     send(&[&[2], &two[..10]].concat());

@@ -1,4 +1,4 @@
-//! Runs `tshark` with a generated script, and reads what it prints.
+//! Runs `tshark` with a generated script and parses its output.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -7,7 +7,7 @@ use std::{env, fs};
 use jsidl::Library;
 use roxmltree::{Document, Node};
 
-/// A directory of this test's own.
+/// A separate directory for the test.
 pub(crate) fn directory(test: &str) -> PathBuf {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR"))
         .join("lua")
@@ -16,10 +16,10 @@ pub(crate) fn directory(test: &str) -> PathBuf {
     directory
 }
 
-/// What tshark prints about a capture, as PDML: every packet with the items of the JAUS protocol.
+/// The tshark output for a capture, as PDML: every packet with the items of the JAUS protocol.
 ///
 /// # Panics
-/// If tshark complains, which it does about errors in Lua.
+/// If tshark reports an error, for instance in the Lua script.
 pub(crate) fn pdml(library: &Library, directory: &Path, capture: &Path) -> String {
     let script = directory.join("jaus.lua");
     fs::write(&script, jsidl::lua::dissector(library)).unwrap();
@@ -38,7 +38,7 @@ pub(crate) fn pdml(library: &Library, directory: &Path, capture: &Path) -> Strin
         .filter(|line| !line.trim().is_empty() && !line.contains("user \"root\""))
         .collect();
     assert!(output.status.success() && unexpected.is_empty(), "{errors}");
-    // Long labels end in the middle of a character.
+    // tshark truncates long labels, possibly within a character.
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     for fault in [
         "_ws.lua.error",
@@ -62,7 +62,7 @@ pub(crate) fn packets<'a, 'p>(pdml: &'a Document<'p>) -> Vec<Node<'a, 'p>> {
         .collect()
 }
 
-/// The items of a packet that stand for a JAUS message each.
+/// The items of a packet that represent JAUS messages.
 pub(crate) fn messages<'a, 'p>(packet: Node<'a, 'p>) -> Vec<Node<'a, 'p>> {
     packet
         .children()
@@ -74,14 +74,14 @@ pub(crate) fn name<'a>(node: Node<'a, '_>) -> &'a str {
     node.attribute("name").unwrap_or_default()
 }
 
-/// What stands in the field of this name anywhere inside of an item.
+/// The shown value of the first field of this name anywhere within an item.
 pub(crate) fn show<'a>(item: Node<'a, '_>, field: &str) -> Option<&'a str> {
     item.descendants()
         .find(|node| name(*node) == field)
         .and_then(|node| node.attribute("show"))
 }
 
-/// The sentences of the expert infos of a kind.
+/// The texts of the expert infos of a kind.
 pub(crate) fn experts<'a>(item: Node<'a, '_>, kind: &str) -> Vec<&'a str> {
     item.descendants()
         .filter(|node| name(*node) == kind)

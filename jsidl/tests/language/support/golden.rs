@@ -1,4 +1,4 @@
-//! The encodings that an independent code generator produced, and the definitions that they are of.
+//! The golden encodings of an independent code generator, and the definitions that they belong to.
 
 #![allow(
     clippy::unwrap_used,
@@ -14,7 +14,7 @@ use jsidl::Library;
 use jsidl::model::{Id, Message, Version};
 use serde_json::Value as Json;
 
-/// The name of every source with its vectors.
+/// The name of each source, with its vectors.
 pub(crate) fn sources() -> Vec<(String, Vec<Json>)> {
     let entries = fs::read_dir(evidence::golden()).unwrap();
     let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -35,9 +35,9 @@ pub(crate) fn lines(path: &Path) -> Vec<Json> {
         .collect()
 }
 
-/// Where the definitions of a source lie, the source's own first.
+/// The directories with the definitions of a source, its own first.
 fn directories(corpus: &Path, source: &str) -> Vec<PathBuf> {
-    // Types and services of one set are used in others of the same family.
+    // Sets of one family use each other's types and services.
     match source.split_once('-') {
         Some(("jts", "examples")) => vec![corpus.join(source), corpus.join("jts")],
         Some((family, set)) => {

@@ -1,4 +1,4 @@
-//! Hand-made definitions that use every construct of the language.
+//! Hand-written definitions that use every construct of the language.
 
 pub(crate) mod golden;
 
@@ -8,7 +8,7 @@ use std::sync::Arc;
 use jsidl::model::*;
 use jsidl::{Library, Loader};
 
-/// The definitions that come with the crate.
+/// The definitions embedded in the crate.
 pub(crate) fn catalogue() -> Library {
     let mut loader = Loader::new();
     loader.catalogue();

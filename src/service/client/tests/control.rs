@@ -1,4 +1,4 @@
-//! Control: requested, renewed, lost, released.
+//! The client side of control: requests, renewals, loss and release.
 
 use std::time::Duration;
 
@@ -143,7 +143,7 @@ fn confirmations_that_get_lost_in_a_row_do_not_cost_control() {
         bench.run_ms(10);
         for _ in bench.sent::<RequestControl>() {
             renewals += 1;
-            // One out of five is confirmed.
+            // Every fifth renewal is confirmed.
             if renewals % 5 == 0 {
                 bench.hear(PEER, &confirm(0));
             }
@@ -365,7 +365,7 @@ fn a_peer_that_was_started_again_is_lost_and_the_control_that_it_grants_anew_giv
     let (mut bench, _) = held(5);
     bench.run_ms(300);
     assert_eq!(bench.sent::<QueryControl>().len(), 1, "before the renewal");
-    // It has just restarted, has no controller, and grants the renewal as a new request.
+    // The peer has just restarted, has no controller, and grants the renewal as a new request.
     bench.hear(PEER, &ReportControl::default());
     bench.hear(PEER, &confirm(0));
     assert_eq!(

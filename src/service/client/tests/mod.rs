@@ -1,4 +1,4 @@
-//! The client side against a peer that the test scripts, in virtual time.
+//! Tests of the client side against a scripted peer, in virtual time.
 
 mod control;
 mod streams;
@@ -31,7 +31,7 @@ impl Bench {
         Self::looking_for(Scope::Nobody)
     }
 
-    /// A client whose discovery searches for others.
+    /// A client whose discovery searches for other components.
     #[expect(
         clippy::disallowed_methods,
         reason = "virtual time starts at any instant"
@@ -50,7 +50,7 @@ impl Bench {
         bench
     }
 
-    /// Advances the time, with every wake-up at its time.
+    /// Advances the time, and handles every timeout when it is due.
     fn run(&mut self, duration: Duration) {
         let end = self.now + duration;
         while let Some(wake) = self.stack.poll_timeout().filter(|wake| *wake <= end) {

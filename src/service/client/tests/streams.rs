@@ -1,4 +1,4 @@
-//! The sequence numbers and the silence of report streams.
+//! Sequence numbers and timeouts of report streams.
 
 use super::subscriptions::{Notice, confirm, fire, notices, up};
 use crate::messages::core::CreateEvent;
@@ -28,7 +28,7 @@ fn a_periodic_event_that_stops_is_down_until_it_is_confirmed_again() {
     bench.run_ms(60_000);
     let attempts = bench.sent::<CreateEvent>();
     assert!((10..20).contains(&attempts.len()), "{}", attempts.len());
-    // It returns with another number.
+    // The event returns with another number.
     confirm(&mut bench, attempts[0].request_id, 1, 2.0);
     fire(&mut bench, 1, 0);
     assert_eq!(

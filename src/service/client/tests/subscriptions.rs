@@ -1,4 +1,4 @@
-//! Subscriptions: created, renewed, down and up again, cancelled.
+//! Subscriptions: creation, renewal, outage and recovery, cancellation.
 
 use std::time::Duration;
 
@@ -41,7 +41,7 @@ fn subscribe(bench: &mut Bench, topic: &Topic) -> SubscriptionId {
     subscribed.expect("nothing is in the way")
 }
 
-/// Confirms a request as the event `event_id` at a rate.
+/// Confirms a request as event `event_id` at a rate of `hz`.
 pub(super) fn confirm(bench: &mut Bench, request_id: u8, event_id: u8, hz: f64) {
     let mut confirm = ConfirmEventRequest {
         request_id,
@@ -288,7 +288,7 @@ fn when_discovery_loses_the_peer_it_is_down_and_asked_for_when_the_peer_is_found
     };
     bench.hear(PEER, &identified);
     subscribe(&mut bench, &status(When::OnChange));
-    // It is as good as silent, and goes down before its first renewal.
+    // A rate of 0 counts as silence: the subscription goes down before its first renewal.
     confirm_all(&mut bench, 7, 0.0);
     assert_eq!(notices(&mut bench), [Notice::Up(None)]);
     bench.run_ms(19_000);
@@ -307,7 +307,7 @@ fn a_peer_that_speaks_again_after_a_silence_is_asked_at_once_and_not_for_every_w
     fire(&mut bench, 7, 0);
     bench.run_ms(6000);
     bench.sent.clear();
-    // In a pause between two attempts, which have become long.
+    // During a pause between two attempts, which has become long.
     bench.hear(PEER, &QueryStatus {});
     bench.run_ms(0);
     let asked = bench.sent::<CreateEvent>();
@@ -375,7 +375,7 @@ fn events_with_the_same_number_are_told_apart_by_their_reports() {
     assert_eq!(owners, [second, first]);
 }
 
-/// It crashes JAUS++.
+/// Update Event crashes JAUS++.
 #[test]
 fn no_update_event_is_sent_in_the_whole_life_of_a_subscription() {
     let mut bench = Bench::new();
@@ -388,7 +388,7 @@ fn no_update_event_is_sent_in_the_whole_life_of_a_subscription() {
             .unwrap();
         confirm(&mut bench, create.request_id, 0, hz);
         fire(&mut bench, 0, 0);
-        // It stops, is requested again, and returns.
+        // The stream stops, is requested again, and returns.
         bench.run_ms(20_000);
         confirm(&mut bench, create.request_id, 0, hz);
         bench.stack.unsubscribe(bench.now, id);
@@ -403,7 +403,7 @@ fn no_update_event_is_sent_in_the_whole_life_of_a_subscription() {
     assert_eq!(of(UpdateEvent::CODE), 0);
 }
 
-/// JAUS++ sends the first report of Global Pose like this: numbers 0 to 3 at once.
+/// JAUS++ sends the first report of Global Pose four times at once, with the numbers 0 to 3.
 #[test]
 fn a_first_report_that_comes_four_times_loses_nothing_and_cancels_nothing() {
     let mut bench = Bench::new();

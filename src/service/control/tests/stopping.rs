@@ -1,4 +1,4 @@
-//! What stops a component that moves something: its end, a panic, a hang, a failure.
+//! Events that stop a moving component: its end, a panic, a hang, a failure.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -34,7 +34,7 @@ fn a_component_that_was_held_up_stops_and_drops_control_before_it_handles_what_h
     let (mut rig, stops) = moving();
     rig.run(Duration::from_secs(3));
     assert_eq!((stops.load(Relaxed), rig.state()), (0, State::Ready));
-    // Nothing calls it for this long; then it handles a command of its client first.
+    // The component is not called for this long; then it first handles a command of its client.
     rig.now += Duration::from_secs(3);
     rig.hear(FIRST, &DeleteElement::default());
     assert_eq!((rig.controller(), rig.state()), (None, State::Standby));

@@ -1,4 +1,4 @@
-//! Rejected events, and limits.
+//! Rejected events, and the limits of the event table.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -15,7 +15,8 @@ use crate::messages::core::*;
 use crate::service::stack_rig::StackRig;
 use crate::service::{EventSettings, Handlers};
 
-/// JAUS++ reads presence vector, request, code and, with the vector's first bit, 80 octets of text.
+/// JAUS++ reads the presence vector, request id, code and, if the first presence bit is set, 80
+/// octets of text.
 #[test]
 fn a_rejection_is_one_that_jauspp_reads_too() {
     let mut rig = Rig::new();

@@ -1,4 +1,4 @@
-//! Command events: run once, and their end reported once.
+//! Command events: each runs once, and its end is reported once.
 
 use super::*;
 use crate::messages::core::command_event::CommandResult;
@@ -7,7 +7,7 @@ use crate::messages::core::reject_event_request::ResponseCode;
 const FIRST: CommandResult = CommandResult::SUCCESSFUL;
 const FAILED: CommandResult = CommandResult::UNSUCCESSFUL;
 
-/// A component with a job that its application ends. `CLIENT` has made it ready.
+/// A component that `CLIENT` has made ready, with a job that its application completes.
 fn ready() -> Rig {
     let mut rig = Rig::new();
     let job = Handlers::new(ServiceId {

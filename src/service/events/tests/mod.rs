@@ -1,4 +1,4 @@
-//! Events of a whole component, in virtual time.
+//! Tests of the events of a whole component, in virtual time.
 
 mod bounds;
 mod commands;
@@ -22,7 +22,7 @@ const CLIENT: JausId = JausId::new(42, 1, 1);
 const OTHER: JausId = JausId::new(42, 2, 1);
 const SECOND: Duration = Duration::from_secs(1);
 
-/// A service of the test; its answer is a number that the test sets.
+/// A test service whose report contains a number that the test sets.
 const COUNTER: ServiceId = ServiceId {
     urn: "urn:test:Counter",
     major: 1,
@@ -104,7 +104,7 @@ fn on_change(request_id: u8) -> CreateEvent {
     }
 }
 
-/// The first answer of that type.
+/// The first reply of that type.
 fn answer<M: Message>(said: &[(JausId, Bytes)]) -> M {
     said.iter()
         .find_map(|(_, octets)| M::decode(octets).ok())
