@@ -18,7 +18,7 @@ pub struct Departure {
     /// How it is known.
     pub source: Source,
     /// How it is recognised.
-    pub told: Recognition,
+    pub recognition: Recognition,
     /// How this implementation handles it.
     pub ours: &'static str,
     /// The file that handles it, relative to the root of the repository.
@@ -56,7 +56,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[JausPlusPlus],
         does: "leaves the end of an older, longer datagram after a message",
         source: Recorded,
-        told: By(&[Sign::StaleOctets]),
+        recognition: By(&[Sign::StaleOctets]),
         ours: "decoding stops at the first implausible header; the rest is counted and otherwise \
             ignored",
         place: "src/wire/judp.rs",
@@ -68,7 +68,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "starts each fragment of a large message with the message code, uses 1573 octets in \
             all but the last, and accepts no other form",
         source: Provoked,
-        told: By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
+        recognition: By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
         ours: "its large messages are reassembled without the repeated codes, and ours to it are \
             fragmented its way",
         place: "src/endpoint/large/style.rs",
@@ -79,7 +79,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[JausPlusPlus],
         does: "does not mark the last fragment of a message that fills all its fragments",
         source: Read,
-        told: By(&[Sign::RepeatedCode]),
+        recognition: By(&[Sign::RepeatedCode]),
         ours: "the message is complete when its sender's next message has the number of the last \
             fragment, because JAUS++ uses that number twice",
         place: "src/endpoint/large/reassembly.rs",
@@ -91,7 +91,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "accepts at most 1425 octets in a packet, rejects fragments with the number 0, and \
             loses a message whose numbers wrap around",
         source: Read,
-        told: By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
+        recognition: By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
         ours: "no packet to it is longer; for every receiver, fragment numbers skip 0 and do not \
             wrap around within a message",
         place: "src/endpoint/large/split.rs",
@@ -103,7 +103,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "reads one datagram per millisecond, so faster traffic overflows its receive buffer: \
             200 kB without acknowledgements never arrive",
         source: Provoked,
-        told: By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
+        recognition: By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
         ours: "fragments of unacknowledged large messages are paced at 600 per second; \
             acknowledgements pace the others. The outgoing messages of one of its components \
             together must fit 655 350 octets",
@@ -116,7 +116,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "counts event ids per query, so several events share an id, and Cancel Event ends \
             the first of them",
         source: Provoked,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "events are distinguished by their reports; a subscription that a cancellation may \
             have ended is requested again",
         place: "src/service/client/subscriptions.rs",
@@ -127,7 +127,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[JausPlusPlus],
         does: "crashes when it receives Update Event (01F1h)",
         source: Provoked,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "never sent to any peer: to change an event, it is cancelled and created again",
         place: "src/service/client/subscription.rs",
         test: "no_update_event_is_sent_in_the_whole_life_of_a_subscription",
@@ -137,7 +137,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[JausPlusPlus],
         does: "sends the first report of an event up to four times, each with its own number",
         source: Recorded,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "each is treated as a normal report, not as a loss or another stream",
         place: "src/service/client/subscription.rs",
         test: "a_first_report_that_comes_four_times_loses_nothing_and_cancels_nothing",
@@ -148,7 +148,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "sends Query Events for one id every 5 s, and re-creates at 1 Hz every other event \
             that the answer does not list",
         source: Recorded,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "Report Events lists the requested event first, then all others of the client",
         place: "src/service/events/mod.rs",
         test: "a_client_is_told_of_its_own_events_by_each_question",
@@ -158,7 +158,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[JausPlusPlus],
         does: "sends Create Event for an existing event",
         source: Recorded,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "same client, type and query are one event: its id is confirmed again, without a \
             second stream",
         place: "src/service/events/mod.rs",
@@ -170,7 +170,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "writes the response code of Reject Event Request one too low, and regardless of the \
             presence vector",
         source: Provoked,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "a code that the presence vector omits is decoded anyway, and incremented",
         place: "src/service/client/rejection.rs",
         test: "a_code_that_the_presence_vector_does_not_tell_of_is_one_too_low",
@@ -181,7 +181,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "reads the first presence bit of Reject Event Request as the text's, so a message \
             with only a code is too short for it and is ignored",
         source: Provoked,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "each rejection carries code and text, so JAUS++ finds both where it expects them. \
             It shows the code one too high",
         place: "src/service/events/rejecting.rs",
@@ -192,7 +192,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[JausPlusPlus],
         does: "answers Query Services for node 255, component 255 with an empty list",
         source: Provoked,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "each component is queried by its id",
         place: "src/service/discovery/search.rs",
         test: "services_are_asked_for_by_number_and_never_by_wildcard",
@@ -202,7 +202,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[JausPlusPlus],
         does: "sends Register Services to components of other subsystems, every 5 s",
         source: Recorded,
-        told: By(&[Sign::RegistersAcrossSubsystems]),
+        recognition: By(&[Sign::RegistersAcrossSubsystems]),
         ours: "the services are recorded like those of a report, without an answer",
         place: "src/service/discovery/learn.rs",
         test: "a_registration_from_another_subsystem_is_learned_and_not_answered",
@@ -213,7 +213,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "sends Set Emergency (0006h) for Clear Emergency, and does not know 0007h: only \
             Reset (0005h) ends its own emergencies",
         source: Provoked,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "the message is taken literally: the emergency stays, however often it is set. One \
             Clear Emergency with the client's id ends it, or the vehicle's application",
         place: "src/service/control/management.rs",
@@ -224,7 +224,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[JausPlusPlus],
         does: "never sends Report Heartbeat Pulse by itself",
         source: Provoked,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "any message is a sign of life, and a silent peer is sent Query Identification",
         place: "src/service/discovery/search.rs",
         test: "a_peer_that_only_answers_is_not_lost",
@@ -234,7 +234,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[JausPlusPlus],
         does: "writes the version octet before each message of a TCP stream, in its own segment",
         source: Recorded,
-        told: By(&[Sign::RepeatedVersion]),
+        recognition: By(&[Sign::RepeatedVersion]),
         ours: "both forms are accepted, and each peer is answered in its own form, because JAUS++ \
             hangs without the octet. It also hangs if a message of ours arrives in two segments: \
             use UDP with it",
@@ -247,7 +247,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "opens a TCP connection to each peer it receives UDP from, and sends on it; it reads \
             answers there only after version octets, or hangs",
         source: Recorded,
-        told: By(&[
+        recognition: By(&[
             Sign::RegistersAcrossSubsystems,
             Sign::StaleOctets,
             Sign::RepeatedVersion,
@@ -264,7 +264,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "sends a message for an id with an unknown address to the group, as a global \
             broadcast that requests acknowledgement, until it is acknowledged",
         source: Recorded,
-        told: By(&[Sign::CallsUnknownIds]),
+        recognition: By(&[Sign::CallsUnknownIds]),
         ours: "it is acknowledged from our unicast address, and delivered to that component only",
         place: "src/endpoint/receive.rs",
         test: "a_call_of_junior_is_acknowledged_by_the_one_alone_from_its_own_address",
@@ -274,7 +274,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[Fkie],
         does: "its Python node manager does the same without the broadcast flag",
         source: Recorded,
-        told: By(&[Sign::CallsUnknownIds]),
+        recognition: By(&[Sign::CallsUnknownIds]),
         ours: "a multicast message for one id that requests acknowledgement is treated the same \
             way",
         place: "src/endpoint/receive.rs",
@@ -286,7 +286,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "writes flags FFh for priority 0, which decodes as an acknowledgement of a last \
             fragment",
         source: Recorded,
-        told: By(&[Sign::PriorityFault]),
+        recognition: By(&[Sign::PriorityFault]),
         ours: "dropped and counted by its own counter, because the flags no longer show whether it \
             is a whole message. Its application must use priorities 1 to 15",
         place: "src/endpoint/receive.rs",
@@ -297,7 +297,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[Junior, Jts, Fkie],
         does: "starts with number 1 in each process",
         source: Provoked,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "duplicates are recognised by content too, not by number alone, and only briefly: \
             0.9 s for a known Junior, because it stops retransmitting earlier; a fragment missing \
             from a reassembly is always accepted",
@@ -311,7 +311,7 @@ pub const DEPARTURES: &[Departure] = &[
             3 s, even if that node was restarted since: if it drops a fragment, the large message \
             never arrives",
         source: Recorded,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "a node derives its first number from the clock, ahead of those it used before",
         place: "src/endpoint/config.rs",
         test: "a_node_that_is_started_again_and_again_uses_no_number_that_junior_remembers",
@@ -321,7 +321,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[Junior, Jts, Fkie],
         does: "assigns a TCP connection to the first id received on it, and opens one per id",
         source: Recorded,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "an id is answered on the connection of its last message, however many there are. \
             Over a connection that we open, only one of our components reaches it: let it connect, \
             or use UDP",
@@ -334,7 +334,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "writes to a reset TCP connection, and SIGPIPE kills it: its engine, with all \
             components of its host",
         source: Recorded,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "a node that stops announces it on its connections, keeps reading, and retransmits \
             nothing on them for 200 ms, because that would be acknowledged late. Nothing helps if \
             our node is killed; start the engine with SIGPIPE ignored",
@@ -347,7 +347,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "reads the header compression flags from bits 0-1 of the first octet, which hold the \
             message type",
         source: Provoked,
-        told: NeedNotBe,
+        recognition: NeedNotBe,
         ours: "the first octet of our messages is always 0, even in answers to one that is not",
         place: "src/wire/as5669a.rs",
         test: "the_first_octet_of_all_that_is_sent_is_zero",
@@ -358,7 +358,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "reads ten datagrams at a time and keeps the latest 50 or 100 fragments of all \
             senders",
         source: Recorded,
-        told: By(&[
+        recognition: By(&[
             Sign::PriorityFault,
             Sign::LongFragments,
             Sign::CallsUnknownIds,
@@ -376,7 +376,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "reads a 0 in any octet of an id as a wildcard, so it also delivers messages for \
             1.1.1 to 513.1.1",
         source: Recorded,
-        told: Configured,
+        recognition: Configured,
         ours: "`Peer::confuses` tells which ids it cannot distinguish; choose only subsystems \
             below 256, or none below 256",
         place: "src/peer/habits.rs",
@@ -388,7 +388,7 @@ pub const DEPARTURES: &[Departure] = &[
         does: "writes 0 for \"all subsystems\", \"all nodes\" or \"all components\" in \
             destinations",
         source: Read,
-        told: By(&[Sign::IopService]),
+        recognition: By(&[Sign::IopService]),
         ours: "from such a peer a 0 is decoded as the wildcard of its field; from all others it is \
             invalid",
         place: "src/endpoint/receive.rs",
@@ -399,7 +399,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[OpenJausSdk],
         does: "counts sequence numbers per destination, so numbers repeat",
         source: Recorded,
-        told: By(&[Sign::NumbersByDestination]),
+        recognition: By(&[Sign::NumbersByDestination]),
         ours: "duplicates are recognised by destination, number and content",
         place: "src/endpoint/recent.rs",
         test: "numbers_that_count_for_each_destination_are_no_duplicates",
@@ -409,7 +409,7 @@ pub const DEPARTURES: &[Departure] = &[
         peers: &[OpenJausSdk],
         does: "sends queries for one component to all components of its node, as global broadcasts",
         source: Recorded,
-        told: By(&[Sign::AsksWholeNodes]),
+        recognition: By(&[Sign::AsksWholeNodes]),
         ours: "each addressed component answers for itself, by unicast",
         place: "src/endpoint/receive.rs",
         test: "a_question_to_a_whole_node_is_answered_by_unicast",

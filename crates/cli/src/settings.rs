@@ -273,7 +273,7 @@ mod tests {
         );
         let nothing_alike = mistake("zzz = 1");
         assert!(
-            nothing_alike.contains("there are ") && nothing_alike.contains("port, "),
+            nothing_alike.contains("choose from ") && nothing_alike.contains("port, "),
             "{nothing_alike}"
         );
         assert!(mistake("nmae = \"x\"").contains("did you mean `name`?"));
@@ -293,7 +293,7 @@ mod tests {
             ("peers = \"10.0.0.2\"", &["1: ", "a list in brackets"]),
             (
                 "max_message = \"4 miles\"",
-                &["1: ", "`4 miles` is no size", "4MiB"],
+                &["1: ", "`4 miles` is not a size", "4MiB"],
             ),
             (
                 "group = \"10.0.0.1\"",

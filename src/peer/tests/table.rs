@@ -6,7 +6,7 @@ use super::super::*;
 /// The table of all departures, as Markdown.
 fn table() -> String {
     let mut table =
-        "| departure | whose | known from | recognised | what we do | where, and the test |\n\
+        "| departure | peers | known from | recognised by | our handling | file and test |\n\
                      |---|---|---|---|---|---|\n"
             .to_owned();
     for departure in DEPARTURES {
@@ -14,18 +14,18 @@ fn table() -> String {
         let source = match departure.source {
             Source::Recorded => "recorded",
             Source::Provoked => "provoked",
-            Source::Read => "read in its code",
+            Source::Read => "read in its source",
         };
-        let told = match departure.told {
+        let recognition = match departure.recognition {
             Recognition::By(signs) => {
                 let signs: Vec<_> = signs.iter().map(Sign::to_string).collect();
                 signs.join("; or ")
             }
-            Recognition::NeedNotBe => "need not be: what we do suits everybody".to_owned(),
+            Recognition::NeedNotBe => "not needed: our handling suits every peer".to_owned(),
             Recognition::Configured => "must be configured: `[[profile]]`".to_owned(),
         };
         table += &format!(
-            "| **{}**: {} | {} | {source} | {told} | {} | `{}`: `{}` |\n",
+            "| **{}**: {} | {} | {source} | {recognition} | {} | `{}`: `{}` |\n",
             departure.name,
             departure.does,
             peers.join(", "),
