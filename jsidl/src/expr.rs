@@ -247,7 +247,7 @@ mod tests {
     #[test]
     fn what_is_no_expression_is_refused_with_the_place() {
         assert_eq!(value("3 +"), Err("it is incomplete".into()));
-        assert_eq!(value("3 $ 4"), Err("`$ 4` is not understood".into()));
+        assert_eq!(value("3 $ 4"), Err("`$ 4` is not recognised".into()));
         assert_eq!(value("(3"), Err("it is incomplete".into()));
         assert_eq!(
             value("1/0"),

@@ -359,8 +359,8 @@ mod tests {
     #[test]
     fn what_is_no_guard_is_refused_with_the_place() {
         assert_eq!(shown("a() &&"), Err("it is incomplete".into()));
-        assert_eq!(shown("a() & b()"), Err("`& b()` is not understood".into()));
-        assert_eq!(shown("a(!b)"), Err("`!b)` is not understood".into()));
+        assert_eq!(shown("a() & b()"), Err("`& b()` is not recognised".into()));
+        assert_eq!(shown("a(!b)"), Err("`!b)` is not recognised".into()));
         assert!(shown(&"(".repeat(500)).is_err());
         assert!(shown(&"!".repeat(500)).is_err());
         assert!(shown(&"a()&&".repeat(500)).is_err());

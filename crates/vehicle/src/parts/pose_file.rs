@@ -165,9 +165,9 @@ mod tests {
     fn a_damaged_file_is_refused_with_the_reason() {
         for (text, why) in [
             ("", "x is missing"),
-            ("x = one", "\"x = one\" is no number"),
-            ("x = NaN", "\"x = NaN\" is no number"),
-            ("nonsense", "\"nonsense\" is no number"),
+            ("x = one", "\"x = one\" is not a number"),
+            ("x = NaN", "\"x = NaN\" is not a number"),
+            ("nonsense", "\"nonsense\" is not a number"),
         ] {
             assert_eq!(Kept::parse(text), Err(why.to_owned()), "{text}");
         }

@@ -469,10 +469,10 @@ fn files_that_are_no_map_are_refused_with_what_is_wrong() {
     assert!(error(b"").contains("0 rows"));
     assert!(error(b"...\n..\n").starts_with("line 2 has 2 cells, but the first has 3"));
     assert!(error(b"..\n.x\n").starts_with("line 2: 'x'"));
-    assert!(error(b"P5 3 2 255\n\0\0").contains("2 values"));
+    assert!(error(b"P5 3 2 255\n\0\0").contains("2 readable values"));
     assert!(error(b"P2 3 2 70000\n").contains("PGM"));
     assert!(error(b"P5 99999 99999 255\n").contains("99999 rows"));
-    assert!(error(b"P2 2 1 9\n3 x").contains("1 values"));
+    assert!(error(b"P2 2 1 9\n3 x").contains("1 readable values"));
 }
 
 #[test]
