@@ -20,7 +20,7 @@
 //! use jaus::peer::{Certainty, Peer, Recogniser};
 //! use jaus::wire::judp;
 //!
-//! // Recorded from JAUS++: it tells its services, then asks from the same buffer.
+//! // Recorded from JAUS++, which reports its services and then sends a query from the same buffer.
 //! let query = b"\x02\x00\x11\x00\x01\x01\x01\x4D\x00\x07\x01\xE8\x03\x01\x2B\x02\x02\x00urn:jaus";
 //! let mut recogniser = Recogniser::new();
 //! let mut frames = judp::frames(Bytes::from_static(query))?;
@@ -28,7 +28,7 @@
 //! recogniser.handle_frame(&frame, frames.remaining());
 //! let verdict = recogniser.verdict();
 //! assert_eq!((verdict.peer, verdict.certainty), (Peer::JausPlusPlus, Certainty::Likely));
-//! assert!(verdict.reasons[0].to_string().contains("behind its messages"));
+//! assert!(verdict.reasons[0].to_string().contains("follow its messages"));
 //! # Ok::<(), jaus::wire::Error>(())
 //! ```
 //!
