@@ -182,7 +182,10 @@ fn an_event_stream_that_is_confirmed_but_never_comes_is_told() {
     let peer = Peer::offering(&[events::URN, liveness::URN])
         .answers::<CreateEvent>(&confirmation)
         .answers::<QueryHeartbeatPulse>(&ReportHeartbeatPulse);
-    assert_eq!(reason("B4", peer), "only 0 reports of event 7 arrived, not 3");
+    assert_eq!(
+        reason("B4", peer),
+        "only 0 reports of event 7 arrived, not 3"
+    );
 }
 
 /// A peer that answers truncated queries and then obeys clients that are not in control.
