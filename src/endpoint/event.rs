@@ -84,7 +84,7 @@ pub enum Event {
         /// Its new address.
         to: Path,
     },
-    /// An id was heard at two addresses, and a challenge did not show that the peer has moved.
+    /// Two addresses send with one id, and a challenge did not confirm that the peer moved.
     PeerConflict {
         /// The shared id.
         id: JausId,

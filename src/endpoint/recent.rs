@@ -5,7 +5,7 @@
 //! out those that will be retransmitted.
 
 use std::collections::{HashMap, VecDeque};
-use std::hash::{BuildHasher, Hasher, RandomState};
+use std::hash::{BuildHasher, BuildHasherDefault, Hasher, RandomState};
 use std::time::{Duration, Instant};
 
 use super::Path;
@@ -51,10 +51,30 @@ pub(super) struct Sighting {
     pub(super) repetitions: u8,
 }
 
+/// A hasher for keys that are keyed hashes already: each received message is looked up.
+#[derive(Clone, Copy, Debug, Default)]
+struct AlreadyHashed(u64);
+
+impl Hasher for AlreadyHashed {
+    fn write(&mut self, octets: &[u8]) {
+        for &octet in octets {
+            self.0 = self.0.rotate_left(8) ^ u64::from(octet);
+        }
+    }
+
+    fn write_u64(&mut self, hash: u64) {
+        self.0 = hash;
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
+}
+
 /// The recent frames.
 #[derive(Debug)]
 pub(super) struct Recent {
-    sightings: HashMap<Fingerprint, Sighting>,
+    sightings: HashMap<Fingerprint, Sighting, BuildHasherDefault<AlreadyHashed>>,
     order: [VecDeque<(Instant, Fingerprint)>; Class::COUNT],
     limit: usize,
     longest: Duration,

@@ -159,7 +159,7 @@ impl FromStr for Peer {
 
 serde_as_text!(Peer);
 
-/// Assigns a profile to an id, whatever is observed of the peer.
+/// Assigns a profile to an id. It overrides what the recogniser observes.
 ///
 /// ```toml
 /// [[profile]]

@@ -10,7 +10,6 @@ mod fragmented;
 mod join;
 mod queue;
 
-use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::hash::RandomState;
 use std::sync::Arc;
@@ -196,14 +195,18 @@ impl Egress {
         frame: &Frame,
         counters: &mut Counters,
     ) -> Result<(), EncodeError> {
-        let mut encoded = HashMap::new();
+        // Few framings, so a list; and all are encoded first, so that a message that cannot be
+        // encoded is sent nowhere.
+        let mut encoded: Vec<(Framing, Bytes)> = Vec::new();
         for &(link, _) in hops {
-            if let Entry::Vacant(entry) = encoded.entry(self.framing(link)) {
-                entry.insert(self.encode(link, frame)?);
+            let framing = self.framing(link);
+            if !encoded.iter().any(|(known, _)| *known == framing) {
+                encoded.push((framing, self.encode(link, frame)?));
             }
         }
         for &hop in hops {
-            if let Some(octets) = encoded.get(&self.framing(hop.0))
+            let framing = self.framing(hop.0);
+            if let Some((_, octets)) = encoded.iter().find(|(known, _)| *known == framing)
                 && let Err(reason) = self.push(now, hop, frame.flags, octets.clone())
             {
                 counters.add(reason);

@@ -1,11 +1,11 @@
 //! The eviction order of the full peer table, and the share of each network address.
 //!
 //! A new peer evicts a peer of the network address that holds the most, if that holds at least two
-//! more than the newcomer's. Peers that were only heard go first, then those that we have sent to,
-//! then those that have acknowledged a message; among equals the one heard longest ago. A peer that
-//! has acknowledged a message stays if it was heard in the last 60 s, unless its address holds more
-//! than a quarter of the table. If no peer can be evicted, the new one is refused. So invented ids
-//! mostly replace each other.
+//! more than the newcomer's. Peers that have only sent to us go first, then those that we have sent
+//! to, then those that have acknowledged a message; among equals the one silent for longest. A peer
+//! that has acknowledged a message is not evicted within 60 s of its last message, unless its
+//! address holds more than a quarter of the table. If no peer can be evicted, the new one is
+//! refused. Forged ids therefore mostly replace each other.
 
 use std::time::{Duration, Instant};
 
