@@ -12,14 +12,30 @@ use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Version};
 
 /// A repetition within this time is a copy made on the way: no sender retransmits that fast.
 const REPEAT_INTERVAL: Duration = Duration::from_millis(1);
+/// The interval before a repetition that is forwarded doubles this often, to 1.275 s.
+const MOST_DOUBLINGS: u8 = 8;
+
+/// How long after the last forwarded repetition the next one is forwarded: 0, 5, 15, 35 ms and so
+/// on.
+///
+/// A sender backs off from 10 ms or more; Junior repeats three times at 100 ms. A frame that
+/// circulates between routers, because it was corrupted or forged as if one of them had sent it,
+/// comes back at a constant interval. It must be dropped soon: each round may corrupt it into
+/// another that circulates too.
+fn forwarding_interval(forwarded: u8) -> Duration {
+    Duration::from_millis(5) * ((1 << forwarded.min(MOST_DOUBLINGS)) - 1)
+}
 
 /// Result of the duplicate check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Novelty {
     /// Not seen recently.
     New,
-    /// Retransmitted by its sender; how often so far.
-    Repeated(u8),
+    /// Retransmitted by its sender.
+    Repeated {
+        /// Whether it may be forwarded, because it comes long enough after those before.
+        forwardable: bool,
+    },
     /// A copy made by the network, or sent round a loop.
     Copy,
 }
@@ -40,34 +56,31 @@ impl Endpoint {
         }
         let seen = seen.in_round(self.peers.round(frame));
         let way = self.heard.way(forwarding.then_some(arrival.path));
-        let novelty = match self.heard.sighting(seen) {
-            None => Novelty::New,
-            Some(before) => {
-                let age = now.saturating_duration_since(before.time);
-                let elsewhere = before.way != way;
-                if elsewhere && age < self.config.retransmission_window {
-                    Novelty::Copy
-                } else if numbered && age < self.duplicate_window(arrival) {
-                    if repeats && age >= REPEAT_INTERVAL {
-                        Novelty::Repeated(before.repetitions.saturating_add(1))
-                    } else {
-                        Novelty::Copy
-                    }
-                } else {
-                    Novelty::New
-                }
+        let mut sighting = Sighting::new(now, way);
+        let mut novelty = Novelty::New;
+        if let Some(before) = self.heard.sighting(seen) {
+            let age = now.saturating_duration_since(before.time);
+            let elsewhere = before.way != way;
+            if elsewhere && age < self.config.retransmission_window {
+                return Novelty::Copy;
             }
-        };
-        let repetitions = match novelty {
-            Novelty::New => 0,
-            Novelty::Repeated(repetitions) => repetitions,
-            Novelty::Copy => return novelty,
-        };
-        let sighting = Sighting {
-            time: now,
-            way,
-            repetitions,
-        };
+            if numbered && age < self.duplicate_window(arrival) {
+                if !repeats || age < REPEAT_INTERVAL {
+                    return Novelty::Copy;
+                }
+                let since = now.saturating_duration_since(before.forwarded);
+                let forwardable = since >= forwarding_interval(before.repetitions);
+                sighting = Sighting {
+                    time: now,
+                    ..before
+                };
+                if forwardable {
+                    sighting.forwarded = now;
+                    sighting.repetitions = before.repetitions.saturating_add(1);
+                }
+                novelty = Novelty::Repeated { forwardable };
+            }
+        }
         self.heard.insert(seen, sighting, self.class(frame));
         novelty
     }

@@ -16,11 +16,6 @@ use crate::address::JausId;
 use crate::peer::{self, Sign};
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, judp};
 
-/// A repeated message is forwarded at most this often. No sender retransmits more often before it
-/// gives up. A frame that circulates between routers, because it was corrupted or forged as if one
-/// of them had sent it, does.
-const MOST_REPETITIONS: u8 = 32;
-
 impl Endpoint {
     /// Processes one datagram and delivers its messages for local components to `sink`.
     ///
@@ -187,13 +182,14 @@ impl Endpoint {
         }
         // Check before learning: a copy that arrived on another path must not move the peer.
         let novelty = match self.recall(arrival, seen) {
-            Novelty::Repeated(_) if self.reassembly.awaits(frame) => Novelty::New,
+            Novelty::Repeated { .. } if self.reassembly.awaits(frame) => Novelty::New,
             novelty => novelty,
         };
         if novelty != Novelty::New {
             self.reassembly.keep(now, frame);
             self.peers.note(frame.source, |peer| peer.duplicates += 1);
-            if passes && let Novelty::Repeated(1..=MOST_REPETITIONS) = novelty {
+            let forwardable = matches!(novelty, Novelty::Repeated { forwardable: true });
+            if passes && forwardable {
                 self.pass_on(arrival);
             }
             return Err(Counter::Duplicate);

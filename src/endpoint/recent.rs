@@ -42,13 +42,29 @@ impl Class {
     }
 }
 
-/// When a frame was recorded, on which path it first arrived, and how often it was repeated since.
+/// When a frame was recorded, on which path it first arrived, and how its repetitions were
+/// forwarded since.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sighting {
     pub(super) time: Instant,
     /// A keyed hash of the path.
     pub(super) way: u64,
+    /// When it was last forwarded, if this endpoint forwards.
+    pub(super) forwarded: Instant,
+    /// How many repetitions were forwarded.
     pub(super) repetitions: u8,
+}
+
+impl Sighting {
+    /// The first sighting of a frame.
+    pub(super) fn new(time: Instant, way: u64) -> Self {
+        Self {
+            time,
+            way,
+            forwarded: time,
+            repetitions: 0,
+        }
+    }
 }
 
 /// A hasher for keys that are keyed hashes already: each received message is looked up.
@@ -126,12 +142,8 @@ impl Recent {
 
     /// Records a frame of our own.
     pub(super) fn insert_own(&mut self, now: Instant, frame: &Frame) {
-        let sighting = Sighting {
-            time: now,
-            way: 0,
-            repetitions: 0,
-        };
-        self.insert(self.fingerprint(frame), sighting, Class::default());
+        let seen = self.fingerprint(frame);
+        self.insert(seen, Sighting::new(now, 0), Class::default());
     }
 
     /// Records a frame.
@@ -247,12 +259,7 @@ mod tests {
         recent.insert_own(start, &known);
         for sequence in 100..200 {
             let seen = recent.fingerprint(&frame(sequence, b"\x02\x22"));
-            let sighting = Sighting {
-                time: start,
-                way: 0,
-                repetitions: 0,
-            };
-            recent.insert(seen, sighting, STRANGER);
+            recent.insert(seen, Sighting::new(start, 0), STRANGER);
         }
         assert!(recent.contains(start, recent.fingerprint(&known), window));
         assert_eq!(recent.len(), 2, "a quarter for strangers");

@@ -8,7 +8,7 @@ use jaus::endpoint::Outgoing;
 use jaus::wire::Priority;
 
 use crate::faults::Faults;
-use crate::judges::{check_bounds, check_rest};
+use crate::judges::{check_bounds, check_carried, check_rest};
 use crate::ledger::Ledger;
 use crate::nodes::{Nodes, components};
 use crate::plan::{Plan, conditions};
@@ -29,6 +29,8 @@ const REST: Duration = Duration::from_secs(240);
 /// Pause between the end of the faults and the next message: windows and duplicate memories have
 /// expired.
 const PAUSE: Duration = Duration::from_secs(10);
+/// How often the number of datagrams is checked, so that a storm fails and does not run for ever.
+const SLICE: Duration = Duration::from_millis(5);
 /// After each component's first message, all nodes know each other's addresses within this time.
 const ACQUAINTANCE: Duration = Duration::from_secs(1);
 
@@ -52,7 +54,7 @@ pub(crate) fn run(seed: u64) -> Result<Summary, String> {
         world.act()?;
     }
     world.heal()?;
-    world.send_to_all();
+    world.send_to_all()?;
     world.come_to_rest()?;
     Ok(world.summary())
 }
@@ -83,15 +85,26 @@ impl World {
 
     fn run_until(&mut self, end: Instant) -> Result<(), String> {
         while let Some(mended) = self.faults.next_end().filter(|&at| at <= end) {
-            self.run_for(mended.saturating_duration_since(self.nodes.network.now()));
+            self.run_for(mended.saturating_duration_since(self.nodes.network.now()))?;
             self.faults.end_due(&mut self.nodes);
         }
-        self.run_for(end.saturating_duration_since(self.nodes.network.now()));
+        self.run_for(end.saturating_duration_since(self.nodes.network.now()))?;
         self.look()
     }
 
-    fn run_for(&mut self, time: Duration) {
-        self.nodes.network.run_for(time);
+    fn run_for(&mut self, time: Duration) -> Result<(), String> {
+        let end = self.nodes.network.now() + time;
+        while self.nodes.network.now() < end {
+            let left = end.saturating_duration_since(self.nodes.network.now());
+            self.nodes.network.run_for(left.min(SLICE));
+            self.check_carried()?;
+        }
+        Ok(())
+    }
+
+    /// Checks that messages do not multiply.
+    fn check_carried(&self) -> Result<(), String> {
+        check_carried(&self.nodes, self.packets + self.faults.counts["forged"])
     }
 
     /// Checks all output, and the memory in use.
@@ -173,19 +186,19 @@ impl World {
         }
         self.rest()?;
         self.faults.end_all(&mut self.nodes);
-        self.run_for(PAUSE);
+        self.run_for(PAUSE)?;
         self.look()
     }
 
     /// Sends a message from every component to all; then one from each node to each single node.
-    fn send_to_all(&mut self) {
+    fn send_to_all(&mut self) -> Result<(), String> {
         self.ledger.expect_all();
         let count = self.nodes.len();
         for (node, source) in (0..count).flat_map(|node| components(node).map(|id| (node, id))) {
             let payload = self.ledger.payload(&mut self.random, 20);
             self.hand_in(node, Outgoing::new(source, JausId::EVERYONE, payload));
         }
-        self.run_for(ACQUAINTANCE);
+        self.run_for(ACQUAINTANCE)?;
         for (node, to) in (0..count).flat_map(|node| (0..count).map(move |to| (node, to))) {
             if !self.nodes.is_reached(node) || !self.nodes.is_reached(to) {
                 continue;
@@ -199,6 +212,7 @@ impl World {
             };
             self.hand_in(node, message);
         }
+        Ok(())
     }
 
     fn come_to_rest(&mut self) -> Result<(), String> {
@@ -208,8 +222,7 @@ impl World {
         let is_forgetful = |node: usize| nodes.plan.nodes[node].is_forgetful;
         self.ledger
             .close(nodes.lives(), is_forgetful, |node| nodes.is_reached(node))?;
-        let forged = self.faults.counts["forged"];
-        check_rest(&mut self.nodes, self.packets + forged)
+        check_rest(&mut self.nodes)
     }
 
     /// Advances until the network is idle. One check at the end suffices: checks are slow, and no
@@ -220,6 +233,7 @@ impl World {
             if self.nodes.network.now() > limit {
                 return Err("the network does not come to rest".to_owned());
             }
+            self.check_carried()?;
         }
         self.look()
     }

@@ -75,11 +75,7 @@ fn flags_ids_and_number_stay_as_they_came() {
 #[test]
 fn a_repeated_message_is_passed_on_again_and_a_copy_from_elsewhere_is_not() {
     let mut between = Between::new(router_config());
-    let wish = Flags::default().with_acknowledgement(Acknowledgement::Request);
-    let frame = Frame {
-        flags: wish,
-        ..message(A, C, 5)
-    };
+    let frame = acknowledged(C);
     for _try in 0..3 {
         between.hear(0, 7, &frame);
         between.hear(0, 7, &frame);
@@ -96,26 +92,48 @@ fn a_repeated_message_is_passed_on_again_and_a_copy_from_elsewhere_is_not() {
     assert_eq!(known.peer, SocketAddr::from(([10, 0, 0, 7], judp::PORT)));
 }
 
-/// In a ring of routers, the frame returns on the path on which it first arrived.
+fn acknowledged(destination: JausId) -> Frame {
+    Frame {
+        flags: Flags::default().with_acknowledgement(Acknowledgement::Request),
+        ..message(A, destination, 5)
+    }
+}
+
+/// In a ring of routers, the frame returns on the path on which it first arrived, until one of them
+/// drops it.
 #[test]
-fn what_goes_round_between_routers_is_passed_on_only_so_often() {
+fn what_goes_round_between_routers_is_dropped_after_a_few_rounds() {
     for destination in [C, JausId::EVERYONE, JausId::new(9, 9, 9)] {
-        let mut between = Between::new(router_config());
-        let wish = Flags::default().with_acknowledgement(Acknowledgement::Request);
-        let frame = Frame {
-            flags: wish,
-            ..message(A, destination, 5)
-        };
-        let mut passed = 0;
-        for _round in 0..500 {
+        for (round, most) in [(5, 3), (30, 4), (100, 6), (300, 7)] {
+            let mut between = Between::new(router_config());
+            let frame = acknowledged(destination);
+            let mut passed = 0;
+            loop {
+                between.hear(0, 7, &frame);
+                if between.sent().is_empty() {
+                    break;
+                }
+                passed += 1;
+                assert!(passed <= most, "{passed} rounds of {round} ms");
+                between.world.now += Duration::from_millis(round);
+            }
+            between.world.now += Duration::from_secs(4);
             between.hear(0, 7, &frame);
-            passed += between.sent().len();
-            between.world.now += Duration::from_millis(5);
+            assert_eq!(between.sent().len(), 1, "a new message with an old number");
         }
-        assert!((20..=33).contains(&passed), "{passed} to {destination}");
-        between.world.now += Duration::from_secs(4);
+    }
+}
+
+/// An endpoint backs off from 10 ms at least, and tries up to 20 times.
+#[test]
+fn a_sender_that_backs_off_is_passed_on_each_time() {
+    let mut between = Between::new(router_config());
+    let frame = acknowledged(C);
+    for attempt in 0..20 {
         between.hear(0, 7, &frame);
-        assert_eq!(between.sent().len(), 1, "a new message with an old number");
+        assert_eq!(between.sent().len(), 1, "attempt {attempt}");
+        let pause = Duration::from_millis(10 << attempt.min(8));
+        between.world.now += pause.min(Duration::from_secs(2));
     }
 }
 
