@@ -27,7 +27,7 @@ counters! {
     /// Dropped: shorter than a header.
     TooShort = "dropped: shorter than a header",
     /// Dropped: the stated data size does not match the datagram.
-    WrongSize = "dropped: data size does not fit the datagram",
+    WrongSize = "dropped: data size differs from the datagram's",
     /// Dropped: header compression without negotiation.
     CompressedHeader = "dropped: compressed header",
     /// Dropped: version bits of RA 2.x, 3.0, 3.1 or undefined.
@@ -35,45 +35,45 @@ counters! {
     /// Dropped: an undefined data flag.
     UnknownDataFlag = "dropped: unknown data flag",
     /// Dropped: a source with a field of 0 or 255.
-    InvalidSource = "dropped: source is not one component",
+    InvalidSource = "dropped: source is not a single component",
     /// Dropped: a destination with a field of 0.
-    InvalidDestination = "dropped: destination names nobody",
+    InvalidDestination = "dropped: invalid destination",
     /// Dropped: our own multicast.
     OwnEcho = "dropped: own multicast",
     /// Dropped: a peer uses the number of one of our subsystems.
-    SubsystemConflict = "dropped: somebody else has our subsystem number",
+    SubsystemConflict = "dropped: another system uses our subsystem number",
     /// Dropped: the destination is not one of our components.
-    NotForUs = "dropped: not for us",
+    NotForUs = "dropped: no local receiver",
     /// Dropped: more messages from one address than allowed.
     MessageRate = "dropped: too many messages from one address",
     /// Dropped: an unknown subsystem, as the table is full.
-    SubsystemsFull = "dropped: no room for another subsystem",
+    SubsystemsFull = "dropped: subsystem table full",
     /// Dropped: an unknown subsystem, as too many come from one address.
     NewSubsystemRate = "dropped: too many new subsystems from one address",
     /// Dropped: a known subsystem from another address while its known address is alive.
-    AddressConflict = "dropped: subsystem is heard from another address",
+    AddressConflict = "dropped: subsystem heard at another address",
     /// Dropped: a part of a large message out of sequence.
-    PartOutOfOrder = "dropped: large message with a part missing",
+    PartOutOfOrder = "dropped: large message with a missing part",
     /// Dropped: an incomplete large message after a timeout.
-    PartsTimedOut = "dropped: large message not finished in time",
+    PartsTimedOut = "dropped: large message timed out",
     /// Dropped: an incomplete large message, for lack of room.
     PartsForgotten = "dropped: no room for unfinished large message",
     /// Dropped: a large message above the size limit.
-    MessageTooLong = "dropped: large message above the limit",
+    MessageTooLong = "dropped: large message over the limit",
     /// Dropped: a query or request with a malformed body.
     Malformed = "dropped: malformed body",
     /// Not answered: too many queries from one subsystem.
-    AnswerRate = "not answered: too many questions from one subsystem",
+    AnswerRate = "not answered: too many queries from one subsystem",
     /// Not sent: too many queries to one subsystem.
-    QuestionRate = "not asked yet: too many questions to one subsystem",
+    QuestionRate = "postponed: too many queries to one subsystem",
     /// Refused: a subscription to an unsupported event, or above the limit.
     EventRefused = "events refused",
     /// Refused: a service connection.
     ConnectionRefused = "service connections refused",
     /// Dropped: a report of an unknown service connection.
-    UnwantedReport = "dropped: report of an unknown service connection",
+    UnwantedReport = "dropped: report for an unknown service connection",
     /// Left out: components, services or names of a subsystem above the limits.
-    ConfigurationTooLong = "left out: configuration above the limits",
+    ConfigurationTooLong = "truncated: configuration over the limits",
     /// Dropped: an outgoing datagram, as the transmit queue is full.
     TransmitQueueFull = "dropped: transmit queue full",
     /// Dropped: an event for the owner, as the event queue is full.

@@ -23,39 +23,39 @@ counters! {
     /// Reports of JAUS components, sent to RA components.
     ReportsToRa = "reports to RA",
     /// Grants of control over an RA component to a JAUS client.
-    ControlOfRa = "control of RA components given",
+    ControlOfRa = "control of RA components granted",
     /// Grants of control over a JAUS component to an RA component.
-    ControlFromRa = "control of JAUS components given",
+    ControlFromRa = "control of JAUS components granted",
     /// Refused: no counterpart on the other side.
     NoCounterpart = "refused: no counterpart on the other side",
     /// Refused: a value that the other side cannot represent, or a malformed body.
-    NotConverted = "refused: cannot be said on the other side",
+    NotConverted = "refused: not expressible on the other side",
     /// Refused: a command of a client that is not in control.
     NotInControl = "refused: sender not in control",
     /// Refused: a command for an RA component in the emergency state.
-    InEmergency = "refused: in an emergency",
+    InEmergency = "refused: in emergency state",
     /// Refused: a driving command for an RA component that its client has sent to Standby.
     InStandby = "refused: in standby",
     /// Refused: a duplicate of a query that is still pending.
-    Repeated = "refused: question repeated while it waits",
+    Repeated = "refused: query already pending",
     /// Refused: too many pending queries.
-    TooManyWaiting = "refused: too many questions wait",
+    TooManyWaiting = "refused: too many pending queries",
     /// Refused: too many service connections.
     TooManyConnections = "refused: too many service connections",
     /// Refused: a change or an execution of a list that the other side's driver does not support.
-    NotListed = "refused: not possible with the other side's list",
+    NotListed = "refused: list change unsupported by the other side",
     /// Sent without confirmation: places for an RA driver that does not report them.
-    Unconfirmed = "places given without confirmation",
+    Unconfirmed = "positions sent without confirmation",
     /// Not answered: the queried component timed out.
-    Unanswered = "not answered in time",
+    Unanswered = "queries timed out",
     /// Dropped: an unsolicited report.
-    Unasked = "dropped: report that nobody waits for",
+    Unasked = "dropped: unsolicited report",
     /// Not shown: an id without counterpart.
-    Unmapped = "not shown: id without counterpart",
+    Unmapped = "hidden: id without counterpart",
     /// Not shown: a subsystem whose number is taken on the other side.
-    Collision = "not shown: number taken on the other side",
+    Collision = "hidden: subsystem number taken on the other side",
     /// Not shown: too many components.
-    TooManyComponents = "not shown: too many components",
+    TooManyComponents = "hidden: too many components",
     /// Not sent: the RA node rejected the message.
     NotSent = "not sent to RA",
 }

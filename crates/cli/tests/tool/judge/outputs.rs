@@ -45,7 +45,7 @@ fn what_is_not_offered_is_skipped_and_counted_and_the_rest_conforms_as_tested() 
         "  passed   A2   Capabilities discovery",
         "  skipped  A3   System management  (AccessControl is not offered)",
         "by unicast, to the component",
-        "  passed   B6   Query Heartbeat Pulse beside the event",
+        "  passed   B6   Query Heartbeat Pulse during the event",
         "8 passed, 0 failed, 10 skipped",
         "105.1.1 conforms to the contests' script as tested: 8 steps passed; 10 steps did not apply",
     ] {
@@ -97,11 +97,11 @@ fn a_run_is_written_down_in_every_form_that_is_asked_for() {
     assert_eq!(lines[0]["verdict"], "skipped");
     let exchange = &lines[1]["proceedings"][0];
     assert_eq!(exchange["sent"]["destination"], "105.1.255");
-    assert_eq!(exchange["came"][0]["message"], "ReportHeartbeatPulse");
+    assert_eq!(exchange["received"][0]["message"], "ReportHeartbeatPulse");
     assert!(exchange["latency_ms"].as_f64().unwrap() > 0.0);
     assert_eq!(
         lines[2]["reason"],
-        "no ReportControl came to 42.2.1 within 0.2 s"
+        "no ReportControl reached 42.2.1 within 0.2 s"
     );
     assert_eq!(
         (&lines[3]["failed"], &lines[3]["conforms"]),
@@ -118,7 +118,7 @@ fn a_run_is_written_down_in_every_form_that_is_asked_for() {
         "{xml}"
     );
     assert!(
-        xml.contains("<failure message=\"no ReportControl came to 42.2.1 within 0.2 s\">"),
+        xml.contains("<failure message=\"no ReportControl reached 42.2.1 within 0.2 s\">"),
         "{xml}"
     );
 

@@ -62,7 +62,7 @@ fn silence_is_told_with_who_had_to_say_what_to_whom_and_how_long_was_waited() {
     let peer = Peer::offering(&[access_control::URN]);
     assert_eq!(
         reason("B13", peer),
-        "no ReportControl came to 42.2.1 within 1 s"
+        "no ReportControl reached 42.2.1 within 1 s"
     );
 }
 
@@ -73,7 +73,7 @@ fn an_answer_after_the_limit_is_none() {
         .late(Duration::from_millis(1500));
     assert_eq!(
         reason("B13", peer),
-        "no ReportControl came to 42.2.1 within 1 s"
+        "no ReportControl reached 42.2.1 within 1 s"
     );
 }
 
@@ -84,7 +84,7 @@ fn an_answer_to_another_than_who_asked_is_told() {
         .answers_to::<QueryControl>(JausId::new(42, 1, 1), &nobody);
     assert_eq!(
         reason("B13", peer),
-        "no ReportControl came to 42.2.1 within 1 s, but ReportControl to 42.1.1"
+        "no ReportControl reached 42.2.1 within 1 s, but ReportControl to 42.1.1"
     );
 }
 
@@ -94,7 +94,7 @@ fn another_answer_than_the_one_that_must_come_is_told() {
         Peer::offering(&[events::URN]).answers::<CreateEvent>(&ConfirmEventRequest::default());
     assert_eq!(
         reason("B7", peer),
-        "no RejectEventRequest came to 42.1.1 within 1 s, but ConfirmEventRequest to 42.1.1"
+        "no RejectEventRequest reached 42.1.1 within 1 s, but ConfirmEventRequest to 42.1.1"
     );
 }
 
@@ -119,7 +119,7 @@ fn wrong_fields_are_told_with_what_they_must_be() {
         (
             "B13",
             access().answers::<QueryControl>(&in_control(somebody, 5)),
-            "ReportControl: 7.1.1 is in control, not nobody (0.0.0)",
+            "ReportControl: 7.1.1 is in control; expected none (0.0.0)",
         ),
         (
             "B14",

@@ -27,7 +27,7 @@ struct Exchange<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     sent: Option<Message<'a>>,
     expected: &'a [String],
-    came: Vec<Message<'a>>,
+    received: Vec<Message<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     measured: Option<&'a str>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -95,7 +95,7 @@ fn exchange<'a>(dictionary: &'a Dictionary, proceeding: &'a Proceeding) -> Excha
     Exchange {
         sent: proceeding.sent.as_ref().map(said),
         expected: &proceeding.expected,
-        came: proceeding.came.iter().map(said).collect(),
+        received: proceeding.received.iter().map(said).collect(),
         measured: proceeding.measured.as_deref(),
         latency_ms: proceeding.latency.map(millis),
     }

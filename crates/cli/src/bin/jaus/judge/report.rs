@@ -96,8 +96,8 @@ impl<'d> Report<'d> {
         for expected in &proceeding.expected {
             lines.push(format!("{INDENT}expected  {expected}"));
         }
-        for said in &proceeding.came {
-            lines.push(format!("{INDENT}came      {}", self.said(said)));
+        for said in &proceeding.received {
+            lines.push(format!("{INDENT}received  {}", self.said(said)));
         }
         if let Some(latency) = proceeding.latency {
             lines.push(format!("{INDENT}in        {}", millis(latency)));
@@ -105,12 +105,12 @@ impl<'d> Report<'d> {
         if let Some(measured) = &proceeding.measured {
             lines.push(format!("{INDENT}measured  {measured}"));
         }
-        if proceeding.came.is_empty()
+        if proceeding.received.is_empty()
             && proceeding.measured.is_none()
             && proceeding.sent.is_some()
             && !proceeding.expected.is_empty()
         {
-            lines.push(format!("{INDENT}came      nothing"));
+            lines.push(format!("{INDENT}received  nothing"));
         }
         lines
     }
@@ -142,7 +142,7 @@ impl<'d> Report<'d> {
         ));
         if let Some((median, most)) = tally.latency() {
             let (median, most) = (millis(median), millis(most));
-            lines.push(format!("answers took {median} (median) to {most} (most)"));
+            lines.push(format!("answers took {median} (median), {most} (maximum)"));
         }
         lines.push(conclusion(subject, tally, against));
         lines

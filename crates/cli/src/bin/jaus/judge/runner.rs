@@ -158,7 +158,7 @@ impl Runner {
             let found = missing.iter().position(is_it);
             // Events arrive independently of the exchange.
             if found.is_some() || heard.code() != Some(Event::CODE) {
-                proceeding.came.push(self.said(&heard));
+                proceeding.received.push(self.said(&heard));
             }
             if let Some(found) = found {
                 let expectation = missing[found];
@@ -192,7 +192,7 @@ impl Runner {
         while let Some(heard) = self.judge_nodes.hear(deadline, &self.step).await? {
             if heard.code() != Some(Event::CODE) && heard.to == exchange.from {
                 check = Err(format!("it was answered with {}", name_of(&heard.octets)));
-                proceeding.came.push(self.said(&heard));
+                proceeding.received.push(self.said(&heard));
                 break;
             }
         }
@@ -373,14 +373,14 @@ impl Runner {
     fn silence(&self, missing: &Expectation, proceeding: &Proceeding) -> String {
         let (name, to) = (missing.name, self.memory.id(missing.to));
         let limit = self.limit.as_secs_f64();
-        let instead = proceeding.came.iter();
+        let instead = proceeding.received.iter();
         let instead = instead.map(|said| format!("{} to {}", name_of(&said.octets), said.to));
         let instead: Vec<_> = instead.collect();
         if instead.is_empty() {
-            return format!("no {name} came to {to} within {limit} s");
+            return format!("no {name} reached {to} within {limit} s");
         }
         format!(
-            "no {name} came to {to} within {limit} s, but {}",
+            "no {name} reached {to} within {limit} s, but {}",
             instead.join(", ")
         )
     }
@@ -405,7 +405,7 @@ impl Proceeding {
         Self {
             sent,
             expected,
-            came: Vec::new(),
+            received: Vec::new(),
             measured: None,
             latency: None,
         }

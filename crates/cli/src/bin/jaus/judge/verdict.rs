@@ -53,7 +53,7 @@ pub(super) struct Proceeding {
     pub(super) sent: Option<ObservedMessage>,
     /// The required messages, as text; empty if none.
     pub(super) expected: Vec<String>,
-    pub(super) came: Vec<ObservedMessage>,
+    pub(super) received: Vec<ObservedMessage>,
     /// The measurement, as text.
     pub(super) measured: Option<String>,
     /// From the request to the last required answer.

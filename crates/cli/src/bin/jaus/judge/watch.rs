@@ -109,7 +109,7 @@ impl Observation {
     pub(super) fn in_words(&self) -> String {
         match self.purpose {
             Purpose::Running { period, .. } => format!(
-                "Event (41F1h) every {} s, numbered one by one",
+                "Event (41F1h) every {} s, numbered consecutively",
                 period.as_secs_f64()
             ),
             Purpose::Silent { lasting } => {
@@ -157,7 +157,7 @@ impl Observed {
             let (one, next) = (pair[0].sequence, pair[1].sequence);
             if next != one.wrapping_add(1) {
                 return Err(format!(
-                    "event {id} number {one} is followed by number {next}"
+                    "event {id} number {one} was followed by number {next}"
                 ));
             }
         }
@@ -268,7 +268,7 @@ mod tests {
         for (events, reason) in [
             (&few[..], "only 2 reports of event 9 arrived, not 3"),
             (&other, "event 9 carries 4002h, not 4202h"),
-            (&unnumbered, "event 9 number 1 is followed by number 1"),
+            (&unnumbered, "event 9 number 1 was followed by number 1"),
             (
                 &slow,
                 "event 9 arrived 2.000 s after the previous one, not after 1 s",

@@ -18,7 +18,7 @@ use super::{DISCOVERY, LIVENESS};
 /// Steps 1 and 2.
 pub(super) fn first() -> Vec<Step> {
     vec![
-        step(Part::B, 1, "Query Identification to everybody")
+        step(Part::B, 1, "Query Identification by broadcast")
             .needs(&[DISCOVERY])
             .act(to_everybody(identify(
                 QueryType::COMPONENT_IDENTIFICATION,
@@ -48,38 +48,39 @@ pub(super) fn again() -> Vec<Step> {
         |_: &ReportSubsystemList, _| Ok(()),
     );
     vec![
-        step(Part::B, 11, "Heartbeat and everything about who is there")
-            .needs(&[DISCOVERY, LIVENESS])
-            .act(pulse.into())
-            .act(query_services().into())
-            .act(
-                identify(QueryType::SYSTEM_IDENTIFICATION, |report, _| {
-                    equal("the query type", report.query_type.0, 1)?;
-                    is_named(report)
-                })
-                .into(),
-            )
-            .act(identify(QueryType::SUBSYSTEM_IDENTIFICATION, identifies_a_subsystem).into())
-            .act(
-                identify(QueryType::NODE_IDENTIFICATION, |report, _| {
-                    equal("the query type", report.query_type.0, 3)?;
-                    is_named(report)
-                })
-                .into(),
-            )
-            .act(
-                identify(QueryType::COMPONENT_IDENTIFICATION, |report, _| {
-                    equal("the query type", report.query_type.0, 4)?;
-                    is_named(report)
-                })
-                .into(),
-            )
-            .act(
-                query_configuration(query_configuration::QueryType::SUBSYSTEM_IDENTIFICATION)
-                    .into(),
-            )
-            .act(query_configuration(query_configuration::QueryType::NODE_IDENTIFICATION).into())
-            .act(list.into()),
+        step(
+            Part::B,
+            11,
+            "Heartbeat, identification, configuration and services",
+        )
+        .needs(&[DISCOVERY, LIVENESS])
+        .act(pulse.into())
+        .act(query_services().into())
+        .act(
+            identify(QueryType::SYSTEM_IDENTIFICATION, |report, _| {
+                equal("the query type", report.query_type.0, 1)?;
+                is_named(report)
+            })
+            .into(),
+        )
+        .act(identify(QueryType::SUBSYSTEM_IDENTIFICATION, identifies_a_subsystem).into())
+        .act(
+            identify(QueryType::NODE_IDENTIFICATION, |report, _| {
+                equal("the query type", report.query_type.0, 3)?;
+                is_named(report)
+            })
+            .into(),
+        )
+        .act(
+            identify(QueryType::COMPONENT_IDENTIFICATION, |report, _| {
+                equal("the query type", report.query_type.0, 4)?;
+                is_named(report)
+            })
+            .into(),
+        )
+        .act(query_configuration(query_configuration::QueryType::SUBSYSTEM_IDENTIFICATION).into())
+        .act(query_configuration(query_configuration::QueryType::NODE_IDENTIFICATION).into())
+        .act(list.into()),
     ]
 }
 
@@ -93,7 +94,7 @@ fn identify(
 ) -> Exchange {
     Exchange::new(Main, QueryIdentification { query_type }).expect(
         Main,
-        "the same query type, a kind and a name",
+        "the same query type, a type and a name",
         check,
     )
 }
@@ -119,7 +120,7 @@ fn query_services() -> Exchange {
 fn query_configuration(query_type: query_configuration::QueryType) -> Exchange {
     Exchange::new(Main, QueryConfiguration { query_type }).expect(
         Main,
-        "the subject's component among them",
+        "including the subject's component",
         |report: &ReportConfiguration, memory| {
             let subject = memory.subject;
             let nodes = report.node_list.iter();

@@ -39,7 +39,7 @@ pub(super) fn steps() -> Vec<Step> {
                 QueryIdentification {
                     query_type: QueryType::SUBSYSTEM_IDENTIFICATION,
                 },
-                "the subsystem's kind and its name",
+                "the subsystem's type and name",
                 identifies_a_subsystem,
             )
             .act(Act::Asked {
@@ -52,7 +52,7 @@ pub(super) fn steps() -> Vec<Step> {
             .act(services_of_the_subject().into()),
         step(Part::A, 3, "System management")
             .needs(&[ACCESS_CONTROL, MANAGEMENT])
-            .ask(Main, QueryControl, "nobody in control", nobody_in_control)
+            .ask(Main, QueryControl, "uncontrolled", nobody_in_control)
             .ask(Main, request_control(), "control accepted", accepted)
             .ask(Main, QueryStatus, "a state", |_: &ReportStatus, _| Ok(()))
             .tell(Main, Resume)
@@ -244,7 +244,7 @@ pub(super) fn nobody_in_control(report: &ReportControl, _: &mut Memory) -> Check
     if id != (0, 0, 0) {
         let (subsystem, node, component) = id;
         return Err(format!(
-            "{subsystem}.{node}.{component} is in control, not nobody (0.0.0)"
+            "{subsystem}.{node}.{component} is in control; expected none (0.0.0)"
         ));
     }
     equal("the authority", report.authority_code, 0)

@@ -35,19 +35,19 @@ fn access_control() -> Vec<Step> {
         access(12, "Query Timeout").ask(First, QueryTimeout, "seconds", |_: &ReportTimeout, _| {
             Ok(())
         }),
-        access(13, "Query Control: nobody").ask(
+        access(13, "Query Control while uncontrolled").ask(
             First,
             QueryControl,
-            "nobody (0.0.0), authority 0",
+            "uncontrolled (0.0.0), authority 0",
             nobody_in_control,
         ),
-        access(14, "Control is refused to an authority below the default").ask(
+        access(14, "Request Control below the default authority is refused").ask(
             First,
             request(0),
             "2, insufficient authority",
             insufficient,
         ),
-        access(15, "Control is given to an authority of 220")
+        access(15, "Request Control with authority 220 is granted")
             .ask(First, request(220), "control accepted", accepted)
             .ask(
                 First,
@@ -72,7 +72,7 @@ fn access_control() -> Vec<Step> {
                 "219",
                 |report: &ReportAuthority, _| equal("the authority", report.authority_code, 219),
             ),
-        access(17, "Control is refused to a lower authority")
+        access(17, "Request Control with a lower authority is refused")
             .rests_on(&[15])
             .ask(
                 Second,
@@ -80,12 +80,12 @@ fn access_control() -> Vec<Step> {
                 "2, insufficient authority",
                 insufficient,
             )
-            .ask(First, QueryControl, "42.2.1 still", |report, memory| {
+            .ask(First, QueryControl, "still 42.2.1", |report, memory| {
                 in_control(report, memory, First)
             }),
         access(
             18,
-            "A higher authority takes control, and the controller is told",
+            "A higher authority takes control, and the former controller is notified",
         )
         .rests_on(&[15])
         .ask(Third, request(231), "control accepted", accepted)
@@ -115,7 +115,7 @@ fn management() -> Vec<Step> {
         management(20, "Set Emergency")
             .tell(Fourth, set_emergency())
             .ask(First, QueryStatus, "5, emergency", is_in_emergency),
-        management(21, "Control is not available in an emergency")
+        management(21, "Request Control in an emergency: not available")
             .rests_on(&[20])
             .ask(
                 First,
@@ -136,7 +136,7 @@ fn management() -> Vec<Step> {
             .rests_on(&[20, 22, 23])
             .tell(First, Standby)
             .ask(First, QueryStatus, "2, standby", is_in_standby),
-        management(25, "Reset: through initialization into standby")
+        management(25, "Reset returns to Standby through Initialize")
             .rests_on(&[20, 22])
             .ask(First, Reset, "control released", released)
             .act(Act::Pause(Duration::from_millis(1500)))
@@ -144,10 +144,10 @@ fn management() -> Vec<Step> {
             .ask(
                 First,
                 QueryControl,
-                "nobody: the reset drops control",
+                "uncontrolled: a reset ends control",
                 nobody_in_control,
             ),
-        management(26, "Release Control in an emergency, which then is cleared")
+        management(26, "Release Control in an emergency, then Clear Emergency")
             .tell(Fourth, set_emergency())
             .ask(First, QueryStatus, "5, emergency", is_in_emergency)
             // After the reset no client is in control; the standard then requires 0, the contests'

@@ -84,7 +84,7 @@ pub(super) fn steps() -> Vec<Step> {
             |report: &ReportLocalWaypoint, _| is_waypoint(report, WAYPOINTS[0]),
         )
         .act(Act::Until(Until {
-            words: "the four waypoints are reached in their order",
+            words: "the four waypoints in order",
             // Some subjects revoke control that is not renewed.
             exchanges: vec![
                 Exchange::new(Main, request_control()).expect(Main, "control accepted", accepted),

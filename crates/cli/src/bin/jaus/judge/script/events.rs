@@ -29,7 +29,7 @@ const SECOND: Duration = Duration::from_secs(1);
 /// Steps 3 to 10.
 pub(super) fn steps() -> Vec<Step> {
     vec![
-        step(Part::B, 3, "Query Events: there are none yet")
+        step(Part::B, 3, "Query Events before any exist")
             .needs(&[EVENTS])
             .ask(
                 Main,
@@ -39,7 +39,7 @@ pub(super) fn steps() -> Vec<Step> {
                     equal("the number of events", report.event_list.len(), 0)
                 },
             ),
-        step(Part::B, 4, "Create Event: a heartbeat every second")
+        step(Part::B, 4, "Create Event: heartbeat at 1 Hz")
             .needs(&[EVENTS, LIVENESS])
             .act(create_heartbeat().into())
             .act(Act::Watch(Watch {
@@ -47,7 +47,7 @@ pub(super) fn steps() -> Vec<Step> {
                 period: SECOND,
                 events: 3,
             })),
-        step(Part::B, 5, "Query Events lists the event by its id")
+        step(Part::B, 5, "Query Events by event id")
             .needs(&[EVENTS, LIVENESS])
             .rests_on(&[4])
             .act(query_event(|report, memory| {
@@ -55,7 +55,7 @@ pub(super) fn steps() -> Vec<Step> {
                 let id = memory.event()?;
                 equal("the event id", report.event_list[0].event_id, id)
             })),
-        step(Part::B, 6, "Query Heartbeat Pulse beside the event")
+        step(Part::B, 6, "Query Heartbeat Pulse during the event")
             .needs(&[LIVENESS])
             .ask(
                 Main,
@@ -66,11 +66,11 @@ pub(super) fn steps() -> Vec<Step> {
         step(
             Part::B,
             7,
-            "Create Event on a report instead of a query is rejected",
+            "Create Event for a report instead of a query is rejected",
         )
         .needs(&[EVENTS])
         .act(create_on_a_report().into()),
-        step(Part::B, 8, "Update Event: half the rate")
+        step(Part::B, 8, "Update Event: 0.5 Hz")
             .needs(&[EVENTS, LIVENESS])
             .rests_on(&[4])
             .act(update_heartbeat().into())
@@ -79,7 +79,7 @@ pub(super) fn steps() -> Vec<Step> {
                 period: 2 * SECOND,
                 events: 2,
             })),
-        step(Part::B, 9, "Cancel Event: nothing comes any more")
+        step(Part::B, 9, "Cancel Event stops the reports")
             .needs(&[EVENTS, LIVENESS])
             .rests_on(&[4])
             .act(cancel_heartbeat().into())
@@ -87,7 +87,7 @@ pub(super) fn steps() -> Vec<Step> {
                 streams: the_event,
                 lasting: Duration::from_millis(2500),
             }),
-        step(Part::B, 10, "Query Events: the event is gone")
+        step(Part::B, 10, "Query Events after cancellation")
             .needs(&[EVENTS, LIVENESS])
             .rests_on(&[4, 9])
             .act(query_event(|report, _| {
@@ -109,16 +109,20 @@ pub(super) fn observer() -> Vec<Step> {
     };
     let pose = subscribe(24, pose, ReportLocalPose::CODE);
     let status = subscribe(25, QueryStatus, ReportStatus::CODE);
-    let mut observer = step(Part::B, 36, "Five event streams for an operator's picture")
-        .needs(&[
-            EVENTS,
-            LIVENESS,
-            ACCESS_CONTROL,
-            MANAGEMENT,
-            VELOCITY_STATE_SENSOR,
-            LOCAL_POSE_SENSOR,
-        ])
-        .by_unicast_only();
+    let mut observer = step(
+        Part::B,
+        36,
+        "Five event streams, as an operator's display needs them",
+    )
+    .needs(&[
+        EVENTS,
+        LIVENESS,
+        ACCESS_CONTROL,
+        MANAGEMENT,
+        VELOCITY_STATE_SENSOR,
+        LOCAL_POSE_SENSOR,
+    ])
+    .by_unicast_only();
     for exchange in [heartbeat, control, velocity, pose, status] {
         observer = observer.act(exchange.into());
     }
@@ -158,7 +162,7 @@ fn create_on_a_report() -> Exchange {
     let report = ReportGlobalPose::default();
     Exchange::with(Main, move |_| create(3, 0.5, &report)).expect(
         Main,
-        "request 3 and why",
+        "request 3 and the reason",
         |report: &RejectEventRequest, _| {
             equal("the request id", report.request_id, 3)?;
             match report.response_code {
@@ -221,7 +225,7 @@ fn query_event(check: fn(&ReportEvents, &mut Memory) -> Check) -> Act {
         })
     };
     let exchange = Exchange::with(Main, message);
-    exchange.expect(Main, "what is running of it", check).into()
+    exchange.expect(Main, "its running events", check).into()
 }
 
 /// Subscribes to a report at 1 Hz.
@@ -242,7 +246,7 @@ fn subscribe(request_id: u8, query: impl Message, report: u16) -> Exchange {
 fn cancel_the_oldest(request_id: u8) -> Exchange {
     let message = move |memory: &Memory| {
         let oldest = memory.streams.first();
-        let oldest = oldest.ok_or("no event is left to cancel")?;
+        let oldest = oldest.ok_or("there is no event to cancel")?;
         Ok(CancelEvent {
             request_id,
             event_id: oldest.id,

@@ -40,7 +40,7 @@ pub(super) fn steps() -> Vec<Step> {
 fn waypoints() -> Vec<Step> {
     let driver = |number, title| step(Part::B, number, title).needs(&[LOCAL_WAYPOINT_DRIVER]);
     vec![
-        driver(27, "Query Travel Speed before anything is set").ask(
+        driver(27, "Query Travel Speed before a waypoint is set").ask(
             Main,
             QueryTravelSpeed,
             "a speed",
@@ -70,41 +70,43 @@ fn waypoints() -> Vec<Step> {
             .needs(&[ACCESS_CONTROL, LOCAL_WAYPOINT_LIST_DRIVER])
             .ask(Main, request_control(), "control accepted", accepted)
             .act(set_element().into()),
-        step(Part::B, 31, "What is in the list")
-            .needs(&[ACCESS_CONTROL, LOCAL_WAYPOINT_LIST_DRIVER])
-            .rests_on(&[30])
-            .ask(
-                Main,
-                QueryElementCount,
-                "1 element",
-                |report: &ReportElementCount, _| {
-                    equal("the element count", report.element_count, 1)
-                },
-            )
-            .ask(
-                Main,
-                QueryElementList,
-                "element 1",
-                |report: &ReportElementList, _| {
-                    let uids = report
-                        .element_list
-                        .iter()
-                        .map(|element| element.element_uid);
-                    list_is(&uids.collect::<Vec<_>>(), &[1])
-                },
-            )
-            .ask(
-                Main,
-                QueryActiveElement,
-                "an element",
-                |_: &ReportActiveElement, _| Ok(()),
-            )
-            .ask(
-                Main,
-                QueryLocalWaypoint { presence_vector: 0 },
-                "a waypoint",
-                |_: &ReportLocalWaypoint, _| Ok(()),
-            ),
+        step(
+            Part::B,
+            31,
+            "Query the list, its length and the active element",
+        )
+        .needs(&[ACCESS_CONTROL, LOCAL_WAYPOINT_LIST_DRIVER])
+        .rests_on(&[30])
+        .ask(
+            Main,
+            QueryElementCount,
+            "1 element",
+            |report: &ReportElementCount, _| equal("the element count", report.element_count, 1),
+        )
+        .ask(
+            Main,
+            QueryElementList,
+            "element 1",
+            |report: &ReportElementList, _| {
+                let uids = report
+                    .element_list
+                    .iter()
+                    .map(|element| element.element_uid);
+                list_is(&uids.collect::<Vec<_>>(), &[1])
+            },
+        )
+        .ask(
+            Main,
+            QueryActiveElement,
+            "an element",
+            |_: &ReportActiveElement, _| Ok(()),
+        )
+        .ask(
+            Main,
+            QueryLocalWaypoint { presence_vector: 0 },
+            "a waypoint",
+            |_: &ReportLocalWaypoint, _| Ok(()),
+        ),
         step(Part::B, 32, "Release Control")
             .needs(&[ACCESS_CONTROL, LOCAL_WAYPOINT_LIST_DRIVER])
             .rests_on(&[30])
@@ -117,12 +119,12 @@ fn sensors() -> Vec<Step> {
     let pose =
         |number, title| step(Part::B, number, title).needs(&[ACCESS_CONTROL, LOCAL_POSE_SENSOR]);
     vec![
-        step(Part::B, 33, "Velocity state: everything, and nothing")
+        step(Part::B, 33, "Query Velocity State: all fields, and none")
             .needs(&[VELOCITY_STATE_SENSOR])
             .ask(
                 Main,
                 query_velocity(u16::MAX),
-                "every field that there is",
+                "all available fields",
                 |report: &ReportVelocityState, _| {
                     if *report == ReportVelocityState::default() {
                         return Err("the report is empty".to_owned());
@@ -231,6 +233,6 @@ fn is_empty(empty: bool) -> Check {
     if empty {
         Ok(())
     } else {
-        Err("it has fields that were not requested".to_owned())
+        Err("it has unrequested fields".to_owned())
     }
 }

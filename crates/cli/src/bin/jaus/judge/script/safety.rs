@@ -32,8 +32,7 @@ const ROUND: Duration = Duration::from_millis(100);
 
 pub(super) fn steps() -> Vec<Step> {
     vec![
-        safety(1, "No motion for who is not in control")
-            .act(stands_throughout(|| vec![effort(Second)])),
+        safety(1, "No motion without control").act(stands_throughout(|| vec![effort(Second)])),
         in_control(2, "No motion in standby")
             .act(stands_throughout(|| vec![renew(), effort(Main)])),
         driving(3, "Standby stops the vehicle")
@@ -55,7 +54,7 @@ pub(super) fn steps() -> Vec<Step> {
                     emergency_code: clear_emergency::EmergencyCode(1),
                 },
             )),
-        driving(5, "The end of control stops the vehicle")
+        driving(5, "Loss of control stops the vehicle")
             .ask(Main, ReleaseControl, "control released", released)
             .act(until_it_stands(|| vec![effort(Main)]))
             .act(stands_throughout(|| vec![effort(Main)])),
@@ -98,7 +97,7 @@ fn driving(number: u8, title: &'static str) -> Step {
 /// The vehicle stops although the commands continue.
 fn until_it_stands(commands: fn() -> Vec<Exchange>) -> Act {
     Act::Until(Until {
-        words: "the vehicle stands although efforts go on",
+        words: "the vehicle stands while efforts continue",
         exchanges: and_velocity(commands),
         reached: stands,
         every: ROUND,
@@ -109,7 +108,7 @@ fn until_it_stands(commands: fn() -> Vec<Exchange>) -> Act {
 /// The vehicle does not move while the commands continue.
 fn stands_throughout(commands: fn() -> Vec<Exchange>) -> Act {
     Act::Throughout(Throughout {
-        words: "the vehicle stands although efforts go on",
+        words: "the vehicle stands while efforts continue",
         exchanges: and_velocity(commands),
         holds: stands,
         every: ROUND,

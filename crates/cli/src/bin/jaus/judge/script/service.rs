@@ -116,7 +116,7 @@ fn walk(service: &ServiceInfo) -> Vec<(Cow<'static, str>, Vec<Act>)> {
     for query in &queries {
         let is_of_something = OF_SOMETHING.contains(&query.code);
         let condition = if is_of_something {
-            " where there is something to report"
+            " if there is something to report"
         } else {
             ""
         };
@@ -125,7 +125,7 @@ fn walk(service: &ServiceInfo) -> Vec<(Cow<'static, str>, Vec<Act>)> {
         steps.push((title, act.into_iter().collect()));
         let cut = cut(query, is_of_something);
         if !cut.is_empty() {
-            let title = format!("{} that ends too early is ignored", query.name).into();
+            let title = format!("{} cut short is ignored", query.name).into();
             steps.push((title, cut));
         }
     }
@@ -280,7 +280,7 @@ mod tests {
             titles("LocalPoseSensor")[..3],
             [
                 "QueryLocalPose is answered",
-                "QueryLocalPose that ends too early is ignored",
+                "QueryLocalPose cut short is ignored",
                 "QueryLocalPoseExt is answered",
             ]
         );

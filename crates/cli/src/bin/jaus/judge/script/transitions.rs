@@ -247,7 +247,7 @@ fn look(machine: &Machine<'_>, after: Situation, tells_status: bool) -> Vec<Act>
     let controller = after.controller;
     let asked = Exchange::new(Main, QueryControl).expect(
         Main,
-        "who is in control",
+        "the controller",
         move |report: &ReportControl, memory: &mut Memory| {
             let is = (report.subsystem_id, report.node_id, report.component_id);
             let must_be = controller.map_or((0, 0, 0), |speaker| {
