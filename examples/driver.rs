@@ -1,5 +1,5 @@
 //! A vehicle that can be driven: it obeys the client in control while it is ready, and stops
-//! whenever it must not act. `cargo run --example operator` drives it.
+//! whenever it must not act. `cargo run --example operator` drives it. A subsystem number may be given.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering::Relaxed};
@@ -10,7 +10,8 @@ use jaus::node::{Config, Node};
 
 #[tokio::main(flavor = "current_thread")]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let node = Node::start(Config::loopback(102, 1))?;
+    let subsystem = std::env::args().nth(1).map_or(Ok(102), |it| it.parse())?;
+    let node = Node::start(Config::loopback(subsystem, 1))?;
     // The motor's effort, in percent.
     let motor = Arc::new(AtomicI32::new(0));
     let throttle = motor.clone();

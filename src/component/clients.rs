@@ -11,11 +11,12 @@ use super::feed::Feed;
 use crate::address::JausId;
 use crate::node;
 use crate::service::{
-    CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Patience, Stack,
-    SubscriptionEnd, SubscriptionId, SubscriptionNews, Topic,
+    Audience, CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Patience,
+    Retake, SessionId, SessionState, Stack, SubscriptionEnd, SubscriptionId, SubscriptionNews,
+    Topic,
 };
 
-/// A request for a subscription or for control.
+/// A request for a subscription, for control, or for a session.
 pub(super) enum Hold {
     /// A subscription to reports.
     Subscribe {
@@ -28,13 +29,21 @@ pub(super) enum Hold {
         authority: u8,
         reply: oneshot::Sender<Controlled>,
     },
+    /// A session.
+    Session {
+        audience: Audience,
+        authority: u8,
+        retake: Retake,
+        reply: oneshot::Sender<Begun>,
+    },
 }
 
-/// The end of a subscription or of control.
+/// The end of a subscription, of control, or of a session.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Cancellation {
     Subscription(SubscriptionId),
     Control(ControlId),
+    Session(SessionId),
 }
 
 /// Sends the cancellation when it is dropped, on any thread.
@@ -51,6 +60,13 @@ impl Drop for Ticket {
         // An error means that the component has stopped, so it has ended already.
         let _ = self.cancellations.send(self.cancellation);
     }
+}
+
+/// A new session.
+pub(super) struct Begun {
+    pub(super) id: SessionId,
+    pub(super) ticket: Ticket,
+    pub(super) state: watch::Receiver<SessionState>,
 }
 
 /// The result of a request for a subscription.
@@ -89,6 +105,7 @@ pub(super) struct Clients {
     feeds: HashMap<SubscriptionId, Arc<Feed>>,
     asking: HashMap<ControlId, oneshot::Sender<Controlled>>,
     controls: HashMap<ControlId, watch::Sender<Condition>>,
+    sessions: HashMap<SessionId, watch::Sender<SessionState>>,
 }
 
 impl Clients {
@@ -100,6 +117,7 @@ impl Clients {
             feeds: HashMap::new(),
             asking: HashMap::new(),
             controls: HashMap::new(),
+            sessions: HashMap::new(),
         }
     }
 
@@ -134,6 +152,25 @@ impl Clients {
                 Ok(id) => drop(self.asking.insert(id, reply)),
                 Err(error) => drop(reply.send(Err(error))),
             },
+            Hold::Session {
+                audience,
+                authority,
+                retake,
+                reply,
+            } => {
+                let now = Instant::now();
+                let id = stack.begin_session(now, audience, authority, retake, patience);
+                let (state, told) = watch::channel(SessionState::Engaging);
+                self.sessions.insert(id, state);
+                let ticket = self.ticket(Cancellation::Session(id));
+                let begun = Begun {
+                    id,
+                    ticket,
+                    state: told,
+                };
+                // An unclaimed ticket cancels.
+                drop(reply.send(begun));
+            }
         }
     }
 
@@ -144,6 +181,7 @@ impl Clients {
                 stack.unsubscribe(Instant::now(), id);
             }
             Cancellation::Control(id) => stack.release_control(Instant::now(), id),
+            Cancellation::Session(id) => stack.release_session(Instant::now(), id),
         }
     }
 
@@ -193,6 +231,15 @@ impl Clients {
                     condition.send_replace(Condition::Released);
                 }
             }
+        }
+    }
+
+    pub(super) fn tell_session(&mut self, id: SessionId, state: SessionState) {
+        if let Some(told) = self.sessions.get(&id) {
+            told.send_replace(state);
+        }
+        if state == SessionState::Released {
+            self.sessions.remove(&id);
         }
     }
 

@@ -18,7 +18,8 @@ use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::QueryHeartbeatPulse;
 use crate::node::{self, Port, Resident};
 use crate::service::{
-    Change, Condition, Event, Inquiry, NoAnswer, Patience, Service, Stack, Standing, UnsafeService,
+    Change, Condition, Event, Inquiry, NoAnswer, Patience, Service, SessionId, SessionOrder, Stack,
+    Standing, UnsafeService,
 };
 
 /// A request of the application to its component's task.
@@ -43,6 +44,8 @@ pub(super) enum Command {
     Announce(u16),
     /// Report the end of the command with this code, and whether it was successful.
     End(u16, bool),
+    /// Change what the application wants of a session.
+    Session(SessionId, SessionOrder),
 }
 
 /// The result of a query.
@@ -210,6 +213,9 @@ impl Driver {
             Command::End(command, successful) => {
                 self.stack.end_command(Instant::now(), command, successful);
             }
+            Command::Session(id, order) => {
+                self.stack.order_session(Instant::now(), id, order);
+            }
             Command::Announce(query) => self.stack.announce(Instant::now(), query),
         }
     }
@@ -238,6 +244,7 @@ impl Driver {
                 }
                 Event::Subscription(id, news) => self.clients.tell_subscriber(id, news),
                 Event::Control(id, news) => self.clients.tell_controller(id, news),
+                Event::Session(id, state) => self.clients.tell_session(id, state),
                 Event::Standing(standing) => _ = self.publisher.standing.send_replace(standing),
                 Event::Message(message) => self.publisher.messages.send(message),
             }

@@ -7,7 +7,8 @@ use crate::address::JausId;
 use crate::codec::{DecodeError, EncodeError};
 use crate::node;
 use crate::service::{
-    CannotSubscribe, ControlLost, ControlRefused, NoAnswer, Offer, State, SubscriptionEnd,
+    CannotSubscribe, ControlLost, ControlRefused, NoAnswer, Offer, SessionLoss, State,
+    SubscriptionEnd,
 };
 
 /// Why a message was not sent.
@@ -126,7 +127,7 @@ pub enum SubscribeError {
         why: SubscriptionEnd,
     },
     /// The request could not be sent.
-    #[error("CreateEvent for cannot send {query} to {peer}")]
+    #[error("cannot send CreateEvent for {query} to {peer}")]
     NotSent {
         /// The component that would send the reports.
         peer: JausId,
@@ -171,6 +172,35 @@ pub enum ControlError {
         peer: JausId,
         /// The code of its state, as in Report Status.
         state: u8,
+    },
+    /// A message could not be sent.
+    #[error(transparent)]
+    NotSent(#[from] SendError),
+    /// The delivery of a command is not confirmed.
+    #[error(transparent)]
+    Undelivered(#[from] DeliverError),
+    /// The component has stopped, because its node has.
+    #[error("the component stopped with its node and controls no more peers")]
+    Stopped,
+}
+
+/// Why a session's peer does not obey commands at present.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// No peer has been found, or it has not answered yet.
+    #[error("no component is ready yet: the session is still looking for one or asking it")]
+    Engaging,
+    /// The peer is under control, and not ready.
+    #[error("{0} is under control, but stands by; call `resume`")]
+    Standby(JausId),
+    /// The peer was lost.
+    #[error("{peer} is lost: {why}")]
+    Lost {
+        /// The component that was controlled, or asked for control.
+        peer: JausId,
+        /// The reason.
+        why: SessionLoss,
     },
     /// A message could not be sent.
     #[error(transparent)]

@@ -298,7 +298,7 @@ impl Component {
     }
 
     /// Passes a request to the component's task; `None` when it has stopped.
-    async fn hold<T>(&self, hold: impl FnOnce(oneshot::Sender<T>) -> Hold) -> Option<T> {
+    pub(super) async fn hold<T>(&self, hold: impl FnOnce(oneshot::Sender<T>) -> Hold) -> Option<T> {
         let (reply, answer) = oneshot::channel();
         let command = Command::Hold(Box::new(hold(reply)));
         self.shared.commands.send(command).await.ok()?;

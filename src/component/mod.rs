@@ -71,21 +71,24 @@ mod error;
 mod feed;
 mod group;
 mod handle;
+mod session;
 mod subscription;
 mod watch;
 
 pub use crate::service::{
-    AccessControl, CannotSubscribe, Change, Condition, ControlLost, ControlRefused, Directory,
-    EventSettings, Handlers, Identification, Kind, Level, Liveness, Loss, Management, Offer,
-    Outage, Patience, Rejection, Scope, Service, Standing, State, SubscriptionEnd, Time, TimeOfDay,
-    Timing, When,
+    AccessControl, Audience, CannotSubscribe, Change, Condition, ControlLost, ControlRefused,
+    Directory, EventSettings, Handlers, Identification, Kind, Level, Liveness, Loss, Management,
+    Offer, Outage, Patience, Rejection, Retake, Scope, Service, SessionLoss, SessionState,
+    Standing, State, SubscriptionEnd, Time, TimeOfDay, Timing, When,
 };
 pub use builder::{AttachError, Builder};
 pub use control::Control;
 pub use error::{
-    ControlError, DeliverError, FindError, ManageError, QueryError, SendError, SubscribeError,
+    ControlError, DeliverError, FindError, ManageError, QueryError, SendError, SessionError,
+    SubscribeError,
 };
-pub use group::{Audience, GroupSubscription, GroupUpdate, Results};
+pub use group::{GroupSubscription, GroupUpdate, Results};
 pub use handle::Component;
+pub use session::Session;
 pub use subscription::{Subscription, Update};
 pub use watch::{Messages, Watch};

@@ -17,9 +17,10 @@
 //! | [`Handlers`] | the application's own messages, one function per message |
 //!
 //! A stack is also a client of other components: it [queries](Stack::ask),
-//! [subscribes](Stack::subscribe) and [takes control](Stack::request_control). It keeps
-//! subscriptions and control until the application cancels them.
+//! [subscribes](Stack::subscribe), [takes control](Stack::request_control) and
+//! [keeps it](Stack::begin_session). It keeps all of them until the application cancels them.
 
+mod audience;
 mod calendar;
 mod client;
 #[cfg(test)]
@@ -55,10 +56,12 @@ use crate::address::JausId;
 use crate::codec::ServiceId;
 use crate::endpoint::Received;
 
+pub use audience::Audience;
 pub use calendar::Date;
 pub use client::{
     CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Outage, Rejection,
-    SubscriptionEnd, SubscriptionId, SubscriptionNews, Topic, When,
+    Retake, SessionId, SessionLoss, SessionOrder, SessionState, SubscriptionEnd, SubscriptionId,
+    SubscriptionNews, Topic, When,
 };
 pub use context::Context;
 pub use control::{AccessControl, Condition, Management};

@@ -43,6 +43,11 @@ impl Outbox {
         );
     }
 
+    /// Sends a message with a priority to one component.
+    pub fn send_with<M: Message>(&mut self, destination: JausId, priority: Priority, message: &M) {
+        self.push(destination, Broadcast::None, priority, false, message);
+    }
+
     /// Sends a message with a priority to one component, with retransmission until its node
     /// acknowledges.
     pub fn send_acknowledged<M: Message>(

@@ -1,5 +1,6 @@
 //! The stack: all services of one component as a single state machine without I/O.
 
+mod client;
 mod safeguard;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -8,16 +9,16 @@ use std::time::Instant;
 
 use bytes::Bytes;
 
-use super::client::{Controls, Subscriptions};
+use super::client::{Controls, Sessions, Subscriptions};
 use super::context::News;
 use super::control::{AccessControl, Control, Management};
 use super::events::{CommandTrial, EventSettings, Events, Outcome, Refusal};
 use super::inquiries::Inquiries;
 use super::life::{Life, Rank};
 use super::{
-    CannotSubscribe, Change, Context, ControlId, ControlNews, ControlRefused, Directory, Discovery,
-    Handled, Inquiry, NoAnswer, Outbox, Patience, Service, Standing, StopCause, SubscriptionId,
-    SubscriptionNews, Topic, UnsafeService, code_of,
+    Change, Context, ControlId, ControlNews, Directory, Discovery, Handled, Inquiry, NoAnswer,
+    Outbox, Service, SessionId, SessionState, Standing, StopCause, SubscriptionId,
+    SubscriptionNews, UnsafeService, code_of,
 };
 use safeguard::Faults;
 
@@ -46,6 +47,7 @@ pub struct Stack {
     inquiries: Inquiries,
     subscriptions: Subscriptions,
     controls: Controls,
+    sessions: Sessions,
     out: Outbox,
     events: VecDeque<Event>,
 }
@@ -61,6 +63,8 @@ pub enum Event {
     Subscription(SubscriptionId, SubscriptionNews),
     /// News of the control over a peer.
     Control(ControlId, ControlNews),
+    /// The progress of a session.
+    Session(SessionId, SessionState),
     /// The component's own state or its controller has changed.
     Standing(Standing),
     /// A message that no service consumed.
@@ -89,6 +93,7 @@ impl Stack {
             inquiries: Inquiries::default(),
             subscriptions: Subscriptions::default(),
             controls: Controls::default(),
+            sessions: Sessions::default(),
             out,
             events: VecDeque::new(),
         };
@@ -311,19 +316,6 @@ impl Stack {
             .map(|answer| answer.payload)
     }
 
-    fn handle_as_client(&mut self, now: Instant, message: &Received) -> Handled {
-        let Self {
-            subscriptions,
-            controls,
-            out,
-            ..
-        } = self;
-        match subscriptions.handle_message(now, message, out) {
-            Handled::Yes => Handled::Yes,
-            Handled::No => controls.handle_message(now, message, out),
-        }
-    }
-
     /// Call this when the time of [`poll_timeout`](Self::poll_timeout) has come. Earlier calls are
     /// harmless.
     pub fn handle_timeout(&mut self, now: Instant) {
@@ -346,67 +338,6 @@ impl Stack {
         self.out.send_octets(destination, payload);
     }
 
-    /// Sends a query to a peer and waits for its first message with the code `report`. If the peer
-    /// id has wildcards, the first answer of any matching component counts.
-    pub fn ask(
-        &mut self,
-        now: Instant,
-        peer: JausId,
-        query: Bytes,
-        report: u16,
-        patience: Patience,
-    ) -> Inquiry {
-        self.inquiries
-            .ask(now, peer, query, report, patience, &mut self.out)
-    }
-
-    /// Cancels a query.
-    pub fn cancel(&mut self, now: Instant, inquiry: Inquiry) {
-        self.inquiries.cancel(now, inquiry, &mut self.out);
-    }
-
-    /// Subscribes to a peer's reports. [`Event::Subscription`] brings the news of it, beginning
-    /// with the peer's confirmation; `patience` limits the wait for that.
-    ///
-    /// # Errors
-    /// If no valid request can be made of `topic`.
-    pub fn subscribe(
-        &mut self,
-        now: Instant,
-        topic: &Topic,
-        patience: Patience,
-    ) -> Result<SubscriptionId, CannotSubscribe> {
-        self.subscriptions
-            .subscribe(now, topic, patience, &mut self.out)
-    }
-
-    /// Ends a subscription.
-    pub fn unsubscribe(&mut self, now: Instant, subscription: SubscriptionId) {
-        self.subscriptions
-            .unsubscribe(now, subscription, &mut self.out);
-    }
-
-    /// Requests control of a peer and keeps renewing it. [`Event::Control`] reports whether it was
-    /// granted, and when it is lost.
-    ///
-    /// # Errors
-    /// If it cannot even be requested.
-    pub fn request_control(
-        &mut self,
-        now: Instant,
-        peer: JausId,
-        authority: u8,
-        patience: Patience,
-    ) -> Result<ControlId, ControlRefused> {
-        self.controls
-            .request(now, peer, authority, patience, &mut self.out)
-    }
-
-    /// Releases control, or cancels a request for it.
-    pub fn release_control(&mut self, now: Instant, control: ControlId) {
-        self.controls.release(now, control, &mut self.out);
-    }
-
     /// Ends all subscriptions and releases all control.
     ///
     /// Everything that the services move stops, and the component obeys no more commands.
@@ -416,6 +347,7 @@ impl Stack {
         self.follow_control(now);
         self.subscriptions.farewell(now, &mut self.out);
         self.controls.farewell(now, &mut self.out);
+        self.sessions = Sessions::default();
     }
 
     /// Whether a release of control still waits for its peer's confirmation.
@@ -498,6 +430,7 @@ impl Stack {
             .chain(self.inquiries.poll_timeout())
             .chain(self.subscriptions.poll_timeout())
             .chain(self.controls.poll_timeout())
+            .chain(self.sessions.poll_timeout())
             .min()
     }
 
@@ -534,16 +467,7 @@ impl Stack {
         self.follow_control(now);
         self.watch_clients(now);
         self.tell_subscribers(now);
-        while let Some((inquiry, failure)) = self.inquiries.poll_failure() {
-            self.events.push_back(Event::Answer(inquiry, Err(failure)));
-        }
-        while let Some((subscription, news)) = self.subscriptions.poll_news() {
-            self.events
-                .push_back(Event::Subscription(subscription, news));
-        }
-        while let Some((control, news)) = self.controls.poll_news() {
-            self.events.push_back(Event::Control(control, news));
-        }
+        self.collect_client_news(now);
     }
 
     /// Passes the decisions of control on to the services.

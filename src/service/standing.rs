@@ -24,6 +24,22 @@ pub enum State {
     Emergency = 5,
 }
 
+impl State {
+    /// The state with a code in Report Status.
+    #[must_use]
+    pub const fn from_code(code: u8) -> Option<Self> {
+        Some(match code {
+            0 => Self::Initialize,
+            1 => Self::Ready,
+            2 => Self::Standby,
+            3 => Self::Shutdown,
+            4 => Self::Failure,
+            5 => Self::Emergency,
+            _ => return None,
+        })
+    }
+}
+
 impl fmt::Display for State {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

@@ -29,7 +29,12 @@ struct Example {
 
 impl Example {
     fn start(name: &'static str) -> Self {
+        Self::start_with(name, &[])
+    }
+
+    fn start_with(name: &'static str, arguments: &[&str]) -> Self {
         let mut program = Command::new(path(name))
+            .args(arguments)
             .stdout(Stdio::piped())
             .spawn()
             .unwrap_or_else(|error| panic!("{name}: {error}; run cargo build --examples"));
@@ -102,6 +107,27 @@ fn the_operator_drives_the_driver_and_lets_it_go() {
     operator.expect("102.1.33 is free again");
     driver.expect("standby now, controlled by None");
     assert!(operator.program.wait().unwrap().success());
+}
+
+#[test]
+fn two_vehicles_are_commanded_through_their_restarts() {
+    let _alone = alone_with_a_driver();
+    let first = Example::start_with("driver", &["102"]);
+    let mut second = Example::start_with("driver", &["103"]);
+    let mut operator = Example::start("two_vehicles");
+    operator.expect("102.1.33 is ready");
+    second.expect("44.1.1 drives with 20 %");
+    drop(first);
+    operator.expect("102.1.33 is lost");
+    let mut first = Example::start_with("driver", &["102"]);
+    first.expect("44.1.1 drives with 20 %");
+    operator.expect("102.1.33 is ready");
+    assert!(
+        !operator
+            .seen
+            .iter()
+            .any(|line| line.contains("103.1.33 is lost"))
+    );
 }
 
 #[test]

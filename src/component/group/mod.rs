@@ -4,7 +4,6 @@
 //! There is no membership protocol: an [`Audience`] describes the members, and Discovery finds
 //! them.
 
-mod audience;
 mod member_table;
 mod reports;
 mod results;
@@ -13,9 +12,8 @@ use super::{Component, DeliverError, QueryError, SendError};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Outgoing;
-use crate::service::{CannotSubscribe, Topic, When};
+use crate::service::{Audience, CannotSubscribe, Topic, When};
 
-pub use audience::Audience;
 pub use reports::{GroupSubscription, GroupUpdate};
 pub use results::Results;
 

@@ -11,12 +11,12 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
-use super::Audience;
 use super::member_table::MemberTable;
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::component::driver::sleep_until;
 use crate::component::{Component, SubscribeError, Subscription, Update};
+use crate::service::Audience;
 use crate::service::{Outage, Topic};
 
 /// The merged reports of all current members of an [`Audience`]. Created by

@@ -1,12 +1,13 @@
-//! The client side of Events and Access Control: subscriptions that survive a peer's restart, and
-//! control that renews itself.
+//! The client side of Events and Access Control: subscriptions that survive a peer's restart,
+//! control that renews itself, and sessions, which take control again after restarts.
 //!
-//! Both are tables of small state machines, one per subscription or controlled peer. They see the
-//! component's incoming messages and send on its behalf. A [`Stack`](super::Stack) owns them.
+//! All are tables of small state machines, one per subscription, controlled peer or session. They
+//! see the component's incoming messages and send on its behalf. A [`Stack`](super::Stack) owns them.
 
 mod control;
 mod news;
 mod rejection;
+mod session;
 mod subscription;
 mod subscriptions;
 #[cfg(test)]
@@ -17,6 +18,8 @@ pub(super) use control::Controls;
 pub use control::{ControlId, ControlLost, ControlNews, ControlRefused};
 pub use news::{Outage, SubscriptionEnd, SubscriptionNews};
 pub use rejection::Rejection;
+pub use session::{Retake, SessionId, SessionLoss, SessionOrder, SessionState};
+pub(super) use session::{Sessions, Surroundings};
 pub use subscriptions::SubscriptionId;
 pub(super) use subscriptions::Subscriptions;
 pub use topic::{CannotSubscribe, Topic, When};

@@ -400,7 +400,7 @@ impl Proxy {
                 ra_client.handle_subscription(now, (id, news), connections, tally);
             }
             Event::Control(id, news) => ra_client.handle_control(now, id, news, stack, tally),
-            Event::Message(_) | Event::Change(_) | Event::Standing(_) => {}
+            Event::Message(_) | Event::Change(_) | Event::Standing(_) | Event::Session(..) => {}
         }
     }
 

@@ -97,7 +97,7 @@ impl Audience {
     }
 
     /// The ids of all members except `own`, in order.
-    pub(super) fn members(&self, directory: &Directory, own: JausId) -> Vec<JausId> {
+    pub(crate) fn members(&self, directory: &Directory, own: JausId) -> Vec<JausId> {
         let others = directory.components().filter(|it| it.id != own);
         others
             .filter(|it| self.includes(it))
@@ -106,7 +106,7 @@ impl Audience {
     }
 
     /// The destination that reaches all members at once, if there is one.
-    pub(super) const fn as_destination(&self) -> Option<JausId> {
+    pub(crate) const fn as_destination(&self) -> Option<JausId> {
         match self.service {
             None => Some(self.scope),
             Some(_) => None,
