@@ -56,6 +56,16 @@ pub enum QueryError {
         /// How long the query waited.
         waited: Duration,
     },
+    /// The peer offers none of the services that answer the query, so it was not sent.
+    #[error("{peer} offers no service that answers {query}: {} does", services.join(" or "))]
+    NotOffered {
+        /// The component to query.
+        peer: JausId,
+        /// The name of the query.
+        query: &'static str,
+        /// The services that answer the query.
+        services: Vec<&'static str>,
+    },
     /// The answer does not match its definition.
     #[error("{peer} answered {query}, but the answer cannot be decoded")]
     Unreadable {

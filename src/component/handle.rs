@@ -8,6 +8,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use super::clients::{Hold, NotControlled, NotSubscribed};
 use super::driver::{Answer, Command};
+use super::offers::missing_for;
 use super::watch::Outlet;
 use super::{
     Builder, Control, ControlError, DeliverError, FindError, Messages, QueryError, SendError,
@@ -16,6 +17,7 @@ use super::{
 use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
 use crate::endpoint::{Outgoing, Received};
+use crate::messages;
 use crate::node;
 use crate::service::{
     Change, Condition, Directory, Kind, NodeDirectory, Offer, Service, Standing, Topic,
@@ -200,6 +202,17 @@ impl Component {
         peer: JausId,
         query: &Q,
     ) -> Result<R, QueryError> {
+        let directory = self.directory();
+        let services = directory.component(peer).map_or_else(Vec::new, |peer| {
+            missing_for(&messages::registry(), peer, Q::CODE)
+        });
+        if !services.is_empty() {
+            return Err(QueryError::NotOffered {
+                peer,
+                query: Q::NAME,
+                services,
+            });
+        }
         let not_sent = |source| QueryError::NotSent {
             peer,
             query: Q::NAME,

@@ -71,6 +71,7 @@ mod error;
 mod feed;
 mod group;
 mod handle;
+mod offers;
 mod session;
 mod subscription;
 mod watch;
