@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::arrival::Arrival;
 use super::{Counter, Endpoint};
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Kind, Version, ra};
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Kind};
 
 /// The most calls remembered.
 const MOST_CALLS: usize = 256;
@@ -53,11 +53,7 @@ impl Endpoint {
             return;
         }
         self.reassembly.hear(now, path.into());
-        // In the older headers, acknowledgements repeat the message code.
-        let code_len = match request.version {
-            Version::As5669a => 0,
-            Version::As5669 | Version::Ra => ra::CODE_LEN,
-        };
+        let code_len = request.version.repeated_code_len();
         let answer = Frame {
             version: request.version,
             kind: Kind::default(),

@@ -69,12 +69,6 @@ impl From<SocketAddr> for Remote {
     }
 }
 
-impl PartialEq<SocketAddr> for Remote {
-    fn eq(&self, address: &SocketAddr) -> bool {
-        self.socket() == Some(*address)
-    }
-}
-
 impl fmt::Display for Remote {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -29,57 +29,22 @@ pub enum AttachError {
     Link(String),
 }
 
-/// The attached components.
-#[derive(Debug, Default)]
-pub(super) struct Components {
-    ids: BTreeSet<JausId>,
-}
-
-impl Components {
-    pub(super) fn attach(&mut self, id: JausId, limit: usize) -> Result<(), AttachError> {
-        if !id.is_unicast() {
-            return Err(AttachError::NotOneComponent(id));
-        }
-        if self.ids.contains(&id) {
-            return Err(AttachError::AlreadyAttached(id));
-        }
-        if self.ids.len() >= limit {
-            return Err(AttachError::TooMany { limit });
-        }
-        self.ids.insert(id);
-        Ok(())
-    }
-
-    pub(super) fn detach(&mut self, id: JausId) {
-        self.ids.remove(&id);
-    }
-
-    pub(super) fn contains(&self, id: JausId) -> bool {
-        self.ids.contains(&id)
-    }
-
-    pub(super) fn iter(&self) -> impl Iterator<Item = JausId> + '_ {
-        self.ids.iter().copied()
-    }
-
-    /// The components that a message to `destination` reaches. A local broadcast reaches only those
-    /// of the sender's subsystem.
-    pub(super) fn receivers(
-        &self,
-        source: JausId,
-        destination: JausId,
-        broadcast: Broadcast,
-    ) -> impl Iterator<Item = JausId> + '_ {
-        let (first, last) = if destination.has_wildcard() {
-            (JausId::from_u32(0), JausId::EVERYONE)
-        } else {
-            (destination, destination)
-        };
-        let ids = self.ids.range(first..=last).copied();
-        let in_scope = move |id: &JausId| {
-            broadcast != Broadcast::Local || id.subsystem() == source.subsystem()
-        };
-        ids.filter(move |&id| destination.matches(id))
-            .filter(in_scope)
-    }
+/// The components that a message to `destination` reaches. A local broadcast reaches only those of
+/// the sender's subsystem.
+pub(super) fn receivers(
+    components: &BTreeSet<JausId>,
+    source: JausId,
+    destination: JausId,
+    broadcast: Broadcast,
+) -> impl Iterator<Item = JausId> + '_ {
+    let (first, last) = if destination.has_wildcard() {
+        (JausId::from_u32(0), JausId::EVERYONE)
+    } else {
+        (destination, destination)
+    };
+    let in_scope =
+        move |id: &JausId| broadcast != Broadcast::Local || id.subsystem() == source.subsystem();
+    let ids = components.range(first..=last).copied();
+    ids.filter(move |&id| destination.matches(id))
+        .filter(in_scope)
 }

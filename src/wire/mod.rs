@@ -55,6 +55,16 @@ impl Version {
             Self::Ra => "ra",
         }
     }
+
+    /// The octets of message code at the beginning of each later fragment and each acknowledgement.
+    /// In AS5669A, only the beginning of a message has the code.
+    #[must_use]
+    pub const fn repeated_code_len(self) -> usize {
+        match self {
+            Self::As5669a => 0,
+            Self::As5669 | Self::Ra => ra::CODE_LEN,
+        }
+    }
 }
 
 impl fmt::Display for Version {

@@ -52,20 +52,13 @@ impl HopQueue {
         };
         let queues = &mut self.whole[least..=priority];
         joined.pack(0, queues, longest);
-        let (length, mut segment) = (joined.len(), None);
-        for _ in 1..segments.min(MOST_OCTETS / length.max(1)) {
+        Some(joined.batch(segments, |joined, length| {
+            let next = pop_if(&mut queues[priority - least], |it| it.len() <= length)?;
             let start = joined.len();
-            let Some(next) = pop_if(&mut queues[priority - least], |it| it.len() <= length) else {
-                break;
-            };
             joined.push(&next);
             joined.pack(start, queues, longest.min(length));
-            segment = Some(length);
-            if joined.len() - start < length {
-                break;
-            }
-        }
-        Some((joined.finish(), segment))
+            Some(())
+        }))
     }
 
     /// The next fragment that may be sent, batched with others of the same length.
@@ -84,23 +77,14 @@ impl HopQueue {
                 Err(_) => leaving.counters.add(Counter::CannotSend),
             }
         };
-        let (length, mut segment) = (first.len(), None);
-        let mut joined = Joined::new(first, buffer);
-        for _ in 1..segments.min(MOST_OCTETS / length.max(1)) {
-            let Some(next) = self.next_fragment(leaving.now, level, Some(like)) else {
-                break;
-            };
+        Some(Joined::new(first, buffer).batch(segments, |joined, _| {
+            let next = self.next_fragment(leaving.now, level, Some(like))?;
             leaving.note(&next);
-            if joined.emit(&next).is_err() {
-                leaving.counters.add(Counter::CannotSend);
-                break;
-            }
-            segment = Some(length);
-            if next.payload.len() < like.1 {
-                break;
-            }
-        }
-        Some((joined.finish(), segment))
+            let emitted = joined.emit(&next);
+            emitted
+                .map_err(|_| leaving.counters.add(Counter::CannotSend))
+                .ok()
+        }))
     }
 }
 
@@ -158,21 +142,34 @@ impl<'a> Joined<'a> {
         }
     }
 
-    fn finish(self) -> Bytes {
-        if self.buffer.is_empty() {
-            self.first
-        } else {
-            self.buffer.split().freeze()
+    /// Appends datagrams of the length of the first, of which only the last may be shorter, up to
+    /// `segments` in all. Returns the octets, and that length if there is more than one datagram.
+    fn batch(
+        mut self,
+        segments: usize,
+        mut append: impl FnMut(&mut Self, usize) -> Option<()>,
+    ) -> (Bytes, Option<usize>) {
+        let (length, mut segment) = (self.len(), None);
+        for _ in 1..segments.min(MOST_OCTETS / length.max(1)) {
+            let start = self.len();
+            if append(&mut self, length).is_none() {
+                break;
+            }
+            segment = Some(length);
+            if self.len() - start < length {
+                break;
+            }
         }
+        if self.buffer.is_empty() {
+            return (self.first, None);
+        }
+        (self.buffer.split().freeze(), segment)
     }
 }
 
 fn pop_if(queue: &mut VecDeque<Bytes>, is_wanted: impl FnOnce(&Bytes) -> bool) -> Option<Bytes> {
-    if queue.front().is_some_and(is_wanted) {
-        queue.pop_front()
-    } else {
-        None
-    }
+    queue.front().filter(|it| is_wanted(it))?;
+    queue.pop_front()
 }
 
 /// Whether another message fits after a datagram with the AS5669A header.

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
 
-use super::recent::{Fingerprint, Recent};
+use super::recent::Recent;
 use super::{Config, Counter, Counters, LinkId, LinkProfile, Path, To, Transmit};
 use crate::wire::{Acknowledgement, EncodeError, Flags, Frame, Framing, Priority, as5669a, judp};
 pub(super) use fragmented::FragmentedSend;
@@ -61,7 +61,7 @@ pub enum Packing {
 /// The links and their queues.
 #[derive(Debug)]
 pub(super) struct Egress {
-    links: BTreeMap<LinkId, LinkProfile>,
+    pub(super) links: BTreeMap<LinkId, LinkProfile>,
     queues: Queues,
     turns: Turns,
     /// Queued datagrams, by priority, without fragments.
@@ -70,7 +70,7 @@ pub(super) struct Egress {
     fragmented: usize,
     buffer: BytesMut,
     /// Messages sent to a group, which may come back.
-    echoes: Recent,
+    pub(super) echoes: Recent,
     /// How long messages wait to be packed; `None` if they do not.
     patience: Option<Duration>,
     /// The longest datagram to pack messages into; 0 if packing is off.
@@ -101,10 +101,6 @@ impl Egress {
         }
     }
 
-    pub(super) fn add_link(&mut self, link: LinkId, profile: LinkProfile) {
-        self.links.insert(link, profile);
-    }
-
     /// Removes a link; returns how many datagrams were queued on it.
     pub(super) fn remove_link(&mut self, link: LinkId) -> u64 {
         self.links.remove(&link);
@@ -122,18 +118,15 @@ impl Egress {
         lost as u64
     }
 
-    pub(super) fn links(&self) -> impl Iterator<Item = (LinkId, &LinkProfile)> {
-        self.links.iter().map(|(&link, profile)| (link, profile))
-    }
-
-    pub(super) fn has_link(&self, link: LinkId) -> bool {
-        self.links.contains_key(&link)
-    }
-
     /// The framing of a link.
     pub(super) fn framing(&self, link: LinkId) -> Framing {
         let profile = self.links.get(&link);
         profile.map_or(Framing::default(), |profile| profile.framing)
+    }
+
+    /// Whether a path leads through datagrams rather than a connection or line.
+    pub(super) fn is_datagram(&self, path: Path) -> bool {
+        self.framing(path.link) == Framing::Judp
     }
 
     /// The number of queues.
@@ -166,7 +159,7 @@ impl Egress {
         flags: Flags,
         octets: Bytes,
     ) -> Result<(), Counter> {
-        if !self.has_link(hop.0) {
+        if !self.links.contains_key(&hop.0) {
             return Err(Counter::LinkGone);
         }
         let priority = flags.priority();
@@ -222,7 +215,7 @@ impl Egress {
         hop: Hop,
         message: FragmentedSend,
     ) -> Result<(), Counter> {
-        if !self.has_link(hop.0) {
+        if !self.links.contains_key(&hop.0) {
             return Err(Counter::LinkGone);
         }
         self.fragmented += message.remaining();
@@ -230,16 +223,6 @@ impl Egress {
         queue.push_fragmented(message);
         self.turns.list(hop, queue, self.longest_packed);
         Ok(())
-    }
-
-    /// Records a message of ours that goes to a group.
-    pub(super) fn remember_echo(&mut self, now: Instant, frame: &Frame) {
-        self.echoes.insert_own(now, frame);
-    }
-
-    /// Whether that message was recently sent to a group.
-    pub(super) fn is_echo(&self, now: Instant, seen: Fingerprint) -> bool {
-        self.echoes.contains(now, seen, self.config.echo_window)
     }
 
     /// The next datagram of a level, with everything packed or batched with it.

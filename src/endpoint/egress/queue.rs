@@ -110,7 +110,9 @@ impl HopQueue {
     ) -> Option<Frame> {
         let waiting = &mut self.fragmented[usize::from(level.priority().bits())];
         let message = waiting.front_mut()?;
-        if self.blocked_until.is_some() || !like.is_none_or(|like| message.continues(like)) {
+        let fits =
+            |(version, octets)| message.whole.version == version && message.next_len() <= octets;
+        if self.blocked_until.is_some() || !like.is_none_or(fits) {
             return None;
         }
         if let Some(pacing) = message.pacing
