@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use super::Endpoint;
-use super::arrival::Arrival;
 use super::large::Whole;
+use super::receive::Arrival;
 use super::recent::{Class, Fingerprint, Sighting};
 use crate::peer;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Version};

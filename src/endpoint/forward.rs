@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use tracing::trace;
 
-use super::arrival::Arrival;
 use super::egress::Hop;
+use super::receive::Arrival;
 use super::{Counter, Endpoint, Path, Peer, To};
 use crate::address::JausId;
 use crate::wire::{Broadcast, DataControl, Frame, Framing, Version, ra};

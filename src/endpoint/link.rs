@@ -41,6 +41,14 @@ impl LinkProfile {
     pub(super) const fn packs(&self) -> bool {
         matches!(self.framing, Framing::Judp) && !self.reads_one
     }
+
+    /// How many datagrams it takes in one [`Transmit`].
+    pub(super) fn segments(&self) -> usize {
+        match self.framing {
+            Framing::Judp => self.max_segments.max(1),
+            Framing::Jtcp | Framing::Jserial => 1,
+        }
+    }
 }
 
 /// The remote end of a link.

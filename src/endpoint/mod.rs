@@ -34,7 +34,6 @@
 
 mod access;
 mod acknowledge;
-mod arrival;
 mod config;
 mod counters;
 mod delivery;
@@ -44,7 +43,6 @@ mod event;
 mod forward;
 mod large;
 mod link;
-mod local;
 mod peers;
 mod rate;
 mod receive;
@@ -68,9 +66,8 @@ pub use delivery::FlowStatus;
 #[cfg(feature = "node")]
 pub(crate) use egress::MOST_OCTETS;
 pub use egress::{Pacing, Packing};
-pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};
+pub use event::{AttachError, Event, MessageHandle, Outgoing, Received, Unacknowledged};
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
-pub use local::AttachError;
 pub use peers::{Peer, RouteState, Traffic};
 pub(crate) use rate::quota_address;
 pub use rate::{Buckets, Rate, Rates};

@@ -1,14 +1,13 @@
 //! The receive path, from a datagram to deliveries: each message is checked, acknowledged,
 //! deduplicated, learned from and delivered.
 
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 use bytes::Bytes;
 use tracing::{debug, trace, warn};
 
-use super::arrival::Arrival;
 use super::duplicates::Novelty;
-use super::local::receivers;
 use super::peers::is_challenge;
 use super::recent::Fingerprint;
 use super::verify::Warning;
@@ -16,6 +15,18 @@ use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
 use crate::address::JausId;
 use crate::peer::{self, Sign};
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, judp};
+
+/// A received message, and how it arrived.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arrival<'a> {
+    pub(super) frame: &'a Frame,
+    pub(super) now: Instant,
+    pub(super) path: Path,
+    /// Whether it was sent to the link's group.
+    pub(super) to_all: bool,
+    /// Octets of memory that its payload keeps alive.
+    pub(super) held: usize,
+}
 
 impl Endpoint {
     /// Processes one datagram and delivers its messages for local components to `sink`.
@@ -224,7 +235,7 @@ impl Endpoint {
         }
         if self.awaits_answer(peer, local, number) && !self.peers.is_proven_elsewhere(peer, path) {
             self.learn(arrival)?;
-            self.receive_answer(now, frame)?;
+            self.receive_answer(now, frame);
             let path = self.where_it_reads(peer, path);
             self.peers.verify(peer, path);
             return Ok(());
@@ -423,4 +434,24 @@ fn check_header(frame: &Frame) -> Result<Broadcast, Counter> {
         return Err(Counter::NoMessageCode);
     }
     Ok(broadcast)
+}
+
+/// The components that a message to `destination` reaches. A local broadcast reaches only those of
+/// the sender's subsystem.
+fn receivers(
+    components: &BTreeSet<JausId>,
+    source: JausId,
+    destination: JausId,
+    broadcast: Broadcast,
+) -> impl Iterator<Item = JausId> + '_ {
+    let (first, last) = if destination.has_wildcard() {
+        (JausId::from_u32(0), JausId::EVERYONE)
+    } else {
+        (destination, destination)
+    };
+    let in_scope =
+        move |id: &JausId| broadcast != Broadcast::Local || id.subsystem() == source.subsystem();
+    let ids = components.range(first..=last).copied();
+    ids.filter(move |&id| destination.matches(id))
+        .filter(in_scope)
 }

@@ -1,7 +1,6 @@
 //! The accounts of bounded tables: how much each network address holds, and its oldest entries.
 
-use std::collections::btree_map::Entry;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, btree_map};
 use std::hash::Hash;
 use std::time::Instant;
 
@@ -54,9 +53,12 @@ impl<K: Copy + Ord + Hash> Tally<K> {
     }
 }
 
+/// Since when an id is in a group, and which.
+type Entry = (Instant, JausId);
+
 /// The ids of each group by age: those of each network address and, under `None`, all.
 #[derive(Debug, Default)]
-pub(super) struct Ages<G>(BTreeMap<(Option<Origin>, G), BTreeSet<(Instant, JausId)>>);
+pub(super) struct Ages<G>(BTreeMap<(Option<Origin>, G), BTreeSet<Entry>>);
 
 impl<G: Copy + Ord> Ages<G> {
     pub(super) fn insert(&mut self, origin: Origin, group: G, since: Instant, id: JausId) {
@@ -67,7 +69,7 @@ impl<G: Copy + Ord> Ages<G> {
 
     pub(super) fn remove(&mut self, origin: Origin, group: G, since: Instant, id: JausId) {
         for of in [None, Some(origin)] {
-            if let Entry::Occupied(mut ids) = self.0.entry((of, group)) {
+            if let btree_map::Entry::Occupied(mut ids) = self.0.entry((of, group)) {
                 ids.get_mut().remove(&(since, id));
                 if ids.get().is_empty() {
                     ids.remove();
@@ -77,7 +79,7 @@ impl<G: Copy + Ord> Ages<G> {
     }
 
     /// The oldest of a group, of one network address or of all, and since when it is there.
-    pub(super) fn oldest(&self, of: Option<Origin>, group: G) -> Option<(Instant, JausId)> {
+    pub(super) fn oldest(&self, of: Option<Origin>, group: G) -> Option<Entry> {
         self.0.get(&(of, group))?.first().copied()
     }
 }

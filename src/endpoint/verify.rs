@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use tracing::{debug, warn};
 
-use super::arrival::Arrival;
 use super::peers::{CHALLENGE, CHALLENGE_FLAGS, Decision, Heard, Probe};
+use super::receive::Arrival;
 use super::{Counter, Endpoint, Event, Path};
 use crate::address::JausId;
 use crate::wire::Frame;
@@ -231,8 +231,8 @@ impl Endpoint {
         let octets = u32::try_from(octets).unwrap_or(u32::MAX);
         let may = self.unverified.take_many(now, to.into(), octets)
             && self.unverified_total.take_many(now, (), octets);
-        let spent = self.unverified.owed(now, &to.into());
-        if spent >= self.config.unverified_address.burst / 4 {
+        let much = self.config.unverified_address.burst / 4;
+        if self.unverified.owes(now, &to.into(), much) {
             self.challenge(now, id);
         }
         if !may {

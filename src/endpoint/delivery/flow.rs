@@ -224,7 +224,7 @@ impl Flow {
     /// Retransmits a lost packet.
     fn repeat(&mut self, now: Instant, level: usize) -> Option<(Frame, u32)> {
         while let Some(sequence) = self.lost[level].pop_front() {
-            let Some(packet) = self.flight.get_mut(&sequence).filter(|packet| packet.lost) else {
+            let Some(packet) = self.flight.get(&sequence).filter(|packet| packet.lost) else {
                 continue;
             };
             let pending = self.pending_messages.get(&packet.message)?;
@@ -232,13 +232,7 @@ impl Flow {
             let frame = started
                 .cut
                 .frame(&pending.whole, started.first, packet.index);
-            packet.lost = false;
-            packet.sent = now;
-            packet.order = self.sends;
-            packet.tries += 1;
-            let tries = packet.tries;
-            self.depart(now, sequence);
-            return Some((frame, tries));
+            return self.depart(now, frame);
         }
         None
     }
@@ -273,12 +267,11 @@ impl Flow {
                 first_sent: now,
                 sent: now,
                 order: self.sends,
-                tries: 1,
+                tries: 0,
                 lost: false,
             };
             self.flight.insert(frame.sequence, packet);
-            self.depart(now, frame.sequence);
-            return Some((frame, 1));
+            return self.depart(now, frame);
         }
     }
 
@@ -318,34 +311,27 @@ impl Flow {
         Some(())
     }
 
-    fn depart(&mut self, now: Instant, sequence: u16) {
-        self.order.push_back((self.sends, sequence));
+    /// Records a transmission; returns the packet's frame, and how often it was sent.
+    fn depart(&mut self, now: Instant, frame: Frame) -> Option<(Frame, u32)> {
+        let packet = self.flight.get_mut(&frame.sequence)?;
+        (packet.sent, packet.order, packet.lost) = (now, self.sends, false);
+        packet.tries += 1;
+        self.order.push_back((self.sends, frame.sequence));
         self.sends += 1;
         self.in_flight += 1;
         self.armed.get_or_insert(now);
+        Some((frame, packet.tries))
     }
 
-    /// Processes an acknowledgement or a refusal of a packet from `source`. Returns whether the
-    /// packet awaits it.
-    pub(super) fn handle_answer(
-        &mut self,
-        now: Instant,
-        source: JausId,
-        sequence: u16,
-        is_refusal: bool,
-    ) -> bool {
-        let Some(message) = self.owner_of(source, sequence) else {
-            return false;
-        };
-        if is_refusal {
+    /// Processes the refusal of a packet from `source`.
+    pub(super) fn refuse(&mut self, source: JausId, sequence: u16) {
+        if let Some(message) = self.owner_of(source, sequence) {
             self.finish(message, Some(Unacknowledged::Refused));
-        } else {
-            self.acknowledge(now, sequence);
         }
-        true
     }
 
-    fn acknowledge(&mut self, now: Instant, sequence: u16) {
+    /// Processes the acknowledgement of a packet.
+    pub(super) fn acknowledge(&mut self, now: Instant, sequence: u16) {
         let Some(packet) = self.flight.remove(&sequence) else {
             return;
         };

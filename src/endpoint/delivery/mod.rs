@@ -321,20 +321,17 @@ impl Endpoint {
         }
     }
 
-    /// Processes an acknowledgement of one of our messages.
-    pub(super) fn receive_answer(&mut self, now: Instant, frame: &Frame) -> Result<(), Counter> {
-        let (destination, source) = (frame.source, frame.destination);
-        let is_refusal = frame.flags.acknowledgement() == Acknowledgement::Negative;
-        let flow = self.deliveries.flows.get_mut(&destination);
-        let is_awaited = flow.is_some_and(|flow| {
+    /// Processes an awaited acknowledgement of one of our messages.
+    pub(super) fn receive_answer(&mut self, now: Instant, frame: &Frame) {
+        let destination = frame.source;
+        if let Some(flow) = self.deliveries.flows.get_mut(&destination) {
             flow.known = true;
-            flow.handle_answer(now, source, frame.sequence, is_refusal)
-        });
-        if !is_awaited {
-            return Err(Counter::UnawaitedAcknowledgement);
+            match frame.flags.acknowledgement() {
+                Acknowledgement::Negative => flow.refuse(frame.destination, frame.sequence),
+                _ => flow.acknowledge(now, frame.sequence),
+            }
         }
         self.report_outcomes(destination);
-        Ok(())
     }
 
     /// Retransmits unacknowledged packets whose timeout has passed, or gives their messages up.

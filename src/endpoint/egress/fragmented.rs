@@ -108,11 +108,6 @@ impl FragmentedSend {
         self.cut.fragment_len(self.next)
     }
 
-    /// How many fragments are left.
-    pub(super) fn fragments(&self) -> usize {
-        self.cut.count() - self.next
-    }
-
     /// The octets of the fragments that are left.
     pub(super) fn remaining(&self) -> usize {
         (self.next..self.cut.count())

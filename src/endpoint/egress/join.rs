@@ -7,29 +7,8 @@ use bytes::{BufMut, Bytes, BytesMut};
 
 use super::queue::{HopQueue, Level};
 use super::{MOST_OCTETS, encode};
-use crate::endpoint::recent::Recent;
-use crate::endpoint::{Counter, Counters};
-use crate::wire::{EncodeError, Frame, Framing, Priority, as5669a, judp};
-
-/// The context in which fragments are sent.
-pub(super) struct Fragments<'a> {
-    pub(super) now: Instant,
-    pub(super) framing: Framing,
-    /// Where to record them, if they go to a group.
-    pub(super) echoes: Option<&'a mut Recent>,
-    /// The total of octets in queued fragments.
-    pub(super) octets: &'a mut usize,
-    pub(super) counters: &'a mut Counters,
-}
-
-impl Fragments<'_> {
-    fn note(&mut self, fragment: &Frame) {
-        *self.octets -= fragment.payload.len();
-        if let Some(echoes) = &mut self.echoes {
-            echoes.insert_own(self.now, fragment);
-        }
-    }
-}
+use crate::endpoint::{Counter, Counters, LinkProfile};
+use crate::wire::{EncodeError, Frame, Priority, as5669a, judp};
 
 impl HopQueue {
     /// The first queued message, packed with others into a datagram of up to `longest` octets, and
@@ -61,30 +40,33 @@ impl HopQueue {
         }))
     }
 
-    /// The next fragment that may be sent, batched with others of the same length.
+    /// The next fragment that may be sent, batched with others of the same length. Each is passed to
+    /// `leave`, and counted if it cannot be encoded.
     pub(super) fn join_fragments(
         &mut self,
+        now: Instant,
         level: Level,
-        segments: usize,
-        leaving: &mut Fragments<'_>,
+        link: &LinkProfile,
         buffer: &mut BytesMut,
+        counters: &mut Counters,
+        mut leave: impl FnMut(&Frame),
     ) -> Option<(Bytes, Option<usize>)> {
         let (first, like) = loop {
-            let frame = self.next_fragment(leaving.now, level, None)?;
-            leaving.note(&frame);
-            match encode(leaving.framing, buffer, &frame) {
+            let frame = self.next_fragment(now, level, None)?;
+            leave(&frame);
+            match encode(link.framing, buffer, &frame) {
                 Ok(octets) => break (octets, (frame.version, frame.payload.len())),
-                Err(_) => leaving.counters.add(Counter::CannotSend),
+                Err(_) => counters.add(Counter::CannotSend),
             }
         };
-        Some(Joined::new(first, buffer).batch(segments, |joined, _| {
-            let next = self.next_fragment(leaving.now, level, Some(like))?;
-            leaving.note(&next);
-            let emitted = joined.emit(&next);
-            emitted
-                .map_err(|_| leaving.counters.add(Counter::CannotSend))
-                .ok()
-        }))
+        Some(
+            Joined::new(first, buffer).batch(link.segments(), |joined, _| {
+                let next = self.next_fragment(now, level, Some(like))?;
+                leave(&next);
+                let emitted = joined.emit(&next);
+                emitted.map_err(|_| counters.add(Counter::CannotSend)).ok()
+            }),
+        )
     }
 }
 

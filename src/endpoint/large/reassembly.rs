@@ -17,8 +17,8 @@ use bytes::Bytes;
 
 use super::style;
 use crate::address::JausId;
-use crate::endpoint::arrival::Arrival;
 use crate::endpoint::rate::Origin;
+use crate::endpoint::receive::Arrival;
 use crate::endpoint::share::{Ages, Tally};
 use crate::endpoint::{Config, Counter, Counters};
 use crate::peer::LargeStyle;
@@ -176,12 +176,14 @@ impl Sender {
     }
 
     /// The run that begins at this number, or else the nearest one before it.
-    fn at_or_before(&self, destination: JausId, sequence: u16) -> Option<Place> {
-        let from = (destination, 0);
-        let before = self.runs.range(from..=(destination, sequence)).next_back();
-        before
-            .or_else(|| self.runs.range(from..=(destination, u16::MAX)).next_back())
-            .map(|(&place, _)| place)
+    fn at_or_before(&self, destination: JausId, sequence: u16) -> Option<(Place, &Run)> {
+        let up_to = |last| {
+            self.runs
+                .range((destination, 0)..=(destination, last))
+                .next_back()
+        };
+        let run = up_to(sequence).or_else(|| up_to(u16::MAX));
+        run.map(|(&place, run)| (place, run))
     }
 
     fn is_stale(&self, run: &Run) -> bool {
@@ -216,8 +218,7 @@ impl Sender {
         let ahead = sequence.wrapping_sub(self.latest).cast_signed();
         self.latest = sequence;
         self.position += i64::from(ahead);
-        if let Some(place) = self.at_or_before(destination, sequence)
-            && let Some(known) = self.runs.get(&place)
+        if let Some((place, known)) = self.at_or_before(destination, sequence)
             && known.covers(place.1, sequence)
         {
             // Most retransmissions were filtered before, so this is a restarted sender; but a
@@ -258,8 +259,7 @@ impl Sender {
     fn insert(&mut self, destination: JausId, first: u16, mut run: Run) -> Place {
         let mut place = (destination, first);
         let before = self.at_or_before(destination, first.wrapping_sub(1));
-        if let Some(before) = before
-            && let Some(known) = self.runs.get(&before)
+        if let Some((before, known)) = before
             && known.last.wrapping_add(1) == first
             && known.is_continued_by(&run)
             && !self.is_stale(known)
@@ -360,11 +360,13 @@ impl Reassembly {
     pub(in crate::endpoint) fn awaits(&self, frame: &Frame) -> bool {
         let continues = matches!(frame.flags.data(), DataControl::Middle | DataControl::Last);
         let number = frame.sequence.wrapping_sub(1);
-        let run = self.senders.get(&frame.source).and_then(|sender| {
-            let place = sender.at_or_before(frame.destination, number)?;
-            sender.runs.get(&place).filter(|run| !sender.is_stale(run))
-        });
-        continues && run.is_some_and(|run| run.begins && !run.ends && run.last == number)
+        let is_begun = |sender: &Sender| {
+            let run = sender.at_or_before(frame.destination, number);
+            run.is_some_and(|(_, run)| {
+                run.begins && !run.ends && run.last == number && !sender.is_stale(run)
+            })
+        };
+        continues && self.senders.get(&frame.source).is_some_and(is_begun)
     }
 
     /// Finishes the large message whose end is shown by `number`, the sequence number of the next

@@ -7,7 +7,7 @@ use super::route::{self, Finding};
 use super::{Challenge, PeerState, Peers, Probe, RouteState};
 use crate::address::JausId;
 use crate::endpoint::Path;
-use crate::endpoint::arrival::Arrival;
+use crate::endpoint::receive::Arrival;
 use crate::peer::Recogniser;
 
 /// The most challenges in progress.

@@ -13,8 +13,8 @@ use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::arrival::Arrival;
 use super::rate::Origin;
+use super::receive::Arrival;
 use super::share::{Ages, Tally};
 use super::{Config, Counter, LinkId, Path, StaticPeer};
 use crate::address::JausId;

@@ -6,7 +6,7 @@ use super::places::Standing;
 use super::{Challenge, RouteState};
 use crate::address::JausId;
 use crate::endpoint::Path;
-use crate::endpoint::arrival::Arrival;
+use crate::endpoint::receive::Arrival;
 use crate::peer::{self, Recogniser};
 use crate::wire::{Frame, Version};
 

@@ -166,7 +166,7 @@ fn a_peer_is_followed_to_a_new_port_after_its_old_one_has_not_answered_a_challen
         rig.pass(Duration::from_millis(300));
     }
     assert!(
-        !rig.endpoint.peers.challenge(PEER).is_some(),
+        rig.endpoint.peers.challenge(PEER).is_none(),
         "the challenge has timed out"
     );
     rig.transmits();
