@@ -110,13 +110,9 @@ impl Endpoint {
 fn with_header(frame: &Frame, version: Version) -> Option<Frame> {
     let answer = frame.flags.acknowledgement().is_answer();
     let later = matches!(frame.flags.data(), DataControl::Middle | DataControl::Last);
-    let payload = match (
-        frame.version.repeated_code_len(),
-        version.repeated_code_len(),
-    ) {
-        (code_len, 0) if answer || later => {
-            frame.payload.slice(code_len.min(frame.payload.len())..)
-        }
+    let [from, to] = [frame.version, version].map(Version::repeated_code_len);
+    let payload = match (from, to) {
+        (1.., 0) if answer || later => frame.payload.slice(frame.repeated_code_len()..),
         (0, 1..) if answer => Bytes::from_static(&[0; ra::CODE_LEN]),
         (0, 1..) if later => return None,
         _ => frame.payload.clone(),

@@ -110,11 +110,11 @@ impl Endpoint {
         let handle = self.deliveries.next_handle();
         let (destination, length) = (message.destination, message.payload.len());
         if self.components.contains(&message.destination) {
-            self.send_to_sibling(handle, message, sink)?;
+            self.send_to_sibling(handle, message, scope, sink)?;
         } else {
             self.send_away(now, handle, &message, scope)?;
             let source = message.source;
-            let message = received_locally(message, scope, destination);
+            let message = received_locally(message, scope);
             self.deliver(&message, Some(source), sink);
         }
         self.counters.add(Counter::MessagesSent);
@@ -153,17 +153,17 @@ impl Endpoint {
         &mut self,
         handle: MessageHandle,
         message: Outgoing,
+        scope: Broadcast,
         sink: &mut dyn Sink,
     ) -> Result<(), SendError> {
-        let (acknowledge, scope, by) =
-            (message.acknowledge, message.broadcast, message.destination);
+        let (acknowledge, by) = (message.acknowledge, message.destination);
         if acknowledge {
             self.deliveries.check_room(self.results, 0)?;
             if !sink.has_room(by, message.priority) {
                 return Err(SendError::ReceiverFull(by));
             }
         }
-        sink.deliver(received_locally(message, scope, by));
+        sink.deliver(received_locally(message, scope));
         self.counters.add(Counter::MessagesDelivered);
         if acknowledge {
             self.announce_result(Event::Acknowledged {
@@ -353,7 +353,7 @@ impl Endpoint {
     }
 }
 
-fn received_locally(message: Outgoing, broadcast: Broadcast, to: JausId) -> Received {
+fn received_locally(message: Outgoing, broadcast: Broadcast) -> Received {
     Received {
         source: message.source,
         destination: message.destination,
@@ -361,6 +361,6 @@ fn received_locally(message: Outgoing, broadcast: Broadcast, to: JausId) -> Rece
         broadcast,
         payload: message.payload,
         path: None,
-        to,
+        to: message.destination,
     }
 }

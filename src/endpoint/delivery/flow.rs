@@ -80,14 +80,8 @@ struct Packet {
     lost: bool,
 }
 
-/// The end of a message: it was acknowledged in full, or given up.
-#[derive(Debug)]
-pub(super) struct Outcome {
-    pub(super) message: MessageHandle,
-    pub(super) pending: PendingMessage,
-    /// Why it was given up.
-    pub(super) given_up: Option<Unacknowledged>,
-}
+/// The end of a message, and why it was given up, unless it was acknowledged in full.
+pub(super) type Outcome = (MessageHandle, PendingMessage, Option<Unacknowledged>);
 
 /// All messages to one destination.
 #[derive(Debug, Default)]
@@ -477,11 +471,7 @@ impl Flow {
             (Unacknowledged::TimedOut, None) => Unacknowledged::NotSent,
             (reason, _) => reason,
         });
-        self.outcomes.push_back(Outcome {
-            message,
-            pending,
-            given_up,
-        });
+        self.outcomes.push_back((message, pending, given_up));
     }
 
     /// Removes a message and its packets in flight.

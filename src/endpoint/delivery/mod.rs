@@ -137,33 +137,30 @@ impl Deliveries {
             }
         }
         let deadline = flow.deadline();
-        match (flow.timer, deadline) {
-            // An early timer is harmless; moving it with each answer would be costly.
-            (Some(set), Some(deadline)) if set <= deadline => {}
-            (set, deadline) => {
-                if let Some(set) = set {
-                    self.timers.remove(&(set, destination));
-                }
-                self.timers.extend(deadline.map(|at| (at, destination)));
-                flow.timer = deadline;
+        // An early timer is harmless; moving it with each answer would be costly.
+        let is_early = |(set, deadline)| set <= deadline;
+        if !flow.timer.zip(deadline).is_some_and(is_early) {
+            if let Some(set) = flow.timer {
+                self.timers.remove(&(set, destination));
             }
+            self.timers.extend(deadline.map(|at| (at, destination)));
+            flow.timer = deadline;
         }
     }
 
     /// The next flow in turn at this priority.
     fn next_ready(&mut self, priority: Priority) -> Option<JausId> {
         let level = usize::from(priority.bits());
-        loop {
-            let destination = self.ready[level].pop_front()?;
-            let Some(flow) = self.flows.get_mut(&destination) else {
-                continue;
-            };
-            flow.listed[level] = false;
-            if flow.wants() == Some(priority) {
+        while let Some(destination) = self.ready[level].pop_front() {
+            if let Some(flow) = self.flows.get_mut(&destination) {
+                flow.listed[level] = false;
+            }
+            if self.wants(destination) == Some(priority) {
                 return Some(destination);
             }
             self.touch(destination);
         }
+        None
     }
 
     /// The highest priority at which a flow has something to send.
@@ -172,10 +169,7 @@ impl Deliveries {
     }
 
     fn take_due(&mut self, now: Instant) -> Option<JausId> {
-        let &(deadline, destination) = self.timers.first()?;
-        if deadline > now {
-            return None;
-        }
+        let &(_, destination) = self.timers.first().filter(|(at, _)| *at <= now)?;
         self.timers.pop_first();
         if let Some(flow) = self.flows.get_mut(&destination) {
             flow.timer = None;
@@ -194,7 +188,7 @@ impl Deliveries {
 
     fn next_outcome(&mut self, destination: JausId) -> Option<Outcome> {
         let outcome = self.flows.get_mut(&destination)?.outcomes.pop_front()?;
-        self.settle(outcome.pending.whole.payload.len());
+        self.settle(outcome.1.whole.payload.len());
         Some(outcome)
     }
 
@@ -235,14 +229,13 @@ impl Endpoint {
         self.deliveries.push(now, handle, whole, awaited)
     }
 
-    /// Sends the next packets of this priority: at least [`TURN`] in all, if there are as many.
-    /// Returns whether any were sent.
+    /// Sends the next packets of this priority, at most [`TURN`]. Returns whether any were sent.
     pub(super) fn send_deliveries(&mut self, now: Instant, priority: Priority) -> bool {
-        let mut total = 0;
-        while total < TURN
+        let mut sent = 0;
+        while sent < TURN
             && let Some(destination) = self.deliveries.next_ready(priority)
         {
-            let mut sent = 0;
+            let before = sent;
             while sent < TURN
                 && self.deliveries.wants(destination) == Some(priority)
                 && self.send_packet(now, destination, priority).is_some()
@@ -251,12 +244,11 @@ impl Endpoint {
             }
             // A flow without free sequence numbers is rescheduled when a message is acknowledged or
             // given up.
-            if sent > 0 {
+            if sent > before {
                 self.deliveries.touch(destination);
             }
-            total += sent;
         }
-        total > 0
+        sent > 0
     }
 
     /// Sends the next packet to a destination, if there is one. Without a route, the packet counts
@@ -350,12 +342,7 @@ impl Endpoint {
 
     /// Reports the outcomes of messages to a destination, and reschedules its flow.
     fn report_outcomes(&mut self, destination: JausId) {
-        while let Some(outcome) = self.deliveries.next_outcome(destination) {
-            let Outcome {
-                message,
-                given_up,
-                pending,
-            } = outcome;
+        while let Some((message, pending, given_up)) = self.deliveries.next_outcome(destination) {
             if given_up.is_some() {
                 self.counters.add(Counter::MessagesGivenUp);
                 self.peers.note(destination, |peer| peer.lost += 1);

@@ -72,8 +72,6 @@ pub(super) struct Egress {
     pub(super) echoes: Recent,
     /// How long messages wait to be packed; `None` if they do not.
     patience: Option<Duration>,
-    /// The longest datagram to pack messages into; 0 if packing is off.
-    longest_packed: usize,
     config: Arc<Config>,
 }
 
@@ -97,7 +95,6 @@ impl Egress {
             buffer: BytesMut::with_capacity(BUFFER),
             echoes: Recent::new(config.max_recent, config.echo_window, keys),
             patience,
-            longest_packed,
             config,
         }
     }
@@ -161,7 +158,7 @@ impl Egress {
         }
         // A sender waits for the answer, so do not delay the message.
         let is_awaited = flags.acknowledgement() == Acknowledgement::Request;
-        let may_wait = !is_awaited && link.packs() && may_pack(&octets, self.longest_packed);
+        let may_wait = !is_awaited && link.packs() && may_pack(&octets, self.queues.longest_packed);
         let patience = self.patience.filter(|_| may_wait);
         let held_until = patience.map(|patience| now + patience);
         self.queues
@@ -221,13 +218,14 @@ impl Egress {
         level: Level,
         counters: &mut Counters,
     ) -> Option<Transmit> {
+        let longest_packed = self.queues.longest_packed;
         while let Some(hop) = self.queues.ready[level.index()].pop_front() {
             let Some(link) = self.links.get(&hop.0) else {
                 continue;
             };
             let joined = self.queues.change(now, hop, |queue| {
                 queue.listed[level.index()] = false;
-                if !queue.is_ready(level, self.longest_packed) {
+                if !queue.is_ready(level, longest_packed) {
                     return None;
                 }
                 if level.is_fragments() {
@@ -241,7 +239,7 @@ impl Egress {
                     return queue.join_fragments(now, level, link, buffer, counters, leave);
                 }
                 let before = queue.waiting();
-                let longest = if link.packs() { self.longest_packed } else { 0 };
+                let longest = if link.packs() { longest_packed } else { 0 };
                 let joined = queue.join_messages(level, link.segments(), longest, &mut self.buffer);
                 for (at, after) in queue.waiting().into_iter().enumerate() {
                     self.waiting[at] -= before[at] - after;
@@ -290,7 +288,7 @@ pub(super) struct Queues {
     ready: [VecDeque<Hop>; Level::COUNT],
     /// When held or paced queues may continue.
     timers: BTreeSet<(Instant, Hop)>,
-    /// The longest datagram to pack messages into.
+    /// The longest datagram to pack messages into; 0 if packing is off.
     longest_packed: usize,
 }
 

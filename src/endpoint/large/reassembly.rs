@@ -42,11 +42,10 @@ const MOST_HELD: usize = 4;
 /// What a fragment contributes to its message: the older headers repeat the code in each fragment.
 /// The payload keeps `held` octets alive.
 fn part_of_message(frame: &Frame, held: usize) -> Bytes {
-    let repeated = match frame.flags.data() {
-        DataControl::First => 0,
-        _ => frame.version.repeated_code_len(),
+    let payload = match frame.flags.data() {
+        DataControl::First => frame.payload.clone(),
+        _ => frame.payload.slice(frame.repeated_code_len()..),
     };
-    let payload = frame.payload.slice(repeated.min(frame.payload.len())..);
     if held > payload.len().saturating_mul(MOST_HELD) {
         Bytes::copy_from_slice(&payload)
     } else {

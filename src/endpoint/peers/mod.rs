@@ -86,14 +86,12 @@ impl Peers {
 
     /// Adds a record, and enters it in the accounts.
     fn insert(&mut self, mut state: PeerState) {
-        let Peer {
-            id, path, route, ..
-        } = state.peer;
+        let (id, path) = (state.peer.id, state.peer.path);
         state.placed = state.peer.last_heard;
         self.order
             .insert(path.into(), state.standing, state.placed, id);
         self.held.add(path.into(), 1);
-        if route == RouteState::Verified {
+        if state.peer.route == RouteState::Verified {
             self.proven.add(path, 1);
         }
         if let Some(challenge) = &state.challenge {
@@ -106,11 +104,11 @@ impl Peers {
     /// Removes a record, also from the accounts.
     pub(super) fn remove(&mut self, id: JausId) -> Option<PeerState> {
         let state = self.states.remove(&id)?;
-        let Peer { path, route, .. } = state.peer;
+        let path = state.peer.path;
         self.order
             .remove(path.into(), state.standing, state.placed, id);
         self.held.subtract(path.into(), 1);
-        if route == RouteState::Verified {
+        if state.peer.route == RouteState::Verified {
             self.proven.subtract(path, 1);
         }
         if let Some(challenge) = &state.challenge {

@@ -103,14 +103,11 @@ impl Challenge {
         true
     }
 
-    fn rival_answered(&self) -> bool {
-        self.rival.is_some_and(|rival| rival.answered)
-    }
-
     /// The finding after an answer, unless the other path still has time to answer.
     pub(super) fn early_finding(&self) -> Option<Finding> {
         // If nothing is at stake, both have time to answer: a peer may be reachable on two paths.
-        match (self.incumbent.answered, self.rival_answered()) {
+        let rival_answered = self.rival.is_some_and(|rival| rival.answered);
+        match (self.incumbent.answered, rival_answered) {
             (true, true) => Some(Finding::Stays),
             (true, false) if self.at_once || self.rival.is_none() => Some(Finding::Stays),
             (false, true) if self.at_once => Some(Finding::Moves { verified: true }),
