@@ -2,20 +2,27 @@
 //! dropped. Every drop is counted with its reason, so that a flood shows up in the numbers.
 
 /// Defines the enum `Counter`, with a short description of each counter, and the struct `Counters`
-/// with the values. The documentation of `Counters` comes first.
+/// with the values. The documentation of `Counters` comes first. A counter without documentation of
+/// its own has its description.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! counters {
+    (@doc $text:literal) => {
+        concat!($text, ".")
+    };
+    (@doc $text:literal $(, $doc:literal)+) => {
+        concat!($($doc, "\n",)+)
+    };
     (
         $(#[doc = $numbers:literal])+
         pub struct Counters;
-        $($(#[doc = $doc:literal])+ $name:ident = $text:literal,)+
+        $($(#[doc = $doc:literal])* $name:ident = $text:literal,)+
     ) => {
         /// The counters.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[non_exhaustive]
         pub enum Counter {
-            $($(#[doc = $doc])+ $name,)+
+            $(#[doc = $crate::counters!(@doc $text $(, $doc)*)] $name,)+
         }
 
         impl Counter {

@@ -34,27 +34,26 @@ impl Access {
     /// Whether a message may come from, or be forwarded to, this subsystem.
     #[must_use]
     pub fn allows_subsystem(&self, subsystem: u16) -> bool {
-        let is_on = |list: &[Subsystems]| list.iter().any(|range| range.contains(subsystem));
-        !is_on(&self.deny_subsystems)
-            && (self.allow_subsystems.is_empty() || is_on(&self.allow_subsystems))
+        let contains = |range: &Subsystems| range.contains(subsystem);
+        admits(&self.allow_subsystems, &self.deny_subsystems, contains)
     }
 
     /// Whether messages may come from this address.
     #[must_use]
     pub fn allows_address(&self, address: IpAddr) -> bool {
-        let is_on = |list: &[Network]| list.iter().any(|network| network.contains(address));
-        !is_on(&self.deny_networks)
-            && (self.allow_networks.is_empty() || is_on(&self.allow_networks))
+        let contains = |network: &Network| network.contains(address);
+        admits(&self.allow_networks, &self.deny_networks, contains)
     }
 
     /// Checks the sender of a message.
     pub(super) fn check_source(&self, source: JausId) -> Result<(), Counter> {
-        if self.allows_subsystem(source.subsystem()) {
-            Ok(())
-        } else {
-            Err(Counter::SubsystemDenied)
-        }
+        let is_allowed = self.allows_subsystem(source.subsystem());
+        is_allowed.then_some(()).ok_or(Counter::SubsystemDenied)
     }
+}
+
+fn admits<T>(allow: &[T], deny: &[T], contains: impl Fn(&T) -> bool) -> bool {
+    !deny.iter().any(&contains) && (allow.is_empty() || allow.iter().any(&contains))
 }
 
 /// A subsystem or a range of subsystems, as text `101` or `200-299`.

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::arrival::Arrival;
 use super::{Counter, Endpoint};
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Kind, Version, ra};
+use crate::wire::{Acknowledgement, Flags, Frame};
 
 /// The most calls remembered.
 const MOST_CALLS: usize = 256;
@@ -53,23 +53,13 @@ impl Endpoint {
             return;
         }
         self.reassembly.hear(now, path.into());
-        // In the older headers, acknowledgements repeat the message code.
-        let code_len = match request.version {
-            Version::As5669a => 0,
-            Version::As5669 | Version::Ra => ra::CODE_LEN,
-        };
+        let priority = request.flags.priority();
+        let code = request.payload.slice(..request.repeated_code_len());
         let answer = Frame {
             version: request.version,
-            kind: Kind::default(),
-            flags: request
-                .flags
-                .with_acknowledgement(Acknowledgement::Positive)
-                .with_broadcast(Broadcast::None)
-                .with_data(DataControl::Single),
-            destination: request.source,
-            source: request.destination,
+            flags: Flags::new(priority).with_acknowledgement(Acknowledgement::Positive),
             sequence: request.sequence,
-            payload: request.payload.slice(..code_len.min(request.payload.len())),
+            ..Frame::new(request.destination, request.source, code)
         };
         if self.send_along(now, path, &answer) == Ok(true) {
             self.counters.add(Counter::AcknowledgementsSent);

@@ -1,4 +1,4 @@
-//! A received message on its way through the endpoint.
+//! The context of a received message.
 
 use std::time::Instant;
 

@@ -1,11 +1,35 @@
-//! Input and output of an endpoint besides datagrams: outgoing messages, received messages and
-//! events.
+//! Input and output of an endpoint besides datagrams: components, outgoing messages, received
+//! messages and events.
 
 use bytes::Bytes;
 
 use super::Path;
 use crate::address::JausId;
 use crate::wire::{Broadcast, Priority, Version};
+
+/// Why a component cannot be attached.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AttachError {
+    /// The id contains a zero or a wildcard.
+    #[error(
+        "{0} is not a single component: the subsystem must be 1 to 65534, node and component 1 to \
+         254 each"
+    )]
+    NotOneComponent(JausId),
+    /// The id is attached already.
+    #[error("{0} is attached already: give each component its own id")]
+    AlreadyAttached(JausId),
+    /// The table is full.
+    #[error("the limit of {limit} attached components is reached")]
+    TooMany {
+        /// [`Config::max_components`](super::Config::max_components).
+        limit: usize,
+    },
+    /// A link cannot serve the id; the text says why.
+    #[error("{0}")]
+    Link(String),
+}
 
 /// Identifies a sent message in the events about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -13,7 +13,7 @@ use tracing::trace;
 
 use super::arrival::Arrival;
 use super::egress::Hop;
-use super::{Counter, Endpoint, Path, To};
+use super::{Counter, Endpoint, Path, Peer, To};
 use crate::address::JausId;
 use crate::wire::{Broadcast, DataControl, Frame, Framing, Version, ra};
 
@@ -25,7 +25,7 @@ impl Endpoint {
     /// Whether a message is also for other nodes, and forwarding is on.
     pub(super) fn is_passed_on(&self, frame: &Frame) -> bool {
         let destination = frame.destination;
-        self.config.forwarding && !destination.has_zero() && !self.components.contains(destination)
+        self.config.forwarding && !destination.has_zero() && !self.components.contains(&destination)
     }
 
     /// Whether a broadcast, or a message to an unknown address, arrived on another path than the
@@ -35,12 +35,10 @@ impl Endpoint {
         let for_many = frame.destination.has_wildcard()
             || frame.flags.broadcast() != Some(Broadcast::None)
             || self.route(frame.destination).is_none();
-        let lately = |at: Instant| now.saturating_duration_since(at) < SETTLED;
-        for_many
-            && self
-                .peers
-                .last_heard(frame.source)
-                .is_some_and(|(path, at)| path != from && lately(at))
+        let is_settled = |at: Instant| now.saturating_duration_since(at) < SETTLED;
+        let is_elsewhere = |peer: &Peer| peer.path != from && is_settled(peer.last_heard);
+        let sender = self.peers.get(frame.source);
+        for_many && sender.is_some_and(|state| is_elsewhere(&state.peer))
     }
 
     /// Forwards a message towards its receivers, unless they are where it came from.
@@ -66,7 +64,7 @@ impl Endpoint {
             if let Some((path, version)) = self.route(destination) {
                 // Multicast has already reached every node on that network.
                 let shared = from.link == path.link
-                    && self.egress.framing(from.link) == Framing::Judp
+                    && self.egress.is_datagram(from)
                     && frame.flags.broadcast() != Some(Broadcast::None);
                 return if path == from || shared {
                     Err(Counter::NotForUs)
@@ -100,28 +98,23 @@ impl Endpoint {
         }
         singly.sort_unstable();
         singly.dedup();
-        let links = self.egress.links().map(|(link, _)| link);
-        let groups = links.filter(|&link| link != from.link);
-        let groups = groups.map(|link| (link, To::Group));
+        let others = self.egress.links.keys().filter(|&&link| link != from.link);
+        let groups = others.map(|&link| (link, To::Group));
         let singly = singly.into_iter().filter(|&path| path != from);
         groups.chain(singly.map(Hop::from)).collect()
     }
 }
 
-/// Translates a frame to another header. The older headers carry the message code in every fragment
-/// and acknowledgement; AS5669A carries it only at the beginning of the message. A later fragment
-/// from AS5669A lacks the code, so it cannot be translated to an older header.
+/// Translates a frame to another header. A later fragment without the message code cannot be
+/// translated to a header that repeats it.
 fn with_header(frame: &Frame, version: Version) -> Option<Frame> {
-    let names_code = |version| version != Version::As5669a;
     let answer = frame.flags.acknowledgement().is_answer();
     let later = matches!(frame.flags.data(), DataControl::Middle | DataControl::Last);
-    let payload = match (names_code(frame.version), names_code(version)) {
-        (true, false) if answer || later => {
-            let code_len = ra::CODE_LEN.min(frame.payload.len());
-            frame.payload.slice(code_len..)
-        }
-        (false, true) if answer => Bytes::from_static(&[0; ra::CODE_LEN]),
-        (false, true) if later => return None,
+    let [from, to] = [frame.version, version].map(Version::repeated_code_len);
+    let payload = match (from, to) {
+        (1.., 0) if answer || later => frame.payload.slice(frame.repeated_code_len()..),
+        (0, 1..) if answer => Bytes::from_static(&[0; ra::CODE_LEN]),
+        (0, 1..) if later => return None,
         _ => frame.payload.clone(),
     };
     Some(Frame {

@@ -41,6 +41,14 @@ impl LinkProfile {
     pub(super) const fn packs(&self) -> bool {
         matches!(self.framing, Framing::Judp) && !self.reads_one
     }
+
+    /// How many datagrams it takes in one [`Transmit`].
+    pub(super) fn segments(&self) -> usize {
+        match self.framing {
+            Framing::Judp => self.max_segments.max(1),
+            Framing::Jtcp | Framing::Jserial => 1,
+        }
+    }
 }
 
 /// The remote end of a link.
@@ -66,12 +74,6 @@ impl Remote {
 impl From<SocketAddr> for Remote {
     fn from(address: SocketAddr) -> Self {
         Self::Socket(address)
-    }
-}
-
-impl PartialEq<SocketAddr> for Remote {
-    fn eq(&self, address: &SocketAddr) -> bool {
-        self.socket() == Some(*address)
     }
 }
 

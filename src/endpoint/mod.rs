@@ -44,8 +44,6 @@ mod event;
 mod forward;
 mod large;
 mod link;
-mod local;
-mod news;
 mod peers;
 mod rate;
 mod receive;
@@ -57,7 +55,7 @@ mod sink;
 mod tests;
 mod verify;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::hash::RandomState;
 use std::sync::Arc;
 use std::time::Instant;
@@ -69,9 +67,8 @@ pub use delivery::FlowStatus;
 #[cfg(feature = "node")]
 pub(crate) use egress::MOST_OCTETS;
 pub use egress::{Pacing, Packing};
-pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};
+pub use event::{AttachError, Event, MessageHandle, Outgoing, Received, Unacknowledged};
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
-pub use local::AttachError;
 pub use peers::{Peer, RouteState, Traffic};
 pub(crate) use rate::quota_address;
 pub use rate::{Buckets, Rate, Rates};
@@ -84,8 +81,6 @@ use acknowledge::Calls;
 use delivery::Deliveries;
 use egress::{Egress, Level};
 use large::{Numbers, Reassembly};
-use local::Components;
-use news::News;
 use peers::{CHALLENGE_FLAGS, Peers};
 use rate::{Bucket, Gate, Origin};
 use recent::Recent;
@@ -95,7 +90,8 @@ use verify::Warnings;
 #[derive(Debug)]
 pub struct Endpoint {
     config: Arc<Config>,
-    components: Components,
+    /// The attached components.
+    components: BTreeSet<JausId>,
     peers: Peers,
     numbers: Numbers,
     gate: Gate,
@@ -114,7 +110,9 @@ pub struct Endpoint {
     deliveries: Deliveries,
     conflicts: BTreeMap<JausId, Instant>,
     egress: Egress,
-    news: News,
+    events: VecDeque<Event>,
+    /// How many of the events are results of messages.
+    results: usize,
     counters: Counters,
 }
 
@@ -129,7 +127,7 @@ impl Endpoint {
         let keys = RandomState::new();
         let longest = config.retransmission_window;
         Self {
-            components: Components::default(),
+            components: BTreeSet::new(),
             peers: Peers::new(config.clone()),
             numbers: Numbers::after(config.first_sequence),
             gate: Gate::new(&config.rates, config.max_peers),
@@ -144,7 +142,8 @@ impl Endpoint {
             deliveries: Deliveries::new(config.clone()),
             conflicts: BTreeMap::new(),
             egress: Egress::new(config.clone(), keys),
-            news: News::default(),
+            events: VecDeque::new(),
+            results: 0,
             counters: Counters::default(),
             config,
         }
@@ -156,14 +155,24 @@ impl Endpoint {
     /// The id does not name one component, is attached already, or would exceed
     /// [`Config::max_components`].
     pub fn attach(&mut self, id: JausId) -> Result<(), AttachError> {
-        self.components.attach(id, self.config.max_components)?;
-        self.peers.forget(id);
+        let limit = self.config.max_components;
+        if !id.is_unicast() {
+            return Err(AttachError::NotOneComponent(id));
+        }
+        if self.components.contains(&id) {
+            return Err(AttachError::AlreadyAttached(id));
+        }
+        if self.components.len() >= limit {
+            return Err(AttachError::TooMany { limit });
+        }
+        self.components.insert(id);
+        self.peers.remove(id);
         Ok(())
     }
 
     /// Detaches a local component and gives up its unacknowledged messages.
     pub fn detach(&mut self, id: JausId) {
-        self.components.detach(id);
+        self.components.remove(&id);
         let given_up = self.deliveries.forget_source(id);
         self.counters.add_many(Counter::MessagesGivenUp, given_up);
         self.conflicts.remove(&id);
@@ -171,12 +180,12 @@ impl Endpoint {
 
     /// The attached components, sorted by id.
     pub fn components(&self) -> impl Iterator<Item = JausId> + '_ {
-        self.components.iter()
+        self.components.iter().copied()
     }
 
     /// Adds a link or updates its profile.
     pub fn add_link(&mut self, link: LinkId, profile: LinkProfile) {
-        self.egress.add_link(link, profile);
+        self.egress.links.insert(link, profile);
     }
 
     /// Removes a link, the routes learned through it and the datagrams queued on it, which are
@@ -194,7 +203,7 @@ impl Endpoint {
 
     /// Replaces the static peers, for instance because links were added or removed.
     pub fn set_static_peers(&mut self, peers: Vec<StaticPeer>) {
-        self.peers.configure(peers);
+        self.peers.configured = peers;
     }
 
     /// The peers whose addresses are known, sorted by id.
@@ -244,7 +253,11 @@ impl Endpoint {
 
     /// The next event.
     pub fn poll_event(&mut self) -> Option<Event> {
-        self.news.pop()
+        let event = self.events.pop_front()?;
+        if let Event::Acknowledged { .. } | Event::NotAcknowledged { .. } = event {
+            self.results -= 1;
+        }
+        Some(event)
     }
 
     /// When to call [`handle_timeout`](Self::handle_timeout); `None` if no timer runs.
@@ -269,8 +282,17 @@ impl Endpoint {
 
     /// Queues an event; an overflow is counted.
     fn announce(&mut self, event: Event) {
-        if !self.news.push(event, self.config.queue_limit) {
+        if self.events.len() - self.results < self.config.queue_limit {
+            self.events.push_back(event);
+        } else {
             self.counters.add(Counter::NewsQueueFull);
         }
+    }
+
+    /// Queues the result of a message. There is always room: as long as it is not polled, it counts
+    /// as a message that waits for its acknowledgement.
+    fn announce_result(&mut self, result: Event) {
+        self.results += 1;
+        self.events.push_back(result);
     }
 }

@@ -13,9 +13,6 @@ use std::time::{Duration, Instant};
 use super::{Counter, LinkId, Path};
 use crate::address::JausId;
 
-/// Nanoseconds per second.
-const NANOS: u64 = 1_000_000_000;
-
 /// A token bucket rate: a sustained rate and a burst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -36,7 +33,7 @@ impl Rate {
 
     /// How long it takes to gain this many tokens.
     fn time_for(self, tokens: u32) -> Duration {
-        Duration::from_nanos(u64::from(tokens) * NANOS / u64::from(self.per_second.max(1)))
+        Duration::from_secs(tokens.into()) / self.per_second.max(1)
     }
 }
 
@@ -90,13 +87,6 @@ impl Bucket {
         self.full = Some(self.full.map_or(now, |full| full.max(now)) + time);
     }
 
-    /// How many tokens are missing.
-    fn owed(self, now: Instant, rate: Rate) -> u32 {
-        let owed =
-            self.debt(now).as_nanos() * u128::from(rate.per_second.max(1)) / u128::from(NANOS);
-        u32::try_from(owed).unwrap_or(u32::MAX)
-    }
-
     pub(super) fn is_full(self, now: Instant) -> bool {
         self.debt(now).is_zero()
     }
@@ -107,7 +97,7 @@ impl Bucket {
 pub struct Buckets<K> {
     rate: Option<Rate>,
     limit: usize,
-    own: HashMap<K, Bucket>,
+    pub(super) own: HashMap<K, Bucket>,
     shared: Bucket,
     swept: Option<Instant>,
 }
@@ -133,10 +123,10 @@ impl<K: Eq + Hash> Buckets<K> {
         self.take_many(now, source, 1)
     }
 
-    /// How many tokens a source has spent that have not been refilled yet.
-    pub(super) fn owed(&self, now: Instant, source: &K) -> u32 {
-        let bucket = self.own.get(source).copied().unwrap_or(self.shared);
-        self.rate.map_or(0, |rate| bucket.owed(now, rate))
+    /// Whether a source has spent this many tokens that have not been refilled yet.
+    pub(super) fn owes(&self, now: Instant, source: &K, tokens: u32) -> bool {
+        let debt = self.own.get(source).unwrap_or(&self.shared).debt(now);
+        self.rate.is_some_and(|rate| debt >= rate.time_for(tokens))
     }
 
     /// Takes this many tokens of a source, if available.
@@ -152,11 +142,6 @@ impl<K: Eq + Hash> Buckets<K> {
         }
         let own = self.own.entry(source).or_default();
         own.take(now, rate, tokens)
-    }
-
-    #[cfg(test)]
-    pub(super) fn len(&self) -> usize {
-        self.own.len()
     }
 
     /// Drops full buckets: a missing bucket is equivalent.

@@ -1,6 +1,7 @@
 //! The receive path, from a datagram to deliveries: each message is checked, acknowledged,
 //! deduplicated, learned from and delivered.
 
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 use bytes::Bytes;
@@ -14,7 +15,7 @@ use super::verify::Warning;
 use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
 use crate::address::JausId;
 use crate::peer::{self, Sign};
-use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, judp};
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, judp};
 
 impl Endpoint {
     /// Processes one datagram and delivers its messages for local components to `sink`.
@@ -92,7 +93,7 @@ impl Endpoint {
     /// Reports that a version octet precedes the next frame of `source` in the middle of a TCP
     /// stream, which helps to recognise the peer and to choose the path for answers.
     pub fn handle_repeated_version(&mut self, source: JausId) {
-        if let Some((path, _)) = self.peers.last_heard(source) {
+        if let Some(path) = self.peers.get(source).map(|state| state.peer.path) {
             self.peers
                 .recognise(source, path, |it| it.note(Sign::RepeatedVersion));
         }
@@ -100,7 +101,7 @@ impl Endpoint {
 
     /// Whether messages from a path are accepted.
     fn check_path(&self, from: Path) -> Result<(), Counter> {
-        if !self.egress.has_link(from.link) {
+        if !self.egress.links.contains_key(&from.link) {
             return Err(Counter::UnknownLink);
         }
         let address = from.peer.socket().map(|address| address.ip());
@@ -151,7 +152,7 @@ impl Endpoint {
             Err(_) if passes => false,
             checked => checked.map(|()| true)?,
         };
-        let is_new = !self.peers.knows(frame.source);
+        let is_new = self.peers.get(frame.source).is_none();
         self.gate.admit(now, path, frame.source, is_new)?;
         // Check before acknowledging: a dropped message must not look delivered.
         if !self.peers.has_room_for(now, frame.source, path) {
@@ -223,7 +224,7 @@ impl Endpoint {
         }
         if self.awaits_answer(peer, local, number) && !self.peers.is_proven_elsewhere(peer, path) {
             self.learn(arrival)?;
-            self.receive_answer(now, frame)?;
+            self.receive_answer(now, frame);
             let path = self.where_it_reads(peer, path);
             self.peers.verify(peer, path);
             return Ok(());
@@ -268,7 +269,8 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Delivers a message to local components once it is complete.
+    /// Delivers a message to local components once it is complete. A whole message may show the end
+    /// of the large one before it, which is then delivered first.
     fn put_together(
         &mut self,
         arrival: Arrival<'_>,
@@ -276,59 +278,50 @@ impl Endpoint {
         sink: &mut dyn Sink,
     ) -> Result<(), Counter> {
         let Arrival { frame, path, .. } = arrival;
-        let payload = if frame.flags.data() == DataControl::Single {
-            self.finish_large(arrival, sink);
-            frame.payload.clone()
-        } else {
-            let style = self.peers.large_style(frame.source);
-            let inserted = self.reassembly.insert(arrival, style, &mut self.counters);
-            let Some(whole) = inserted? else {
-                return Ok(());
-            };
-            self.recall_beginning(arrival, &whole);
-            self.peers
-                .recognise(frame.source, path, |it| it.handle_large(whole.style));
-            whole.payload
-        };
-        let message = Received {
-            source: frame.source,
-            destination: frame.destination,
-            priority: frame.flags.priority(),
+        let source = frame.source;
+        let received = |destination, priority, broadcast, payload| Received {
+            source,
+            destination,
+            priority,
             broadcast,
             payload,
             path: Some(path),
-            to: frame.destination,
+            to: destination,
         };
-        self.deliver(&message, None, sink);
-        Ok(())
-    }
-
-    /// Delivers a large message whose end is shown only by its sender's next message.
-    fn finish_large(&mut self, next: Arrival<'_>, sink: &mut dyn Sink) {
-        let (source, path) = (next.frame.source, next.path);
-        let finished = self.reassembly.finish(source, next.frame.sequence);
-        if let Some((destination, priority, whole)) = finished {
+        let is_single = frame.flags.data() == DataControl::Single;
+        let large = if is_single {
+            self.reassembly.finish(source, frame.sequence)
+        } else {
+            let style = self.peers.large_style(source);
+            let inserted = self.reassembly.insert(arrival, style, &mut self.counters)?;
+            inserted.inspect(|whole| self.recall_beginning(arrival, whole))
+        };
+        if let Some(whole) = large {
             self.peers
                 .recognise(source, path, |it| it.handle_large(whole.style));
-            let message = Received {
-                source,
-                destination,
-                priority,
-                broadcast: Broadcast::None,
-                payload: whole.payload,
-                path: Some(path),
-                to: destination,
+            let scope = if is_single {
+                Broadcast::None
+            } else {
+                broadcast
             };
+            let message = received(whole.destination, whole.priority, scope, whole.payload);
             self.deliver(&message, None, sink);
         }
+        if is_single {
+            let (destination, priority) = (frame.destination, frame.flags.priority());
+            let message = received(destination, priority, broadcast, frame.payload.clone());
+            self.deliver(&message, None, sink);
+        }
+        Ok(())
     }
 
     /// Checks whether a message is for local components.
     fn check_receivers(&self, frame: &Frame, broadcast: Broadcast) -> Result<(), Counter> {
         let reaches = |broadcast| {
             let (source, destination) = (frame.source, frame.destination);
-            let mut receivers = self.components.receivers(source, destination, broadcast);
-            receivers.next().is_some()
+            receivers(&self.components, source, destination, broadcast)
+                .next()
+                .is_some()
         };
         if reaches(broadcast) {
             Ok(())
@@ -345,10 +338,12 @@ impl Endpoint {
     /// the component that sent it is detached by now. Any other message with a local source id is
     /// an id conflict.
     fn refuse_own(&mut self, arrival: Arrival<'_>, seen: Fingerprint) -> Result<(), Counter> {
-        if self.egress.is_echo(arrival.now, seen) && self.may_be_ours(arrival.path) {
+        let window = self.config.echo_window;
+        let is_echo = self.egress.echoes.contains(arrival.now, seen, window);
+        if is_echo && self.may_be_ours(arrival.path) {
             return Err(Counter::OwnEcho);
         }
-        if self.components.contains(arrival.frame.source) {
+        if self.components.contains(&arrival.frame.source) {
             self.announce_conflict(arrival);
             return Err(Counter::IdConflict);
         }
@@ -357,9 +352,9 @@ impl Endpoint {
 
     /// Whether a message may be our own, judging by its source address.
     fn may_be_ours(&self, from: Path) -> bool {
-        let links = self.egress.links();
-        let mut own = links.flat_map(|(_, link)| &link.own).peekable();
-        own.peek().is_none() || own.any(|&own| from.peer == own)
+        let links = self.egress.links.values();
+        let mut own = links.flat_map(|link| &link.own).peekable();
+        own.peek().is_none() || own.any(|&own| from.peer == own.into())
     }
 
     /// Announces that another sender uses a local id, at most once per interval.
@@ -381,20 +376,19 @@ impl Endpoint {
     /// The path for answers to a sender: where it was heard, unless it does not read there. In that
     /// case the datagram path on which it was heard before, if any.
     pub(super) fn where_it_reads(&self, id: JausId, from: Path) -> Path {
-        let is_datagram = |path: &Path| self.egress.framing(path.link) == Framing::Judp;
-        if is_datagram(&from) || !self.peers.is_deaf_on_its_connections(id) {
+        if self.egress.is_datagram(from) || !self.peers.is_deaf_on_its_connections(id) {
             return from;
         }
-        let before = self.peers.last_heard(id).map(|(path, _)| path);
-        before.filter(is_datagram).unwrap_or(from)
+        let before = self.peers.get(id).map(|state| state.peer.path);
+        before
+            .filter(|&path| self.egress.is_datagram(path))
+            .unwrap_or(from)
     }
 
     /// Delivers a complete message to every matching component except `but`.
     pub(super) fn deliver(&mut self, message: &Received, but: Option<JausId>, sink: &mut dyn Sink) {
         let (source, destination) = (message.source, message.destination);
-        let receivers = self
-            .components
-            .receivers(source, destination, message.broadcast);
+        let receivers = receivers(&self.components, source, destination, message.broadcast);
         for to in receivers.filter(|&to| Some(to) != but) {
             sink.deliver(Received {
                 to,
@@ -429,4 +423,24 @@ fn check_header(frame: &Frame) -> Result<Broadcast, Counter> {
         return Err(Counter::NoMessageCode);
     }
     Ok(broadcast)
+}
+
+/// The components that a message to `destination` reaches. A local broadcast reaches only those of
+/// the sender's subsystem.
+fn receivers(
+    components: &BTreeSet<JausId>,
+    source: JausId,
+    destination: JausId,
+    broadcast: Broadcast,
+) -> impl Iterator<Item = JausId> + '_ {
+    let (first, last) = if destination.has_wildcard() {
+        (JausId::from_u32(0), JausId::EVERYONE)
+    } else {
+        (destination, destination)
+    };
+    let in_scope =
+        move |id: &JausId| broadcast != Broadcast::Local || id.subsystem() == source.subsystem();
+    let ids = components.range(first..=last).copied();
+    ids.filter(move |&id| destination.matches(id))
+        .filter(in_scope)
 }

@@ -109,12 +109,12 @@ impl Endpoint {
         let scope = self.check(&message)?;
         let handle = self.deliveries.next_handle();
         let (destination, length) = (message.destination, message.payload.len());
-        if self.components.contains(message.destination) {
-            self.send_to_sibling(handle, message, sink)?;
+        if self.components.contains(&message.destination) {
+            self.send_to_sibling(handle, message, scope, sink)?;
         } else {
             self.send_away(now, handle, &message, scope)?;
             let source = message.source;
-            let message = received_locally(message, scope, destination);
+            let message = received_locally(message, scope);
             self.deliver(&message, Some(source), sink);
         }
         self.counters.add(Counter::MessagesSent);
@@ -126,7 +126,7 @@ impl Endpoint {
     fn check(&self, message: &Outgoing) -> Result<Broadcast, SendError> {
         let (source, destination, length) =
             (message.source, message.destination, message.payload.len());
-        if !self.components.contains(source) {
+        if !self.components.contains(&source) {
             return Err(SendError::UnknownSource(source));
         }
         if destination.has_zero() {
@@ -153,20 +153,20 @@ impl Endpoint {
         &mut self,
         handle: MessageHandle,
         message: Outgoing,
+        scope: Broadcast,
         sink: &mut dyn Sink,
     ) -> Result<(), SendError> {
-        let (acknowledge, scope, by) =
-            (message.acknowledge, message.broadcast, message.destination);
+        let (acknowledge, by) = (message.acknowledge, message.destination);
         if acknowledge {
-            self.deliveries.check_room(self.news.results(), 0)?;
+            self.deliveries.check_room(self.results, 0)?;
             if !sink.has_room(by, message.priority) {
                 return Err(SendError::ReceiverFull(by));
             }
         }
-        sink.deliver(received_locally(message, scope, by));
+        sink.deliver(received_locally(message, scope));
         self.counters.add(Counter::MessagesDelivered);
         if acknowledge {
-            self.news.push_result(Event::Acknowledged {
+            self.announce_result(Event::Acknowledged {
                 message: handle,
                 by,
             });
@@ -183,7 +183,7 @@ impl Endpoint {
     ) -> Result<(), SendError> {
         let destination = message.destination;
         let is_to_one = scope == Broadcast::None;
-        if is_to_one && self.egress.links().next().is_none() {
+        if is_to_one && self.egress.links.is_empty() {
             return Err(SendError::NoLink(destination));
         }
         let route = self.route(destination);
@@ -228,7 +228,7 @@ impl Endpoint {
     fn seeks_proof(&self, destination: JausId, length: usize) -> bool {
         let much = length > self.config.unverified_address.burst as usize / 2;
         self.route(destination).is_none_or(|(path, _)| {
-            let needs_proof = much || self.peers.awaits_proof(destination);
+            let needs_proof = much || self.peers.repeats_code(destination).is_none();
             needs_proof && !self.is_free(path)
         })
     }
@@ -304,7 +304,7 @@ impl Endpoint {
     pub(super) fn send_to_all(&mut self, now: Instant, mut frame: Frame) -> Result<(), SendError> {
         let hops = self.hops_to_all(frame.destination);
         self.check_egress(frame.flags.priority(), hops.len())?;
-        self.egress.remember_echo(now, &frame);
+        self.egress.echoes.insert_own(now, &frame);
         frame.version = Version::As5669a;
         if frame.flags.broadcast() == Some(Broadcast::None) {
             trace!(destination = %frame.destination, "address unknown");
@@ -325,7 +325,8 @@ impl Endpoint {
         let presumed = self.peers.presumed(destination);
         Cutting {
             limit: longest.map_or(limit, |longest| longest.min(limit)),
-            repeat_code: version != Version::As5669a || self.peers.wants_repeated_code(destination),
+            repeat_code: version.repeated_code_len() > 0
+                || self.peers.repeats_code(destination) == Some(true),
             kept: presumed.fragments_kept().zip(presumed.payload_limit()),
         }
     }
@@ -341,18 +342,18 @@ impl Endpoint {
     pub(super) fn route(&self, destination: JausId) -> Option<(Path, Version)> {
         self.peers
             .route(destination)
-            .filter(|(path, _)| self.egress.has_link(path.link))
+            .filter(|(path, _)| self.egress.links.contains_key(&path.link))
     }
 
     /// The group of every link, and the static peers that multicast does not reach.
     fn hops_to_all(&self, destination: JausId) -> Vec<Hop> {
-        let groups = self.egress.links().map(|(link, _)| (link, To::Group));
+        let groups = self.egress.links.keys().map(|&link| (link, To::Group));
         let copies = self.peers.broadcast_copies(destination);
         groups.chain(copies.into_iter().map(Hop::from)).collect()
     }
 }
 
-fn received_locally(message: Outgoing, broadcast: Broadcast, to: JausId) -> Received {
+fn received_locally(message: Outgoing, broadcast: Broadcast) -> Received {
     Received {
         source: message.source,
         destination: message.destination,
@@ -360,6 +361,6 @@ fn received_locally(message: Outgoing, broadcast: Broadcast, to: JausId) -> Rece
         broadcast,
         payload: message.payload,
         path: None,
-        to,
+        to: message.destination,
     }
 }

@@ -1,10 +1,10 @@
 //! The accounts of bounded tables: how much each network address holds, and its oldest entries.
 
-use std::collections::btree_map::Entry;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, btree_map};
 use std::hash::Hash;
 use std::time::Instant;
 
+use super::rate::Origin;
 use crate::address::JausId;
 
 /// The amounts of all holders, and their ranking.
@@ -53,32 +53,33 @@ impl<K: Copy + Ord + Hash> Tally<K> {
     }
 }
 
-/// The ids of each group by age.
-#[derive(Debug)]
-pub(super) struct Ages<G>(BTreeMap<G, BTreeSet<(Instant, JausId)>>);
+/// Since when an id is in a group, and which.
+type Entry = (Instant, JausId);
 
-impl<G> Default for Ages<G> {
-    fn default() -> Self {
-        Self(BTreeMap::new())
+/// The ids of each group by age: those of each network address and, under `None`, all.
+#[derive(Debug, Default)]
+pub(super) struct Ages<G>(BTreeMap<(Option<Origin>, G), BTreeSet<Entry>>);
+
+impl<G: Copy + Ord> Ages<G> {
+    pub(super) fn insert(&mut self, origin: Origin, group: G, since: Instant, id: JausId) {
+        for of in [None, Some(origin)] {
+            self.0.entry((of, group)).or_default().insert((since, id));
+        }
     }
-}
 
-impl<G: Ord> Ages<G> {
-    pub(super) fn insert(&mut self, group: G, since: Instant, id: JausId) {
-        self.0.entry(group).or_default().insert((since, id));
-    }
-
-    pub(super) fn remove(&mut self, group: G, since: Instant, id: JausId) {
-        if let Entry::Occupied(mut ids) = self.0.entry(group) {
-            ids.get_mut().remove(&(since, id));
-            if ids.get().is_empty() {
-                ids.remove();
+    pub(super) fn remove(&mut self, origin: Origin, group: G, since: Instant, id: JausId) {
+        for of in [None, Some(origin)] {
+            if let btree_map::Entry::Occupied(mut ids) = self.0.entry((of, group)) {
+                ids.get_mut().remove(&(since, id));
+                if ids.get().is_empty() {
+                    ids.remove();
+                }
             }
         }
     }
 
-    /// The oldest of a group, and since when it is there.
-    pub(super) fn oldest(&self, group: &G) -> Option<(Instant, JausId)> {
-        self.0.get(group)?.first().copied()
+    /// The oldest of a group, of one network address or of all, and since when it is there.
+    pub(super) fn oldest(&self, of: Option<Origin>, group: G) -> Option<Entry> {
+        self.0.get(&(of, group))?.first().copied()
     }
 }

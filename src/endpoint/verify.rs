@@ -14,10 +14,10 @@ use bytes::Bytes;
 use tracing::{debug, warn};
 
 use super::arrival::Arrival;
-use super::peers::{CHALLENGE, CHALLENGE_FLAGS, Challenge, Finding, Heard, Probe};
+use super::peers::{CHALLENGE, CHALLENGE_FLAGS, Decision, Heard, Probe};
 use super::{Counter, Endpoint, Event, Path};
 use crate::address::JausId;
-use crate::wire::{Frame, Framing};
+use crate::wire::Frame;
 
 /// A challenge reuses an old sequence number, at least this many and at most twice as many numbers
 /// ago. No message awaits such a number, and a peer's duplicate detection does not confuse it with
@@ -59,7 +59,7 @@ impl Endpoint {
         let Arrival { frame, now, .. } = arrival;
         let (id, version) = (frame.source, frame.version);
         let path = self.where_it_reads(id, arrival.path);
-        let is_stream = self.egress.framing(path.link) != Framing::Judp;
+        let is_stream = !self.egress.is_datagram(path);
         let local = self.challenger(frame.destination);
         let arrival = Arrival { path, ..arrival };
         match self.peers.hear(arrival, is_stream, local.is_some())? {
@@ -106,10 +106,10 @@ impl Endpoint {
 
     /// The local component that challenges a peer which has written to `destination`.
     fn challenger(&self, destination: JausId) -> Option<JausId> {
-        if self.components.contains(destination) {
+        if self.components.contains(&destination) {
             return Some(destination);
         }
-        self.components.iter().next()
+        self.components.first().copied()
     }
 
     /// Challenges an unverified peer, unless it may not be challenged now.
@@ -135,18 +135,14 @@ impl Endpoint {
         if !self.peers.may_challenge(now, id, cause) {
             return;
         }
-        let incumbent = self.probe(id, local, incumbent);
-        let rival = rival.map(|(path, answered)| Probe {
-            answered,
-            ..self.probe(id, local, path)
-        });
-        let challenge = Challenge::new(now, local, incumbent, was_verified, rival);
-        self.peers.begin_challenge(now, id, challenge);
-        self.send_probes(now, id, &challenge);
+        let incumbent = (self.probe(id, local, incumbent, false), was_verified);
+        let rival = rival.map(|(path, is_stream)| self.probe(id, local, path, is_stream));
+        self.peers.begin_challenge(now, id, local, incumbent, rival);
+        self.send_probes(now, id);
     }
 
     /// A probe with an unpredictable sequence number that no message to the peer awaits.
-    fn probe(&mut self, id: JausId, local: JausId, path: Path) -> Probe {
+    fn probe(&mut self, id: JausId, local: JausId, path: Path, answered: bool) -> Probe {
         let latest = self.numbers.peek(1) as u16;
         let number = loop {
             self.probes += 1;
@@ -161,11 +157,14 @@ impl Endpoint {
         Probe {
             path,
             number,
-            answered: false,
+            answered,
         }
     }
 
-    fn send_probes(&mut self, now: Instant, id: JausId, challenge: &Challenge) {
+    fn send_probes(&mut self, now: Instant, id: JausId) {
+        let Some(challenge) = self.peers.challenge(id) else {
+            return;
+        };
         let version = self.peers.version(id);
         for probe in challenge.probes() {
             let frame = Frame {
@@ -182,54 +181,40 @@ impl Endpoint {
 
     /// Processes an acknowledgement that no message awaits. Returns whether a challenge does.
     pub(super) fn receive_challenge_answer(&mut self, arrival: Arrival<'_>) -> bool {
-        let Some((challenge, finding)) = self.peers.answer_challenge(arrival) else {
-            return false;
-        };
-        if let Some(finding) = finding {
-            self.settle_challenge(arrival.now, arrival.frame.source, &challenge, finding);
+        let answered = self.peers.answer_challenge(arrival);
+        if let Some(Some(decision)) = answered {
+            self.follow(arrival.now, arrival.frame.source, decision);
         }
-        true
+        answered.is_some()
     }
 
     /// Retransmits or decides the challenges that are due.
     pub(super) fn handle_challenges(&mut self, now: Instant) {
-        while let Some((id, challenge, finding)) = self.peers.next_due(now) {
-            match finding {
-                Some(finding) => self.settle_challenge(now, id, &challenge, finding),
-                None => self.send_probes(now, id, &challenge),
+        while let Some((id, decision)) = self.peers.next_due(now) {
+            match decision {
+                Some(decision) => self.follow(now, id, decision),
+                None => self.send_probes(now, id),
             }
         }
     }
 
-    fn settle_challenge(
-        &mut self,
-        now: Instant,
-        id: JausId,
-        challenge: &Challenge,
-        finding: Finding,
-    ) {
+    /// Acts on the decision of a challenge: packets that waited for it may leave.
+    fn follow(&mut self, now: Instant, id: JausId, decision: Decision) {
+        let Decision { from, to, refused } = decision;
         self.deliveries.touch(id);
-        let Some(rival) = challenge.rival else {
-            return;
-        };
-        let incumbent = challenge.incumbent.path;
-        let (before, after) = match finding {
-            Finding::Moves { .. } => (incumbent, rival.path),
-            Finding::Stays | Finding::Unanswered => (rival.path, incumbent),
-        };
-        if challenge.was_provisional == (after == incumbent) {
-            self.announce_move(now, id, before, after);
+        if from != to {
+            self.announce_move(now, id, from, to);
         }
-        if after == incumbent {
+        if let Some(other) = refused {
             self.counters.add(Counter::PeerConflicts);
             self.announce(Event::PeerConflict {
                 id,
-                path: incumbent,
-                other: rival.path,
+                path: to,
+                other,
             });
             if self.warnings.is_due(now, Warning::PeerConflict) {
                 warn!(
-                    %id, at = %incumbent.peer, other = %rival.path.peer,
+                    %id, at = %to.peer, other = %other.peer,
                     "an id is used at two addresses: give each component its own id, or pin it \
                      with peers"
                 );
@@ -246,14 +231,14 @@ impl Endpoint {
         let octets = u32::try_from(octets).unwrap_or(u32::MAX);
         let may = self.unverified.take_many(now, to.into(), octets)
             && self.unverified_total.take_many(now, (), octets);
-        let spent = self.unverified.owed(now, &to.into());
-        if spent >= self.config.unverified_address.burst / 4 {
+        let much = self.config.unverified_address.burst / 4;
+        if self.unverified.owes(now, &to.into(), much) {
             self.challenge(now, id);
         }
         if !may {
             self.counters.add(Counter::UnverifiedBudget);
             // A busy peer may still answer the challenge.
-            let is_asked = self.peers.is_challenged(id);
+            let is_asked = self.peers.challenge(id).is_some();
             if !is_asked && self.warnings.is_due(now, Warning::Unverified) {
                 warn!(
                     to = %to.peer,
@@ -267,6 +252,6 @@ impl Endpoint {
 
     /// Whether traffic to a path is unlimited.
     pub(super) fn is_free(&self, to: Path) -> bool {
-        self.egress.framing(to.link) != Framing::Judp || self.peers.is_proven(to)
+        !self.egress.is_datagram(to) || self.peers.is_proven(to)
     }
 }

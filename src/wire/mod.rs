@@ -55,6 +55,16 @@ impl Version {
             Self::Ra => "ra",
         }
     }
+
+    /// The octets of message code at the beginning of each later fragment and each acknowledgement.
+    /// In AS5669A, only the beginning of a message has the code.
+    #[must_use]
+    pub const fn repeated_code_len(self) -> usize {
+        match self {
+            Self::As5669a => 0,
+            Self::As5669 | Self::Ra => ra::CODE_LEN,
+        }
+    }
 }
 
 impl fmt::Display for Version {
@@ -112,10 +122,13 @@ impl Frame {
     /// The payload length without the code, of which acknowledgements with the older headers carry
     /// a copy.
     fn body_len(&self) -> usize {
-        match self.version {
-            Version::As5669a => self.payload.len(),
-            Version::As5669 | Version::Ra => self.payload.len().saturating_sub(ra::CODE_LEN),
-        }
+        self.payload.len() - self.repeated_code_len()
+    }
+
+    /// The octets of the payload that repeat the message code, if this is an acknowledgement or a
+    /// later fragment.
+    pub(crate) fn repeated_code_len(&self) -> usize {
+        self.version.repeated_code_len().min(self.payload.len())
     }
 
     /// Whether this is a well-formed acknowledgement, positive or negative: one without a message.

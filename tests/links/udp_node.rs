@@ -62,8 +62,8 @@ async fn nodes_that_never_met_talk_by_id_alone() {
     );
     // The answer went to the query's source address.
     assert_eq!(report.broadcast, Broadcast::None);
-    assert_eq!(report.path.unwrap().peer, a.links()[0].local);
-    assert_eq!(b.peers()[0].path.peer, a.links()[0].local);
+    assert_eq!(report.path.unwrap().peer, a.links()[0].local.into());
+    assert_eq!(b.peers()[0].path.peer, a.links()[0].local.into());
 }
 
 #[tokio::test]

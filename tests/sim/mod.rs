@@ -533,7 +533,7 @@ impl<O: Owner> Network<O> {
             for receiver in &node.attachments {
                 let is_meant = match to {
                     To::Group => true,
-                    To::Peer(peer) => peer == receiver.address,
+                    To::Peer(peer) => peer == receiver.address.into(),
                 };
                 if is_meant && receiver.network == sender.network {
                     let from = (Some(from), sender.address);

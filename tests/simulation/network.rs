@@ -258,7 +258,7 @@ fn two_nodes_with_one_id_are_both_told() {
     network.run_until_idle();
     for (host, other) in [(hosts[0], hosts[1]), (hosts[1], hosts[0])] {
         let peer = network.address(other);
-        let conflict = |event: &Event| matches!(event, Event::IdConflict { id: ONE, path } if path.peer == peer);
+        let conflict = |event: &Event| matches!(event, Event::IdConflict { id: ONE, path } if path.peer == peer.into());
         assert!(network.owner(host).take_news().iter().any(conflict));
     }
 }

@@ -13,7 +13,7 @@ use super::round_trip::RoundTrip;
 use super::window::Window;
 use crate::address::JausId;
 use crate::endpoint::large::{Cut, Numbers};
-use crate::endpoint::{Config, Unacknowledged};
+use crate::endpoint::{Config, MessageHandle, Unacknowledged};
 use crate::wire::{Frame, Priority, Version};
 
 /// The window for a destination with unknown address, because its packets are broadcast.
@@ -41,16 +41,16 @@ const ROUND: u64 = 1 << 16;
 
 /// A message that is queued or unacknowledged.
 #[derive(Debug)]
-struct PendingMessage {
-    whole: Frame,
+pub(super) struct PendingMessage {
+    pub(super) whole: Frame,
     /// Whether the sender wants the result reported.
-    awaited: bool,
+    pub(super) awaited: bool,
     /// When it was queued.
     accepted: Instant,
     /// How it was cut, once its first packet is sent.
     started: Option<Started>,
     /// Octets acknowledged so far.
-    acknowledged: usize,
+    pub(super) acknowledged: usize,
 }
 
 /// The state of a message whose first packet is sent.
@@ -68,7 +68,7 @@ struct Started {
 /// A fragment or unfragmented message that was sent and not acknowledged yet.
 #[derive(Debug)]
 struct Packet {
-    message: u64,
+    message: MessageHandle,
     index: usize,
     priority: Priority,
     first_sent: Instant,
@@ -80,26 +80,16 @@ struct Packet {
     lost: bool,
 }
 
-/// The end of a message: it was acknowledged in full, or given up.
-#[derive(Debug)]
-pub(super) struct Outcome {
-    pub(super) message: u64,
-    /// Whether the sender wants it reported.
-    pub(super) awaited: bool,
-    /// Why it was given up.
-    pub(super) given_up: Option<Unacknowledged>,
-    /// Octets that were acknowledged.
-    pub(super) acknowledged: usize,
-    pub(super) length: usize,
-}
+/// The end of a message, and why it was given up, unless it was acknowledged in full.
+pub(super) type Outcome = (MessageHandle, PendingMessage, Option<Unacknowledged>);
 
 /// All messages to one destination.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Flow {
     /// By handle, and so in the order in which they were queued.
-    pending_messages: BTreeMap<u64, PendingMessage>,
+    pending_messages: BTreeMap<MessageHandle, PendingMessage>,
     /// Messages not fully sent yet, by priority.
-    waiting: [VecDeque<u64>; Priority::ALL.len()],
+    waiting: [VecDeque<MessageHandle>; Priority::ALL.len()],
     /// Packets to retransmit, by priority.
     lost: [VecDeque<u16>; Priority::ALL.len()],
     flight: HashMap<u16, Packet>,
@@ -118,7 +108,7 @@ pub(super) struct Flow {
     /// When the latest acknowledgement arrived.
     heard: Option<Instant>,
     /// When a message was last queued or acknowledged.
-    pub(super) active: Instant,
+    pub(super) active: Option<Instant>,
     /// Whether messages were given up because of silence, and no acknowledgement has arrived since.
     silent: bool,
     /// Whether the address is known.
@@ -129,8 +119,6 @@ pub(super) struct Flow {
     pub(super) listed: [bool; Priority::ALL.len()],
     /// When the flow is checked next, at the latest.
     pub(super) timer: Option<Instant>,
-    /// Messages with a packet that has used up its attempts.
-    exhausted: Vec<u64>,
     /// The outcomes of messages that are not reported yet.
     pub(super) outcomes: VecDeque<Outcome>,
     /// No message in flight has a lower serial number.
@@ -140,32 +128,13 @@ pub(super) struct Flow {
 }
 
 impl Flow {
-    pub(super) fn new(now: Instant, config: &Config) -> Self {
+    pub(super) fn new(config: &Config) -> Self {
         Self {
-            pending_messages: BTreeMap::new(),
-            waiting: Default::default(),
-            lost: Default::default(),
-            flight: HashMap::new(),
-            order: VecDeque::new(),
-            sends: 0,
-            newest: 0,
             tolerance: TOLERANCE.0,
-            in_flight: 0,
             window: Window::new(config.initial_window, config.max_window),
-            round_trip: RoundTrip::default(),
-            armed: None,
-            heard: None,
-            active: now,
-            silent: false,
-            known: false,
-            connected: false,
-            listed: Default::default(),
-            timer: None,
-            exhausted: Vec::new(),
-            outcomes: VecDeque::new(),
-            floor: 0,
             patience: config.acknowledge_patience,
             tries: config.acknowledge_tries,
+            ..Self::default()
         }
     }
 
@@ -183,14 +152,21 @@ impl Flow {
     }
 
     /// Queues a message; `awaited` says whether the sender wants its outcome reported.
-    pub(super) fn push(&mut self, now: Instant, message: u64, whole: Frame, awaited: bool) {
+    pub(super) fn push(
+        &mut self,
+        now: Instant,
+        message: MessageHandle,
+        whole: Frame,
+        awaited: bool,
+    ) {
         if self.is_idle() {
             self.round_trip.restart();
-            if now.saturating_duration_since(self.active) >= STALE {
+            let is_stale = |at: Instant| now.saturating_duration_since(at) >= STALE;
+            if self.active.is_some_and(is_stale) {
                 self.window.rest();
             }
         }
-        self.active = now;
+        self.active = Some(now);
         self.waiting[usize::from(whole.flags.priority().bits())].push_back(message);
         let pending = PendingMessage {
             whole,
@@ -242,7 +218,7 @@ impl Flow {
     /// Retransmits a lost packet.
     fn repeat(&mut self, now: Instant, level: usize) -> Option<(Frame, u32)> {
         while let Some(sequence) = self.lost[level].pop_front() {
-            let Some(packet) = self.flight.get_mut(&sequence).filter(|packet| packet.lost) else {
+            let Some(packet) = self.flight.get(&sequence).filter(|packet| packet.lost) else {
                 continue;
             };
             let pending = self.pending_messages.get(&packet.message)?;
@@ -250,13 +226,7 @@ impl Flow {
             let frame = started
                 .cut
                 .frame(&pending.whole, started.first, packet.index);
-            packet.lost = false;
-            packet.sent = now;
-            packet.order = self.sends;
-            packet.tries += 1;
-            let tries = packet.tries;
-            self.depart(now, sequence);
-            return Some((frame, tries));
+            return self.depart(now, frame);
         }
         None
     }
@@ -291,12 +261,11 @@ impl Flow {
                 first_sent: now,
                 sent: now,
                 order: self.sends,
-                tries: 1,
+                tries: 0,
                 lost: false,
             };
             self.flight.insert(frame.sequence, packet);
-            self.depart(now, frame.sequence);
-            return Some((frame, 1));
+            return self.depart(now, frame);
         }
     }
 
@@ -304,7 +273,7 @@ impl Flow {
     /// needs are in flight.
     fn start(
         &mut self,
-        message: u64,
+        message: MessageHandle,
         numbers: &mut Numbers,
         begin: &mut impl FnMut(usize) -> (Cut, Version),
     ) -> Option<()> {
@@ -336,44 +305,33 @@ impl Flow {
         Some(())
     }
 
-    fn depart(&mut self, now: Instant, sequence: u16) {
-        self.order.push_back((self.sends, sequence));
+    /// Records a transmission; returns the packet's frame, and how often it was sent.
+    fn depart(&mut self, now: Instant, frame: Frame) -> Option<(Frame, u32)> {
+        let packet = self.flight.get_mut(&frame.sequence)?;
+        (packet.sent, packet.order, packet.lost) = (now, self.sends, false);
+        packet.tries += 1;
+        self.order.push_back((self.sends, frame.sequence));
         self.sends += 1;
         self.in_flight += 1;
         self.armed.get_or_insert(now);
+        Some((frame, packet.tries))
     }
 
-    /// Processes an acknowledgement or a refusal of a packet from `source`. Returns whether the
-    /// packet awaits it.
-    pub(super) fn handle_answer(
-        &mut self,
-        now: Instant,
-        source: JausId,
-        sequence: u16,
-        is_refusal: bool,
-    ) -> bool {
-        let Some(message) = self.owner_of(source, sequence) else {
-            return false;
-        };
-        if is_refusal {
+    /// Processes the refusal of a packet from `source`.
+    pub(super) fn refuse(&mut self, source: JausId, sequence: u16) {
+        if let Some(message) = self.owner_of(source, sequence) {
             self.finish(message, Some(Unacknowledged::Refused));
-        } else {
-            self.acknowledge(now, sequence);
         }
-        true
     }
 
-    fn acknowledge(&mut self, now: Instant, sequence: u16) {
+    /// Processes the acknowledgement of a packet.
+    pub(super) fn acknowledge(&mut self, now: Instant, sequence: u16) {
         let Some(packet) = self.flight.remove(&sequence) else {
             return;
         };
         self.learn_from(now, &packet);
-        if !packet.lost {
-            self.in_flight -= 1;
-        }
+        self.in_flight -= usize::from(!packet.lost);
         self.newest = self.newest.max(packet.order);
-        self.find_lost(now);
-        self.armed = (self.in_flight > 0).then_some(now);
         if let Some(pending) = self.pending_messages.get_mut(&packet.message)
             && let Some(started) = &mut pending.started
         {
@@ -383,11 +341,12 @@ impl Flow {
                 self.finish(packet.message, None);
             }
         }
-        self.give_up_exhausted();
+        self.find_lost(now);
+        self.armed = (self.in_flight > 0).then_some(now);
     }
 
     /// The message that a packet from `source` belongs to.
-    pub(super) fn owner_of(&self, source: JausId, sequence: u16) -> Option<u64> {
+    pub(super) fn owner_of(&self, source: JausId, sequence: u16) -> Option<MessageHandle> {
         let message = self.flight.get(&sequence)?.message;
         let pending = self.pending_messages.get(&message)?;
         (pending.whole.source == source).then_some(message)
@@ -395,7 +354,7 @@ impl Flow {
 
     fn learn_from(&mut self, now: Instant, packet: &Packet) {
         self.heard = Some(now);
-        self.active = now;
+        self.active = self.heard;
         self.silent = false;
         let time = now.saturating_duration_since(packet.sent);
         let shortest = self.round_trip.shortest().unwrap_or_default();
@@ -430,6 +389,7 @@ impl Flow {
         }
     }
 
+    /// Marks a packet as lost. Gives its message up if it has used up its attempts.
     fn lose(&mut self, now: Instant, sequence: u16) {
         let Some(packet) = self.flight.get_mut(&sequence) else {
             return;
@@ -439,7 +399,8 @@ impl Flow {
         self.lost[usize::from(packet.priority.bits())].push_back(sequence);
         let long = now.saturating_duration_since(packet.first_sent) >= self.patience;
         if long && packet.tries >= self.tries {
-            self.exhausted.push(packet.message);
+            let message = packet.message;
+            self.finish(message, Some(Unacknowledged::TimedOut));
         }
     }
 
@@ -491,7 +452,6 @@ impl Flow {
                 }
             }
         }
-        self.give_up_exhausted();
         let mut silent = self.silent;
         while self.end_of_patience().is_some_and(|end| end <= now)
             && let Some((&message, _)) = self.pending_messages.first_key_value()
@@ -502,14 +462,8 @@ impl Flow {
         self.silent = silent;
     }
 
-    fn give_up_exhausted(&mut self) {
-        for message in std::mem::take(&mut self.exhausted) {
-            self.finish(message, Some(Unacknowledged::TimedOut));
-        }
-    }
-
     /// Removes a message and records its outcome.
-    fn finish(&mut self, message: u64, given_up: Option<Unacknowledged>) {
+    fn finish(&mut self, message: MessageHandle, given_up: Option<Unacknowledged>) {
         let Some(pending) = self.remove(message) else {
             return;
         };
@@ -517,17 +471,11 @@ impl Flow {
             (Unacknowledged::TimedOut, None) => Unacknowledged::NotSent,
             (reason, _) => reason,
         });
-        self.outcomes.push_back(Outcome {
-            message,
-            awaited: pending.awaited,
-            given_up,
-            acknowledged: pending.acknowledged,
-            length: pending.whole.payload.len(),
-        });
+        self.outcomes.push_back((message, pending, given_up));
     }
 
     /// Removes a message and its packets in flight.
-    fn remove(&mut self, message: u64) -> Option<PendingMessage> {
+    fn remove(&mut self, message: MessageHandle) -> Option<PendingMessage> {
         let pending = self.pending_messages.remove(&message)?;
         if let Some(started) = &pending.started
             && started.missing > 0

@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 
 use tracing::debug;
 
-use super::{Config, Counter, Endpoint, Event, MessageHandle, Path, SendError};
+use super::{Config, Counter, Endpoint, Event, MessageHandle, SendError};
 use crate::address::JausId;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, Priority, Version};
 use flow::{Flow, Outcome};
@@ -52,8 +52,6 @@ pub(super) struct Deliveries {
     flows: HashMap<JausId, Flow>,
     /// Flows that may have something to send, by priority; the first is next.
     ready: [VecDeque<JausId>; Priority::ALL.len()],
-    /// The flow that sent last, and how many packets it has sent in its turn.
-    turn: Option<(JausId, usize)>,
     /// The latest time to check each flow; at most one entry per flow.
     timers: BTreeSet<(Instant, JausId)>,
     handed_in: u64,
@@ -104,8 +102,8 @@ impl Deliveries {
         self.messages += 1;
         self.octets += whole.payload.len();
         let flow = self.flows.entry(destination);
-        let flow = flow.or_insert_with(|| Flow::new(now, &self.config));
-        flow.push(now, handle.0, whole, awaited);
+        let flow = flow.or_insert_with(|| Flow::new(&self.config));
+        flow.push(now, handle, whole, awaited);
         self.touch(destination);
         Ok(())
     }
@@ -116,7 +114,7 @@ impl Deliveries {
             return true;
         }
         let idle = self.flows.iter().filter(|(_, flow)| flow.is_idle());
-        let oldest = idle.min_by_key(|(_, flow)| flow.active.min(now));
+        let oldest = idle.min_by_key(|(_, flow)| flow.active.min(Some(now)));
         let Some((&destination, _)) = oldest else {
             return false;
         };
@@ -135,59 +133,43 @@ impl Deliveries {
             let level = usize::from(priority.bits());
             if !flow.listed[level] {
                 flow.listed[level] = true;
-                match self.turn {
-                    Some((whose, sent)) if whose == destination && sent < TURN => {
-                        self.ready[level].push_front(destination);
-                    }
-                    _ => self.ready[level].push_back(destination),
-                }
+                self.ready[level].push_back(destination);
             }
         }
         let deadline = flow.deadline();
-        match (flow.timer, deadline) {
-            // An early timer is harmless; moving it with each answer would be costly.
-            (Some(set), Some(deadline)) if set <= deadline => {}
-            (set, deadline) => {
-                if let Some(set) = set {
-                    self.timers.remove(&(set, destination));
-                }
-                self.timers.extend(deadline.map(|at| (at, destination)));
-                flow.timer = deadline;
+        // An early timer is harmless; moving it with each answer would be costly.
+        let is_early = |(set, deadline)| set <= deadline;
+        if !flow.timer.zip(deadline).is_some_and(is_early) {
+            if let Some(set) = flow.timer {
+                self.timers.remove(&(set, destination));
             }
+            self.timers.extend(deadline.map(|at| (at, destination)));
+            flow.timer = deadline;
         }
     }
 
     /// The next flow in turn at this priority.
     fn next_ready(&mut self, priority: Priority) -> Option<JausId> {
         let level = usize::from(priority.bits());
-        loop {
-            let destination = self.ready[level].pop_front()?;
-            let Some(flow) = self.flows.get_mut(&destination) else {
-                continue;
-            };
-            flow.listed[level] = false;
-            if flow.wants() == Some(priority) {
+        while let Some(destination) = self.ready[level].pop_front() {
+            if let Some(flow) = self.flows.get_mut(&destination) {
+                flow.listed[level] = false;
+            }
+            if self.wants(destination) == Some(priority) {
                 return Some(destination);
             }
             self.touch(destination);
         }
+        None
     }
 
-    /// Counts a sent packet against the flow's turn.
-    fn take_turn(&mut self, destination: JausId) {
-        self.turn = match self.turn {
-            Some((whose, sent)) if whose == destination && sent < TURN => {
-                Some((destination, sent + 1))
-            }
-            _ => Some((destination, 1)),
-        };
+    /// The highest priority at which a flow has something to send.
+    fn wants(&self, destination: JausId) -> Option<Priority> {
+        self.flows.get(&destination)?.wants()
     }
 
     fn take_due(&mut self, now: Instant) -> Option<JausId> {
-        let &(deadline, destination) = self.timers.first()?;
-        if deadline > now {
-            return None;
-        }
+        let &(_, destination) = self.timers.first().filter(|(at, _)| *at <= now)?;
         self.timers.pop_first();
         if let Some(flow) = self.flows.get_mut(&destination) {
             flow.timer = None;
@@ -206,7 +188,7 @@ impl Deliveries {
 
     fn next_outcome(&mut self, destination: JausId) -> Option<Outcome> {
         let outcome = self.flows.get_mut(&destination)?.outcomes.pop_front()?;
-        self.settle(outcome.length);
+        self.settle(outcome.1.whole.payload.len());
         Some(outcome)
     }
 
@@ -242,7 +224,7 @@ impl Endpoint {
         awaited: bool,
     ) -> Result<(), SendError> {
         self.deliveries
-            .check_room(self.news.results(), whole.payload.len())?;
+            .check_room(self.results, whole.payload.len())?;
         whole.flags = whole.flags.with_acknowledgement(Acknowledgement::Request);
         self.deliveries.push(now, handle, whole, awaited)
     }
@@ -253,12 +235,17 @@ impl Endpoint {
         while sent < TURN
             && let Some(destination) = self.deliveries.next_ready(priority)
         {
+            let before = sent;
+            while sent < TURN
+                && self.deliveries.wants(destination) == Some(priority)
+                && self.send_packet(now, destination, priority).is_some()
+            {
+                sent += 1;
+            }
             // A flow without free sequence numbers is rescheduled when a message is acknowledged or
             // given up.
-            if self.send_packet(now, destination, priority).is_some() {
-                self.deliveries.take_turn(destination);
+            if sent > before {
                 self.deliveries.touch(destination);
-                sent += 1;
             }
         }
         sent > 0
@@ -276,9 +263,9 @@ impl Endpoint {
         let much = self.config.unverified_address.burst as usize / 2;
         let flow = self.deliveries.flows.get(&destination)?;
         let is_too_much = route.is_some() && !is_proven && flow.begins_more_than(much);
-        if is_too_much || self.peers.awaits_proof(destination) {
+        if is_too_much || self.peers.repeats_code(destination).is_none() {
             self.challenge(now, destination);
-            if self.peers.is_challenged(destination) {
+            if self.peers.challenge(destination).is_some() {
                 return None;
             }
         }
@@ -317,30 +304,26 @@ impl Endpoint {
     /// Handles a message that was given up: if its destination was silent meanwhile, its route
     /// becomes stale, and further messages go to the group.
     fn lose(&mut self, now: Instant, destination: JausId) {
-        let is_datagram = |path: Path| self.egress.framing(path.link) == Framing::Judp;
         if let Some(since) = now.checked_sub(self.config.acknowledge_patience)
             && self
                 .route(destination)
-                .is_some_and(|(path, _)| is_datagram(path))
+                .is_some_and(|(path, _)| self.egress.is_datagram(path))
         {
             self.peers.lose(destination, since);
         }
     }
 
-    /// Processes an acknowledgement of one of our messages.
-    pub(super) fn receive_answer(&mut self, now: Instant, frame: &Frame) -> Result<(), Counter> {
-        let (destination, source) = (frame.source, frame.destination);
-        let is_refusal = frame.flags.acknowledgement() == Acknowledgement::Negative;
-        let flow = self.deliveries.flows.get_mut(&destination);
-        let is_awaited = flow.is_some_and(|flow| {
+    /// Processes an awaited acknowledgement of one of our messages.
+    pub(super) fn receive_answer(&mut self, now: Instant, frame: &Frame) {
+        let destination = frame.source;
+        if let Some(flow) = self.deliveries.flows.get_mut(&destination) {
             flow.known = true;
-            flow.handle_answer(now, source, frame.sequence, is_refusal)
-        });
-        if !is_awaited {
-            return Err(Counter::UnawaitedAcknowledgement);
+            match frame.flags.acknowledgement() {
+                Acknowledgement::Negative => flow.refuse(frame.destination, frame.sequence),
+                _ => flow.acknowledge(now, frame.sequence),
+            }
         }
         self.report_outcomes(destination);
-        Ok(())
     }
 
     /// Retransmits unacknowledged packets whose timeout has passed, or gives their messages up.
@@ -359,16 +342,15 @@ impl Endpoint {
 
     /// Reports the outcomes of messages to a destination, and reschedules its flow.
     fn report_outcomes(&mut self, destination: JausId) {
-        while let Some(outcome) = self.deliveries.next_outcome(destination) {
-            if outcome.given_up.is_some() {
+        while let Some((message, pending, given_up)) = self.deliveries.next_outcome(destination) {
+            if given_up.is_some() {
                 self.counters.add(Counter::MessagesGivenUp);
                 self.peers.note(destination, |peer| peer.lost += 1);
             }
-            if !outcome.awaited {
+            if !pending.awaited {
                 continue;
             }
-            let message = MessageHandle(outcome.message);
-            self.news.push_result(match outcome.given_up {
+            self.announce_result(match given_up {
                 None => Event::Acknowledged {
                     message,
                     by: destination,
@@ -377,8 +359,8 @@ impl Endpoint {
                     message,
                     destination,
                     reason,
-                    acknowledged: outcome.acknowledged,
-                    length: outcome.length,
+                    acknowledged: pending.acknowledged,
+                    length: pending.whole.payload.len(),
                 },
             });
         }

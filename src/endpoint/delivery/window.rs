@@ -18,7 +18,7 @@ const MOST_LOST: usize = 20;
 const LEAST_COUNT: usize = 64;
 
 /// The window of one destination.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Window {
     packets: usize,
     initial: usize,

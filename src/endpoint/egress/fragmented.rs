@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use crate::endpoint::large::Cut;
 use crate::endpoint::rate::Bucket;
 use crate::peer::Intake;
-use crate::wire::{Frame, Version};
+use crate::wire::Frame;
 
 /// Headers before a datagram and kernel metadata after it.
 const ENVELOPE: usize = 384;
@@ -103,19 +103,9 @@ impl FragmentedSend {
         self.next == self.cut.count()
     }
 
-    /// Whether the next fragment has that header and is not longer.
-    pub(super) fn continues(&self, (version, octets): (Version, usize)) -> bool {
-        self.whole.version == version && self.next_len() <= octets
-    }
-
     /// The length of the next fragment, in octets.
     pub(super) fn next_len(&self) -> usize {
         self.cut.fragment_len(self.next)
-    }
-
-    /// How many fragments are left.
-    pub(super) fn fragments(&self) -> usize {
-        self.cut.count() - self.next
     }
 
     /// The octets of the fragments that are left.

@@ -7,29 +7,8 @@ use bytes::{BufMut, Bytes, BytesMut};
 
 use super::queue::{HopQueue, Level};
 use super::{MOST_OCTETS, encode};
-use crate::endpoint::recent::Recent;
-use crate::endpoint::{Counter, Counters};
-use crate::wire::{EncodeError, Frame, Framing, Priority, as5669a, judp};
-
-/// The context in which fragments are sent.
-pub(super) struct Fragments<'a> {
-    pub(super) now: Instant,
-    pub(super) framing: Framing,
-    /// Where to record them, if they go to a group.
-    pub(super) echoes: Option<&'a mut Recent>,
-    /// The total of octets in queued fragments.
-    pub(super) octets: &'a mut usize,
-    pub(super) counters: &'a mut Counters,
-}
-
-impl Fragments<'_> {
-    fn note(&mut self, fragment: &Frame) {
-        *self.octets -= fragment.payload.len();
-        if let Some(echoes) = &mut self.echoes {
-            echoes.insert_own(self.now, fragment);
-        }
-    }
-}
+use crate::endpoint::{Counter, Counters, LinkProfile};
+use crate::wire::{EncodeError, Frame, Priority, as5669a, judp};
 
 impl HopQueue {
     /// The first queued message, packed with others into a datagram of up to `longest` octets, and
@@ -52,55 +31,42 @@ impl HopQueue {
         };
         let queues = &mut self.whole[least..=priority];
         joined.pack(0, queues, longest);
-        let (length, mut segment) = (joined.len(), None);
-        for _ in 1..segments.min(MOST_OCTETS / length.max(1)) {
+        Some(joined.batch(segments, |joined, length| {
+            let next = pop_if(&mut queues[priority - least], |it| it.len() <= length)?;
             let start = joined.len();
-            let Some(next) = pop_if(&mut queues[priority - least], |it| it.len() <= length) else {
-                break;
-            };
             joined.push(&next);
             joined.pack(start, queues, longest.min(length));
-            segment = Some(length);
-            if joined.len() - start < length {
-                break;
-            }
-        }
-        Some((joined.finish(), segment))
+            Some(())
+        }))
     }
 
-    /// The next fragment that may be sent, batched with others of the same length.
+    /// The next fragment that may be sent, batched with others of the same length. Each is passed to
+    /// `leave`, and counted if it cannot be encoded.
     pub(super) fn join_fragments(
         &mut self,
+        now: Instant,
         level: Level,
-        segments: usize,
-        leaving: &mut Fragments<'_>,
+        link: &LinkProfile,
         buffer: &mut BytesMut,
+        counters: &mut Counters,
+        mut leave: impl FnMut(&Frame),
     ) -> Option<(Bytes, Option<usize>)> {
         let (first, like) = loop {
-            let frame = self.next_fragment(leaving.now, level, None)?;
-            leaving.note(&frame);
-            match encode(leaving.framing, buffer, &frame) {
+            let frame = self.next_fragment(now, level, None)?;
+            leave(&frame);
+            match encode(link.framing, buffer, &frame) {
                 Ok(octets) => break (octets, (frame.version, frame.payload.len())),
-                Err(_) => leaving.counters.add(Counter::CannotSend),
+                Err(_) => counters.add(Counter::CannotSend),
             }
         };
-        let (length, mut segment) = (first.len(), None);
-        let mut joined = Joined::new(first, buffer);
-        for _ in 1..segments.min(MOST_OCTETS / length.max(1)) {
-            let Some(next) = self.next_fragment(leaving.now, level, Some(like)) else {
-                break;
-            };
-            leaving.note(&next);
-            if joined.emit(&next).is_err() {
-                leaving.counters.add(Counter::CannotSend);
-                break;
-            }
-            segment = Some(length);
-            if next.payload.len() < like.1 {
-                break;
-            }
-        }
-        Some((joined.finish(), segment))
+        Some(
+            Joined::new(first, buffer).batch(link.segments(), |joined, _| {
+                let next = self.next_fragment(now, level, Some(like))?;
+                leave(&next);
+                let emitted = joined.emit(&next);
+                emitted.map_err(|_| counters.add(Counter::CannotSend)).ok()
+            }),
+        )
     }
 }
 
@@ -158,21 +124,34 @@ impl<'a> Joined<'a> {
         }
     }
 
-    fn finish(self) -> Bytes {
-        if self.buffer.is_empty() {
-            self.first
-        } else {
-            self.buffer.split().freeze()
+    /// Appends datagrams of the length of the first, of which only the last may be shorter, up to
+    /// `segments` in all. Returns the octets, and that length if there is more than one datagram.
+    fn batch(
+        mut self,
+        segments: usize,
+        mut append: impl FnMut(&mut Self, usize) -> Option<()>,
+    ) -> (Bytes, Option<usize>) {
+        let (length, mut segment) = (self.len(), None);
+        for _ in 1..segments.min(MOST_OCTETS / length.max(1)) {
+            let start = self.len();
+            if append(&mut self, length).is_none() {
+                break;
+            }
+            segment = Some(length);
+            if self.len() - start < length {
+                break;
+            }
         }
+        if self.buffer.is_empty() {
+            return (self.first, None);
+        }
+        (self.buffer.split().freeze(), segment)
     }
 }
 
 fn pop_if(queue: &mut VecDeque<Bytes>, is_wanted: impl FnOnce(&Bytes) -> bool) -> Option<Bytes> {
-    if queue.front().is_some_and(is_wanted) {
-        queue.pop_front()
-    } else {
-        None
-    }
+    queue.front().filter(|it| is_wanted(it))?;
+    queue.pop_front()
 }
 
 /// Whether another message fits after a datagram with the AS5669A header.

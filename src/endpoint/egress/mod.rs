@@ -17,12 +17,12 @@ use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
 
-use super::recent::{Fingerprint, Recent};
+use super::recent::Recent;
 use super::{Config, Counter, Counters, LinkId, LinkProfile, Path, To, Transmit};
 use crate::wire::{Acknowledgement, EncodeError, Flags, Frame, Framing, Priority, as5669a, judp};
 pub(super) use fragmented::FragmentedSend;
 pub use fragmented::Pacing;
-use join::{Fragments, may_pack};
+use join::may_pack;
 use queue::HopQueue;
 pub(super) use queue::Level;
 
@@ -61,20 +61,17 @@ pub enum Packing {
 /// The links and their queues.
 #[derive(Debug)]
 pub(super) struct Egress {
-    links: BTreeMap<LinkId, LinkProfile>,
-    queues: Queues,
-    turns: Turns,
+    pub(super) links: BTreeMap<LinkId, LinkProfile>,
+    pub(super) queues: Queues,
     /// Queued datagrams, by priority, without fragments.
     waiting: [usize; Priority::ALL.len()],
     /// Octets of messages in queued fragments.
     fragmented: usize,
     buffer: BytesMut,
     /// Messages sent to a group, which may come back.
-    echoes: Recent,
+    pub(super) echoes: Recent,
     /// How long messages wait to be packed; `None` if they do not.
     patience: Option<Duration>,
-    /// The longest datagram to pack messages into; 0 if packing is off.
-    longest_packed: usize,
     config: Arc<Config>,
 }
 
@@ -89,26 +86,23 @@ impl Egress {
         };
         Self {
             links: BTreeMap::new(),
-            queues: Queues::default(),
-            turns: Turns::default(),
+            queues: Queues {
+                longest_packed,
+                ..Queues::default()
+            },
             waiting: Default::default(),
             fragmented: 0,
             buffer: BytesMut::with_capacity(BUFFER),
             echoes: Recent::new(config.max_recent, config.echo_window, keys),
             patience,
-            longest_packed,
             config,
         }
-    }
-
-    pub(super) fn add_link(&mut self, link: LinkId, profile: LinkProfile) {
-        self.links.insert(link, profile);
     }
 
     /// Removes a link; returns how many datagrams were queued on it.
     pub(super) fn remove_link(&mut self, link: LinkId) -> u64 {
         self.links.remove(&link);
-        self.turns.forget(|hop| hop.0 == link);
+        self.queues.forget_turns(link);
         let mut lost = 0;
         for (_, queue) in self.queues.known.extract_if(|hop, _| hop.0 == link) {
             for (priority, count) in Priority::ALL.into_iter().zip(queue.waiting()) {
@@ -122,24 +116,15 @@ impl Egress {
         lost as u64
     }
 
-    pub(super) fn links(&self) -> impl Iterator<Item = (LinkId, &LinkProfile)> {
-        self.links.iter().map(|(&link, profile)| (link, profile))
-    }
-
-    pub(super) fn has_link(&self, link: LinkId) -> bool {
-        self.links.contains_key(&link)
-    }
-
     /// The framing of a link.
     pub(super) fn framing(&self, link: LinkId) -> Framing {
         let profile = self.links.get(&link);
         profile.map_or(Framing::default(), |profile| profile.framing)
     }
 
-    /// The number of queues.
-    #[cfg(test)]
-    pub(super) fn len(&self) -> usize {
-        self.queues.known.len()
+    /// Whether a path leads through datagrams rather than a connection or line.
+    pub(super) fn is_datagram(&self, path: Path) -> bool {
+        self.framing(path.link) == Framing::Judp
     }
 
     /// Whether `count` more datagrams of a priority fit.
@@ -166,23 +151,18 @@ impl Egress {
         flags: Flags,
         octets: Bytes,
     ) -> Result<(), Counter> {
-        if !self.has_link(hop.0) {
-            return Err(Counter::LinkGone);
-        }
+        let link = self.links.get(&hop.0).ok_or(Counter::LinkGone)?;
         let priority = flags.priority();
         if !self.has_room(priority, 1) {
             return Err(Counter::TransmitQueueFull);
         }
         // A sender waits for the answer, so do not delay the message.
         let is_awaited = flags.acknowledgement() == Acknowledgement::Request;
-        let may_wait = !is_awaited && may_pack(&octets, self.longest_packed);
+        let may_wait = !is_awaited && link.packs() && may_pack(&octets, self.queues.longest_packed);
         let patience = self.patience.filter(|_| may_wait);
-        let packs = self.links.get(&hop.0).is_some_and(LinkProfile::packs);
-        let is_packed = patience.filter(|_| packs);
-        let held_until = is_packed.map(|patience| now + patience);
-        let queue = self.queues.get(now, hop);
-        queue.push(priority, octets, held_until);
-        self.turns.list(hop, queue, self.longest_packed);
+        let held_until = patience.map(|patience| now + patience);
+        self.queues
+            .change(now, hop, |queue| queue.push(priority, octets, held_until));
         self.waiting[usize::from(priority.bits())] += 1;
         Ok(())
     }
@@ -222,24 +202,13 @@ impl Egress {
         hop: Hop,
         message: FragmentedSend,
     ) -> Result<(), Counter> {
-        if !self.has_link(hop.0) {
+        if !self.links.contains_key(&hop.0) {
             return Err(Counter::LinkGone);
         }
         self.fragmented += message.remaining();
-        let queue = self.queues.get(now, hop);
-        queue.push_fragmented(message);
-        self.turns.list(hop, queue, self.longest_packed);
+        self.queues
+            .change(now, hop, |queue| queue.push_fragmented(message));
         Ok(())
-    }
-
-    /// Records a message of ours that goes to a group.
-    pub(super) fn remember_echo(&mut self, now: Instant, frame: &Frame) {
-        self.echoes.insert_own(now, frame);
-    }
-
-    /// Whether that message was recently sent to a group.
-    pub(super) fn is_echo(&self, now: Instant, seen: Fingerprint) -> bool {
-        self.echoes.contains(now, seen, self.config.echo_window)
     }
 
     /// The next datagram of a level, with everything packed or batched with it.
@@ -249,35 +218,34 @@ impl Egress {
         level: Level,
         counters: &mut Counters,
     ) -> Option<Transmit> {
-        while let Some(hop) = self.turns.ready[level.index()].pop_front() {
-            let queue = self.queues.get(now, hop);
-            queue.listed[level.index()] = false;
+        let longest_packed = self.queues.longest_packed;
+        while let Some(hop) = self.queues.ready[level.index()].pop_front() {
             let Some(link) = self.links.get(&hop.0) else {
                 continue;
             };
-            if !queue.is_ready(level, self.longest_packed) {
-                continue;
-            }
-            let joined = if level.is_fragments() {
-                let mut leaving = Fragments {
-                    now,
-                    framing: link.framing,
-                    echoes: (hop.1 == To::Group).then_some(&mut self.echoes),
-                    octets: &mut self.fragmented,
-                    counters,
-                };
-                queue.join_fragments(level, segments(link), &mut leaving, &mut self.buffer)
-            } else {
+            let joined = self.queues.change(now, hop, |queue| {
+                queue.listed[level.index()] = false;
+                if !queue.is_ready(level, longest_packed) {
+                    return None;
+                }
+                if level.is_fragments() {
+                    let leave = |fragment: &Frame| {
+                        self.fragmented -= fragment.payload.len();
+                        if hop.1 == To::Group {
+                            self.echoes.insert_own(now, fragment);
+                        }
+                    };
+                    let buffer = &mut self.buffer;
+                    return queue.join_fragments(now, level, link, buffer, counters, leave);
+                }
                 let before = queue.waiting();
-                let longest = if link.packs() { self.longest_packed } else { 0 };
-                let joined = queue.join_messages(level, segments(link), longest, &mut self.buffer);
-                let taken = before.into_iter().zip(queue.waiting());
-                for (waiting, (before, after)) in self.waiting.iter_mut().zip(taken) {
-                    *waiting -= before - after;
+                let longest = if link.packs() { longest_packed } else { 0 };
+                let joined = queue.join_messages(level, link.segments(), longest, &mut self.buffer);
+                for (at, after) in queue.waiting().into_iter().enumerate() {
+                    self.waiting[at] -= before[at] - after;
                 }
                 joined
-            };
-            self.turns.list(hop, queue, self.longest_packed);
+            });
             if let Some((payload, segment)) = joined {
                 let datagrams = segment.map_or(1, |segment| payload.len().div_ceil(segment));
                 counters.add_many(Counter::DatagramsSent, datagrams as u64);
@@ -295,71 +263,57 @@ impl Egress {
 
     /// Releases queues whose hold or pacing time has passed.
     pub(super) fn handle_timeout(&mut self, now: Instant) {
-        while let Some(&(due, hop)) = self.turns.timers.first()
+        while let Some(&(due, hop)) = self.queues.timers.first()
             && due <= now
         {
-            self.turns.timers.pop_first();
-            let queue = self.queues.get(now, hop);
-            queue.handle_timeout(now);
-            self.turns.list(hop, queue, self.longest_packed);
+            self.queues.timers.pop_first();
+            self.queues
+                .change(now, hop, |queue| queue.handle_timeout(now));
         }
     }
 
     /// When to call [`handle_timeout`](Self::handle_timeout).
     pub(super) fn next_deadline(&self) -> Option<Instant> {
-        self.turns.timers.first().map(|&(at, _)| at)
+        self.queues.timers.first().map(|&(at, _)| at)
     }
 }
 
-/// The queues; idle ones are kept for later use.
+/// The queues, with their schedule. Idle ones are kept for later use.
 #[derive(Debug, Default)]
-struct Queues {
-    known: HashMap<Hop, HopQueue>,
+pub(super) struct Queues {
+    pub(super) known: HashMap<Hop, HopQueue>,
     /// How many queues there were after the last sweep of idle ones.
     swept: usize,
-}
-
-impl Queues {
-    fn get(&mut self, now: Instant, hop: Hop) -> &mut HopQueue {
-        if self.known.len() >= IDLE_QUEUES.max(2 * self.swept) && !self.known.contains_key(&hop) {
-            self.known.retain(|_, queue| !queue.is_idle(now));
-            self.swept = self.known.len();
-        }
-        self.known.entry(hop).or_default()
-    }
-}
-
-/// The schedule of the queues.
-#[derive(Debug, Default)]
-struct Turns {
     /// Queues with something to send, by level; each is in a list at most once.
     ready: [VecDeque<Hop>; Level::COUNT],
     /// When held or paced queues may continue.
     timers: BTreeSet<(Instant, Hop)>,
+    /// The longest datagram to pack messages into; 0 if packing is off.
+    longest_packed: usize,
 }
 
-impl Turns {
-    /// Schedules a queue: its turns if it has something to send, its timer if that must wait.
-    fn list(&mut self, hop: Hop, queue: &mut HopQueue, longest_packed: usize) {
-        for level in queue.list(longest_packed) {
+impl Queues {
+    /// Changes a queue, and schedules it: its turns if it has something to send, its timer if that
+    /// must wait.
+    fn change<T>(&mut self, now: Instant, hop: Hop, change: impl FnOnce(&mut HopQueue) -> T) -> T {
+        if self.known.len() >= IDLE_QUEUES.max(2 * self.swept) && !self.known.contains_key(&hop) {
+            self.known.retain(|_, queue| !queue.is_idle(now));
+            self.swept = self.known.len();
+        }
+        let queue = self.known.entry(hop).or_default();
+        let changed = change(queue);
+        for level in queue.list(self.longest_packed) {
             self.ready[level.index()].push_back(hop);
         }
         self.timers.extend(queue.deadlines().map(|at| (at, hop)));
+        changed
     }
 
-    fn forget(&mut self, is_gone: impl Fn(&Hop) -> bool) {
-        self.timers.retain(|(_, hop)| !is_gone(hop));
+    fn forget_turns(&mut self, link: LinkId) {
+        self.timers.retain(|(_, hop)| hop.0 != link);
         for list in &mut self.ready {
-            list.retain(|hop| !is_gone(hop));
+            list.retain(|hop| hop.0 != link);
         }
-    }
-}
-
-/// How many datagrams a link sends with one call.
-fn segments(profile: &LinkProfile) -> usize {
-    match profile.framing {
-        Framing::Judp => profile.max_segments.max(1),
-        Framing::Jtcp | Framing::Jserial => 1,
     }
 }
 

@@ -26,10 +26,6 @@ impl Level {
         Self(PRIORITIES + priority.bits() as usize)
     }
 
-    fn all() -> impl Iterator<Item = Self> {
-        (0..Self::COUNT).map(Self)
-    }
-
     pub(super) const fn index(self) -> usize {
         self.0
     }
@@ -45,7 +41,7 @@ impl Level {
 
 /// The datagrams and fragments queued for one hop, by priority.
 #[derive(Debug, Default)]
-pub(super) struct HopQueue {
+pub(in crate::endpoint) struct HopQueue {
     pub(super) whole: [VecDeque<Bytes>; PRIORITIES],
     fragmented: [VecDeque<FragmentedSend>; PRIORITIES],
     /// By level, whether the queue is in the list of queues with something to send.
@@ -93,7 +89,7 @@ impl HopQueue {
         if self.whole.iter().all(VecDeque::is_empty) {
             self.held_until = None;
         }
-        Level::all().filter(move |level| {
+        (0..Level::COUNT).map(Level).filter(move |level| {
             let is_new = !self.listed[level.index()] && self.is_ready(*level, longest);
             self.listed[level.index()] |= is_new;
             is_new
@@ -110,7 +106,9 @@ impl HopQueue {
     ) -> Option<Frame> {
         let waiting = &mut self.fragmented[usize::from(level.priority().bits())];
         let message = waiting.front_mut()?;
-        if self.blocked_until.is_some() || !like.is_none_or(|like| message.continues(like)) {
+        let fits =
+            |(version, octets)| message.whole.version == version && message.next_len() <= octets;
+        if self.blocked_until.is_some() || !like.is_none_or(fits) {
             return None;
         }
         if let Some(pacing) = message.pacing
@@ -145,7 +143,8 @@ impl HopQueue {
     pub(super) fn fragments(&self) -> (usize, usize) {
         let messages = self.fragmented.iter().flatten();
         messages.fold((0, 0), |(count, octets), message| {
-            (count + message.fragments(), octets + message.remaining())
+            let left = message.cut.count() - message.next;
+            (count + left, octets + message.remaining())
         })
     }
 

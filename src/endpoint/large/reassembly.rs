@@ -22,7 +22,7 @@ use crate::endpoint::rate::Origin;
 use crate::endpoint::share::{Ages, Tally};
 use crate::endpoint::{Config, Counter, Counters};
 use crate::peer::LargeStyle;
-use crate::wire::{Acknowledgement, DataControl, Frame, Priority, Version, ra};
+use crate::wire::{Acknowledgement, DataControl, Frame, Priority, Version};
 
 /// The overhead of a piece, in octets.
 const PIECE_COST: usize = 64;
@@ -42,11 +42,9 @@ const MOST_HELD: usize = 4;
 /// What a fragment contributes to its message: the older headers repeat the code in each fragment.
 /// The payload keeps `held` octets alive.
 fn part_of_message(frame: &Frame, held: usize) -> Bytes {
-    let payload = match (frame.version, frame.flags.data()) {
-        (Version::As5669a, _) | (_, DataControl::First) => frame.payload.clone(),
-        (Version::As5669 | Version::Ra, _) => {
-            frame.payload.slice(ra::CODE_LEN.min(frame.payload.len())..)
-        }
+    let payload = match frame.flags.data() {
+        DataControl::First => frame.payload.clone(),
+        _ => frame.payload.slice(frame.repeated_code_len()..),
     };
     if held > payload.len().saturating_mul(MOST_HELD) {
         Bytes::copy_from_slice(&payload)
@@ -58,6 +56,8 @@ fn part_of_message(frame: &Frame, held: usize) -> Bytes {
 /// A message whose fragments have all arrived.
 #[derive(Debug)]
 pub(in crate::endpoint) struct Whole {
+    pub(in crate::endpoint) destination: JausId,
+    pub(in crate::endpoint) priority: Priority,
     pub(in crate::endpoint) payload: Bytes,
     /// How it was cut; standard unless another style is known or detected.
     pub(in crate::endpoint) style: LargeStyle,
@@ -101,14 +101,14 @@ impl Run {
     }
 
     /// Joins a run that has both ends; `known` is the sender's style, if known.
-    fn join(&self, known: Option<LargeStyle>) -> Whole {
+    fn join(&self, (destination, first): Place, known: Option<LargeStyle>) -> Whole {
         let (payload, style) = style::join(self.version, &self.pieces, known);
-        let after_first = (self.pieces.len() as u16).wrapping_sub(1);
-        let piece = self.pieces.front().cloned().unwrap_or_default();
         Whole {
+            destination,
+            priority: self.priority,
             payload,
             style,
-            first: (self.last.wrapping_sub(after_first), piece),
+            first: (first, self.pieces.front().cloned().unwrap_or_default()),
         }
     }
 
@@ -175,12 +175,14 @@ impl Sender {
     }
 
     /// The run that begins at this number, or else the nearest one before it.
-    fn at_or_before(&self, destination: JausId, sequence: u16) -> Option<Place> {
-        let from = (destination, 0);
-        let before = self.runs.range(from..=(destination, sequence)).next_back();
-        before
-            .or_else(|| self.runs.range(from..=(destination, u16::MAX)).next_back())
-            .map(|(&place, _)| place)
+    fn at_or_before(&self, destination: JausId, sequence: u16) -> Option<(Place, &Run)> {
+        let up_to = |last| {
+            self.runs
+                .range((destination, 0)..=(destination, last))
+                .next_back()
+        };
+        let run = up_to(sequence).or_else(|| up_to(u16::MAX));
+        run.map(|(&place, run)| (place, run))
     }
 
     fn is_stale(&self, run: &Run) -> bool {
@@ -202,21 +204,20 @@ impl Sender {
         self.runs.insert(place, run);
     }
 
-    /// Adds a fragment; returns the run if it is a complete message.
+    /// Adds a fragment; returns the run and its key if it is a complete message.
     fn take_in(
         &mut self,
         arrival: Arrival<'_>,
         max_message: usize,
         counters: &mut Counters,
-    ) -> Result<Option<Run>, Counter> {
+    ) -> Result<Option<(Place, Run)>, Counter> {
         let frame = arrival.frame;
         let (destination, sequence) = (frame.destination, frame.sequence);
         let data = frame.flags.data();
         let ahead = sequence.wrapping_sub(self.latest).cast_signed();
         self.latest = sequence;
         self.position += i64::from(ahead);
-        if let Some(place) = self.at_or_before(destination, sequence)
-            && let Some(known) = self.runs.get(&place)
+        if let Some((place, known)) = self.at_or_before(destination, sequence)
             && known.covers(place.1, sequence)
         {
             // Most retransmissions were filtered before, so this is a restarted sender; but a
@@ -248,18 +249,16 @@ impl Sender {
             self.take(place);
             return Err(Counter::MessageTooLong);
         }
-        Ok(if run.begins && run.ends {
-            self.take(place)
-        } else {
-            None
-        })
+        let is_whole = run.begins && run.ends;
+        let run = is_whole.then(|| self.take(place)).flatten();
+        Ok(run.map(|run| (place, run)))
     }
+
     /// Inserts a new fragment next to its neighbours; returns the key of the run that holds it.
     fn insert(&mut self, destination: JausId, first: u16, mut run: Run) -> Place {
         let mut place = (destination, first);
         let before = self.at_or_before(destination, first.wrapping_sub(1));
-        if let Some(before) = before
-            && let Some(known) = self.runs.get(&before)
+        if let Some((before, known)) = before
             && known.last.wrapping_add(1) == first
             && known.is_continued_by(&run)
             && !self.is_stale(known)
@@ -286,9 +285,8 @@ impl Sender {
 #[derive(Debug, Default)]
 pub(in crate::endpoint) struct Reassembly {
     senders: HashMap<JausId, Sender>,
-    /// The senders by the time since which they are idle, or an earlier one: those of each network
-    /// address and, under `None`, all.
-    listed: Ages<Option<Origin>>,
+    /// The senders by the time since which they are idle, or an earlier one.
+    listed: Ages<()>,
     cost: usize,
     /// The cost of each network address.
     shares: Tally<Origin>,
@@ -317,7 +315,7 @@ impl Reassembly {
         let source = frame.source;
         if let Entry::Vacant(vacant) = self.senders.entry(source) {
             vacant.insert(Sender::new(now, frame.sequence, path.into()));
-            self.enlist(path.into(), now, source);
+            self.listed.insert(path.into(), (), now, source);
         }
         let max_message = self.config.max_message;
         let inserted = self.change(source, |sender| -> Result<_, Counter> {
@@ -328,7 +326,7 @@ impl Reassembly {
         });
         self.keep_within_bounds(source, counters);
         let whole = inserted.unwrap_or(Ok(None))?;
-        Ok(whole.map(|run| run.join(style)))
+        Ok(whole.map(|(place, run)| run.join(place, style)))
     }
 
     /// Records a repeated fragment: its sender is still active.
@@ -342,7 +340,7 @@ impl Reassembly {
 
     /// Records that a message that wants an acknowledgement arrived from that network address.
     pub(in crate::endpoint) fn hear(&mut self, now: Instant, origin: Origin) {
-        if self.listed.oldest(&Some(origin)).is_some() {
+        if self.listed.oldest(Some(origin), ()).is_some() {
             self.heard.insert(origin, now);
         }
     }
@@ -361,22 +359,20 @@ impl Reassembly {
     pub(in crate::endpoint) fn awaits(&self, frame: &Frame) -> bool {
         let continues = matches!(frame.flags.data(), DataControl::Middle | DataControl::Last);
         let number = frame.sequence.wrapping_sub(1);
-        let run = self.senders.get(&frame.source).and_then(|sender| {
-            let place = sender.at_or_before(frame.destination, number)?;
-            sender.runs.get(&place).filter(|run| !sender.is_stale(run))
-        });
-        continues && run.is_some_and(|run| run.begins && !run.ends && run.last == number)
+        let is_begun = |sender: &Sender| {
+            let run = sender.at_or_before(frame.destination, number);
+            run.is_some_and(|(_, run)| {
+                run.begins && !run.ends && run.last == number && !sender.is_stale(run)
+            })
+        };
+        continues && self.senders.get(&frame.source).is_some_and(is_begun)
     }
 
     /// Finishes the large message whose end is shown by `number`, the sequence number of the next
-    /// whole message; returns it with its receiver and priority. JAUS++ does not mark the end of a
-    /// message that fills its fragments, and reuses the number of the last fragment for the next
-    /// message. See "no last fragment" in [`peer`](crate::peer#the-table).
-    pub(in crate::endpoint) fn finish(
-        &mut self,
-        source: JausId,
-        number: u16,
-    ) -> Option<(JausId, Priority, Whole)> {
+    /// whole message. JAUS++ does not mark the end of a message that fills its fragments, and
+    /// reuses the number of the last fragment for the next message. See "no last fragment" in
+    /// [`peer`](crate::peer#the-table).
+    pub(in crate::endpoint) fn finish(&mut self, source: JausId, number: u16) -> Option<Whole> {
         let sender = self.senders.get(&source)?;
         let from = (number, (JausId::from_u32(0), 0));
         let ending = sender.ends.range(from..).map_while(|&(last, place)| {
@@ -388,33 +384,26 @@ impl Reassembly {
         };
         let (place, _) = ending.take(MOST_ENDING).find(is_whole)?;
         let run = self.change(source, |sender| sender.take(place))??;
-        self.drop_if_empty(source);
-        let whole = run.join(Some(LargeStyle::RepeatedCode));
-        Some((place.0, run.priority, whole))
+        Some(run.join(place, Some(LargeStyle::RepeatedCode)))
     }
 
-    /// Changes a sender, and updates the accounts.
+    /// Changes a sender, and updates the accounts. A sender without runs is dropped.
     fn change<T>(&mut self, source: JausId, change: impl FnOnce(&mut Sender) -> T) -> Option<T> {
         let sender = self.senders.get_mut(&source)?;
         let before = sender.cost;
         let changed = change(sender);
-        let (origin, after) = (sender.origin, sender.cost);
+        let (origin, after, is_empty) = (sender.origin, sender.cost, sender.runs.is_empty());
         self.cost = self.cost + after - before;
         self.shares
             .set(origin, self.shares.of(origin) + after - before);
-        Some(changed)
-    }
-
-    fn drop_if_empty(&mut self, source: JausId) {
-        let sender = self.senders.get(&source);
-        if sender.is_some_and(|sender| sender.runs.is_empty()) {
+        if is_empty {
             self.list(source);
         }
+        Some(changed)
     }
 
     /// Drops the oldest runs, of this sender or of all, until all bounds are met.
     fn keep_within_bounds(&mut self, source: JausId, counters: &mut Counters) {
-        self.drop_if_empty(source);
         while let Some(sender) = self.senders.get(&source)
             && (sender.runs.len() > MAX_RUNS || sender.cost > self.config.max_reassembly_per_sender)
         {
@@ -422,27 +411,12 @@ impl Reassembly {
         }
         while self.cost > self.config.max_reassembly
             && let Some((_, origin)) = self.shares.largest()
-            && let Some((listed, source)) = self.listed.oldest(&Some(origin))
+            && let Some((listed, source)) = self.listed.oldest(Some(origin), ())
         {
             match self.senders.get(&source) {
                 Some(sender) if self.idle_since(sender) > listed => self.list(source),
                 _ => self.forget_oldest_of(source, counters),
             }
-        }
-    }
-
-    fn enlist(&mut self, origin: Origin, listed: Instant, source: JausId) {
-        for of in [None, Some(origin)] {
-            self.listed.insert(of, listed, source);
-        }
-    }
-
-    fn strike(&mut self, origin: Origin, listed: Instant, source: JausId) {
-        for of in [None, Some(origin)] {
-            self.listed.remove(of, listed, source);
-        }
-        if self.listed.oldest(&Some(origin)).is_none() {
-            self.heard.remove(&origin);
         }
     }
 
@@ -459,19 +433,17 @@ impl Reassembly {
 
     /// Lists a sender by the time since which it is idle, or drops it if it has no run.
     fn list(&mut self, source: JausId) {
-        let Some(sender) = self.senders.get(&source) else {
+        let Some(mut sender) = self.senders.remove(&source) else {
             return;
         };
-        let (origin, before, idle) = (sender.origin, sender.listed, self.idle_since(sender));
-        let is_empty = sender.runs.is_empty();
-        if is_empty {
-            self.senders.remove(&source);
-        } else if let Some(sender) = self.senders.get_mut(&source) {
-            sender.listed = idle;
-            self.enlist(origin, idle, source);
-        }
-        if is_empty || idle != before {
-            self.strike(origin, before, source);
+        let origin = sender.origin;
+        self.listed.remove(origin, (), sender.listed, source);
+        if !sender.runs.is_empty() {
+            sender.listed = self.idle_since(&sender);
+            self.listed.insert(origin, (), sender.listed, source);
+            self.senders.insert(source, sender);
+        } else if self.listed.oldest(Some(origin), ()).is_none() {
+            self.heard.remove(&origin);
         }
     }
 
@@ -479,7 +451,7 @@ impl Reassembly {
     /// while its sender keeps retransmitting one fragment and the others are acknowledged.
     pub(in crate::endpoint) fn expire(&mut self, now: Instant, counters: &mut Counters) {
         let timeout = self.config.reassembly_timeout;
-        while let Some((listed, source)) = self.listed.oldest(&None)
+        while let Some((listed, source)) = self.listed.oldest(None, ())
             && listed + timeout <= now
         {
             while let Some(sender) = self.senders.get(&source)
@@ -493,7 +465,7 @@ impl Reassembly {
 
     /// When the next run may expire.
     pub(in crate::endpoint) fn next_expiry(&self) -> Option<Instant> {
-        let (listed, _) = self.listed.oldest(&None)?;
+        let (listed, _) = self.listed.oldest(None, ())?;
         Some(listed + self.config.reassembly_timeout)
     }
 

@@ -1,15 +1,13 @@
 //! The challenges in progress: their deadlines, their limits and their outcome.
 
-use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use super::places::Standing;
-use super::{Challenge, Finding, Peers, RouteState, route};
+use super::route::{self, Finding};
+use super::{Challenge, PeerState, Peers, Probe, RouteState};
 use crate::address::JausId;
 use crate::endpoint::Path;
 use crate::endpoint::arrival::Arrival;
-use crate::endpoint::rate::Origin;
-use crate::endpoint::share::Tally;
 use crate::peer::Recogniser;
 
 /// The most challenges in progress.
@@ -24,67 +22,71 @@ const SETTLED: Duration = Duration::from_secs(2);
 /// How long a path that did not answer is not challenged again.
 const UNANSWERED: Duration = Duration::from_secs(10);
 
-/// The challenges in progress, by deadline, and the count for each network address.
-#[derive(Debug, Default)]
-pub(super) struct Challenges {
-    due: BTreeSet<(Instant, JausId)>,
-    shares: Tally<Origin>,
-}
-
-impl Challenges {
-    /// Whether traffic from an address may start one more challenge.
-    pub(super) fn has_room(&self, cause: Origin) -> bool {
-        self.due.len() < MOST && self.shares.of(cause) < MOST_OF_ADDRESS
-    }
+/// The decision of a challenge.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::endpoint) struct Decision {
+    /// The peer's path so far.
+    pub(in crate::endpoint) from: Path,
+    /// Its path from now on.
+    pub(in crate::endpoint) to: Path,
+    /// The rival's path, unless the peer is there now.
+    pub(in crate::endpoint) refused: Option<Path>,
 }
 
 impl Peers {
+    /// Whether traffic from a path may start one more challenge.
+    pub(super) fn has_room_for_challenge(&self, cause: Path) -> bool {
+        self.due.len() < MOST && self.caused.of(cause.into()) < MOST_OF_ADDRESS
+    }
+
     /// Whether traffic from a path may start a challenge of a peer now.
     pub(in crate::endpoint) fn may_challenge(&self, now: Instant, id: JausId, cause: Path) -> bool {
-        self.challenges.has_room(cause.into())
+        self.has_room_for_challenge(cause)
             && self.pin(id).is_none()
-            && self.states.get(&id).is_some_and(|state| {
+            && self.get(id).is_some_and(|state| {
                 let pause = state.unanswered.filter(|(at, _)| *at == cause);
                 let pauses = [state.settled_until, pause.map(|(_, until)| until)];
                 state.challenge.is_none() && pauses.into_iter().flatten().all(|until| until <= now)
             })
     }
 
-    pub(in crate::endpoint) fn is_challenged(&self, id: JausId) -> bool {
-        let state = self.states.get(&id);
-        state.is_some_and(|state| state.challenge.is_some())
+    /// The challenge of a peer in progress.
+    pub(in crate::endpoint) fn challenge(&self, id: JausId) -> Option<Challenge> {
+        self.get(id)?.challenge
     }
 
-    /// Begins a challenge of a peer.
+    /// Begins a challenge, sent by the component `local`, of a peer on its path, which may be
+    /// verified, and on the path of its rival.
     pub(in crate::endpoint) fn begin_challenge(
         &mut self,
         now: Instant,
         id: JausId,
-        challenge: Challenge,
+        local: JausId,
+        (incumbent, was_verified): (Probe, bool),
+        rival: Option<Probe>,
     ) {
-        let Some(state) = self.states.get_mut(&id) else {
-            return;
-        };
-        let silence = now.saturating_duration_since(state.heard_on_route);
-        let (incumbent, rival) = (challenge.incumbent.path, challenge.rival.map(|it| it.path));
-        let challenge = Challenge {
-            was_provisional: rival == Some(state.peer.path),
-            at_once: rival.is_some_and(|rival| rival.is_near(incumbent))
-                || silence >= route::SILENT,
-            due: now + route::TRY_INTERVAL,
-            ..challenge
-        };
-        self.challenges.due.insert((challenge.due, id));
-        self.challenges.shares.add(challenge.cause(), 1);
-        state.challenge = Some(challenge);
+        self.change(id, |state| {
+            let silence = now.saturating_duration_since(state.heard_on_route);
+            state.challenge = Some(Challenge {
+                local,
+                incumbent,
+                was_verified,
+                rival,
+                at_once: rival.is_some_and(|rival| rival.path.is_near(incumbent.path))
+                    || silence >= route::SILENT,
+                incumbent_heard: false,
+                tries: 1,
+                due: now + route::TRY_INTERVAL,
+            });
+        });
     }
 
-    /// Processes an acknowledgement that no message awaits. Returns the challenge that it belongs
-    /// to, if any, and its finding, if the acknowledgement decides it.
+    /// Processes an acknowledgement that no message awaits. Returns `None` if no challenge does
+    /// either, and the decision if this makes one.
     pub(in crate::endpoint) fn answer_challenge(
         &mut self,
         arrival: Arrival<'_>,
-    ) -> Option<(Challenge, Option<Finding>)> {
+    ) -> Option<Option<Decision>> {
         let (frame, now, path) = (arrival.frame, arrival.now, arrival.path);
         let state = self.states.get_mut(&frame.source)?;
         let challenge = state.challenge.as_mut()?;
@@ -100,78 +102,67 @@ impl Peers {
             state.also_at.push(path);
         }
         let finding = challenge.early_finding();
-        if let Some(finding) = finding {
-            self.settle(now, frame.source, finding);
-        } else if incumbent.answered && state.peer.path == incumbent.path {
+        if finding.is_none() && incumbent.answered && state.peer.path == incumbent.path {
             self.set_route(frame.source, incumbent.path, RouteState::Verified);
         }
+        let decision = finding.and_then(|finding| self.settle(now, frame.source, finding));
         self.raise(frame.source, Standing::Answered);
-        Some((challenge, finding))
+        Some(decision)
     }
 
-    /// The next challenge that is due: the peer, the challenge and its finding; `None` as finding
-    /// if it must be sent again.
+    /// The next peer whose challenge is due, and the decision; `None` if the challenge must be sent
+    /// again.
     pub(in crate::endpoint) fn next_due(
         &mut self,
         now: Instant,
-    ) -> Option<(JausId, Challenge, Option<Finding>)> {
-        let &(due, id) = self.challenges.due.first()?;
-        if due > now {
-            return None;
-        }
-        let challenge = self.states.get_mut(&id)?.challenge.as_mut()?;
-        let finding = challenge.handle_timeout(now);
-        let challenge = *challenge;
-        match finding {
-            Some(finding) => self.settle(now, id, finding),
-            None => {
-                self.challenges.due.remove(&(due, id));
-                self.challenges.due.insert((challenge.due, id));
-            }
-        }
-        Some((id, challenge, finding))
+    ) -> Option<(JausId, Option<Decision>)> {
+        let &(_, id) = self.due.first().filter(|(due, _)| *due <= now)?;
+        let finding = self.change(id, |state| state.challenge.as_mut()?.handle_timeout(now))?;
+        let decision = finding.and_then(|finding| self.settle(now, id, finding));
+        Some((id, decision))
     }
 
     /// When the next challenge is due.
     pub(in crate::endpoint) fn next_deadline(&self) -> Option<Instant> {
-        self.challenges.due.first().map(|&(due, _)| due)
+        self.due.first().map(|&(due, _)| due)
     }
 
-    /// Applies the finding of a challenge.
-    fn settle(&mut self, now: Instant, id: JausId, finding: Finding) {
-        let Some(challenge) = self.end_challenge(id) else {
-            return;
-        };
-        let Some(state) = self.states.get_mut(&id) else {
-            return;
-        };
-        let before = challenge.incumbent.path;
-        let (path, route) = match (finding, challenge.rival) {
+    /// Ends a challenge with this finding.
+    fn settle(&mut self, now: Instant, id: JausId, finding: Finding) -> Option<Decision> {
+        self.change(id, |state| state.settle(now, finding))?
+    }
+}
+
+impl PeerState {
+    fn settle(&mut self, now: Instant, finding: Finding) -> Option<Decision> {
+        let challenge = self.challenge.take()?;
+        let (known, from) = (challenge.incumbent.path, self.peer.path);
+        let mut refused = challenge.rival.map(|rival| rival.path);
+        let (path, route) = match (finding, refused) {
             (Finding::Moves { verified }, Some(rival)) => {
-                if !rival.path.is_near(before) {
-                    state.recogniser = Recogniser::new();
+                if !rival.is_near(known) {
+                    self.recogniser = Recogniser::new();
                 }
-                (rival.path, RouteState::of(verified))
+                refused = None;
+                (rival, RouteState::of(verified))
             }
-            (Finding::Stays, _) => (before, RouteState::Verified),
-            _ => (before, RouteState::of(challenge.was_verified)),
+            (Finding::Stays, _) => (known, RouteState::Verified),
+            _ => (known, RouteState::of(challenge.was_verified)),
         };
         // Programs that run one after the other may share an id. The next move may follow a
         // verified one at once, and an unanswered challenge must not delay a move.
         match finding {
             Finding::Moves { verified: true } => {}
             Finding::Unanswered if challenge.rival.is_none() => {
-                state.unanswered = Some((before, now + UNANSWERED));
+                self.unanswered = Some((known, now + UNANSWERED));
             }
-            _ => state.settled_until = Some(now + SETTLED),
+            _ => self.settled_until = Some(now + SETTLED),
         }
-        self.set_route(id, path, route);
-    }
-
-    pub(super) fn end_challenge(&mut self, id: JausId) -> Option<Challenge> {
-        let challenge = self.states.get_mut(&id)?.challenge.take()?;
-        self.challenges.due.remove(&(challenge.due, id));
-        self.challenges.shares.subtract(challenge.cause(), 1);
-        Some(challenge)
+        (self.peer.path, self.peer.route) = (path, route);
+        Some(Decision {
+            from,
+            to: path,
+            refused,
+        })
     }
 }

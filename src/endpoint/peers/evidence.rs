@@ -21,45 +21,37 @@ impl Peers {
     }
 
     fn assigned_or(&self, id: JausId, by: fn(&Recogniser) -> peer::Peer) -> peer::Peer {
-        let recognised = || self.states.get(&id).map(|state| by(&state.recogniser));
-        let assigned = Assignment::find(&self.config.profiles, id);
-        assigned.or_else(recognised).unwrap_or_default()
+        let recognised = || self.get(id).map(|state| by(&state.recogniser));
+        self.assigned(id).or_else(recognised).unwrap_or_default()
+    }
+
+    fn assigned(&self, id: JausId) -> Option<peer::Peer> {
+        Assignment::find(&self.config.profiles, id)
     }
 
     /// Whether to avoid answering a peer on the TCP connections that it opened: its profile says
     /// so, or it shows the habit that goes with it.
     pub(in crate::endpoint) fn is_deaf_on_its_connections(&self, id: JausId) -> bool {
-        let is_by_habit = || {
-            let state = self.states.get(&id);
-            state.is_some_and(|state| state.recogniser.repeats_version())
-        };
-        let assigned = Assignment::find(&self.config.profiles, id);
-        self.profile(id).is_deaf_on_its_connections() || assigned.is_none() && is_by_habit()
+        let has_habit = |state: &PeerState| state.recogniser.repeats_version();
+        self.profile(id).is_deaf_on_its_connections()
+            || self.assigned(id).is_none() && self.get(id).is_some_and(has_habit)
     }
 
     /// How a peer cuts large messages, if known. A peer configured as standard cuts them as the
     /// standard says.
     pub(in crate::endpoint) fn large_style(&self, id: JausId) -> Option<LargeStyle> {
         let style = self.profile(id).large_style();
-        let assigned = || Assignment::find(&self.config.profiles, id);
-        style.or_else(|| assigned().map(|_| LargeStyle::Standard))
+        style.or_else(|| self.assigned(id).map(|_| LargeStyle::Standard))
     }
 
-    /// Whether large messages to a peer repeat the code in each fragment. Any sender can make a
-    /// peer look as if it wanted that, so its address must be verified.
-    pub(in crate::endpoint) fn wants_repeated_code(&self, id: JausId) -> bool {
-        self.large_style(id) == Some(LargeStyle::RepeatedCode) && self.trusts_evidence(id)
-    }
-
-    /// Whether large messages to a peer must wait until it is known how to cut them.
-    pub(in crate::endpoint) fn awaits_proof(&self, id: JausId) -> bool {
-        self.large_style(id) == Some(LargeStyle::RepeatedCode) && !self.trusts_evidence(id)
-    }
-
-    fn trusts_evidence(&self, id: JausId) -> bool {
+    /// Whether large messages to a peer repeat the code in each fragment; `None` if they must wait
+    /// for an answer. Any sender can make a peer look as if it wanted that, so its address must be
+    /// verified.
+    pub(in crate::endpoint) fn repeats_code(&self, id: JausId) -> Option<bool> {
         let is_verified = |state: &PeerState| state.peer.route == RouteState::Verified;
-        Assignment::find(&self.config.profiles, id).is_some()
-            || self.states.get(&id).is_some_and(is_verified)
+        let repeats = self.large_style(id) == Some(LargeStyle::RepeatedCode);
+        let is_sure = || self.assigned(id).is_some() || self.get(id).is_some_and(is_verified);
+        (!repeats || is_sure()).then_some(repeats)
     }
 
     /// Passes evidence other than an accepted frame, which arrived on path `from`, to the peer's

@@ -9,21 +9,21 @@ mod places;
 mod route;
 mod state;
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use std::time::Instant;
 
 use super::arrival::Arrival;
 use super::rate::Origin;
-use super::share::Tally;
+use super::share::{Ages, Tally};
 use super::{Config, Counter, LinkId, Path, StaticPeer};
 use crate::address::JausId;
 use crate::wire::{Frame, Version};
-use challenges::Challenges;
-use places::{Place, Places, Standing};
+pub(super) use challenges::Decision;
+use places::Standing;
 pub use route::RouteState;
 use route::has_own_number;
-pub(super) use route::{CHALLENGE, CHALLENGE_FLAGS, Challenge, Finding, Probe, is_challenge};
+pub(super) use route::{CHALLENGE, CHALLENGE_FLAGS, Challenge, Probe, is_challenge};
 use state::PeerState;
 pub use state::{Peer, Traffic};
 
@@ -50,11 +50,19 @@ pub(super) enum Heard {
 #[derive(Debug, Default)]
 pub(super) struct Peers {
     states: HashMap<JausId, PeerState>,
-    places: Places,
+    /// The eviction order. It catches up with the times at which peers were heard only during a
+    /// search, so that receiving a message costs nothing.
+    order: Ages<Standing>,
+    /// The number of peers of each network address.
+    held: Tally<Origin>,
     /// The number of verified peers on each path.
     proven: Tally<Path>,
-    challenges: Challenges,
-    configured: Vec<StaticPeer>,
+    /// The challenges in progress, by deadline.
+    due: BTreeSet<(Instant, JausId)>,
+    /// The number of challenges that each network address has caused.
+    caused: Tally<Origin>,
+    /// Peers with a configured address.
+    pub(super) configured: Vec<StaticPeer>,
     config: Arc<Config>,
 }
 
@@ -67,28 +75,61 @@ impl Peers {
         }
     }
 
-    pub(super) fn configure(&mut self, peers: Vec<StaticPeer>) {
-        self.configured = peers;
-    }
-
     fn is_full(&self) -> bool {
         self.states.len() >= self.config.max_peers.max(1)
     }
 
-    pub(super) fn knows(&self, id: JausId) -> bool {
-        self.states.contains_key(&id)
+    /// The record of a peer, if its address is known.
+    pub(super) fn get(&self, id: JausId) -> Option<&PeerState> {
+        self.states.get(&id)
+    }
+
+    /// Adds a record, and enters it in the accounts.
+    fn insert(&mut self, mut state: PeerState) {
+        let (id, path) = (state.peer.id, state.peer.path);
+        state.placed = state.peer.last_heard;
+        self.order
+            .insert(path.into(), state.standing, state.placed, id);
+        self.held.add(path.into(), 1);
+        if state.peer.route == RouteState::Verified {
+            self.proven.add(path, 1);
+        }
+        if let Some(challenge) = &state.challenge {
+            self.due.insert((challenge.due, id));
+            self.caused.add(challenge.cause(), 1);
+        }
+        self.states.insert(id, state);
+    }
+
+    /// Removes a record, also from the accounts.
+    pub(super) fn remove(&mut self, id: JausId) -> Option<PeerState> {
+        let state = self.states.remove(&id)?;
+        let path = state.peer.path;
+        self.order
+            .remove(path.into(), state.standing, state.placed, id);
+        self.held.subtract(path.into(), 1);
+        if state.peer.route == RouteState::Verified {
+            self.proven.subtract(path, 1);
+        }
+        if let Some(challenge) = &state.challenge {
+            self.due.remove(&(challenge.due, id));
+            self.caused.subtract(challenge.cause(), 1);
+        }
+        Some(state)
+    }
+
+    /// Changes a record in a way that matters to the accounts.
+    fn change<T>(&mut self, id: JausId, change: impl FnOnce(&mut PeerState) -> T) -> Option<T> {
+        let mut state = self.remove(id)?;
+        let changed = change(&mut state);
+        self.insert(state);
+        Some(changed)
     }
 
     /// Whether we have neither sent to a peer nor received an acknowledgement from it.
     pub(super) fn is_stranger(&self, id: JausId) -> bool {
-        let state = self.states.get(&id);
-        state.is_none_or(|state| state.place.standing == Standing::Heard)
-    }
-
-    /// A peer's path, and when it was last heard on any path.
-    pub(super) fn last_heard(&self, id: JausId) -> Option<(Path, Instant)> {
-        let peer = &self.states.get(&id)?.peer;
-        Some((peer.path, peer.last_heard))
+        let has_history = |state: &PeerState| state.standing > Standing::Heard;
+        !self.get(id).is_some_and(has_history)
     }
 
     /// The peers' paths on a link, possibly with repetitions.
@@ -116,7 +157,7 @@ impl Peers {
     /// Whether a peer is verified at another host than this path's, and not at this path's host as
     /// well.
     pub(super) fn is_proven_elsewhere(&self, id: JausId, from: Path) -> bool {
-        self.states.get(&id).is_some_and(|state| {
+        self.get(id).is_some_and(|state| {
             let mut proven = state.also_at.iter().chain([&state.peer.path]);
             state.peer.route == RouteState::Verified && !proven.any(|path| path.is_near(from))
         })
@@ -140,10 +181,10 @@ impl Peers {
         let pin = self.pin(frame.source);
         let path = pin.unwrap_or(arrival.path);
         let number = self.counted_on(frame);
-        let can_challenge = can_challenge && self.challenges.has_room(arrival.path.into());
+        let can_challenge = can_challenge && self.has_room_for_challenge(arrival.path);
         let Some(state) = self.states.get_mut(&frame.source) else {
             let route = RouteState::of(is_stream || pin.is_some());
-            return self.take_in(Arrival { path, ..arrival }, route, number);
+            return self.take_in(PeerState::new(Arrival { path, ..arrival }, route, number));
         };
         let silence = now.saturating_duration_since(state.peer.last_heard);
         state.peer.received.add(frame.payload.len());
@@ -202,69 +243,44 @@ impl Peers {
     }
 
     /// Adds a peer, if there is room.
-    fn take_in(
-        &mut self,
-        arrival: Arrival<'_>,
-        route: RouteState,
-        number: Option<u32>,
-    ) -> Result<Heard, Counter> {
-        let (id, now, path) = (arrival.frame.source, arrival.now, arrival.path);
+    fn take_in(&mut self, state: PeerState) -> Result<Heard, Counter> {
         let mut evicted = None;
         if self.is_full() {
-            let oldest = self.next_to_go(now, path.into());
-            self.forget(oldest.ok_or(Counter::PeersFull)?);
+            let oldest = self.next_to_go(state.peer.last_heard, state.peer.path.into());
+            self.remove(oldest.ok_or(Counter::PeersFull)?);
             evicted = oldest;
         }
-        let place = Place {
-            standing: Standing::Heard,
-            origin: path.into(),
-            heard: now,
-        };
-        self.places.insert(id, place);
-        let state = PeerState::new(arrival, number, place);
-        self.states.insert(id, state);
-        self.set_route(id, path, route);
+        self.insert(state);
         Ok(Heard::New { evicted })
     }
 
     /// Changes the path and state of a peer's route.
     fn set_route(&mut self, id: JausId, path: Path, route: RouteState) {
-        let Some(state) = self.states.get_mut(&id) else {
-            return;
-        };
-        if state.peer.route == RouteState::Verified {
-            self.proven.subtract(state.peer.path, 1);
-        }
-        if route == RouteState::Verified {
-            self.proven.add(path, 1);
-        }
-        (state.peer.path, state.peer.route) = (path, route);
-        let Place {
-            standing, origin, ..
-        } = state.place;
-        if origin != Origin::from(path) {
-            self.place_anew(id, standing);
-        }
+        self.change(id, |state| {
+            (state.peer.path, state.peer.route) = (path, route);
+        });
     }
 
     /// Records that a peer has acknowledged a message. If the acknowledgement came on its route,
     /// the route is verified.
     pub(super) fn verify(&mut self, id: JausId, from: Path) {
         self.raise(id, Standing::Answered);
-        if let Some(state) = self.states.get(&id)
+        if let Some(state) = self.get(id)
             && state.peer.path == from
             && !state.has_rival()
             && state.peer.route != RouteState::Verified
         {
-            self.set_route(id, from, RouteState::Verified);
-            self.end_challenge(id);
+            self.change(id, |state| {
+                state.peer.route = RouteState::Verified;
+                state.challenge = None;
+            });
         }
     }
 
     /// Marks a route as stale if the peer was silent since `since`, while a message waited for its
     /// acknowledgement.
     pub(super) fn lose(&mut self, id: JausId, since: Instant) {
-        if let Some(state) = self.states.get(&id)
+        if let Some(state) = self.get(id)
             && state.peer.last_heard < since
             && self.pin(id).is_none()
         {
@@ -284,10 +300,7 @@ impl Peers {
     /// candidate nearest to the sender's latest.
     fn counted_on(&self, frame: &Frame) -> Option<u32> {
         const FIRST_ROUND: u32 = 1 << 16;
-        let latest = self
-            .states
-            .get(&frame.source)
-            .and_then(|state| state.latest);
+        let latest = self.get(frame.source).and_then(|state| state.latest);
         let latest = latest.unwrap_or(FIRST_ROUND | u32::from(frame.sequence));
         let ahead = frame.sequence.wrapping_sub(latest as u16) as i16;
         has_own_number(frame).then(|| latest.wrapping_add_signed(ahead.into()))
@@ -309,7 +322,7 @@ impl Peers {
     /// The path and header for `id`, if known. A configured address takes precedence over a learned
     /// one.
     pub(super) fn route(&self, id: JausId) -> Option<(Path, Version)> {
-        let learned = self.states.get(&id).map(|state| &state.peer);
+        let learned = self.get(id).map(|state| &state.peer);
         let known = learned.filter(|peer| peer.route != RouteState::Stale);
         let path = self.pin(id).or_else(|| known.map(|peer| peer.path))?;
         Some((path, self.version(id)))
@@ -317,8 +330,8 @@ impl Peers {
 
     /// The header that a peer reads.
     pub(super) fn version(&self, id: JausId) -> Version {
-        let learned = self.states.get(&id);
-        learned.map_or(Version::As5669a, |state| state.peer.version)
+        self.get(id)
+            .map_or(Version::As5669a, |state| state.peer.version)
     }
 
     /// The addresses that get a copy of a broadcast to `destination`.
@@ -331,28 +344,18 @@ impl Peers {
             .collect()
     }
 
-    pub(super) fn forget(&mut self, id: JausId) {
-        self.end_challenge(id);
-        if let Some(state) = self.states.remove(&id) {
-            self.places.remove(id, state.place);
-            if state.peer.route == RouteState::Verified {
-                self.proven.subtract(state.peer.path, 1);
-            }
-        }
-    }
-
     /// Forgets the routes on paths that are gone.
     pub(super) fn forget_paths(&mut self, gone: impl Fn(Path) -> bool) {
         let ids: Vec<_> = self.states.keys().copied().collect();
         for id in ids {
-            let Some(state) = self.states.get(&id) else {
+            let Some(state) = self.get(id) else {
                 continue;
             };
             let mut probes = state.challenge.iter().flat_map(Challenge::probes);
             if gone(state.peer.path) {
-                self.forget(id);
+                self.remove(id);
             } else if probes.any(|probe| gone(probe.path)) {
-                self.end_challenge(id);
+                self.change(id, |state| state.challenge = None);
             }
         }
     }
@@ -371,13 +374,7 @@ impl Peers {
 
 /// Whether two ids, each possibly with wildcards, overlap.
 fn overlap(one: JausId, other: JausId) -> bool {
-    let fits = |a: u16, b: u16, any: u16| a == b || a == any || b == any;
-    let (any_node, any_component) = (JausId::ANY_NODE.into(), JausId::ANY_COMPONENT.into());
-    fits(one.subsystem(), other.subsystem(), JausId::ANY_SUBSYSTEM)
-        && fits(one.node().into(), other.node().into(), any_node)
-        && fits(
-            one.component().into(),
-            other.component().into(),
-            any_component,
-        )
+    let fields = |id: JausId| [id.subsystem(), id.node().into(), id.component().into()];
+    let (one, other, any) = (fields(one), fields(other), fields(JausId::EVERYONE));
+    (0..3).all(|at| one[at] == other[at] || [one[at], other[at]].contains(&any[at]))
 }

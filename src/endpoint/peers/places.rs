@@ -9,15 +9,15 @@
 
 use std::time::{Duration, Instant};
 
-use super::Peers;
+use super::{PeerState, Peers};
 use crate::address::JausId;
 use crate::endpoint::Path;
 use crate::endpoint::rate::Origin;
-use crate::endpoint::share::{Ages, Tally};
 
 /// Our history with a peer, which determines the eviction order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Standing {
+    #[default]
     Heard,
     SpokenTo,
     /// It has acknowledged one of our messages.
@@ -36,41 +36,6 @@ impl Standing {
     }
 }
 
-/// A peer's position in the eviction order.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    pub(super) standing: Standing,
-    pub(super) origin: Origin,
-    /// When the peer was last heard before it got this position.
-    pub(super) heard: Instant,
-}
-
-/// The eviction order. It catches up with the times at which peers were heard only during a search,
-/// so that receiving a message costs nothing.
-#[derive(Debug, Default)]
-pub(super) struct Places {
-    /// Each peer by its network address and, under `None`, among all peers.
-    order: Ages<(Option<Origin>, Standing)>,
-    /// How many peers each network address holds.
-    held: Tally<Origin>,
-}
-
-impl Places {
-    pub(super) fn insert(&mut self, id: JausId, place: Place) {
-        for of in [None, Some(place.origin)] {
-            self.order.insert((of, place.standing), place.heard, id);
-        }
-        self.held.add(place.origin, 1);
-    }
-
-    pub(super) fn remove(&mut self, id: JausId, place: Place) {
-        for of in [None, Some(place.origin)] {
-            self.order.remove((of, place.standing), place.heard, id);
-        }
-        self.held.subtract(place.origin, 1);
-    }
-}
-
 impl Peers {
     /// Whether an id is known or can be added: there is room, or a peer can be evicted.
     pub(in crate::endpoint) fn has_room_for(
@@ -79,15 +44,15 @@ impl Peers {
         id: JausId,
         from: Path,
     ) -> bool {
-        self.knows(id) || !self.is_full() || self.next_to_go(now, from.into()).is_some()
+        self.get(id).is_some() || !self.is_full() || self.next_to_go(now, from.into()).is_some()
     }
 
     /// The peer to evict for a new one from a network address. An address that holds a quarter of
     /// the table gets no more of it, and makes room for addresses that hold less.
     pub(super) fn next_to_go(&mut self, now: Instant, newcomer: Origin) -> Option<JausId> {
         let limit = self.config.max_peers;
-        let (most, holder) = self.places.held.largest()?;
-        let own = self.places.held.of(newcomer);
+        let (most, holder) = self.held.largest()?;
+        let own = self.held.of(newcomer);
         let (is_excessive, own_is) = (most * 4 > limit, own * 4 > limit);
         if most > own + 1 {
             let found = Standing::ALL.into_iter().find_map(|standing| {
@@ -119,32 +84,19 @@ impl Peers {
         silence: Duration,
     ) -> Option<JausId> {
         loop {
-            let (heard, id) = self.places.order.oldest(&(of, standing))?;
-            if self.states.get(&id)?.peer.last_heard > heard {
-                self.place_anew(id, standing);
+            let (heard, id) = self.order.oldest(of, standing)?;
+            if self.get(id)?.peer.last_heard > heard {
+                self.change(id, |_| ());
                 continue;
             }
             return (now.saturating_duration_since(heard) >= silence).then_some(id);
         }
     }
 
-    /// Updates a peer's position.
-    pub(super) fn place_anew(&mut self, id: JausId, standing: Standing) {
-        if let Some(state) = self.states.get_mut(&id) {
-            self.places.remove(id, state.place);
-            state.place = Place {
-                standing,
-                origin: state.peer.path.into(),
-                heard: state.peer.last_heard,
-            };
-            self.places.insert(id, state.place);
-        }
-    }
-
     pub(super) fn raise(&mut self, id: JausId, standing: Standing) {
-        let state = self.states.get(&id);
-        if state.is_some_and(|state| state.place.standing < standing) {
-            self.place_anew(id, standing);
+        let is_below = |state: &PeerState| state.standing < standing;
+        if self.get(id).is_some_and(is_below) {
+            self.change(id, |state| state.standing = standing);
         }
     }
 }

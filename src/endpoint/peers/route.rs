@@ -57,12 +57,11 @@ pub(in crate::endpoint) struct Challenge {
     /// The local component that sends it.
     pub(in crate::endpoint) local: JausId,
     /// On the peer's known path.
-    pub(in crate::endpoint) incumbent: Probe,
+    pub(super) incumbent: Probe,
+    /// Whether that path was verified before.
     pub(super) was_verified: bool,
     /// On the other path where its id is heard; `None` if the only path is to be verified.
-    pub(in crate::endpoint) rival: Option<Probe>,
-    /// Whether messages go to the rival in the meantime.
-    pub(in crate::endpoint) was_provisional: bool,
+    pub(super) rival: Option<Probe>,
     /// Whether the first answer decides, without waiting for the other path.
     pub(super) at_once: bool,
     pub(super) incumbent_heard: bool,
@@ -72,7 +71,7 @@ pub(in crate::endpoint) struct Challenge {
 
 /// The outcome of a challenge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::endpoint) enum Finding {
+pub(super) enum Finding {
     /// The peer is on its known path, and has proven it.
     Stays,
     /// Nothing new is known.
@@ -82,27 +81,6 @@ pub(in crate::endpoint) enum Finding {
 }
 
 impl Challenge {
-    /// A challenge of a peer whose route on the incumbent's path `was_verified`.
-    pub(in crate::endpoint) const fn new(
-        now: Instant,
-        local: JausId,
-        incumbent: Probe,
-        was_verified: bool,
-        rival: Option<Probe>,
-    ) -> Self {
-        Self {
-            local,
-            incumbent,
-            was_verified,
-            rival,
-            was_provisional: false,
-            at_once: false,
-            incumbent_heard: false,
-            tries: 1,
-            due: now,
-        }
-    }
-
     /// The network address that caused it.
     pub(super) fn cause(&self) -> Origin {
         self.rival.unwrap_or(self.incumbent).path.into()
@@ -125,14 +103,11 @@ impl Challenge {
         true
     }
 
-    fn rival_answered(&self) -> bool {
-        self.rival.is_some_and(|rival| rival.answered)
-    }
-
     /// The finding after an answer, unless the other path still has time to answer.
     pub(super) fn early_finding(&self) -> Option<Finding> {
         // If nothing is at stake, both have time to answer: a peer may be reachable on two paths.
-        match (self.incumbent.answered, self.rival_answered()) {
+        let rival_answered = self.rival.is_some_and(|rival| rival.answered);
+        match (self.incumbent.answered, rival_answered) {
             (true, true) => Some(Finding::Stays),
             (true, false) if self.at_once || self.rival.is_none() => Some(Finding::Stays),
             (false, true) if self.at_once => Some(Finding::Moves { verified: true }),

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::places::Place;
+use super::places::Standing;
 use super::{Challenge, RouteState};
 use crate::address::JausId;
 use crate::endpoint::Path;
@@ -79,10 +79,11 @@ impl RouteState {
 
 /// The record of a peer.
 #[derive(Debug)]
-pub(super) struct PeerState {
-    pub(super) peer: Peer,
-    /// Its position in the eviction order.
-    pub(super) place: Place,
+pub(in crate::endpoint) struct PeerState {
+    pub(in crate::endpoint) peer: Peer,
+    pub(super) standing: Standing,
+    /// When it was last heard before it got its place in the eviction order.
+    pub(super) placed: Instant,
     /// Its latest sequence number, extended over all rounds; `None` before the first.
     pub(super) latest: Option<u32>,
     /// The evidence of what it is.
@@ -99,7 +100,7 @@ pub(super) struct PeerState {
 }
 
 impl PeerState {
-    pub(super) fn new(arrival: Arrival<'_>, number: Option<u32>, place: Place) -> Self {
+    pub(super) fn new(arrival: Arrival<'_>, route: RouteState, number: Option<u32>) -> Self {
         let (frame, now, path) = (arrival.frame, arrival.now, arrival.path);
         let mut received = Traffic::default();
         received.add(frame.payload.len());
@@ -109,7 +110,7 @@ impl PeerState {
             peer: Peer {
                 id: frame.source,
                 path,
-                route: RouteState::Unverified,
+                route,
                 version: frame.version,
                 first_heard: now,
                 last_heard: now,
@@ -121,7 +122,8 @@ impl PeerState {
                 lost: 0,
                 round_trip: None,
             },
-            place,
+            standing: Standing::Heard,
+            placed: now,
             latest: number,
             recogniser,
             also_at: Vec::new(),

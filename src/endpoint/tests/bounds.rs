@@ -179,5 +179,5 @@ fn without_pacing_destinations_are_forgotten_too() {
             .unwrap();
         assert_eq!(rig.transmits().len(), 4);
     }
-    assert!(rig.endpoint.egress.len() <= 128);
+    assert!(rig.endpoint.egress.queues.known.len() <= 128);
 }

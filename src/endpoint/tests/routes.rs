@@ -166,7 +166,7 @@ fn a_peer_is_followed_to_a_new_port_after_its_old_one_has_not_answered_a_challen
         rig.pass(Duration::from_millis(300));
     }
     assert!(
-        !rig.endpoint.peers.is_challenged(PEER),
+        rig.endpoint.peers.challenge(PEER).is_none(),
         "the challenge has timed out"
     );
     rig.transmits();
@@ -205,14 +205,14 @@ fn who_starts_many_challenges_keeps_nobody_else_from_being_challenged() {
     rig.transmits();
     rig.hear(&again(1));
     rig.hear_from(PEER_HOST + 1, &again(2));
-    assert!(rig.endpoint.peers.is_challenged(PEER));
+    assert!(rig.endpoint.peers.challenge(PEER).is_some());
     // Unanswered challenges end soon, and their places are free again.
     rig.pass(Duration::from_secs(2));
     rig.pass(Duration::from_secs(2));
     let source = invented(499);
     rig.hear_from(ELSEWHERE, &Frame { source, ..again(3) });
     rig.hear_from(ELSEWHERE + 1, &Frame { source, ..again(4) });
-    assert!(rig.endpoint.peers.is_challenged(source));
+    assert!(rig.endpoint.peers.challenge(source).is_some());
 }
 
 #[test]
@@ -411,7 +411,7 @@ fn a_forged_sign_does_not_change_how_messages_are_cut() {
         for _try in 0..4 {
             rig.pass(Duration::from_millis(300));
         }
-        rig.endpoint.peers.wants_repeated_code(PEER)
+        rig.endpoint.peers.repeats_code(PEER) == Some(true)
     };
     assert!(codes_to(true, PEER_HOST), "the peer itself");
     assert!(!codes_to(true, ELSEWHERE), "somebody else");

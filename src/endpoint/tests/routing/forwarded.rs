@@ -89,7 +89,10 @@ fn a_repeated_message_is_passed_on_again_and_a_copy_from_elsewhere_is_not() {
     between.hear(0, 7, &once);
     assert_eq!(between.sent().len(), 1, "nobody waits for it");
     let known = between.world.whereabouts(between.router, A).unwrap();
-    assert_eq!(known.peer, SocketAddr::from(([10, 0, 0, 7], judp::PORT)));
+    assert_eq!(
+        known.peer,
+        Remote::Socket(SocketAddr::from(([10, 0, 0, 7], judp::PORT)))
+    );
 }
 
 fn acknowledged(destination: JausId) -> Frame {

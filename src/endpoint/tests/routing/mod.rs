@@ -114,7 +114,7 @@ impl World {
             for (to, plug) in self.plugs.iter().enumerate() {
                 let reached = match transmit.to {
                     To::Group => plug.framing == Framing::Judp || to != from,
-                    To::Peer(peer) => peer == plug.address,
+                    To::Peer(peer) => peer == plug.address.into(),
                 };
                 if plug.network == network && reached {
                     self.flying.push_back((from, to, transmit.payload.clone()));
