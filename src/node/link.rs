@@ -5,7 +5,6 @@ use std::task::{Context, Poll};
 use std::time::Instant;
 
 use super::components::Components;
-use crate::address::JausId;
 use crate::endpoint::{Endpoint, Ingress, LinkId, LinkProfile, Path, Remote, Transmit};
 use crate::link::Slab;
 #[cfg(unix)]
@@ -52,12 +51,10 @@ impl Link {
     /// Its message framing.
     pub(super) const fn framing(&self) -> Framing {
         match self {
-            Self::Udp(_) => Framing::Judp,
-            #[cfg(unix)]
-            Self::Junior(_) => Framing::Judp,
             Self::Tcp(_) => Framing::Jtcp,
             #[cfg(feature = "serial")]
             Self::Serial(_) => Framing::Jserial,
+            _ => Framing::Judp,
         }
     }
 
@@ -112,15 +109,6 @@ impl Link {
             Self::Junior(link) => link.hang_up(),
             Self::Tcp(link) => link.hang_up(),
             _ => Poll::Ready(()),
-        }
-    }
-
-    /// Notes that a component is gone.
-    pub(super) fn release(&mut self, id: JausId) {
-        match self {
-            #[cfg(unix)]
-            Self::Junior(link) => link.release(id),
-            _ => {}
         }
     }
 

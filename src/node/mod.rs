@@ -33,7 +33,6 @@
 //! # }
 //! ```
 
-mod answers;
 mod awaiting;
 mod components;
 mod config;

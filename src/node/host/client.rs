@@ -10,7 +10,7 @@ use std::time::Duration;
 use tokio::sync::{Notify, watch};
 use tokio::time::{sleep, timeout};
 
-use super::super::awaiting::{Awaiting, Waiter};
+use super::super::awaiting::{Awaiting, MAX_AWAITED, Waiter};
 use super::super::events::EventSender;
 use super::super::mailbox::Mailbox;
 use super::super::{HostError, SendError, Undelivered};
@@ -24,8 +24,6 @@ use crate::wire::{Acknowledgement, Flags};
 /// Limit of octets that wait for the node. A single larger message is accepted if nothing else
 /// waits.
 const MAX_WAITING: usize = 4 << 20;
-/// Limit of messages that wait for an acknowledgement.
-const MAX_AWAITED: usize = 4096;
 /// Required room in the mailbox before a read: about the largest number of messages in one read.
 const ROOM: usize = 1024;
 /// How long a component that does not read delays what follows, such as the outcomes of its own
@@ -76,7 +74,7 @@ impl Client {
                 writer: attached.writer,
                 max_message: attached.max_message,
                 sent: 0,
-                awaited: Awaiting::new(MAX_AWAITED),
+                awaited: Awaiting::default(),
             }),
             mailbox: Arc::new(Mailbox::new(host.limits)),
             events: EventSender::new(),

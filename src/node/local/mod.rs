@@ -166,35 +166,31 @@ fn full_id(config: &Config, version: u8, wanted: JausId) -> Result<JausId, Refus
         return Err((Reason::Version, why));
     }
     let (subsystem, node) = (config.subsystem, config.node);
-    let of_node = JausId::new(subsystem, node, wanted.component());
-    match (wanted.subsystem(), wanted.node()) {
-        (0, 0) => Ok(of_node),
-        _ if wanted == of_node => Ok(of_node),
-        _ => {
-            let why = format!(
-                "{wanted} does not belong to this node, whose components are \
-                 {subsystem}.{node}.1 to {subsystem}.{node}.254"
-            );
-            Err((Reason::WrongId, why))
-        }
+    let names_node = (wanted.subsystem(), wanted.node()) != (0, 0);
+    let id = JausId::new(subsystem, node, wanted.component());
+    if names_node && wanted != id {
+        let why = format!(
+            "{wanted} does not belong to this node, whose components are {subsystem}.{node}.1 to \
+             {subsystem}.{node}.254"
+        );
+        return Err((Reason::WrongId, why));
     }
+    Ok(id)
 }
 
 fn refusal(error: &AttachError, holder: Option<Process>) -> Refusal {
-    let reason = match error {
+    let words = error.to_string();
+    match error {
         AttachError::AlreadyAttached(id) => {
-            let holder = match holder {
-                Some(process) => process.to_string(),
-                None => format!("the node itself (process {})", std::process::id()),
-            };
+            let itself = || format!("the node itself (process {})", std::process::id());
+            let holder = holder.map_or_else(itself, |process| process.to_string());
             let why = format!("{id} is used by {holder}: choose another component number");
-            return (Reason::Taken, why);
+            (Reason::Taken, why)
         }
-        AttachError::TooMany { .. } => Reason::TooMany,
-        AttachError::Link(_) => Reason::Taken,
-        _ => Reason::WrongId,
-    };
-    (reason, error.to_string())
+        AttachError::TooMany { .. } => (Reason::TooMany, words),
+        AttachError::Link(_) => (Reason::Taken, words),
+        _ => (Reason::WrongId, words),
+    }
 }
 
 impl From<Error> for Departure {

@@ -8,12 +8,11 @@
 //! them wait, so nothing here grows without bound.
 
 use std::future::{pending, poll_fn};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use super::super::answers::Answers;
-use super::super::awaiting::Waiter;
+use super::super::awaiting::{Answers, Waiter};
 use super::super::components::{ComponentEvent, Departure};
 use super::super::core::{Core, LAST_WORDS, Shared};
 use super::super::mailbox::Mailbox;
@@ -50,7 +49,7 @@ impl Session {
     ) -> Self {
         Self {
             shared,
-            answers: Arc::new(Answers::new(writer)),
+            answers: Arc::new(Answers(Mutex::new(writer))),
             id,
             process,
             mailbox,
