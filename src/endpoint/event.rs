@@ -94,7 +94,7 @@ pub enum Event {
         other: Path,
     },
     /// A peer was forgotten because the table is full:
-    /// [`Config::max_peers`](super::Config::max_peers).
+    /// [`Limits::max_peers`](super::Limits::max_peers).
     PeerForgotten {
         /// The peer.
         id: JausId,

@@ -70,11 +70,12 @@ pub use delivery::FlowStatus;
 pub(crate) use egress::MOST_OCTETS;
 pub use egress::{Pacing, Packing};
 pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};
+pub use forward::Routing;
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use local::AttachError;
 pub use peers::{Peer, RouteState, Traffic};
 pub(crate) use rate::quota_address;
-pub use rate::{Buckets, Rate, Rates};
+pub use rate::{Buckets, Limits, Rate};
 pub use send::SendError;
 pub use sink::{Ingress, Sink};
 
@@ -132,8 +133,8 @@ impl Endpoint {
             components: Components::default(),
             peers: Peers::new(config.clone()),
             numbers: Numbers::after(config.first_sequence),
-            gate: Gate::new(&config.rates, config.max_peers),
-            unverified: Buckets::new(config.unverified_address, config.max_peers),
+            gate: Gate::new(&config.limits),
+            unverified: Buckets::new(config.unverified_address, config.limits.max_peers),
             unverified_total: Buckets::new(config.unverified_total, 1),
             warnings: Warnings::default(),
             probes: 0,

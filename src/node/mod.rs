@@ -56,7 +56,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 pub use self::components::{ComponentEvent, Departure};
-pub use self::config::{Config, ConfigError, Delivery, Limits, Listen, Peer, Routing, Tcp, units};
+pub use self::config::{Config, ConfigError, Delivery, Listen, Peer, Tcp, units};
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::events::EventStream;
 pub use self::host::{Host, HostEvent, HostEvents};
@@ -64,7 +64,7 @@ pub use self::mailbox::{MailboxCounters, MailboxLimits};
 pub use self::port::{Port, Sender};
 pub use self::resident::Resident;
 pub use self::tap::{Content, Passage, Tap, Tapped, Way};
-pub use crate::endpoint::AttachError;
+pub use crate::endpoint::{AttachError, Limits, Routing};
 pub use crate::link::local::{Address, Local, Process};
 
 use self::core::Shared;

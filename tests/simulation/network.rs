@@ -8,7 +8,7 @@ use std::time::Duration;
 use crate::sim::{Conditions, Host, Mailbox, Network};
 use bytes::{BufMut, Bytes, BytesMut};
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Counter, Endpoint, Event, Outgoing, Unacknowledged};
+use jaus::endpoint::{Config, Counter, Endpoint, Event, Limits, Outgoing, Unacknowledged};
 
 const ONE: JausId = JausId::new(101, 1, 1);
 const OTHER: JausId = JausId::new(102, 1, 1);
@@ -311,7 +311,10 @@ fn a_cut_wire_is_told_and_heals() {
 fn a_flood_of_invented_peers_is_bounded_and_leaves_the_node_working() {
     let mut network = Network::new(7, Conditions::good());
     let config = Config {
-        max_peers: 50,
+        limits: Limits {
+            max_peers: 50,
+            ..Limits::default()
+        },
         ..Config::default()
     };
     let victim = network.join(endpoint_with(OTHER, config), Mailbox::default());

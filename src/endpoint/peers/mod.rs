@@ -72,7 +72,7 @@ impl Peers {
     }
 
     fn is_full(&self) -> bool {
-        self.states.len() >= self.config.max_peers.max(1)
+        self.states.len() >= self.config.limits.max_peers.max(1)
     }
 
     pub(super) fn knows(&self, id: JausId) -> bool {

@@ -303,9 +303,9 @@ fn unfinished_messages_are_bounded_per_sender_and_in_all() {
 fn what_invented_senders_leave_behind_is_bounded() {
     let config = Config {
         max_reassembly: 1 << 20,
-        rates: Rates {
-            new_ids: Rate::new(u32::MAX, u32::MAX),
-            ..Rates::default()
+        limits: Limits {
+            new_ids_per_address: Rate::new(u32::MAX, u32::MAX),
+            ..Limits::default()
         },
         ..Config::default()
     };
