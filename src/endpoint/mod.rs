@@ -69,7 +69,7 @@ pub use delivery::FlowStatus;
 #[cfg(feature = "node")]
 pub(crate) use egress::MOST_OCTETS;
 pub use egress::{Pacing, Packing};
-pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};
+pub use event::{Event, MessageHandle, Outgoing, Received, Shortfall, Unacknowledged};
 pub use forward::Routing;
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use local::AttachError;

@@ -56,21 +56,7 @@ impl Awaiting {
     pub(super) fn handle_event(&mut self, event: &Event) {
         let (message, outcome) = match *event {
             Event::Acknowledged { message, .. } => (message, Ok(())),
-            Event::NotAcknowledged {
-                message,
-                destination,
-                reason,
-                acknowledged,
-                length,
-            } => {
-                let undelivered = Undelivered::NotAcknowledged {
-                    destination,
-                    reason,
-                    acknowledged,
-                    length,
-                };
-                (message, Err(undelivered))
-            }
+            Event::NotAcknowledged { message, shortfall } => (message, Err(shortfall.into())),
             _ => return,
         };
         if let Some(waiter) = self.remove(message) {
@@ -113,26 +99,12 @@ impl Waiter {
 impl Answers {
     /// Sends the outcome of a message.
     pub(super) fn send(&self, handle: u64, outcome: Result<(), Undelivered>) {
-        let octets = |octets: usize| u32::try_from(octets).unwrap_or(u32::MAX);
-        let outcome = match outcome {
-            Ok(()) => Outcome::Acknowledged,
-            Err(Undelivered::NotAcknowledged {
-                destination,
-                reason,
-                acknowledged,
-                length,
-            }) => Outcome::NotAcknowledged {
-                destination,
-                reason,
-                acknowledged: octets(acknowledged),
-                length: octets(length),
-            },
-            Err(error) => {
-                let rejected = Record::rejected(handle, &error.to_string());
-                return self.lock().send(&rejected);
-            }
-        };
-        self.lock().send(&Head::Outcome { handle, outcome }.into());
+        let record = |outcome| Head::Outcome { handle, outcome }.into();
+        self.lock().send(&match outcome {
+            Ok(()) => record(Outcome::Acknowledged),
+            Err(Undelivered::NotAcknowledged(it)) => record(Outcome::NotAcknowledged(it)),
+            Err(error) => Record::rejected(handle, &error.to_string()),
+        });
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Writer> {

@@ -191,11 +191,11 @@ impl Core {
         survey: &Survey,
     ) -> (Vec<(LinkId, Link)>, Vec<Interface>) {
         if self.stopped {
-            return (Vec::new(), Vec::new());
+            return Default::default();
         }
         let (gone, came) = self.links.retire(survey);
-        for (id, _) in &gone {
-            self.endpoint.remove_link(*id);
+        for &(id, _) in &gone {
+            self.endpoint.remove_link(id);
         }
         (gone, came)
     }

@@ -56,7 +56,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 pub use self::components::{ComponentEvent, Departure};
-pub use self::config::{Config, ConfigError, Delivery, Listen, Peer, Tcp, units};
+pub use self::config::{Config, ConfigError, Delivery, Peer, Tcp, units};
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::events::EventStream;
 pub use self::host::{Host, HostEvent, HostEvents};

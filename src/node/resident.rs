@@ -42,12 +42,10 @@ impl Resident {
 
     /// Waits until the node is stopping.
     pub async fn closing(&self) {
-        match self.0.clone() {
-            Some(mut closing) => {
-                // An error means that the node is gone.
-                let _ = closing.wait_for(|closing| *closing).await;
-            }
-            None => std::future::pending().await,
-        }
+        let Some(mut closing) = self.0.clone() else {
+            return std::future::pending().await;
+        };
+        // An error means that the node is gone.
+        let _ = closing.wait_for(|closing| *closing).await;
     }
 }

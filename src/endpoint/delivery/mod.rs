@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 
 use tracing::debug;
 
-use super::{Config, Counter, Endpoint, Event, MessageHandle, Path, SendError};
+use super::{Config, Counter, Endpoint, Event, MessageHandle, Path, SendError, Shortfall};
 use crate::address::JausId;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, Priority, Version};
 use flow::{Flow, Outcome};
@@ -375,10 +375,12 @@ impl Endpoint {
                 },
                 Some(reason) => Event::NotAcknowledged {
                     message,
-                    destination,
-                    reason,
-                    acknowledged: outcome.acknowledged,
-                    length: outcome.length,
+                    shortfall: Shortfall {
+                        destination,
+                        reason,
+                        acknowledged: outcome.acknowledged,
+                        length: outcome.length,
+                    },
                 },
             });
         }

@@ -131,10 +131,12 @@ fn a_large_message_with_acknowledgement_is_told_when_all_of_it_is_acknowledged()
         rig.events(),
         [Event::NotAcknowledged {
             message,
-            destination: PEER,
-            reason: Unacknowledged::TimedOut,
-            acknowledged: 1425,
-            length: 1425 * 3,
+            shortfall: Shortfall {
+                destination: PEER,
+                reason: Unacknowledged::TimedOut,
+                acknowledged: 1425,
+                length: 1425 * 3,
+            },
         }]
     );
     assert_eq!(rig.endpoint.poll_timeout(), None);

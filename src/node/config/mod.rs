@@ -48,6 +48,7 @@ mod tcp;
 mod tests;
 pub mod units;
 
+use std::net::SocketAddr;
 #[cfg(unix)]
 use std::path::PathBuf;
 
@@ -55,7 +56,7 @@ pub use self::delivery::Delivery;
 pub use self::error::ConfigError;
 use self::error::{in_range, not_zero};
 pub use self::peer::Peer;
-pub use self::tcp::{Listen, Tcp};
+pub use self::tcp::Tcp;
 use super::mailbox::MailboxLimits;
 use crate::address::JausId;
 use crate::endpoint::{self, Access, Limits, PAYLOAD_LIMITS, Pacing, Routing};
@@ -248,7 +249,7 @@ impl Config {
 
     /// Accepts TCP connections at this address.
     #[must_use]
-    pub fn tcp_listen(mut self, at: Listen) -> Self {
+    pub const fn tcp_listen(mut self, at: SocketAddr) -> Self {
         self.tcp.listen = Some(at);
         self
     }

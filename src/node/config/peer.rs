@@ -39,18 +39,16 @@ impl FromStr for Peer {
     type Err = ConfigError;
 
     fn from_str(text: &str) -> Result<Self, ConfigError> {
-        let (id, place) = match text.split_once('@') {
-            Some((id, place)) => (
-                Some(id.parse::<JausId>().map_err(ConfigError::PeerId)?),
-                place,
-            ),
-            None => (None, text),
-        };
-        let place: Option<Place> = place.parse().ok();
-        place
-            .filter(|place| !place.lacks_zone())
-            .map(|place| Self { id, place })
-            .ok_or_else(|| ConfigError::Peer(text.to_owned()))
+        let named = text.split_once('@');
+        let (id, place) = named.map_or((None, text), |(id, place)| (Some(id), place));
+        let id = id
+            .map(str::parse)
+            .transpose()
+            .map_err(ConfigError::PeerId)?;
+        let place = place.parse().ok();
+        let place = place.filter(|place: &Place| !place.lacks_zone());
+        let place = place.ok_or_else(|| ConfigError::Peer(text.to_owned()))?;
+        Ok(Self { id, place })
     }
 }
 

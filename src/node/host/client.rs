@@ -331,17 +331,7 @@ impl Client {
     fn handle_outcome(&self, handle: u64, outcome: Outcome, record: &Record) {
         let outcome = match outcome {
             Outcome::Acknowledged => Ok(()),
-            Outcome::NotAcknowledged {
-                reason,
-                destination,
-                acknowledged,
-                length,
-            } => Err(Undelivered::NotAcknowledged {
-                destination,
-                reason,
-                acknowledged: acknowledged as usize,
-                length: length as usize,
-            }),
+            Outcome::NotAcknowledged(shortfall) => Err(shortfall.into()),
             Outcome::Rejected => Err(Undelivered::Rejected(record.text())),
         };
         let message = MessageHandle(handle);
