@@ -62,13 +62,14 @@ use std::hash::RandomState;
 use std::sync::Arc;
 use std::time::Instant;
 
+pub use crate::peer::Pacing;
 pub use access::{Access, AccessError, Network, Subsystems};
 pub use config::{Config, PAYLOAD_LIMITS, StaticPeer, first_sequence_at};
 pub use counters::{Counter, Counters};
 pub use delivery::FlowStatus;
 #[cfg(feature = "node")]
 pub(crate) use egress::MOST_OCTETS;
-pub use egress::{Pacing, Packing};
+pub use egress::Packing;
 pub use event::{Event, MessageHandle, Outgoing, Received, Shortfall, Unacknowledged};
 pub use forward::Routing;
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};

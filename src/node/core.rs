@@ -70,7 +70,7 @@ impl Shared {
             config,
             core: Mutex::new(Core::new(endpoint, links)),
             stopped: watch::Sender::new(false),
-            residents: Residents::new(),
+            residents: Residents::default(),
             local_place,
             listening: watch::Sender::new(()),
             commons: Mutex::default(),
@@ -152,7 +152,8 @@ pub(super) struct Core {
     /// Messages sent since the last [`pump`](Self::pump).
     gathered: usize,
     driver: Option<Waker>,
-    stop_at: Option<Instant>,
+    /// When it has to have stopped, once it shuts down.
+    pub(super) stop_at: Option<Instant>,
     stopped: bool,
 }
 
@@ -220,10 +221,6 @@ impl Core {
             }
             self.components.remove(id, why);
         }
-    }
-
-    pub(super) const fn is_stopping(&self) -> bool {
-        self.stop_at.is_some()
     }
 
     /// Sends a message. If it requests an acknowledgement, `waiter` gets the outcome.

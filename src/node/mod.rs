@@ -72,7 +72,7 @@ use self::driver::Driver;
 use self::follower::follow;
 use self::link::Link;
 use self::links::Links;
-use self::local::Server;
+use self::local::serve;
 use crate::address::JausId;
 use crate::endpoint::{self, Event, LinkId};
 use crate::link::interface::Changes;
@@ -126,7 +126,11 @@ impl Node {
         if let Some(listener) = listener {
             let place = listener.place();
             tracing::info!(place, "components of this host may attach");
-            runtime.spawn(Server::new(listener, shared.clone()).run());
+            runtime.spawn(serve(
+                shared.clone(),
+                shared.listening.subscribe(),
+                listener,
+            ));
         }
         let guard = Arc::new(Guard(shared));
         Ok(Self { guard })

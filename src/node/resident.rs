@@ -9,14 +9,10 @@ use tokio::sync::watch;
 const LIMIT: Duration = Duration::from_secs(1);
 
 /// Tells the residents of a node whether it is about to stop. Each has a receiver.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Residents(watch::Sender<bool>);
 
 impl Residents {
-    pub(super) fn new() -> Self {
-        Self(watch::Sender::new(false))
-    }
-
     pub(super) fn admit(&self) -> Resident {
         Resident(Some(self.0.subscribe()))
     }

@@ -8,7 +8,7 @@
 //! them wait, so nothing here grows without bound.
 
 use std::future::{pending, poll_fn};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ use super::super::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::{Outgoing, Received};
 use crate::link::local::record::{Head, Record, RecordError};
-use crate::link::local::{Error, Process, Reader, Writer};
+use crate::link::local::{Error, Process, Reader};
 use crate::wire::{Acknowledgement, Flags};
 
 /// Octets collected for one write.
@@ -32,30 +32,14 @@ const STUCK: Duration = Duration::from_secs(2);
 /// An attached component.
 #[derive(Debug)]
 pub(super) struct Session {
-    shared: Arc<Shared>,
-    answers: Arc<Answers>,
-    id: JausId,
-    process: Process,
-    mailbox: Arc<Mailbox>,
+    pub(super) shared: Arc<Shared>,
+    pub(super) answers: Arc<Answers>,
+    pub(super) id: JausId,
+    pub(super) process: Process,
+    pub(super) mailbox: Arc<Mailbox>,
 }
 
 impl Session {
-    pub(super) fn new(
-        shared: Arc<Shared>,
-        writer: Writer,
-        id: JausId,
-        process: Process,
-        mailbox: Arc<Mailbox>,
-    ) -> Self {
-        Self {
-            shared,
-            answers: Arc::new(Answers(Mutex::new(writer))),
-            id,
-            process,
-            mailbox,
-        }
-    }
-
     /// Serves the component until it is gone or the node has stopped.
     pub(super) async fn run(self, mut reader: Reader) {
         let end = async {
