@@ -43,7 +43,8 @@ impl Awaiting {
         waiter: Waiter,
     ) -> bool {
         if self.0.len() >= MAX_AWAITED {
-            self.0.retain(|_, (_, waiter)| waiter.waits());
+            let has_left = |waiter: &Waiter| matches!(waiter, Waiter::Here(it) if it.is_closed());
+            self.0.retain(|_, (_, waiter)| !has_left(waiter));
         }
         let has_room = self.0.len() < MAX_AWAITED;
         if has_room {
@@ -85,13 +86,6 @@ impl Waiter {
             // An error means that the sender no longer waits.
             Self::Here(sender) => drop(sender.send(outcome)),
             Self::There { answers, handle } => answers.send(handle, outcome),
-        }
-    }
-
-    fn waits(&self) -> bool {
-        match self {
-            Self::Here(sender) => !sender.is_closed(),
-            Self::There { .. } => true,
         }
     }
 }

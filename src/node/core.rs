@@ -162,9 +162,9 @@ impl Core {
         let mut core = Self {
             endpoint,
             links,
-            components: Components::new(),
+            components: Components::default(),
             awaiting: Awaiting::default(),
-            events: EventSender::new(),
+            events: EventSender::default(),
             slab: Slab::new(),
             gathered: 0,
             driver: None,

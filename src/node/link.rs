@@ -152,11 +152,7 @@ impl Link {
             Self::Junior(link) => link.receive(cx, now, slab, |datagram| {
                 let path = from(Remote::Line);
                 components.taps.datagram(path, &datagram);
-                let ingress = Ingress {
-                    path,
-                    to_all: false,
-                };
-                endpoint.handle_datagram(now, ingress, datagram, components);
+                endpoint.handle_datagram(now, path, datagram, components);
             }),
             Self::Tcp(link) => link.receive(cx, now, |arrival| match arrival {
                 Arrival::Frame {

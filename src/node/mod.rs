@@ -172,21 +172,19 @@ impl Node {
     /// not call it many times a second.
     #[must_use]
     pub fn links(&self) -> Vec<LinkReport> {
-        let report = |(id, link): (LinkId, &udp::UdpLink)| LinkReport {
-            link: id,
-            interface: link.interface().clone(),
-            local: link.local(),
-            group: link.group(),
-            counters: *link.counters(),
-            kernel_drops: None,
+        let report = |(link, udp): (LinkId, &udp::UdpLink)| {
+            let report = LinkReport {
+                link,
+                interface: udp.interface().clone(),
+                local: udp.local(),
+                group: udp.group(),
+                counters: *udp.counters(),
+                kernel_drops: None,
+            };
+            (report, udp.inodes().to_vec())
         };
-        let (mut reports, inodes): (Vec<_>, Vec<_>) = {
-            let core = self.shared().lock();
-            let links = core.links.udp();
-            links
-                .map(|(id, link)| (report((id, link)), link.inodes().to_vec()))
-                .unzip()
-        };
+        let reports = self.shared().lock().links.udp().map(report).unzip();
+        let (mut reports, inodes): (Vec<_>, Vec<_>) = reports;
         // Without the lock, which must not be held during system calls for information.
         let drops = udp::kernel_drops(inodes.iter().map(Vec::as_slice));
         for (report, drops) in reports.iter_mut().zip(drops) {

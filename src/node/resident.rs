@@ -27,15 +27,11 @@ impl Residents {
 }
 
 /// Keeps a stopping node running for a moment, until this is dropped.
+// `None` for the node of another process, which does not wait.
 #[derive(Debug)]
-pub struct Resident(Option<watch::Receiver<bool>>);
+pub struct Resident(pub(super) Option<watch::Receiver<bool>>);
 
 impl Resident {
-    /// For the node of another process, which does not wait.
-    pub(super) const fn elsewhere() -> Self {
-        Self(None)
-    }
-
     /// Waits until the node is stopping.
     pub async fn closing(&self) {
         let Some(mut closing) = self.0.clone() else {

@@ -103,16 +103,12 @@ impl Peer {
     /// ```
     #[must_use]
     pub fn confuses(self, one: JausId, other: JausId) -> bool {
-        self == Self::Jts && one != other && same_octets(one, other)
+        // It compares octet by octet, with 0 and 255 matching any.
+        let is_any = |octet| [0, 0xFF].contains(&octet);
+        let mut octets = one.to_wire().into_iter().zip(other.to_wire());
+        let are_same = octets.all(|(a, b)| a == b || is_any(a) || is_any(b));
+        self == Self::Jts && one != other && are_same
     }
-}
-
-/// Whether two ids are equal octet by octet, with 0 and 255 matching any octet.
-fn same_octets(one: JausId, other: JausId) -> bool {
-    let octets = one.to_wire().into_iter().zip(other.to_wire());
-    octets
-        .into_iter()
-        .all(|(a, b)| a == b || [a, b].iter().any(|it| [0, 0xFF].contains(it)))
 }
 
 /// The payload of each JAUS++ fragment except the last, in octets: the code and 1571 more.

@@ -297,7 +297,10 @@ impl Config {
         }
         #[cfg(feature = "serial")]
         validate_serial(&self.serial)?;
-        self.tcp.validate()?;
+        if self.tcp.listen.is_some() {
+            not_zero("tcp.max_accepted", self.tcp.max_accepted)?;
+            not_zero("tcp.max_per_address", self.tcp.max_per_address)?;
+        }
         limits::validate(&self.routing, &self.limits)?;
         self.delivery.validate()?;
         Ok(self.udp().validate()?)

@@ -4,8 +4,9 @@
 use std::net::IpAddr;
 use std::net::SocketAddr;
 
-use super::error::not_zero;
-use super::{ConfigError, Peer};
+#[cfg(feature = "serde")]
+use super::ConfigError;
+use super::Peer;
 use crate::endpoint::Access;
 #[cfg(feature = "serde")]
 use crate::link::STANDARD_PORT;
@@ -53,15 +54,6 @@ impl Tcp {
     /// Whether TCP is in use.
     pub(in crate::node) const fn is_used(&self) -> bool {
         self.listen.is_some() || !self.connect.is_empty()
-    }
-
-    /// Checks that a listener can accept connections.
-    pub(super) fn validate(&self) -> Result<(), ConfigError> {
-        if self.listen.is_some() {
-            not_zero("tcp.max_accepted", self.max_accepted)?;
-            not_zero("tcp.max_per_address", self.max_per_address)?;
-        }
-        Ok(())
     }
 
     /// The settings of the link; `access` limits which addresses may connect.

@@ -81,7 +81,7 @@ impl Client {
                 awaited: Awaiting::default(),
             }),
             mailbox: Arc::new(Mailbox::new(host.limits)),
-            events: EventSender::new(),
+            events: EventSender::default(),
             status: watch::Sender::new(Status::Connected),
             emptied: Notify::new(),
         });

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use super::super::awaiting::{Answers, Waiter};
 use super::super::components::{ComponentEvent, Departure};
-use super::super::core::{Core, LAST_WORDS, Shared};
+use super::super::core::{LAST_WORDS, Shared};
 use super::super::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::{Outgoing, Received};
@@ -154,25 +154,20 @@ impl Session {
                         acknowledge: flags.acknowledgement() == Acknowledgement::Request,
                         payload,
                     };
+                    let waiter = message.acknowledge.then(|| Waiter::There {
+                        answers: self.answers.clone(),
+                        handle,
+                    });
                     let core = core.get_or_insert_with(|| self.shared.lock());
-                    self.transmit(core, message, handle);
+                    if let Err(error) = core.send(message, waiter) {
+                        self.answers.send(handle, Err(error.into()));
+                    }
                 }
                 Head::Leave => return Ok(true),
                 _ => return Err(RecordError::Unexpected),
             }
         }
         Ok(false)
-    }
-
-    /// Sends a message, and reports an error to the component.
-    fn transmit(&self, core: &mut Core, message: Outgoing, handle: u64) {
-        let waiter = message.acknowledge.then(|| Waiter::There {
-            answers: self.answers.clone(),
-            handle,
-        });
-        if let Err(error) = core.send(message, waiter) {
-            self.answers.send(handle, Err(error.into()));
-        }
     }
 }
 
