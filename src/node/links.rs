@@ -192,10 +192,8 @@ impl Links {
         let mut placed = BTreeMap::<_, Vec<_>>::new();
         for peer in self.config.peers.iter().filter(|peer| peer.id().is_none()) {
             let address = peer.address();
-            placed
-                .entry(self.link_to(address))
-                .or_default()
-                .push(address);
+            let others = placed.entry(self.link_to(address)).or_default();
+            others.push(address);
         }
         for (&id, link) in &mut self.open {
             if let Link::Udp(link) = link {

@@ -126,11 +126,8 @@ impl Node {
         if let Some(listener) = listener {
             let place = listener.place();
             tracing::info!(place, "components of this host may attach");
-            runtime.spawn(serve(
-                shared.clone(),
-                shared.listening.subscribe(),
-                listener,
-            ));
+            let listening = shared.listening.subscribe();
+            runtime.spawn(serve(shared.clone(), listening, listener));
         }
         let guard = Arc::new(Guard(shared));
         Ok(Self { guard })
@@ -183,8 +180,8 @@ impl Node {
             };
             (report, udp.inodes().to_vec())
         };
-        let reports = self.shared().lock().links.udp().map(report).unzip();
-        let (mut reports, inodes): (Vec<_>, Vec<_>) = reports;
+        let (mut reports, inodes): (Vec<_>, Vec<_>) =
+            self.shared().lock().links.udp().map(report).unzip();
         // Without the lock, which must not be held during system calls for information.
         let drops = udp::kernel_drops(inodes.iter().map(Vec::as_slice));
         for (report, drops) in reports.iter_mut().zip(drops) {

@@ -27,9 +27,11 @@ impl Residents {
 }
 
 /// Keeps a stopping node running for a moment, until this is dropped.
-// `None` for the node of another process, which does not wait.
 #[derive(Debug)]
-pub struct Resident(pub(super) Option<watch::Receiver<bool>>);
+pub struct Resident(
+    /// `None` for the node of another process, which does not wait.
+    pub(super) Option<watch::Receiver<bool>>,
+);
 
 impl Resident {
     /// Waits until the node is stopping.

@@ -1,7 +1,7 @@
 //! Configured peers: an address and, if known, an id.
 
 use std::fmt;
-use std::net::{SocketAddr, SocketAddrV4};
+use std::net::SocketAddr;
 use std::str::FromStr;
 
 use super::ConfigError;
@@ -58,15 +58,6 @@ impl fmt::Display for Peer {
             write!(f, "{id}@")?;
         }
         self.place.fmt(f)
-    }
-}
-
-impl From<SocketAddrV4> for Peer {
-    fn from(address: SocketAddrV4) -> Self {
-        Self {
-            id: None,
-            place: SocketAddr::V4(address).into(),
-        }
     }
 }
 
