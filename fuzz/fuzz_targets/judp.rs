@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::{
-    Config, Endpoint, LinkId, LinkProfile, Outgoing, Pacing, Packing, Path, Rate, Rates,
+    Config, Endpoint, Limits, LinkId, LinkProfile, Outgoing, Pacing, Packing, Path, Rate, Routing,
 };
 use jaus::wire::{Broadcast, Flags, Frame, Kind, Priority, Version, judp};
 use libfuzzer_sys::fuzz_target;
@@ -125,7 +125,10 @@ fn config(choices: u8) -> Config {
     let chosen = |bit: u8| choices & (1 << bit) != 0;
     let limit = |bit| chosen(bit).then_some(Rate::new(50, 5));
     Config {
-        forwarding: chosen(0),
+        routing: Routing {
+            forward: chosen(0),
+            ..Routing::default()
+        },
         packing: if chosen(1) {
             Packing::Within(Duration::from_millis(5))
         } else {
@@ -135,8 +138,9 @@ fn config(choices: u8) -> Config {
             burst: 4096,
             rate: 100_000,
         }),
-        rates: Rates {
-            new_ids: Rate::new(64, 8),
+        limits: Limits {
+            max_peers: 4,
+            new_ids_per_address: Rate::new(64, 8),
             messages_per_address: limit(3),
             messages_per_id: limit(4),
         },
@@ -145,7 +149,6 @@ fn config(choices: u8) -> Config {
         max_reassembly: REASSEMBLY_LIMIT,
 
         max_components: 4,
-        max_peers: 4,
         max_recent: 16,
         max_unacknowledged: 4,
         queue_limit: QUEUE_LIMIT,

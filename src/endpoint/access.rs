@@ -14,6 +14,12 @@ use crate::as_text::serde_as_text;
 
 /// Allow and deny lists. Deny wins over allow. If an allow list is not empty, everything that is
 /// not on it is denied; empty lists admit everything.
+///
+/// ```toml
+/// [access]
+/// allow_subsystems = ["101", "200-299"]
+/// deny_networks = ["10.0.9.0/24", "fd00:9::/32"]
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]

@@ -4,7 +4,7 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-use super::{Access, Pacing, Packing, Path, Rate, Rates};
+use super::{Access, Limits, Pacing, Packing, Path, Rate, Routing};
 use crate::address::JausId;
 use crate::peer::Assignment;
 
@@ -45,11 +45,6 @@ pub const fn first_sequence_at(since_1970: Duration) -> u16 {
 pub struct Config {
     /// The most components that can be attached.
     pub max_components: usize,
-    /// The most peers whose address is remembered. At the limit, a new peer evicts a peer of the
-    /// network address that holds most of them, else a peer that we have not spoken to, else the
-    /// peer heard longest ago. Messages to an evicted peer go to the group until it is heard again.
-    /// Addresses of static peers do not count and are never evicted.
-    pub max_peers: usize,
     /// Peers with a configured address, which is not learned. Messages with their ids from another
     /// network address are refused.
     pub static_peers: Vec<StaticPeer>,
@@ -121,16 +116,12 @@ pub struct Config {
     pub max_paced: usize,
     /// Whether small messages share datagrams.
     pub packing: Packing,
-    /// Whether to forward messages for other nodes between links. Off by default: a node with two
-    /// links does not join two networks unless configured to.
-    pub forwarding: bool,
-    /// The rate limit on forwarded broadcasts and messages for unknown ids, for all senders
-    /// together.
-    pub forwarded_broadcasts: Rate,
+    /// Whether and how much to forward between links.
+    pub routing: Routing,
     /// Which senders are allowed.
     pub access: Access,
-    /// Rate limits per source.
-    pub rates: Rates,
+    /// Limits of peers, and rate limits per source.
+    pub limits: Limits,
     /// How many octets may go to one network address as long as no peer there is configured or has
     /// acknowledged anything.
     pub unverified_address: Rate,
@@ -151,7 +142,6 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             max_components: 254,
-            max_peers: 1024,
             static_peers: Vec::new(),
             payload_limit: 1425,
             max_message: 16 << 20,
@@ -175,10 +165,9 @@ impl Default for Config {
             pacing: Some(Pacing::default()),
             max_paced: 32 << 20,
             packing: Packing::Off,
-            forwarding: false,
-            forwarded_broadcasts: Rate::new(500, 1000),
+            routing: Routing::default(),
             access: Access::default(),
-            rates: Rates::default(),
+            limits: Limits::default(),
             unverified_address: Rate::new(1 << 10, 4 << 10),
             unverified_total: Rate::new(64 << 10, 64 << 10),
             challenge_key: 0,

@@ -48,7 +48,7 @@ impl Endpoint {
     /// forwards and the message arrives on another path.
     pub(super) fn recall(&mut self, arrival: Arrival<'_>, seen: Fingerprint) -> Novelty {
         let Arrival { frame, now, .. } = arrival;
-        let forwarding = self.config.forwarding;
+        let forwarding = self.config.routing.forward;
         let repeats = frame.flags.acknowledgement() != Acknowledgement::None;
         let numbered = repeats || frame.version == Version::As5669a;
         if !numbered && !forwarding {

@@ -118,7 +118,7 @@ pub enum Event {
         other: Path,
     },
     /// A peer was forgotten because the table is full:
-    /// [`Config::max_peers`](super::Config::max_peers).
+    /// [`Limits::max_peers`](super::Limits::max_peers).
     PeerForgotten {
         /// The peer.
         id: JausId,
@@ -141,16 +141,24 @@ pub enum Event {
     NotAcknowledged {
         /// The message.
         message: MessageHandle,
-        /// Its destination.
-        destination: JausId,
-        /// The reason.
-        reason: Unacknowledged,
-        /// How many of its octets were acknowledged: of a large message, the fragments that got
-        /// through.
-        acknowledged: usize,
-        /// Its length in octets.
-        length: usize,
+        /// What is missing, and why.
+        shortfall: Shortfall,
     },
+}
+
+/// How much of a message was not acknowledged, and why.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{destination} acknowledged {acknowledged} of {length} octets: {reason}")]
+pub struct Shortfall {
+    /// The destination of the message.
+    pub destination: JausId,
+    /// Why the rest was not acknowledged.
+    pub reason: Unacknowledged,
+    /// How many of its octets were acknowledged: of a large message, the fragments that got
+    /// through.
+    pub acknowledged: usize,
+    /// Its length in octets.
+    pub length: usize,
 }
 
 /// Why a message was not acknowledged.

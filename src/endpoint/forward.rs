@@ -13,7 +13,7 @@ use tracing::trace;
 
 use super::arrival::Arrival;
 use super::egress::Hop;
-use super::{Counter, Endpoint, Path, Peer, To};
+use super::{Counter, Endpoint, Path, Peer, Rate, To};
 use crate::address::JausId;
 use crate::wire::{Broadcast, DataControl, Frame, Framing, Version, ra};
 
@@ -21,11 +21,39 @@ use crate::wire::{Broadcast, DataControl, Frame, Framing, Version, ra};
 /// copies.
 const SETTLED: Duration = Duration::from_secs(1);
 
+/// Whether and how much a node forwards between its links. By default it does not, even with
+/// several links: joining two networks is a deliberate decision.
+///
+/// ```toml
+/// [routing]
+/// forward = true
+/// broadcasts = { per_second = 500, burst = 1000 }
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+pub struct Routing {
+    /// Whether to forward messages for other nodes.
+    pub forward: bool,
+    /// The total rate of forwarded messages with many receivers or an unknown destination.
+    pub broadcasts: Rate,
+}
+
+impl Default for Routing {
+    fn default() -> Self {
+        Self {
+            forward: false,
+            broadcasts: Rate::new(500, 1000),
+        }
+    }
+}
+
 impl Endpoint {
     /// Whether a message is also for other nodes, and forwarding is on.
     pub(super) fn is_passed_on(&self, frame: &Frame) -> bool {
         let destination = frame.destination;
-        self.config.forwarding && !destination.has_zero() && !self.components.contains(&destination)
+        let is_elsewhere = !destination.has_zero() && !self.components.contains(&destination);
+        self.config.routing.forward && is_elsewhere
     }
 
     /// Whether a broadcast, or a message to an unknown address, arrived on another path than the
@@ -82,7 +110,7 @@ impl Endpoint {
         if hops.is_empty() {
             return Err(Counter::NotForUs);
         }
-        let rate = self.config.forwarded_broadcasts;
+        let rate = self.config.routing.broadcasts;
         if !self.broadcasts.take(now, rate, 1) {
             return Err(Counter::ForwardRate);
         }

@@ -60,18 +60,20 @@ use std::hash::RandomState;
 use std::sync::Arc;
 use std::time::Instant;
 
+pub use crate::peer::Pacing;
 pub use access::{Access, AccessError, Network, Subsystems};
 pub use config::{Config, PAYLOAD_LIMITS, StaticPeer, first_sequence_at};
 pub use counters::{Counter, Counters};
 pub use delivery::FlowStatus;
 #[cfg(feature = "node")]
 pub(crate) use egress::MOST_OCTETS;
-pub use egress::{Pacing, Packing};
-pub use event::{AttachError, Event, MessageHandle, Outgoing, Received, Unacknowledged};
+pub use egress::Packing;
+pub use event::{AttachError, Event, MessageHandle, Outgoing, Received, Shortfall, Unacknowledged};
+pub use forward::Routing;
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use peers::{Peer, RouteState, Traffic};
 pub(crate) use rate::quota_address;
-pub use rate::{Buckets, Rate, Rates};
+pub use rate::{Buckets, Limits, Rate};
 pub use send::SendError;
 pub use sink::{Ingress, Sink};
 
@@ -130,8 +132,8 @@ impl Endpoint {
             components: BTreeSet::new(),
             peers: Peers::new(config.clone()),
             numbers: Numbers::after(config.first_sequence),
-            gate: Gate::new(&config.rates, config.max_peers),
-            unverified: Buckets::new(config.unverified_address, config.max_peers),
+            gate: Gate::new(&config.limits),
+            unverified: Buckets::new(config.unverified_address, config.limits.max_peers),
             unverified_total: Buckets::new(config.unverified_total, 1),
             warnings: Warnings::default(),
             probes: 0,

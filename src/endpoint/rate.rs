@@ -37,22 +37,38 @@ impl Rate {
     }
 }
 
-/// The rate limits per source.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rates {
+/// Limits of what is accepted from others.
+///
+/// ```toml
+/// [limits]
+/// max_peers = 1024
+/// new_ids_per_address = { per_second = 64, burst = 1024 }
+/// messages_per_address = { per_second = 20000, burst = 40000 }
+/// messages_per_id = { per_second = 5000, burst = 10000 }
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+pub struct Limits {
+    /// The most peers whose address is remembered, 1 to 65536. At the limit, a new peer evicts a
+    /// peer of the network address that holds most of them, else a peer that we have not spoken to,
+    /// else the peer heard longest ago. Messages to an evicted peer go to the group until it is
+    /// heard again. Addresses of static peers do not count and are never evicted.
+    pub max_peers: usize,
     /// New ids from one network address. The default is a burst of 1024 and 64 per second: all
     /// components of four full nodes, or of a router's whole network.
-    pub new_ids: Rate,
-    /// Messages from one network address. Unlimited by default.
+    pub new_ids_per_address: Rate,
+    /// Messages from one network address; unlimited if omitted.
     pub messages_per_address: Option<Rate>,
-    /// Messages from one id. Unlimited by default.
+    /// Messages from one id; unlimited if omitted.
     pub messages_per_id: Option<Rate>,
 }
 
-impl Default for Rates {
+impl Default for Limits {
     fn default() -> Self {
         Self {
-            new_ids: Rate::new(64, 1024),
+            max_peers: 1024,
+            new_ids_per_address: Rate::new(64, 1024),
             messages_per_address: None,
             messages_per_id: None,
         }
@@ -191,12 +207,13 @@ pub(super) struct Gate {
 }
 
 impl Gate {
-    /// Creates buckets for at most `limit` sources in each table.
-    pub(super) fn new(rates: &Rates, limit: usize) -> Self {
+    /// Creates buckets for at most as many sources in each table as there may be peers.
+    pub(super) fn new(limits: &Limits) -> Self {
+        let most = limits.max_peers;
         Self {
-            new_ids: Buckets::new(rates.new_ids, limit),
-            messages_by_address: Buckets::new(rates.messages_per_address, limit),
-            messages_by_id: Buckets::new(rates.messages_per_id, limit),
+            new_ids: Buckets::new(limits.new_ids_per_address, most),
+            messages_by_address: Buckets::new(limits.messages_per_address, most),
+            messages_by_id: Buckets::new(limits.messages_per_id, most),
         }
     }
 

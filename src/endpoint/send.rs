@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use tracing::trace;
 
-use super::egress::{FragmentedSend, Hop, Pacing};
+use super::egress::{FragmentedSend, Hop};
 use super::large::{Cut, Cutting};
-use super::{Counter, Endpoint, Event, MessageHandle, Outgoing, Path, Received, Sink, To};
+use super::{Counter, Endpoint, Event, MessageHandle, Outgoing, Pacing, Path, Received, Sink, To};
 use crate::address::JausId;
 use crate::wire::{
     Acknowledgement, Broadcast, EncodeError, Flags, Frame, Priority, Version, as5669a,

@@ -1,14 +1,23 @@
 //! The messages whose senders wait for an acknowledgement.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::oneshot;
 
-use super::answers::Answers;
 use super::error::Undelivered;
 use crate::address::JausId;
 use crate::endpoint::{Event, MessageHandle};
+use crate::link::local::Writer;
+use crate::link::local::record::{Head, Outcome, Record};
+
+/// Limit of waiting senders: that of an endpoint, so only the client of another process's node can
+/// reach it.
+pub(super) const MAX_AWAITED: usize = 4096;
+
+/// All waiting senders.
+#[derive(Debug, Default)]
+pub(super) struct Awaiting(HashMap<MessageHandle, (JausId, Waiter)>);
 
 /// A waiting sender.
 #[derive(Debug)]
@@ -19,20 +28,12 @@ pub(super) enum Waiter {
     There { answers: Arc<Answers>, handle: u64 },
 }
 
-/// All waiting senders.
+/// The writing half of a component process's connection: replies of the session, and outcomes of
+/// the component's messages.
 #[derive(Debug)]
-pub(super) struct Awaiting {
-    limit: usize,
-    waiters: HashMap<MessageHandle, (JausId, Waiter)>,
-}
+pub(super) struct Answers(pub(super) Mutex<Writer>);
 
 impl Awaiting {
-    /// At most `limit` senders can wait.
-    pub(super) fn new(limit: usize) -> Self {
-        let waiters = HashMap::new();
-        Self { limit, waiters }
-    }
-
     /// Adds a waiting sender; returns whether there was room.
     #[must_use]
     pub(super) fn insert(
@@ -41,12 +42,13 @@ impl Awaiting {
         source: JausId,
         waiter: Waiter,
     ) -> bool {
-        if self.waiters.len() >= self.limit {
-            self.waiters.retain(|_, (_, waiter)| waiter.waits());
+        if self.0.len() >= MAX_AWAITED {
+            let has_left = |waiter: &Waiter| matches!(waiter, Waiter::Here(it) if it.is_closed());
+            self.0.retain(|_, (_, waiter)| !has_left(waiter));
         }
-        let has_room = self.waiters.len() < self.limit;
+        let has_room = self.0.len() < MAX_AWAITED;
         if has_room {
-            self.waiters.insert(message, (source, waiter));
+            self.0.insert(message, (source, waiter));
         }
         has_room
     }
@@ -55,21 +57,7 @@ impl Awaiting {
     pub(super) fn handle_event(&mut self, event: &Event) {
         let (message, outcome) = match *event {
             Event::Acknowledged { message, .. } => (message, Ok(())),
-            Event::NotAcknowledged {
-                message,
-                destination,
-                reason,
-                acknowledged,
-                length,
-            } => {
-                let undelivered = Undelivered::NotAcknowledged {
-                    destination,
-                    reason,
-                    acknowledged,
-                    length,
-                };
-                (message, Err(undelivered))
-            }
+            Event::NotAcknowledged { message, shortfall } => (message, Err(shortfall.into())),
             _ => return,
         };
         if let Some(waiter) = self.remove(message) {
@@ -78,17 +66,17 @@ impl Awaiting {
     }
 
     pub(super) fn remove(&mut self, message: MessageHandle) -> Option<Waiter> {
-        self.waiters.remove(&message).map(|(_, waiter)| waiter)
+        self.0.remove(&message).map(|(_, waiter)| waiter)
     }
 
     /// Drops the waiters of a component that is gone.
     pub(super) fn forget_source(&mut self, source: JausId) {
-        self.waiters.retain(|_, (of, _)| *of != source);
+        self.0.retain(|_, (of, _)| *of != source);
     }
 
     /// Drops all waiters: no more outcomes will be known.
     pub(super) fn clear(&mut self) {
-        self.waiters.clear();
+        self.0.clear();
     }
 }
 
@@ -100,11 +88,20 @@ impl Waiter {
             Self::There { answers, handle } => answers.send(handle, outcome),
         }
     }
+}
 
-    fn waits(&self) -> bool {
-        match self {
-            Self::Here(sender) => !sender.is_closed(),
-            Self::There { .. } => true,
-        }
+impl Answers {
+    /// Sends the outcome of a message.
+    pub(super) fn send(&self, handle: u64, outcome: Result<(), Undelivered>) {
+        let record = |outcome| Head::Outcome { handle, outcome }.into();
+        self.lock().send(&match outcome {
+            Ok(()) => record(Outcome::Acknowledged),
+            Err(Undelivered::NotAcknowledged(it)) => record(Outcome::NotAcknowledged(it)),
+            Err(error) => Record::rejected(handle, &error.to_string()),
+        });
+    }
+
+    pub(super) fn lock(&self) -> MutexGuard<'_, Writer> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -63,14 +63,12 @@ impl ComponentEvent {
     #[must_use]
     pub fn in_words(&self) -> Option<String> {
         match self {
-            Self::Attached { id, process } => {
-                let process = process.as_ref()?;
-                Some(format!("{id} is attached by {process}"))
-            }
-            Self::Detached { id, process, why } => {
-                let process = process.as_ref()?;
-                Some(format!("{id} of {process} {why}"))
-            }
+            Self::Attached { id, process } => process
+                .as_ref()
+                .map(|process| format!("{id} is attached by {process}")),
+            Self::Detached { id, process, why } => process
+                .as_ref()
+                .map(|process| format!("{id} of {process} {why}")),
             Self::Refused { process, why } => Some(format!("{process} was refused: {why}")),
             Self::Stuck { id, process } => Some(format!(
                 "{id} of {process} stopped reading; its messages are dropped when its mailbox is \
@@ -110,7 +108,7 @@ impl fmt::Display for Departure {
 }
 
 /// The attached components of a node, to which the endpoint delivers messages, and the taps.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Components {
     attached: BTreeMap<JausId, Attached>,
     pub(super) events: EventSender<ComponentEvent>,
@@ -125,14 +123,6 @@ struct Attached {
 }
 
 impl Components {
-    pub(super) fn new() -> Self {
-        Self {
-            attached: BTreeMap::new(),
-            events: EventSender::new(),
-            taps: Taps::default(),
-        }
-    }
-
     /// The process of a component, unless it is the node's own.
     pub(super) fn process(&self, id: JausId) -> Option<&Process> {
         self.attached.get(&id)?.process.as_ref()

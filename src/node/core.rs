@@ -23,7 +23,7 @@ use super::mailbox::Mailbox;
 use super::resident::Residents;
 use crate::address::JausId;
 use crate::endpoint::{
-    self, AttachError, Endpoint, Event, MessageHandle, Outgoing, first_sequence_at,
+    self, AttachError, Endpoint, Event, LinkId, MessageHandle, Outgoing, first_sequence_at,
 };
 #[cfg(unix)]
 use crate::link::junior::Claim;
@@ -34,9 +34,6 @@ use crate::wire::Priority;
 
 /// Limit of messages in a burst that leave together.
 const BURST: usize = 64;
-/// Limit of messages whose senders wait for an acknowledgement. The endpoint's own is lower, and it
-/// eventually gives up each message.
-const MAX_AWAITED: usize = 65_536;
 /// How long a node that shuts down tries to send queued messages.
 pub(super) const LAST_WORDS: Duration = Duration::from_millis(250);
 
@@ -73,7 +70,7 @@ impl Shared {
             config,
             core: Mutex::new(Core::new(endpoint, links)),
             stopped: watch::Sender::new(false),
-            residents: Residents::new(),
+            residents: Residents::default(),
             local_place,
             listening: watch::Sender::new(()),
             commons: Mutex::default(),
@@ -106,14 +103,22 @@ impl Shared {
         process: Option<Process>,
     ) -> Result<Arc<Mailbox>, AttachError> {
         let mailbox = Arc::new(Mailbox::new(self.config.mailbox));
-        self.lock().attach(id, mailbox.clone(), process)?;
+        let mut core = self.lock();
+        core.endpoint.attach(id)?;
+        if core.stopped {
+            mailbox.close();
+        }
+        core.components.add(id, mailbox.clone(), process);
+        drop(core);
         #[cfg(unix)]
         if let Some(folder) = &self.config.junior {
             let claim = Claim::new(folder, id);
             let mut core = self.lock();
-            match claim {
-                Ok(claim) => core.links.admit(claim),
-                Err(error) => {
+            match (claim, core.links.junior()) {
+                (Ok(claim), Some(junior)) => junior.admit(claim),
+                // The node has stopped.
+                (Ok(_), None) => {}
+                (Err(error), _) => {
                     core.detach(id, &mailbox, Departure::Left);
                     return Err(AttachError::Link(error.to_string()));
                 }
@@ -147,7 +152,8 @@ pub(super) struct Core {
     /// Messages sent since the last [`pump`](Self::pump).
     gathered: usize,
     driver: Option<Waker>,
-    stop_at: Option<Instant>,
+    /// When it has to have stopped, once it shuts down.
+    pub(super) stop_at: Option<Instant>,
     stopped: bool,
 }
 
@@ -156,9 +162,9 @@ impl Core {
         let mut core = Self {
             endpoint,
             links,
-            components: Components::new(),
-            awaiting: Awaiting::new(MAX_AWAITED),
-            events: EventSender::new(),
+            components: Components::default(),
+            awaiting: Awaiting::default(),
+            events: EventSender::default(),
             slab: Slab::new(),
             gathered: 0,
             driver: None,
@@ -181,15 +187,18 @@ impl Core {
 
     /// Removes the links whose interfaces are gone. Returns those links, and the interfaces that
     /// need a link. Both are empty after the node has stopped.
-    pub(super) fn retire_links(&mut self, survey: &Survey) -> (Vec<UdpLink>, Vec<Interface>) {
+    pub(super) fn retire_links(
+        &mut self,
+        survey: &Survey,
+    ) -> (Vec<(LinkId, Link)>, Vec<Interface>) {
         if self.stopped {
-            return (Vec::new(), Vec::new());
+            return Default::default();
         }
         let (gone, came) = self.links.retire(survey);
-        for (id, _) in &gone {
-            self.endpoint.remove_link(*id);
+        for &(id, _) in &gone {
+            self.endpoint.remove_link(id);
         }
-        (gone.into_iter().map(|(_, link)| link).collect(), came)
+        (gone, came)
     }
 
     /// Adds links that were opened on new interfaces, unless the node has stopped meanwhile.
@@ -201,33 +210,17 @@ impl Core {
         }
     }
 
-    /// The part of [`Shared::attach`] that needs the lock.
-    fn attach(
-        &mut self,
-        id: JausId,
-        mailbox: Arc<Mailbox>,
-        process: Option<Process>,
-    ) -> Result<(), AttachError> {
-        self.endpoint.attach(id)?;
-        if self.stopped {
-            mailbox.close();
-        }
-        self.components.add(id, mailbox, process);
-        Ok(())
-    }
-
     /// Detaches a component, unless its id belongs to another mailbox by now.
     pub(super) fn detach(&mut self, id: JausId, mailbox: &Arc<Mailbox>, why: Departure) {
         if self.components.has(id, mailbox) {
             self.endpoint.detach(id);
             self.awaiting.forget_source(id);
-            self.links.release(id);
+            #[cfg(unix)]
+            if let Some(junior) = self.links.junior() {
+                junior.release(id);
+            }
             self.components.remove(id, why);
         }
-    }
-
-    pub(super) const fn is_stopping(&self) -> bool {
-        self.stop_at.is_some()
     }
 
     /// Sends a message. If it requests an acknowledgement, `waiter` gets the outcome.
@@ -248,7 +241,7 @@ impl Core {
             result = self.endpoint.send(now, message, &mut self.components);
         }
         if let (Ok(handle), Some(waiter)) = (&result, waiter) {
-            // The endpoint's own limit is lower.
+            // The endpoint has the same limit.
             let _ = self.awaiting.insert(*handle, source, waiter);
         }
         // The first message of a burst leaves at once, and so do urgent ones. The others leave
@@ -343,20 +336,15 @@ impl Core {
 
     /// Sends what waits for the network; returns whether nothing is left.
     fn flush(&mut self, cx: &mut Context<'_>, now: Instant) -> bool {
-        let mut flushed = true;
-        for link in self.links.open.values_mut() {
-            flushed &= link.poll_flush(cx, now).is_ready();
-        }
-        flushed
+        let links = self.links.open.values_mut();
+        let flushed = links.map(|link| link.poll_flush(cx, now));
+        flushed.filter(Poll::is_pending).count() == 0
     }
 
     /// Closes connections properly; returns whether the peers have done so too.
     fn hang_up(&mut self) -> bool {
-        let mut hung_up = true;
-        for link in self.links.open.values_mut() {
-            hung_up &= link.hang_up().is_ready();
-        }
-        hung_up
+        let hung_up = self.links.open.values_mut().map(Link::hang_up);
+        hung_up.filter(Poll::is_pending).count() == 0
     }
 
     /// Closes everything. Idempotent.

@@ -4,7 +4,7 @@ use std::net::IpAddr;
 
 use super::{ConfigError, Peer};
 use crate::address::JausId;
-use crate::endpoint::{self, Unacknowledged};
+use crate::endpoint::{self, Shortfall};
 use crate::link;
 use crate::link::local::record::Reason;
 
@@ -79,17 +79,8 @@ pub enum Undelivered {
     #[error("the node of this host did not send it: {0}")]
     Rejected(String),
     /// It was sent, but not or not completely acknowledged.
-    #[error("{destination} acknowledged {acknowledged} of {length} octets: {reason}")]
-    NotAcknowledged {
-        /// Its destination.
-        destination: JausId,
-        /// Why the rest was not.
-        reason: Unacknowledged,
-        /// Octets that were acknowledged.
-        acknowledged: usize,
-        /// Octets of the message.
-        length: usize,
-    },
+    #[error(transparent)]
+    NotAcknowledged(#[from] Shortfall),
     /// The component or its node ended before the outcome was known. The message may have arrived.
     #[error("the node was lost before it reported the delivery")]
     Lost,

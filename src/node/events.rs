@@ -38,11 +38,13 @@ impl<T: Clone> EventStream<T> {
 #[derive(Debug)]
 pub(super) struct EventSender<T>(Option<broadcast::Sender<T>>);
 
-impl<T: Clone> EventSender<T> {
-    pub(super) fn new() -> Self {
+impl<T: Clone> Default for EventSender<T> {
+    fn default() -> Self {
         Self(Some(broadcast::Sender::new(KEPT)))
     }
+}
 
+impl<T: Clone> EventSender<T> {
     pub(super) fn send(&self, event: T) {
         if let Some(sender) = &self.0 {
             // It is no error to have no listeners.

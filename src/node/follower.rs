@@ -60,7 +60,7 @@ pub(super) async fn follow(shared: Arc<Shared>, mut changes: Changes) {
 fn update(shared: &Shared) -> Option<Vec<(Interface, Error)>> {
     let survey = Survey::make(&shared.config)?;
     let (gone, came) = shared.lock().retire_links(&survey);
-    let mut is_change = !gone.is_empty();
+    let closed = gone.len();
     // The new links may need the same addresses.
     drop(gone);
     let settings = shared.config.udp();
@@ -71,8 +71,7 @@ fn update(shared: &Shared) -> Option<Vec<(Interface, Error)>> {
             Err(error) => failures.push((interface, error)),
         }
     }
-    is_change |= !links.is_empty();
-    if is_change {
+    if closed + links.len() > 0 {
         shared.lock().adopt_links(links, survey);
     }
     Some(failures)

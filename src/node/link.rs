@@ -5,7 +5,6 @@ use std::task::{Context, Poll};
 use std::time::Instant;
 
 use super::components::Components;
-use crate::address::JausId;
 use crate::endpoint::{Endpoint, Ingress, LinkId, LinkProfile, Path, Remote, Transmit};
 use crate::link::Slab;
 #[cfg(unix)]
@@ -52,12 +51,10 @@ impl Link {
     /// Its message framing.
     pub(super) const fn framing(&self) -> Framing {
         match self {
-            Self::Udp(_) => Framing::Judp,
-            #[cfg(unix)]
-            Self::Junior(_) => Framing::Judp,
             Self::Tcp(_) => Framing::Jtcp,
             #[cfg(feature = "serial")]
             Self::Serial(_) => Framing::Jserial,
+            _ => Framing::Judp,
         }
     }
 
@@ -115,15 +112,6 @@ impl Link {
         }
     }
 
-    /// Notes that a component is gone.
-    pub(super) fn release(&mut self, id: JausId) {
-        match self {
-            #[cfg(unix)]
-            Self::Junior(link) => link.release(id),
-            _ => {}
-        }
-    }
-
     /// When the link needs a turn if nothing arrives before.
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
         match self {
@@ -164,11 +152,7 @@ impl Link {
             Self::Junior(link) => link.receive(cx, now, slab, |datagram| {
                 let path = from(Remote::Line);
                 components.taps.datagram(path, &datagram);
-                let ingress = Ingress {
-                    path,
-                    to_all: false,
-                };
-                endpoint.handle_datagram(now, ingress, datagram, components);
+                endpoint.handle_datagram(now, path, datagram, components);
             }),
             Self::Tcp(link) => link.receive(cx, now, |arrival| match arrival {
                 Arrival::Frame {

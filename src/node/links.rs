@@ -12,10 +12,9 @@ use std::time::Instant;
 
 use super::link::Link;
 use super::{Config, Peer, StartError};
-use crate::address::JausId;
 use crate::endpoint::{LinkId, Path, StaticPeer};
 #[cfg(unix)]
-use crate::link::junior::{Claim, JuniorLink};
+use crate::link::junior::JuniorLink;
 #[cfg(feature = "serial")]
 use crate::link::serial::SerialLink;
 use crate::link::tcp::TcpLink;
@@ -112,21 +111,13 @@ impl Links {
         })
     }
 
-    /// Registers a component with Junior's node manager.
+    /// The link through Junior, with which each component is registered.
     #[cfg(unix)]
-    pub(super) fn admit(&mut self, claim: Claim) {
-        for link in self.open.values_mut() {
-            if let Link::Junior(link) = link {
-                return link.admit(claim);
-            }
-        }
-    }
-
-    /// Notes that a component is gone.
-    pub(super) fn release(&mut self, id: JausId) {
-        for link in self.open.values_mut() {
-            link.release(id);
-        }
+    pub(super) fn junior(&mut self) -> Option<&mut JuniorLink> {
+        self.open.values_mut().find_map(|link| match link {
+            Link::Junior(link) => Some(link),
+            _ => None,
+        })
     }
 
     /// When a link needs a turn if nothing arrives before.
@@ -141,20 +132,17 @@ impl Links {
 
     /// Removes the links whose interfaces are gone. Returns them, and the interfaces without a
     /// link.
-    pub(super) fn retire(&mut self, survey: &Survey) -> (Vec<(LinkId, UdpLink)>, Vec<Interface>) {
-        let is_gone = |link: &UdpLink| !survey.wanted.contains(link.interface());
-        let ids: Vec<_> = self
-            .udp()
-            .filter_map(|(id, link)| is_gone(link).then_some(id))
+    pub(super) fn retire(&mut self, survey: &Survey) -> (Vec<(LinkId, Link)>, Vec<Interface>) {
+        let udp = self.udp().map(|(id, link)| (id, link.interface()));
+        let gone: Vec<_> = udp
+            .filter(|(_, interface)| !survey.wanted.contains(interface))
+            .inspect(|(_, interface)| {
+                tracing::info!(%interface, "link closed: the interface was removed");
+            })
+            .map(|(id, _)| id)
             .collect();
-        let mut gone = Vec::new();
-        for id in ids {
-            if let Some(Link::Udp(link)) = self.open.remove(&id) {
-                tracing::info!(interface = %link.interface(), "link closed: the interface was \
-                    removed");
-                gone.push((id, link));
-            }
-        }
+        let close = |id| self.open.remove_entry(id);
+        let gone = gone.iter().filter_map(close).collect();
         let has_link =
             |interface: &&Interface| !self.udp().any(|(_, link)| link.interface() == *interface);
         let came = survey.wanted.iter().filter(has_link).cloned().collect();
@@ -172,38 +160,23 @@ impl Links {
 
     /// The routes to peers with a configured id.
     pub(super) fn static_peers(&self) -> Vec<StaticPeer> {
-        let named = |&peer: &Peer| {
-            let path = Path {
-                link: self.link_to(peer.address())?,
-                peer: peer.address().into(),
-            };
-            Some(StaticPeer {
-                id: peer.id()?,
-                path,
-                gets_broadcasts: true,
-            })
-        };
-        let behind_connection = |&peer: &Peer| {
-            let path = Path {
-                link: self.tcp()?,
-                peer: peer.address().into(),
-            };
-            // Broadcasts go to all connections anyway.
-            Some(StaticPeer {
-                id: peer.id()?,
-                path,
-                gets_broadcasts: false,
-            })
-        };
-        let config = &self.config;
-        let by_udp = config.peers.iter().filter_map(named);
-        let by_tcp = config.tcp.connect.iter().filter_map(behind_connection);
-        by_udp.chain(by_tcp).collect()
-    }
-
-    fn tcp(&self) -> Option<LinkId> {
         let mut links = self.open.iter();
-        links.find_map(|(&id, link)| matches!(link, Link::Tcp(_)).then_some(id))
+        let tcp = links.find_map(|(&id, link)| matches!(link, Link::Tcp(_)).then_some(id));
+        let (by_udp, by_tcp) = (&self.config.peers, &self.config.tcp.connect);
+        let by_udp = by_udp
+            .iter()
+            .map(|peer| (peer, self.link_to(peer.address()), true));
+        // Broadcasts go to all connections anyway.
+        let by_tcp = by_tcp.iter().map(|peer| (peer, tcp, false));
+        let named = |(peer, link, gets_broadcasts): (&Peer, Option<LinkId>, bool)| {
+            let (id, link, peer) = (peer.id()?, link?, peer.address().into());
+            Some(StaticPeer {
+                id,
+                path: Path { link, peer },
+                gets_broadcasts,
+            })
+        };
+        by_udp.chain(by_tcp).filter_map(named).collect()
     }
 
     fn insert(&mut self, link: Link) {
@@ -216,21 +189,16 @@ impl Links {
 
     /// Assigns the peers without an id to the links that reach them.
     fn distribute_peers(&mut self) {
-        let nameless = self.config.peers.iter().filter(|peer| peer.id().is_none());
-        let placed: Vec<_> = nameless
-            .filter_map(|peer| Some((self.link_to(peer.address())?, peer.address())))
-            .collect();
+        let mut placed = BTreeMap::<_, Vec<_>>::new();
+        for peer in self.config.peers.iter().filter(|peer| peer.id().is_none()) {
+            let address = peer.address();
+            let others = placed.entry(self.link_to(address)).or_default();
+            others.push(address);
+        }
         for (&id, link) in &mut self.open {
-            let Link::Udp(link) = link else {
-                continue;
-            };
-            link.set_peers(
-                placed
-                    .iter()
-                    .filter(|(at, _)| *at == id)
-                    .map(|(_, a)| *a)
-                    .collect(),
-            );
+            if let Link::Udp(link) = link {
+                link.set_peers(placed.remove(&Some(id)).unwrap_or_default());
+            }
         }
     }
 

@@ -69,13 +69,6 @@ struct Inner<T> {
 }
 
 impl Mailbox {
-    pub(super) fn new(limits: MailboxLimits) -> Self {
-        Self::bounded(Bounds {
-            items: limits.messages,
-            octets: limits.octets,
-        })
-    }
-
     /// Queues a message.
     pub(super) fn deliver(&self, message: Received) {
         self.push(message.priority, message.payload.len(), message);
@@ -104,7 +97,11 @@ impl Mailbox {
 }
 
 impl<T> Mailbox<T> {
-    pub(super) fn bounded(bounds: Bounds) -> Self {
+    pub(super) fn new(limits: MailboxLimits) -> Self {
+        let bounds = Bounds {
+            items: limits.messages,
+            octets: limits.octets,
+        };
         Self {
             inner: Mutex::new(Inner {
                 messages: Backlog::new(bounds),

@@ -33,7 +33,6 @@
 //! # }
 //! ```
 
-mod answers;
 mod awaiting;
 mod components;
 mod config;
@@ -57,7 +56,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 pub use self::components::{ComponentEvent, Departure};
-pub use self::config::{Config, ConfigError, Delivery, Limits, Listen, Peer, Routing, Tcp, units};
+pub use self::config::{Config, ConfigError, Delivery, Peer, Tcp, units};
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::events::EventStream;
 pub use self::host::{Host, HostEvent, HostEvents};
@@ -65,7 +64,7 @@ pub use self::mailbox::{MailboxCounters, MailboxLimits};
 pub use self::port::{Port, Sender};
 pub use self::resident::Resident;
 pub use self::tap::{Content, Passage, Tap, Tapped, Way};
-pub use crate::endpoint::AttachError;
+pub use crate::endpoint::{AttachError, Limits, Routing};
 pub use crate::link::local::{Address, Local, Process};
 
 use self::core::Shared;
@@ -73,7 +72,7 @@ use self::driver::Driver;
 use self::follower::follow;
 use self::link::Link;
 use self::links::Links;
-use self::local::Server;
+use self::local::serve;
 use crate::address::JausId;
 use crate::endpoint::{self, Event, LinkId};
 use crate::link::interface::Changes;
@@ -127,7 +126,8 @@ impl Node {
         if let Some(listener) = listener {
             let place = listener.place();
             tracing::info!(place, "components of this host may attach");
-            runtime.spawn(Server::new(listener, shared.clone()).run());
+            let listening = shared.listening.subscribe();
+            runtime.spawn(serve(shared.clone(), listening, listener));
         }
         let guard = Arc::new(Guard(shared));
         Ok(Self { guard })
@@ -169,21 +169,19 @@ impl Node {
     /// not call it many times a second.
     #[must_use]
     pub fn links(&self) -> Vec<LinkReport> {
-        let report = |(id, link): (LinkId, &udp::UdpLink)| LinkReport {
-            link: id,
-            interface: link.interface().clone(),
-            local: link.local(),
-            group: link.group(),
-            counters: *link.counters(),
-            kernel_drops: None,
+        let report = |(link, udp): (LinkId, &udp::UdpLink)| {
+            let report = LinkReport {
+                link,
+                interface: udp.interface().clone(),
+                local: udp.local(),
+                group: udp.group(),
+                counters: *udp.counters(),
+                kernel_drops: None,
+            };
+            (report, udp.inodes().to_vec())
         };
-        let (mut reports, inodes): (Vec<_>, Vec<_>) = {
-            let core = self.shared().lock();
-            let links = core.links.udp();
-            links
-                .map(|(id, link)| (report((id, link)), link.inodes().to_vec()))
-                .unzip()
-        };
+        let (mut reports, inodes): (Vec<_>, Vec<_>) =
+            self.shared().lock().links.udp().map(report).unzip();
         // Without the lock, which must not be held during system calls for information.
         let drops = udp::kernel_drops(inodes.iter().map(Vec::as_slice));
         for (report, drops) in reports.iter_mut().zip(drops) {

@@ -102,7 +102,7 @@ impl Port {
     pub fn reside(&self) -> Resident {
         match &self.sender.way {
             Attachment::Here(shared) => shared.residents.admit(),
-            Attachment::Host(_) => Resident::elsewhere(),
+            Attachment::Host(_) => Resident(None),
         }
     }
 
@@ -132,7 +132,7 @@ impl Port {
     #[must_use]
     pub fn host_events(&self) -> HostEvents {
         match &self.sender.way {
-            Attachment::Here(_) => EventSender::new().subscribe(),
+            Attachment::Here(_) => EventSender::default().subscribe(),
             Attachment::Host(client) => client.events.subscribe(),
         }
     }

@@ -9,14 +9,10 @@ use tokio::sync::watch;
 const LIMIT: Duration = Duration::from_secs(1);
 
 /// Tells the residents of a node whether it is about to stop. Each has a receiver.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Residents(watch::Sender<bool>);
 
 impl Residents {
-    pub(super) fn new() -> Self {
-        Self(watch::Sender::new(false))
-    }
-
     pub(super) fn admit(&self) -> Resident {
         Resident(Some(self.0.subscribe()))
     }
@@ -32,22 +28,18 @@ impl Residents {
 
 /// Keeps a stopping node running for a moment, until this is dropped.
 #[derive(Debug)]
-pub struct Resident(Option<watch::Receiver<bool>>);
+pub struct Resident(
+    /// `None` for the node of another process, which does not wait.
+    pub(super) Option<watch::Receiver<bool>>,
+);
 
 impl Resident {
-    /// For the node of another process, which does not wait.
-    pub(super) const fn elsewhere() -> Self {
-        Self(None)
-    }
-
     /// Waits until the node is stopping.
     pub async fn closing(&self) {
-        match self.0.clone() {
-            Some(mut closing) => {
-                // An error means that the node is gone.
-                let _ = closing.wait_for(|closing| *closing).await;
-            }
-            None => std::future::pending().await,
-        }
+        let Some(mut closing) = self.0.clone() else {
+            return std::future::pending().await;
+        };
+        // An error means that the node is gone.
+        let _ = closing.wait_for(|closing| *closing).await;
     }
 }

@@ -15,10 +15,9 @@ use std::time::SystemTime;
 
 use bytes::Bytes;
 
-use super::mailbox::Mailbox;
+use super::mailbox::{Mailbox, MailboxLimits};
 use crate::address::JausId;
 use crate::endpoint::{LinkId, Path, Received, To, Transmit};
-use crate::link::backlog::Bounds;
 use crate::wire::{Flags, Frame, Framing, Priority, jserial, jtcp, judp};
 
 /// Limit of octets that wait for one tap, whatever the number of messages.
@@ -183,8 +182,8 @@ pub(super) struct Taps {
 impl Taps {
     /// Opens a tap that holds up to `limit` passages.
     pub(super) fn open(&mut self, limit: usize) -> Tap {
-        let queue = Arc::new(Queue::bounded(Bounds {
-            items: limit.max(1),
+        let queue = Arc::new(Queue::new(MailboxLimits {
+            messages: limit.max(1),
             octets: OCTETS,
         }));
         if self.ended {

@@ -14,12 +14,13 @@ pub enum LargeStyle {
     RepeatedCode,
 }
 
-/// How fast a receiver empties its receive buffer, in octets that datagrams occupy there.
+/// How fast a receiver empties its receive buffer, in octets that datagrams occupy there. It limits
+/// the rate of fragments of unacknowledged large messages to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Intake {
-    /// The most octets to send at once.
+pub struct Pacing {
+    /// Octets that may be filled at once.
     pub burst: usize,
-    /// The octets that it empties per second.
+    /// Octets assumed to be emptied per second.
     pub rate: u64,
 }
 
@@ -63,7 +64,7 @@ impl Peer {
     /// How fast it takes in large messages, in its default configuration, if slower than other
     /// peers.
     #[must_use]
-    pub const fn intake(self) -> Option<Intake> {
+    pub const fn intake(self) -> Option<Pacing> {
         match self {
             Self::JausPlusPlus => Some(JAUSPP_INTAKE),
             Self::Junior | Self::Jts | Self::Fkie => Some(JUNIOR_INTAKE),
@@ -102,16 +103,12 @@ impl Peer {
     /// ```
     #[must_use]
     pub fn confuses(self, one: JausId, other: JausId) -> bool {
-        self == Self::Jts && one != other && same_octets(one, other)
+        // It compares octet by octet, with 0 and 255 matching any.
+        let is_any = |octet| [0, 0xFF].contains(&octet);
+        let mut octets = one.to_wire().into_iter().zip(other.to_wire());
+        let are_same = octets.all(|(a, b)| a == b || is_any(a) || is_any(b));
+        self == Self::Jts && one != other && are_same
     }
-}
-
-/// Whether two ids are equal octet by octet, with 0 and 255 matching any octet.
-fn same_octets(one: JausId, other: JausId) -> bool {
-    let octets = one.to_wire().into_iter().zip(other.to_wire());
-    octets
-        .into_iter()
-        .all(|(a, b)| a == b || [a, b].iter().any(|it| [0, 0xFF].contains(it)))
 }
 
 /// The payload of each JAUS++ fragment except the last, in octets: the code and 1571 more.
@@ -121,7 +118,7 @@ const JAUSPP_PAYLOAD: usize = 1425;
 /// JAUS++ reads one datagram and sleeps for a millisecond, then for another before its component
 /// gets it: at most some 900 datagrams per second, each occupying 2304 octets for one of its
 /// fragments. Two thirds of that leave it time for other senders.
-const JAUSPP_INTAKE: Intake = Intake {
+const JAUSPP_INTAKE: Pacing = Pacing {
     burst: 64_000,
     rate: 1_400_000,
 };
@@ -131,7 +128,7 @@ pub(crate) const JUNIOR_PAYLOAD: usize = 4079;
 const JUNIOR_FRAGMENTS: usize = 50;
 /// Measured with Junior: its 140000 octets must hold everything that arrives while its run-time
 /// engine sleeps, and that engine passes ten datagrams per turn to an application.
-const JUNIOR_INTAKE: Intake = Intake {
+const JUNIOR_INTAKE: Pacing = Pacing {
     burst: 64_000,
     rate: 10_000_000,
 };

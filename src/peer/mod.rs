@@ -52,7 +52,7 @@ use crate::as_text::serde_as_text;
 
 pub use departure::{DEPARTURES, Departure, Recognition, Source};
 pub(crate) use habits::JAUSPP_FRAGMENT;
-pub use habits::{Intake, LargeStyle};
+pub use habits::{LargeStyle, Pacing};
 pub(crate) use recogniser::is_priority_fault;
 pub use recogniser::{Certainty, Reason, Recogniser, Verdict};
 pub use sign::Sign;

@@ -22,9 +22,8 @@ impl Numbers {
 
     /// Records a number; returns whether the peer is known to count per destination.
     pub(super) fn handle(&mut self, destination: JausId, number: u16) -> bool {
-        let known = self.latest.iter_mut().flatten();
-        let known = known.into_iter().find(|(id, _)| *id == destination);
-        match known {
+        let mut known = self.latest.iter_mut().flatten();
+        match known.find(|(id, _)| *id == destination) {
             Some((_, latest)) => {
                 let goes_on = number == latest.wrapping_add(1);
                 let elsewhere = self.last.is_some_and(|last| last != destination);

@@ -218,20 +218,16 @@ impl Recogniser {
 
     /// The peer with the most evidence, and its certainty; the first if several are equal.
     fn best(&self) -> (Peer, Certainty) {
-        let mut best = (Peer::Standard, 0);
-        for peer in Peer::ALL {
-            let weight = self.signs.weight(peer);
-            if weight > best.1 {
-                best = (peer, weight);
-            }
-        }
-        let certainty = match best.1 {
+        let weighed = Peer::ALL.map(|peer| (self.signs.weight(peer), peer));
+        let most = weighed.into_iter().rev().max_by_key(|&(weight, _)| weight);
+        let (weight, peer) = most.unwrap_or_default();
+        let certainty = match weight {
             0 => Certainty::Unknown,
             1 => Certainty::Guess,
             2..=3 => Certainty::Likely,
             _ => Certainty::Certain,
         };
-        (best.0, certainty)
+        (peer, certainty)
     }
 
     fn handle_number(&mut self, frame: &Frame) {

@@ -33,9 +33,7 @@ async fn a_further_component_costs_at_most_10_kib_however_many_there_are() {
     let _alone = ALONE.lock().await;
     // A link without traffic.
     let listener = SocketAddr::from(([127, 0, 0, 1], 0));
-    let config = Config::new(101, 1)
-        .without_udp()
-        .tcp_listen(listener.into());
+    let config = Config::new(101, 1).without_udp().tcp_listen(listener);
     let node = Node::start(config).unwrap();
     let mut components: Vec<_> = attach(&node, 1..=50).collect();
     let mut costs = Vec::new();

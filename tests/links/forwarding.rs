@@ -16,9 +16,7 @@ use jaus_test_kit::waiting::{until, within_limit};
 fn network(forward: bool) -> (Vec<Node>, [Port; 3]) {
     let group = own_group();
     let listen: SocketAddr = ([127, 0, 0, 1], 0).into();
-    let mut config = Config::loopback(103, 1)
-        .group(group)
-        .tcp_listen(listen.into());
+    let mut config = Config::loopback(103, 1).group(group).tcp_listen(listen);
     config.routing.forward = forward;
     let router = Node::start(config).unwrap();
     let tcp = router.tcp().and_then(|tcp| tcp.listening).unwrap();

@@ -21,9 +21,7 @@ const REPORT_HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x42]);
 /// A node without UDP that accepts connections.
 fn listening(subsystem: u16) -> Config {
     let at: SocketAddr = ([127, 0, 0, 1], 0).into();
-    Config::new(subsystem, 1)
-        .without_udp()
-        .tcp_listen(at.into())
+    Config::new(subsystem, 1).without_udp().tcp_listen(at)
 }
 
 /// A node without UDP that connects to another; `id` is the peer's configured id.
@@ -407,7 +405,7 @@ async fn a_peer_that_was_restarted_is_connected_to_again() {
 
     vehicle.shutdown().await;
     until(|| operator.tcp().unwrap().connections.is_empty()).await;
-    let again = Config::new(101, 1).without_udp().tcp_listen(place.into());
+    let again = Config::new(101, 1).without_udp().tcp_listen(place);
     let vehicle = Node::start(again).unwrap();
     let mut driver = vehicle.attach(1).unwrap();
     ask_until_heard(&console, &mut driver).await;
@@ -462,7 +460,7 @@ async fn a_port_that_is_taken_is_an_error_that_says_so() {
     let vehicle = Node::start(listening(101)).unwrap();
     let taken = Config::new(102, 1)
         .without_udp()
-        .tcp_listen(address(&vehicle).into());
+        .tcp_listen(address(&vehicle));
     let error = Node::start(taken).unwrap_err();
     assert!(matches!(error, StartError::Link(_)), "{error:?}");
     let port = address(&vehicle).port();

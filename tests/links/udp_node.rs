@@ -3,7 +3,7 @@
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{Event, Outgoing, Received, Unacknowledged};
+use jaus::endpoint::{Event, Outgoing, Received, Shortfall, Unacknowledged};
 use jaus::link::Group;
 use jaus::node::{Config, Events, MailboxLimits, Node, Port, StartError};
 use jaus::wire::{Broadcast, Priority};
@@ -142,10 +142,12 @@ async fn who_asks_for_an_acknowledgement_is_told_when_it_comes_and_when_it_does_
     let unheard = sender.send(asking(nobody)).unwrap();
     let wanted = Event::NotAcknowledged {
         message: unheard,
-        destination: nobody,
-        reason: Unacknowledged::TimedOut,
-        acknowledged: 0,
-        length: REPORT_HEARTBEAT.len(),
+        shortfall: Shortfall {
+            destination: nobody,
+            reason: Unacknowledged::TimedOut,
+            acknowledged: 0,
+            length: REPORT_HEARTBEAT.len(),
+        },
     };
     event(&mut events, |event| *event == wanted).await;
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Endpoint};
+use jaus::endpoint::{Config, Endpoint, Routing};
 use jaus::service::{
     Change, Directory, Discovery, Event, Kind, Liveness, Profile, Scope, Service, Stack, Timing,
 };
@@ -214,9 +214,9 @@ impl World {
     fn restart(&mut self, node: usize) {
         self.keep_counts(node);
         let components = Components::new(self.network.now(), node, self.random.number());
-        let forwarding = self.is_routed && node == 0;
+        let forward = self.is_routed && node == 0;
         self.network
-            .restart(Host(node), endpoint(node, forwarding), components);
+            .restart(Host(node), endpoint(node, forward), components);
         self.is_dead[node] = false;
     }
 
@@ -271,9 +271,12 @@ impl World {
     }
 }
 
-fn endpoint(node: usize, forwarding: bool) -> Endpoint {
+fn endpoint(node: usize, forward: bool) -> Endpoint {
     let mut endpoint = Endpoint::new(Config {
-        forwarding,
+        routing: Routing {
+            forward,
+            ..Routing::default()
+        },
         ..Config::default()
     });
     for id in ids(node) {

@@ -20,7 +20,7 @@ fn check_bounds_of(nodes: &mut Nodes, node: usize) -> Result<(), String> {
     let config = &nodes.plan.nodes[node].config;
     let endpoint = nodes.network.endpoint(Host(node));
     let peers = endpoint.peers().count();
-    if peers > config.max_peers {
+    if peers > config.limits.max_peers {
         return Err(format!("node {node} knows {peers} peers"));
     }
     let unfinished = endpoint.unfinished();

@@ -8,7 +8,9 @@ use std::time::Duration;
 use crate::sim::{Conditions, Host, Mailbox, Network};
 use bytes::{BufMut, Bytes, BytesMut};
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Counter, Endpoint, Event, Outgoing, Unacknowledged};
+use jaus::endpoint::{
+    Config, Counter, Endpoint, Event, Limits, Outgoing, Shortfall, Unacknowledged,
+};
 
 const ONE: JausId = JausId::new(101, 1, 1);
 const OTHER: JausId = JausId::new(102, 1, 1);
@@ -117,8 +119,8 @@ fn acknowledged_messages_survive_a_poor_wire_and_arrive_once() {
                     );
                     told += 1;
                 }
-                Event::NotAcknowledged { reason, .. } => {
-                    assert_eq!(reason, Unacknowledged::TimedOut);
+                Event::NotAcknowledged { shortfall, .. } => {
+                    assert_eq!(shortfall.reason, Unacknowledged::TimedOut);
                     told += 1;
                 }
                 _ => {}
@@ -289,10 +291,12 @@ fn a_cut_wire_is_told_and_heals() {
     network.run_until_idle();
     let failed = Event::NotAcknowledged {
         message: lost,
-        destination: OTHER,
-        reason: Unacknowledged::TimedOut,
-        acknowledged: 0,
-        length: message(1).payload.len(),
+        shortfall: Shortfall {
+            destination: OTHER,
+            reason: Unacknowledged::TimedOut,
+            acknowledged: 0,
+            length: message(1).payload.len(),
+        },
     };
     assert!(network.owner(hosts[0]).take_news().contains(&failed));
     network.set_cut(hosts[0], hosts[1], false);
@@ -311,7 +315,10 @@ fn a_cut_wire_is_told_and_heals() {
 fn a_flood_of_invented_peers_is_bounded_and_leaves_the_node_working() {
     let mut network = Network::new(7, Conditions::good());
     let config = Config {
-        max_peers: 50,
+        limits: Limits {
+            max_peers: 50,
+            ..Limits::default()
+        },
         ..Config::default()
     };
     let victim = network.join(endpoint_with(OTHER, config), Mailbox::default());

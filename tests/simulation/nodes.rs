@@ -114,7 +114,7 @@ impl Nodes {
     /// arrives on more than one of them may time out.
     pub(crate) fn is_reached(&self, node: usize) -> bool {
         let plan = &self.plan.nodes[node];
-        let has_room = !plan.is_forgetful && plan.config.max_peers >= 4 * self.len();
+        let has_room = !plan.is_forgetful && plan.config.limits.max_peers >= 4 * self.len();
         has_room && !self.plan.has_loop()
     }
 
@@ -131,7 +131,7 @@ impl Nodes {
         let mut news = Vec::new();
         for node in 0..self.len() {
             let life = self.life(node);
-            let has_room = self.plan.nodes[node].config.max_peers >= 4 * self.len();
+            let has_room = self.plan.nodes[node].config.limits.max_peers >= 4 * self.len();
             let is_strict = has_room && !self.has_rested[node];
             for (at, event) in std::mem::take(&mut self.network.owner(Host(node)).events) {
                 match event {

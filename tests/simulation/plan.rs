@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use jaus::endpoint::{Config, Pacing, Packing};
+use jaus::endpoint::{Config, Limits, Pacing, Packing};
 
 use crate::sim::{Conditions, Random, Socket};
 
@@ -45,12 +45,16 @@ impl Plan {
 
     /// Whether there is more than one route between two networks.
     pub(crate) fn has_loop(&self) -> bool {
-        self.nodes.iter().filter(|it| it.config.forwarding).count() > 1
+        self.nodes
+            .iter()
+            .filter(|it| it.config.routing.forward)
+            .count()
+            > 1
     }
 
     /// Whether there are routers.
     pub(crate) fn is_routed(&self) -> bool {
-        self.nodes.iter().any(|node| node.config.forwarding)
+        self.nodes.iter().any(|node| node.config.routing.forward)
     }
 }
 
@@ -75,7 +79,10 @@ impl NodePlan {
         let mut config = Config {
             payload_limit: random.choose(&[1425, 1425, 256, 4079]),
             max_window: random.choose(&[512, 512, 4]),
-            max_peers: random.choose(&[1024, 1024, 1024, 3]),
+            limits: Limits {
+                max_peers: random.choose(&[1024, 1024, 1024, 3]),
+                ..Limits::default()
+            },
             pacing: random.choose(&[
                 Some(Pacing::default()),
                 Some(Pacing {
@@ -93,8 +100,8 @@ impl NodePlan {
             ..Config::default()
         };
         if networks.len() > 1 {
-            config.forwarding = true;
-            config.max_peers = 1024;
+            config.routing.forward = true;
+            config.limits.max_peers = 1024;
         }
         let is_forgetful = random.happens(50);
         if is_forgetful {

@@ -110,7 +110,7 @@ fn component() -> Vec<u8> {
 /// The node's output to a component: welcome, a message from the network, and outcomes.
 fn node() -> Vec<u8> {
     use jaus::address::JausId;
-    use jaus::endpoint::{LinkId, Path, Unacknowledged};
+    use jaus::endpoint::{LinkId, Path, Shortfall, Unacknowledged};
     use jaus::link::local::record::{Head, Outcome, Reason, Record};
     use jaus::wire::Flags;
     let id = JausId::new(101, 1, 33);
@@ -122,12 +122,12 @@ fn node() -> Vec<u8> {
         destination: id,
         path: Some(Path { link, peer }),
     };
-    let unacknowledged = Outcome::NotAcknowledged {
+    let unacknowledged = Outcome::NotAcknowledged(Shortfall {
         destination: id,
         reason: Unacknowledged::TimedOut,
         acknowledged: 5,
         length: 10,
-    };
+    });
     let outcome = |handle, outcome| Record::from(Head::Outcome { handle, outcome });
     let max_message = 1 << 20;
     records(&[

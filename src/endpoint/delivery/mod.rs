@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 
 use tracing::debug;
 
-use super::{Config, Counter, Endpoint, Event, MessageHandle, SendError};
+use super::{Config, Counter, Endpoint, Event, MessageHandle, SendError, Shortfall};
 use crate::address::JausId;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, Priority, Version};
 use flow::{Flow, Outcome};
@@ -357,10 +357,12 @@ impl Endpoint {
                 },
                 Some(reason) => Event::NotAcknowledged {
                     message,
-                    destination,
-                    reason,
-                    acknowledged: pending.acknowledged,
-                    length: pending.whole.payload.len(),
+                    shortfall: Shortfall {
+                        destination,
+                        reason,
+                        acknowledged: pending.acknowledged,
+                        length: pending.whole.payload.len(),
+                    },
                 },
             });
         }

@@ -9,22 +9,13 @@ use std::time::{Duration, Instant};
 
 use crate::endpoint::large::Cut;
 use crate::endpoint::rate::Bucket;
-use crate::peer::Intake;
+use crate::peer::Pacing;
 use crate::wire::Frame;
 
 /// Headers before a datagram and kernel metadata after it.
 const ENVELOPE: usize = 384;
 /// The kernel's descriptor of a datagram.
 const DESCRIPTION: usize = 256;
-
-/// The rate limit for fragments of unacknowledged large messages to one remote end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pacing {
-    /// Octets of the receive buffer that may be filled at once.
-    pub burst: usize,
-    /// Octets of the receive buffer assumed to be emptied per second.
-    pub rate: u64,
-}
 
 impl Default for Pacing {
     /// The burst fits Linux's default receive buffer of 212992 octets and leaves a tenth to other
@@ -41,10 +32,10 @@ impl Default for Pacing {
 
 impl Pacing {
     /// The pacing for a receiver with less capacity.
-    pub(in crate::endpoint) fn within(self, intake: Intake) -> Self {
+    pub(in crate::endpoint) fn within(self, other: Self) -> Self {
         Self {
-            burst: self.burst.min(intake.burst),
-            rate: self.rate.min(intake.rate),
+            burst: self.burst.min(other.burst),
+            rate: self.rate.min(other.rate),
         }
     }
 

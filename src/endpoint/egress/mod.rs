@@ -21,7 +21,6 @@ use super::recent::Recent;
 use super::{Config, Counter, Counters, LinkId, LinkProfile, Path, To, Transmit};
 use crate::wire::{Acknowledgement, EncodeError, Flags, Frame, Framing, Priority, as5669a, judp};
 pub(super) use fragmented::FragmentedSend;
-pub use fragmented::Pacing;
 use join::may_pack;
 use queue::HopQueue;
 pub(super) use queue::Level;

@@ -76,7 +76,7 @@ impl Peers {
     }
 
     fn is_full(&self) -> bool {
-        self.states.len() >= self.config.max_peers.max(1)
+        self.states.len() >= self.config.limits.max_peers.max(1)
     }
 
     /// The record of a peer, if its address is known.

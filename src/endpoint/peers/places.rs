@@ -50,7 +50,7 @@ impl Peers {
     /// The peer to evict for a new one from a network address. An address that holds a quarter of
     /// the table gets no more of it, and makes room for addresses that hold less.
     pub(super) fn next_to_go(&mut self, now: Instant, newcomer: Origin) -> Option<JausId> {
-        let limit = self.config.max_peers;
+        let limit = self.config.limits.max_peers;
         let (most, holder) = self.held.largest()?;
         let own = self.held.of(newcomer);
         let (is_excessive, own_is) = (most * 4 > limit, own * 4 > limit);

@@ -168,10 +168,12 @@ fn an_unacknowledged_message_is_sent_again_and_then_given_up() {
         rig.events(),
         [Event::NotAcknowledged {
             message,
-            destination: PEER,
-            reason: Unacknowledged::TimedOut,
-            acknowledged: 0,
-            length: QUERY_IDENTIFICATION.len(),
+            shortfall: Shortfall {
+                destination: PEER,
+                reason: Unacknowledged::TimedOut,
+                acknowledged: 0,
+                length: QUERY_IDENTIFICATION.len(),
+            },
         }]
     );
     assert_eq!(
@@ -213,10 +215,12 @@ fn a_refused_message_is_told() {
         rig.events(),
         [Event::NotAcknowledged {
             message,
-            destination: PEER,
-            reason: Unacknowledged::Refused,
-            acknowledged: 0,
-            length: QUERY_IDENTIFICATION.len(),
+            shortfall: Shortfall {
+                destination: PEER,
+                reason: Unacknowledged::Refused,
+                acknowledged: 0,
+                length: QUERY_IDENTIFICATION.len(),
+            },
         }]
     );
 }

@@ -176,7 +176,10 @@ proptest! {
     fn nothing_breaks_an_endpoint_or_makes_it_grow(steps in vec(any_step(), 0..120)) {
         let config = Config {
             queue_limit: LIMIT,
-            max_peers: LIMIT,
+            limits: Limits {
+                max_peers: LIMIT,
+                ..Limits::default()
+            },
             max_recent: LIMIT,
             max_components: LIMIT,
             max_unacknowledged: LIMIT,

@@ -5,7 +5,10 @@ use super::*;
 fn small() -> Config {
     Config {
         queue_limit: 4,
-        max_peers: 3,
+        limits: Limits {
+            max_peers: 3,
+            ..Limits::default()
+        },
         max_recent: 8,
         max_unacknowledged: 2,
         max_paced: 3_000_000,
@@ -37,7 +40,10 @@ fn a_full_table_of_peers_forgets_the_one_heard_longest_ago() {
 #[test]
 fn a_forgotten_peer_is_told_and_reached_through_the_group() {
     let mut rig = Rig::with(Config {
-        max_peers: 1,
+        limits: Limits {
+            max_peers: 1,
+            ..Limits::default()
+        },
         ..Config::default()
     });
     rig.hear(&from_peer(QUERY_HEARTBEAT));
@@ -80,7 +86,10 @@ fn datagrams_that_nobody_polls_are_refused() {
 #[test]
 fn news_that_nobody_polls_is_dropped_and_counted() {
     let mut rig = Rig::with(Config {
-        max_peers: 100,
+        limits: Limits {
+            max_peers: 100,
+            ..Limits::default()
+        },
         ..small()
     });
     for component in 1..=10 {

@@ -153,7 +153,7 @@ fn a_peer_that_never_acknowledges_ends_every_attempt_in_time_and_holds_up_nobody
         rig.pass(timeout - rig.now);
         rig.transmits();
         reasons.extend(rig.events().into_iter().map(|event| match event {
-            Event::NotAcknowledged { reason, .. } => reason,
+            Event::NotAcknowledged { shortfall, .. } => shortfall.reason,
             event => panic!("{event:?}"),
         }));
     }
@@ -224,10 +224,10 @@ fn a_packet_that_never_gets_through_ends_its_message_though_others_do() {
         assert!(rig.now - begin < MINUTE, "it ends");
     };
     assert!(rig.now - begin >= Config::default().acknowledge_patience);
-    let [Event::NotAcknowledged { reason, .. }] = results[..] else {
+    let [Event::NotAcknowledged { shortfall, .. }] = results[..] else {
         panic!("{results:?}")
     };
-    assert_eq!(reason, Unacknowledged::TimedOut);
+    assert_eq!(shortfall.reason, Unacknowledged::TimedOut);
 }
 
 #[test]

@@ -101,8 +101,8 @@ fn flood(hosts: u32, config: Config) -> Rig {
 /// fragments. [`PEER`] must still be known.
 fn is_bounded(rig: &Rig) {
     let config = Config::default();
-    assert!(rig.endpoint.peers().count() <= config.max_peers);
-    assert!(rig.endpoint.gate.new_ids.own.len() <= config.max_peers);
+    assert!(rig.endpoint.peers().count() <= config.limits.max_peers);
+    assert!(rig.endpoint.gate.new_ids.own.len() <= config.limits.max_peers);
     assert!(rig.endpoint.heard.len() <= config.max_recent * 5 / 2);
     assert!(rig.endpoint.reassembly.cost() <= config.max_reassembly);
     assert!(rig.endpoint.peers().any(|peer| peer.id == PEER));
@@ -131,9 +131,9 @@ fn a_flood_from_many_addresses_pushes_out_only_itself() {
 #[test]
 fn with_configured_rates_a_flood_is_cut_off_at_the_gate() {
     let config = Config {
-        rates: Rates {
+        limits: Limits {
             messages_per_address: Some(Rate::new(10_000, 1000)),
-            ..Rates::default()
+            ..Limits::default()
         },
         ..Config::default()
     };
@@ -171,7 +171,10 @@ fn who_is_denied_is_not_heard() {
 #[test]
 fn a_table_full_of_peers_that_answer_takes_in_nobody_until_one_falls_silent() {
     let mut rig = Rig::with(Config {
-        max_peers: 2,
+        limits: Limits {
+            max_peers: 2,
+            ..Limits::default()
+        },
         ..Config::default()
     });
     let peer = |component| Frame {
@@ -205,7 +208,10 @@ fn a_table_full_of_peers_that_answer_takes_in_nobody_until_one_falls_silent() {
 #[test]
 fn ids_that_prove_nothing_lock_nobody_out_however_many_addresses_they_have() {
     let mut rig = Rig::with(Config {
-        max_peers: 60,
+        limits: Limits {
+            max_peers: 60,
+            ..Limits::default()
+        },
         ..Config::default()
     });
     for component in 1..=60 {

@@ -131,10 +131,12 @@ fn a_large_message_with_acknowledgement_is_told_when_all_of_it_is_acknowledged()
         rig.events(),
         [Event::NotAcknowledged {
             message,
-            destination: PEER,
-            reason: Unacknowledged::TimedOut,
-            acknowledged: 1425,
-            length: 1425 * 3,
+            shortfall: Shortfall {
+                destination: PEER,
+                reason: Unacknowledged::TimedOut,
+                acknowledged: 1425,
+                length: 1425 * 3,
+            },
         }]
     );
     assert_eq!(rig.endpoint.poll_timeout(), None);
@@ -303,9 +305,9 @@ fn unfinished_messages_are_bounded_per_sender_and_in_all() {
 fn what_invented_senders_leave_behind_is_bounded() {
     let config = Config {
         max_reassembly: 1 << 20,
-        rates: Rates {
-            new_ids: Rate::new(u32::MAX, u32::MAX),
-            ..Rates::default()
+        limits: Limits {
+            new_ids_per_address: Rate::new(u32::MAX, u32::MAX),
+            ..Limits::default()
         },
         ..Config::default()
     };

@@ -355,7 +355,7 @@ fn a_configured_id_is_refused_from_elsewhere_and_never_moved() {
 #[test]
 fn one_address_cannot_lock_newcomers_of_another_out() {
     let mut rig = Rig::new();
-    let numbers = 0..Config::default().max_peers as u16;
+    let numbers = 0..Limits::default().max_peers as u16;
     let invented = |number: u16| JausId::new(1000 + number / 200, 1, (number % 200 + 1) as u8);
     for source in numbers.map(invented) {
         rig.hear_from(ELSEWHERE, &Frame { source, ..again(1) });

@@ -27,7 +27,7 @@ use std::net::{IpAddr, Ipv6Addr, SocketAddr, SocketAddrV6};
 use bytes::{Buf, BufMut, Bytes};
 
 use crate::address::JausId;
-use crate::endpoint::{LinkId, Path, Remote, Unacknowledged};
+use crate::endpoint::{LinkId, Path, Remote, Shortfall, Unacknowledged};
 use crate::wire::Flags;
 
 /// The version of the format.
@@ -111,16 +111,7 @@ pub enum Outcome {
     /// Its receiver has acknowledged it.
     Acknowledged,
     /// It was not acknowledged, and will not be sent again.
-    NotAcknowledged {
-        /// The reason.
-        reason: Unacknowledged,
-        /// Its destination.
-        destination: JausId,
-        /// Octets of it that were acknowledged.
-        acknowledged: u32,
-        /// Octets of the whole message.
-        length: u32,
-    },
+    NotAcknowledged(Shortfall),
     /// The node rejected it. The payload is the reason.
     Rejected,
 }
@@ -348,16 +339,13 @@ impl Outcome {
     fn encode(self, out: &mut Vec<u8>) {
         match self {
             Self::Acknowledged => out.put_u8(0),
-            Self::NotAcknowledged {
-                reason,
-                destination,
-                acknowledged,
-                length,
-            } => {
-                let before = Self::REASONS.iter().take_while(|&&r| r != reason);
+            Self::NotAcknowledged(shortfall) => {
+                let reasons = Self::REASONS.iter();
+                let before = reasons.take_while(|&&reason| reason != shortfall.reason);
                 out.put_u8(1 + before.count() as u8);
-                for field in [destination.to_u32(), acknowledged, length] {
-                    out.put_u32_le(field);
+                out.put_u32_le(shortfall.destination.to_u32());
+                for octets in [shortfall.acknowledged, shortfall.length] {
+                    out.put_u32_le(u32::try_from(octets).unwrap_or(u32::MAX));
                 }
             }
             Self::Rejected => out.put_u8(4),
@@ -368,12 +356,12 @@ impl Outcome {
         Some(match octets.try_get_u8().ok()? {
             0 => Self::Acknowledged,
             4 => Self::Rejected,
-            code => Self::NotAcknowledged {
+            code => Self::NotAcknowledged(Shortfall {
                 reason: *Self::REASONS.get(usize::from(code) - 1)?,
                 destination: id(octets)?,
-                acknowledged: octets.try_get_u32_le().ok()?,
-                length: octets.try_get_u32_le().ok()?,
-            },
+                acknowledged: octets.try_get_u32_le().ok()? as usize,
+                length: octets.try_get_u32_le().ok()? as usize,
+            }),
         })
     }
 }

@@ -1,80 +1,11 @@
-//! The sections `[routing]` and `[limits]`: whether a node forwards messages, and how much it
-//! accepts from others. The section `[access]`, which senders it accepts, is
-//! [`Access`](crate::endpoint::Access).
-//!
-//! ```toml
-//! [routing]
-//! forward = true                                        # between the node's links
-//! broadcasts = { per_second = 500, burst = 1000 }       # what goes to many, in all
-//!
-//! [access]
-//! allow_subsystems = ["101", "200-299"]
-//! deny_networks = ["10.0.9.0/24", "fd00:9::/32"]
-//!
-//! [limits]
-//! max_peers = 1024
-//! new_ids_per_address = { per_second = 64, burst = 1024 }
-//! messages_per_address = { per_second = 20000, burst = 40000 }
-//! messages_per_id = { per_second = 5000, burst = 10000 }
-//! ```
+//! Checks of the sections `[routing]` and `[limits]`.
 
 use super::ConfigError;
 use super::error::{in_range, not_zero};
-use crate::endpoint::{self, Rate};
+use crate::endpoint::{Limits, Rate, Routing};
 
 /// The largest valid `max_peers`.
 const MOST_PEERS: usize = 65_536;
-
-/// Whether and how much a node forwards between its links. By default it does not, even with
-/// several links: joining two networks is a deliberate decision.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
-#[non_exhaustive]
-pub struct Routing {
-    /// Whether to forward messages for other nodes.
-    pub forward: bool,
-    /// The total rate of forwarded messages with many receivers or an unknown destination.
-    pub broadcasts: Rate,
-}
-
-impl Default for Routing {
-    fn default() -> Self {
-        let usual = endpoint::Config::default();
-        Self {
-            forward: usual.forwarding,
-            broadcasts: usual.forwarded_broadcasts,
-        }
-    }
-}
-
-/// Limits of what a node accepts from others.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
-#[non_exhaustive]
-pub struct Limits {
-    /// Limit of known peers, 1 to 65536.
-    pub max_peers: usize,
-    /// Rate of new ids from each network address.
-    pub new_ids_per_address: Rate,
-    /// Rate of messages from each network address; unlimited if omitted.
-    pub messages_per_address: Option<Rate>,
-    /// Rate of messages from each id; unlimited if omitted.
-    pub messages_per_id: Option<Rate>,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        let usual = endpoint::Config::default();
-        Self {
-            max_peers: usual.max_peers,
-            new_ids_per_address: usual.rates.new_ids,
-            messages_per_address: usual.rates.messages_per_address,
-            messages_per_id: usual.rates.messages_per_id,
-        }
-    }
-}
 
 /// Rejects limits that would block everything, or are too large.
 pub(super) fn validate(routing: &Routing, limits: &Limits) -> Result<(), ConfigError> {
@@ -101,8 +32,6 @@ pub(super) fn validate(routing: &Routing, limits: &Limits) -> Result<(), ConfigE
 #[cfg(test)]
 mod tests {
     use super::*;
-    #[cfg(feature = "serde")]
-    use crate::endpoint::Rates;
     use crate::node::Config;
 
     #[test]
@@ -143,10 +72,11 @@ mod tests {
         )
         .unwrap();
         let endpoint = config.endpoint(0);
-        assert!(endpoint.forwarding && !endpoint.access.allows_subsystem(102));
+        assert!(endpoint.routing.forward && !endpoint.access.allows_subsystem(102));
         assert!(!endpoint.access.allows_address([10, 0, 9, 1].into()));
-        assert_eq!(endpoint.rates.messages_per_id, Some(Rate::new(50, 100)));
-        assert_eq!(endpoint.rates.new_ids, Rates::default().new_ids);
+        assert_eq!(endpoint.limits.messages_per_id, Some(Rate::new(50, 100)));
+        let usual = Limits::default().new_ids_per_address;
+        assert_eq!(endpoint.limits.new_ids_per_address, usual);
         for (text, value, remedy) in [
             (
                 "[routing]\nforwards = true",

@@ -48,18 +48,18 @@ mod tcp;
 mod tests;
 pub mod units;
 
+use std::net::SocketAddr;
 #[cfg(unix)]
 use std::path::PathBuf;
 
 pub use self::delivery::Delivery;
 pub use self::error::ConfigError;
 use self::error::{in_range, not_zero};
-pub use self::limits::{Limits, Routing};
 pub use self::peer::Peer;
-pub use self::tcp::{Listen, Tcp};
+pub use self::tcp::Tcp;
 use super::mailbox::MailboxLimits;
 use crate::address::JausId;
-use crate::endpoint::{self, Access, PAYLOAD_LIMITS, Pacing, Rates};
+use crate::endpoint::{self, Access, Limits, PAYLOAD_LIMITS, Pacing, Routing};
 use crate::link::local::{Address, Local};
 #[cfg(feature = "serial")]
 use crate::link::serial::Settings as SerialLine;
@@ -249,7 +249,7 @@ impl Config {
 
     /// Accepts TCP connections at this address.
     #[must_use]
-    pub fn tcp_listen(mut self, at: Listen) -> Self {
+    pub const fn tcp_listen(mut self, at: SocketAddr) -> Self {
         self.tcp.listen = Some(at);
         self
     }
@@ -297,7 +297,10 @@ impl Config {
         }
         #[cfg(feature = "serial")]
         validate_serial(&self.serial)?;
-        self.tcp.validate()?;
+        if self.tcp.listen.is_some() {
+            not_zero("tcp.max_accepted", self.tcp.max_accepted)?;
+            not_zero("tcp.max_per_address", self.tcp.max_per_address)?;
+        }
         limits::validate(&self.routing, &self.limits)?;
         self.delivery.validate()?;
         Ok(self.udp().validate()?)
@@ -306,12 +309,11 @@ impl Config {
     /// The endpoint's settings. The reassembly buffer has room for two of the longest messages.
     pub(super) fn endpoint(&self, first_sequence: u16) -> endpoint::Config {
         let usual = endpoint::Config::default();
-        let (delivery, limits) = (&self.delivery, &self.limits);
+        let delivery = &self.delivery;
         endpoint::Config {
             payload_limit: self.payload_limit,
             max_message: self.max_message,
             max_reassembly: usual.max_reassembly.max(2 * self.max_message),
-            max_peers: limits.max_peers,
             acknowledge_patience: delivery.patience,
             max_window: delivery.window,
             max_unacknowledged_octets: delivery.waiting,
@@ -320,14 +322,9 @@ impl Config {
                 burst: delivery.pace_burst,
                 rate: delivery.pace_rate as u64,
             }),
-            forwarding: self.routing.forward,
-            forwarded_broadcasts: self.routing.broadcasts,
+            routing: self.routing.clone(),
             access: self.access.clone(),
-            rates: Rates {
-                new_ids: limits.new_ids_per_address,
-                messages_per_address: limits.messages_per_address,
-                messages_per_id: limits.messages_per_id,
-            },
+            limits: self.limits.clone(),
             first_sequence,
             profiles: self.profile.clone(),
             ..usual

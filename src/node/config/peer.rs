@@ -1,7 +1,7 @@
 //! Configured peers: an address and, if known, an id.
 
 use std::fmt;
-use std::net::{SocketAddr, SocketAddrV4};
+use std::net::SocketAddr;
 use std::str::FromStr;
 
 use super::ConfigError;
@@ -39,18 +39,16 @@ impl FromStr for Peer {
     type Err = ConfigError;
 
     fn from_str(text: &str) -> Result<Self, ConfigError> {
-        let (id, place) = match text.split_once('@') {
-            Some((id, place)) => (
-                Some(id.parse::<JausId>().map_err(ConfigError::PeerId)?),
-                place,
-            ),
-            None => (None, text),
-        };
-        let place: Option<Place> = place.parse().ok();
-        place
-            .filter(|place| !place.lacks_zone())
-            .map(|place| Self { id, place })
-            .ok_or_else(|| ConfigError::Peer(text.to_owned()))
+        let named = text.split_once('@');
+        let (id, place) = named.map_or((None, text), |(id, place)| (Some(id), place));
+        let id = id
+            .map(str::parse)
+            .transpose()
+            .map_err(ConfigError::PeerId)?;
+        let place = place.parse().ok();
+        let place = place.filter(|place: &Place| !place.lacks_zone());
+        let place = place.ok_or_else(|| ConfigError::Peer(text.to_owned()))?;
+        Ok(Self { id, place })
     }
 }
 
@@ -60,15 +58,6 @@ impl fmt::Display for Peer {
             write!(f, "{id}@")?;
         }
         self.place.fmt(f)
-    }
-}
-
-impl From<SocketAddrV4> for Peer {
-    fn from(address: SocketAddrV4) -> Self {
-        Self {
-            id: None,
-            place: SocketAddr::V4(address).into(),
-        }
     }
 }
 

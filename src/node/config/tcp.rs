@@ -1,14 +1,16 @@
 //! The `[tcp]` section: connections to and from other nodes.
 
-use std::fmt;
-use std::net::{IpAddr, SocketAddr};
-use std::str::FromStr;
+#[cfg(feature = "serde")]
+use std::net::IpAddr;
+use std::net::SocketAddr;
 
-use super::error::not_zero;
-use super::{ConfigError, Peer};
-use crate::as_text::serde_as_text;
+#[cfg(feature = "serde")]
+use super::ConfigError;
+use super::Peer;
 use crate::endpoint::Access;
-use crate::link::{STANDARD_PORT, tcp};
+#[cfg(feature = "serde")]
+use crate::link::STANDARD_PORT;
+use crate::link::tcp;
 
 /// TCP connections of a node. The default is none.
 ///
@@ -22,8 +24,10 @@ use crate::link::{STANDARD_PORT, tcp};
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 #[non_exhaustive]
 pub struct Tcp {
-    /// The address to accept connections at; none if omitted.
-    pub listen: Option<Listen>,
+    /// The address to accept connections at; none if omitted. In a file the port may be omitted;
+    /// it is 3794 then.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "read_listen"))]
+    pub listen: Option<SocketAddr>,
     /// Peers to connect to. With an id (or a pattern of ids) in front, messages for it go there
     /// before it has sent any.
     pub connect: Vec<Peer>,
@@ -52,19 +56,10 @@ impl Tcp {
         self.listen.is_some() || !self.connect.is_empty()
     }
 
-    /// Checks that a listener can accept connections.
-    pub(super) fn validate(&self) -> Result<(), ConfigError> {
-        if self.listen.is_some() {
-            not_zero("tcp.max_accepted", self.max_accepted)?;
-            not_zero("tcp.max_per_address", self.max_per_address)?;
-        }
-        Ok(())
-    }
-
     /// The settings of the link; `access` limits which addresses may connect.
     pub(in crate::node) fn settings(&self, access: &Access) -> tcp::Settings {
         tcp::Settings {
-            listen: self.listen.map(|listen| listen.0),
+            listen: self.listen,
             connect: self.connect.iter().map(|peer| peer.address()).collect(),
             max_accepted: self.max_accepted,
             max_per_address: self.max_per_address,
@@ -73,46 +68,30 @@ impl Tcp {
     }
 }
 
-/// The address where a node accepts connections: `10.0.0.5`, which means port 3794,
-/// `10.0.0.5:3795`, `0.0.0.0` for all addresses of the host, port 0 for any free one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Listen(SocketAddr);
-
-impl From<SocketAddr> for Listen {
-    fn from(address: SocketAddr) -> Self {
-        Self(address)
-    }
+/// Deserializes the address to listen on; the default port is 3794.
+#[cfg(feature = "serde")]
+fn read_listen<'de, D: serde::Deserializer<'de>>(d: D) -> Result<Option<SocketAddr>, D::Error> {
+    let Some(text) = <Option<String> as serde::Deserialize>::deserialize(d)? else {
+        return Ok(None);
+    };
+    let standard = |ip: IpAddr| SocketAddr::new(ip, STANDARD_PORT);
+    let address = text.parse().or_else(|_| text.parse().map(standard)).ok();
+    let address = address.filter(|address| !address.ip().is_multicast());
+    let wrong = || serde::de::Error::custom(ConfigError::Listen(text));
+    address.map(Some).ok_or_else(wrong)
 }
-
-impl FromStr for Listen {
-    type Err = ConfigError;
-
-    fn from_str(text: &str) -> Result<Self, ConfigError> {
-        let standard = |ip: IpAddr| SocketAddr::new(ip, STANDARD_PORT);
-        let address = text.parse().or_else(|_| text.parse().map(standard));
-        address
-            .ok()
-            .filter(|address| !address.ip().is_multicast())
-            .map(Self)
-            .ok_or_else(|| ConfigError::Listen(text.to_owned()))
-    }
-}
-
-impl fmt::Display for Listen {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
-
-serde_as_text!(Listen);
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    #[cfg(feature = "serde")]
     #[test]
     fn an_address_to_listen_on_has_the_standard_port_unless_it_names_one() {
-        let listen = |text: &str| text.parse::<Listen>().map(|listen| listen.to_string());
+        let listen = |text: &str| {
+            let tcp = toml::from_str::<Tcp>(&format!("listen = \"{text}\""));
+            tcp.map(|tcp| tcp.listen.unwrap().to_string())
+        };
         assert_eq!(listen("0.0.0.0").unwrap(), "0.0.0.0:3794");
         assert_eq!(listen("10.0.0.5:0").unwrap(), "10.0.0.5:0");
         assert_eq!(listen("[::]:3795").unwrap(), "[::]:3795");

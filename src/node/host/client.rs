@@ -10,7 +10,7 @@ use std::time::Duration;
 use tokio::sync::{Notify, watch};
 use tokio::time::{sleep, timeout};
 
-use super::super::awaiting::{Awaiting, Waiter};
+use super::super::awaiting::{Awaiting, MAX_AWAITED, Waiter};
 use super::super::events::EventSender;
 use super::super::mailbox::Mailbox;
 use super::super::{HostError, SendError, Undelivered};
@@ -24,8 +24,6 @@ use crate::wire::{Acknowledgement, Flags};
 /// Limit of octets that wait for the node. A single larger message is accepted if nothing else
 /// waits.
 const MAX_WAITING: usize = 4 << 20;
-/// Limit of messages that wait for an acknowledgement.
-const MAX_AWAITED: usize = 4096;
 /// Required room in the mailbox before a read: about the largest number of messages in one read.
 const ROOM: usize = 1024;
 /// How long a component that does not read delays what follows, such as the outcomes of its own
@@ -68,6 +66,10 @@ enum Status {
     Left,
 }
 
+impl Status {
+    const DISCONNECTED: [Self; 2] = [Self::Lost, Self::Left];
+}
+
 impl Client {
     pub(super) fn start(host: Host, attached: Attached) -> Arc<Self> {
         let client = Arc::new(Self {
@@ -76,10 +78,10 @@ impl Client {
                 writer: attached.writer,
                 max_message: attached.max_message,
                 sent: 0,
-                awaited: Awaiting::new(MAX_AWAITED),
+                awaited: Awaiting::default(),
             }),
             mailbox: Arc::new(Mailbox::new(host.limits)),
-            events: EventSender::new(),
+            events: EventSender::default(),
             status: watch::Sender::new(Status::Connected),
             emptied: Notify::new(),
         });
@@ -88,7 +90,7 @@ impl Client {
     }
 
     pub(in super::super) fn is_connected(&self) -> bool {
-        self.status.borrow().is_connected()
+        !Status::DISCONNECTED.contains(&self.status.borrow())
     }
 
     /// Sends a message to the node. If the message requests an acknowledgement, `waiter` gets the
@@ -108,18 +110,16 @@ impl Client {
             let limit = MAX_AWAITED;
             return Err(endpoint::SendError::TooManyUnacknowledged { limit }.into());
         }
-        let acknowledgement = if message.acknowledge {
-            Acknowledgement::Request
-        } else {
-            Acknowledgement::None
-        };
-        let flags = Flags::new(message.priority).with_broadcast(message.broadcast);
+        let mut flags = Flags::new(message.priority).with_broadcast(message.broadcast);
+        if message.acknowledge {
+            flags = flags.with_acknowledgement(Acknowledgement::Request);
+        }
+        let (destination, payload) = (message.destination, message.payload);
         let head = Head::Send {
-            flags: flags.with_acknowledgement(acknowledgement),
+            flags,
             handle,
-            destination: message.destination,
+            destination,
         };
-        let payload = message.payload;
         inner.writer.send_now(&Record { head, payload });
         if inner.writer.is_empty() {
             self.emptied.notify_waiters();
@@ -162,7 +162,7 @@ impl Client {
 
     /// Ready when there is no connection.
     pub(in super::super) async fn disconnected(&self) {
-        self.reached(|status| !status.is_connected()).await;
+        self.reached(&Status::DISCONNECTED).await;
     }
 
     /// Detaches the component.
@@ -170,15 +170,15 @@ impl Client {
         let mut inner = self.lock();
         inner.awaited.clear();
         inner.writer.send(&Head::Leave.into());
-        self.status.send_modify(|status| *status = Status::Leaving);
+        self.status.send_replace(Status::Leaving);
         drop(inner);
         self.mailbox.close();
     }
 
-    async fn reached(&self, wanted: impl Fn(Status) -> bool) {
+    async fn reached(&self, wanted: &[Status]) {
         let mut status = self.status.subscribe();
         // This cannot fail: `self` holds the sender.
-        let _ = status.wait_for(|status| wanted(*status)).await;
+        let _ = status.wait_for(|status| wanted.contains(status)).await;
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
@@ -187,7 +187,7 @@ impl Client {
 
     /// Reads and writes until the component has left.
     async fn run(self: Arc<Self>, host: Host, mut reader: Reader) {
-        let leaving = || self.reached(|status| status == Status::Leaving);
+        let leaving = || self.reached(&[Status::Leaving]);
         loop {
             let late = async {
                 leaving().await;
@@ -220,13 +220,10 @@ impl Client {
         inner.writer.close();
         inner.awaited.clear();
         self.emptied.notify_waiters();
-        self.status.send_if_modified(|now| {
-            let stays = (*now, status) == (Status::Leaving, Status::Lost);
-            if !stays {
-                *now = status;
-            }
-            !stays
-        });
+        let is_leaving = *self.status.borrow() == Status::Leaving;
+        if !is_leaving || status == Status::Left {
+            self.status.send_replace(status);
+        }
     }
 
     /// Retries until the node, or its successor, has attached the component again.
@@ -320,30 +317,17 @@ impl Client {
                     path,
                     to: self.id,
                 });
-                Ok(())
             }
-            Head::Outcome { handle, outcome } => {
-                self.handle_outcome(handle, outcome, &record);
-                Ok(())
-            }
-            _ => Err(RecordError::Unexpected),
+            Head::Outcome { handle, outcome } => self.handle_outcome(handle, outcome, &record),
+            _ => return Err(RecordError::Unexpected),
         }
+        Ok(())
     }
 
     fn handle_outcome(&self, handle: u64, outcome: Outcome, record: &Record) {
         let outcome = match outcome {
             Outcome::Acknowledged => Ok(()),
-            Outcome::NotAcknowledged {
-                reason,
-                destination,
-                acknowledged,
-                length,
-            } => Err(Undelivered::NotAcknowledged {
-                destination,
-                reason,
-                acknowledged: acknowledged as usize,
-                length: length as usize,
-            }),
+            Outcome::NotAcknowledged(shortfall) => Err(shortfall.into()),
             Outcome::Rejected => Err(Undelivered::Rejected(record.text())),
         };
         let message = MessageHandle(handle);
@@ -354,11 +338,5 @@ impl Client {
             tracing::debug!(id = %self.id, why, "message not sent");
             self.events.send(HostEvent::Rejected { message, why });
         }
-    }
-}
-
-impl Status {
-    const fn is_connected(self) -> bool {
-        matches!(self, Self::Connected | Self::Leaving)
     }
 }

@@ -10,7 +10,7 @@
 
 mod session;
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use tokio::sync::{Semaphore, watch};
@@ -18,6 +18,7 @@ use tokio::time::timeout;
 
 use self::session::Session;
 use super::Config;
+use super::awaiting::Answers;
 use super::components::{ComponentEvent, Departure};
 use super::core::Shared;
 use super::mailbox::Mailbox;
@@ -36,51 +37,38 @@ const HANDSHAKE: Duration = Duration::from_secs(5);
 /// successor's first record may be noticed in either order.
 const OVERLAP: Duration = Duration::from_millis(200);
 
-/// Accepts components until the node has stopped.
-#[derive(Debug)]
-pub(super) struct Server {
-    listener: Listener,
-    shared: Arc<Shared>,
-    /// Dropped after the listener, because the next node of this host may need the same address.
-    _listening: watch::Receiver<()>,
-}
-
 /// Why a component is not attached.
 type Refusal = (Reason, String);
 
-impl Server {
-    pub(super) fn new(listener: Listener, shared: Arc<Shared>) -> Self {
-        Self {
-            listener,
-            _listening: shared.listening.subscribe(),
-            shared,
-        }
-    }
-
-    pub(super) async fn run(self) {
-        let unattached = Arc::new(Semaphore::new(UNATTACHED));
-        while let Ok(permit) = unattached.clone().acquire_owned().await {
-            let accepted = tokio::select! {
-                accepted = self.listener.accept() => accepted,
-                () = self.shared.stopped() => return,
-            };
-            match accepted {
-                Ok(stream) => {
-                    let shared = self.shared.clone();
-                    tokio::spawn(async move {
-                        let attached = attach(&shared, stream).await;
-                        drop(permit);
-                        if let Some((session, reader)) = attached {
-                            session.run(reader).await;
-                        }
-                    });
-                }
-                Err(error) => {
-                    tracing::warn!(%error, "cannot accept a component");
-                    // For instance too many open files: do not retry at once.
-                    if matches!(error, Error::Io { .. }) {
-                        tokio::time::sleep(OVERLAP).await;
+/// Accepts components until the node has stopped. The listener, as the last parameter, is dropped
+/// before `_listening` tells so, because the next node of this host may need the same address.
+pub(super) async fn serve(
+    shared: Arc<Shared>,
+    _listening: watch::Receiver<()>,
+    listener: Listener,
+) {
+    let unattached = Arc::new(Semaphore::new(UNATTACHED));
+    while let Ok(permit) = unattached.clone().acquire_owned().await {
+        let accepted = tokio::select! {
+            accepted = listener.accept() => accepted,
+            () = shared.stopped() => return,
+        };
+        match accepted {
+            Ok(stream) => {
+                let shared = shared.clone();
+                tokio::spawn(async move {
+                    let attached = attach(&shared, stream).await;
+                    drop(permit);
+                    if let Some((session, reader)) = attached {
+                        session.run(reader).await;
                     }
+                });
+            }
+            Err(error) => {
+                tracing::warn!(%error, "cannot accept a component");
+                // For instance too many open files: do not retry at once.
+                if matches!(error, Error::Io { .. }) {
+                    tokio::time::sleep(OVERLAP).await;
                 }
             }
         }
@@ -116,7 +104,13 @@ async fn attach(shared: &Arc<Shared>, stream: Stream) -> Option<(Session, Reader
             let max_message = u32::try_from(shared.config.max_message).unwrap_or(u32::MAX);
             reader.set_limit(max_message as usize + LONGEST_HEAD);
             writer.queue(&Head::Welcome { id, max_message }.into());
-            let session = Session::new(shared.clone(), writer, id, process, mailbox);
+            let session = Session {
+                shared: shared.clone(),
+                answers: Arc::new(Answers(Mutex::new(writer))),
+                id,
+                process,
+                mailbox,
+            };
             Some((session, reader))
         }
         Err((reason, why)) => {
@@ -140,7 +134,7 @@ async fn admit(
     let id = full_id(&shared.config, version, wanted)?;
     let deadline = tokio::time::Instant::now() + OVERLAP;
     loop {
-        if shared.lock().is_stopping() {
+        if shared.lock().stop_at.is_some() {
             return Err((Reason::Stopping, "the node is stopping".to_owned()));
         }
         let error = match shared.attach(id, Some(process.clone())) {
@@ -166,35 +160,31 @@ fn full_id(config: &Config, version: u8, wanted: JausId) -> Result<JausId, Refus
         return Err((Reason::Version, why));
     }
     let (subsystem, node) = (config.subsystem, config.node);
-    let of_node = JausId::new(subsystem, node, wanted.component());
-    match (wanted.subsystem(), wanted.node()) {
-        (0, 0) => Ok(of_node),
-        _ if wanted == of_node => Ok(of_node),
-        _ => {
-            let why = format!(
-                "{wanted} does not belong to this node, whose components are \
-                 {subsystem}.{node}.1 to {subsystem}.{node}.254"
-            );
-            Err((Reason::WrongId, why))
-        }
+    let names_node = (wanted.subsystem(), wanted.node()) != (0, 0);
+    let id = JausId::new(subsystem, node, wanted.component());
+    if names_node && wanted != id {
+        let why = format!(
+            "{wanted} does not belong to this node, whose components are {subsystem}.{node}.1 to \
+             {subsystem}.{node}.254"
+        );
+        return Err((Reason::WrongId, why));
     }
+    Ok(id)
 }
 
 fn refusal(error: &AttachError, holder: Option<Process>) -> Refusal {
-    let reason = match error {
+    let words = error.to_string();
+    match error {
         AttachError::AlreadyAttached(id) => {
-            let holder = match holder {
-                Some(process) => process.to_string(),
-                None => format!("the node itself (process {})", std::process::id()),
-            };
+            let itself = || format!("the node itself (process {})", std::process::id());
+            let holder = holder.map_or_else(itself, |process| process.to_string());
             let why = format!("{id} is used by {holder}: choose another component number");
-            return (Reason::Taken, why);
+            (Reason::Taken, why)
         }
-        AttachError::TooMany { .. } => Reason::TooMany,
-        AttachError::Link(_) => Reason::Taken,
-        _ => Reason::WrongId,
-    };
-    (reason, error.to_string())
+        AttachError::TooMany { .. } => (Reason::TooMany, words),
+        AttachError::Link(_) => (Reason::Taken, words),
+        _ => (Reason::WrongId, words),
+    }
 }
 
 impl From<Error> for Departure {

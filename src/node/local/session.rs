@@ -12,15 +12,14 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use super::super::answers::Answers;
-use super::super::awaiting::Waiter;
+use super::super::awaiting::{Answers, Waiter};
 use super::super::components::{ComponentEvent, Departure};
-use super::super::core::{Core, LAST_WORDS, Shared};
+use super::super::core::{LAST_WORDS, Shared};
 use super::super::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::{Outgoing, Received};
 use crate::link::local::record::{Head, Record, RecordError};
-use crate::link::local::{Error, Process, Reader, Writer};
+use crate::link::local::{Error, Process, Reader};
 use crate::wire::{Acknowledgement, Flags};
 
 /// Octets collected for one write.
@@ -33,30 +32,14 @@ const STUCK: Duration = Duration::from_secs(2);
 /// An attached component.
 #[derive(Debug)]
 pub(super) struct Session {
-    shared: Arc<Shared>,
-    answers: Arc<Answers>,
-    id: JausId,
-    process: Process,
-    mailbox: Arc<Mailbox>,
+    pub(super) shared: Arc<Shared>,
+    pub(super) answers: Arc<Answers>,
+    pub(super) id: JausId,
+    pub(super) process: Process,
+    pub(super) mailbox: Arc<Mailbox>,
 }
 
 impl Session {
-    pub(super) fn new(
-        shared: Arc<Shared>,
-        writer: Writer,
-        id: JausId,
-        process: Process,
-        mailbox: Arc<Mailbox>,
-    ) -> Self {
-        Self {
-            shared,
-            answers: Arc::new(Answers::new(writer)),
-            id,
-            process,
-            mailbox,
-        }
-    }
-
     /// Serves the component until it is gone or the node has stopped.
     pub(super) async fn run(self, mut reader: Reader) {
         let end = async {
@@ -171,25 +154,20 @@ impl Session {
                         acknowledge: flags.acknowledgement() == Acknowledgement::Request,
                         payload,
                     };
+                    let waiter = message.acknowledge.then(|| Waiter::There {
+                        answers: self.answers.clone(),
+                        handle,
+                    });
                     let core = core.get_or_insert_with(|| self.shared.lock());
-                    self.transmit(core, message, handle);
+                    if let Err(error) = core.send(message, waiter) {
+                        self.answers.send(handle, Err(error.into()));
+                    }
                 }
                 Head::Leave => return Ok(true),
                 _ => return Err(RecordError::Unexpected),
             }
         }
         Ok(false)
-    }
-
-    /// Sends a message, and reports an error to the component.
-    fn transmit(&self, core: &mut Core, message: Outgoing, handle: u64) {
-        let waiter = message.acknowledge.then(|| Waiter::There {
-            answers: self.answers.clone(),
-            handle,
-        });
-        if let Err(error) = core.send(message, waiter) {
-            self.answers.send(handle, Err(error.into()));
-        }
     }
 }
 

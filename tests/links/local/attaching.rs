@@ -81,10 +81,10 @@ async fn a_sender_learns_whether_its_message_has_arrived() {
     );
     for port in [&here, &there] {
         let outcome = within_limit(port.deliver(message(port, nobody, b"x"))).await;
-        let Err(Undelivered::NotAcknowledged { destination, .. }) = outcome else {
+        let Err(Undelivered::NotAcknowledged(shortfall)) = outcome else {
             panic!("{outcome:?}");
         };
-        assert_eq!(destination, nobody);
+        assert_eq!(shortfall.destination, nobody);
     }
 }
 

@@ -4,7 +4,7 @@ use std::net::{Ipv6Addr, SocketAddr, SocketAddrV6};
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{LinkId, Path, Remote, Unacknowledged};
+use jaus::endpoint::{LinkId, Path, Remote, Shortfall, Unacknowledged};
 use jaus::link::local::Assembler;
 use jaus::link::local::record::{Head, Outcome, Reason, Record, RecordError, VERSION};
 use jaus::wire::Flags;
@@ -47,11 +47,13 @@ fn outcome() -> impl Strategy<Value = Outcome> {
         Unacknowledged::NotSent,
     ]);
     let not = (reason, id(), any::<(u32, u32)>()).prop_map(
-        |(reason, destination, (acknowledged, length))| Outcome::NotAcknowledged {
-            reason,
-            destination,
-            acknowledged,
-            length,
+        |(reason, destination, (acknowledged, length))| {
+            Outcome::NotAcknowledged(Shortfall {
+                reason,
+                destination,
+                acknowledged: acknowledged as usize,
+                length: length as usize,
+            })
         },
     );
     prop_oneof![Just(Outcome::Acknowledged), not, Just(Outcome::Rejected)]

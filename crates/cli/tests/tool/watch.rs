@@ -35,9 +35,7 @@ const REPORT: &[u8] = &[0x02, 0x42];
 fn two_networks() -> (Node, Port, Port) {
     let group = own_group();
     let listen: SocketAddr = ([127, 0, 0, 1], 0).into();
-    let mut config = Config::loopback(101, 1)
-        .group(group)
-        .tcp_listen(listen.into());
+    let mut config = Config::loopback(101, 1).group(group).tcp_listen(listen);
     config.routing.forward = true;
     let vehicle = Node::start(config).unwrap();
     let tcp = vehicle.tcp().and_then(|tcp| tcp.listening).unwrap();

@@ -204,7 +204,10 @@ impl World {
 
 fn router_config() -> Config {
     Config {
-        forwarding: true,
+        routing: Routing {
+            forward: true,
+            ..Routing::default()
+        },
         ..Config::default()
     }
 }

@@ -1,6 +1,6 @@
 //! Checks whether the ports of a node are free, and which program occupies them.
 
-use std::net::{SocketAddr, TcpListener};
+use std::net::TcpListener;
 #[cfg(unix)]
 use std::path::Path;
 
@@ -92,7 +92,7 @@ pub(super) fn check_junior(folder: &Path) -> Finding {
 
 /// The same for the TCP listener address, if one is configured.
 pub(super) fn check_tcp(config: &Config) -> Option<Finding> {
-    let listen: SocketAddr = config.tcp.listen?.to_string().parse().ok()?;
+    let listen = config.tcp.listen?;
     Some(match TcpListener::bind(listen) {
         Ok(_) => Finding::ok(CHECK, format_args!("TCP {listen} is free")),
         Err(error) => Finding::problem(CHECK, format_args!("TCP {listen} is not free: {error}"))

@@ -1,10 +1,12 @@
 //! Echo of messages of any size.
 
+use std::net::Ipv4Addr;
 use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::Outgoing;
+use jaus::link::STANDARD_PORT;
 use jaus::node::{Node, Port};
 use tokio::time::{interval, sleep, timeout};
 
@@ -81,7 +83,7 @@ pub(super) async fn keep(arguments: &RoleArguments) -> Outcome {
 /// Echoes every test message, acknowledged. Broadcasts a query from time to time, as discovery
 /// does, so that a peer that never broadcasts learns our address.
 pub(super) async fn echo(arguments: &RoleArguments) -> Outcome {
-    let everywhere = "0.0.0.0".parse().map_err(|error| format!("{error}"))?;
+    let everywhere = (Ipv4Addr::UNSPECIFIED, STANDARD_PORT).into();
     let node = Node::start(arguments.config()?.tcp_listen(everywhere));
     let node = node.map_err(|error| error.to_string())?;
     let mut port = node
