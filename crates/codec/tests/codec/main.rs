@@ -3,6 +3,7 @@
 
 mod messages;
 mod registry;
+mod scale;
 mod wire;
 
 #[cfg(feature = "arbitrary")]
