@@ -171,6 +171,7 @@ fn the_shortest_decimal_has_no_digit_too_many() {
         (3.4, 7.0, 2, Round, 0, 4.0),
         (-3.6, 0.0, 2, Round, 0, -3.0),
         (0.0, 0.96, 4, Round, 4, 0.9),
+        (0.0, 0.996, 8, Round, 8, 0.99),
         // The computed value is on the wrong side of the boundary.
         (sevenths(-30.0), sevenths(20.0), 5, Floor, 3, 0.7),
         (-3.0, 0.3, 11, Ceiling, 10, -0.1),

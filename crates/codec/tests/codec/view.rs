@@ -318,6 +318,24 @@ fn text_that_is_not_utf_8_and_octets_are_hexadecimal() {
     assert_eq!(read("{\"hex\":\"616263\"}"), Ok(Text::from("abc")));
 }
 
+/// Bits 0 and 15 belong to no sub-field.
+#[derive(Clone, Copy, PartialEq)]
+struct Wide(u16);
+jaus_codec::bit_field!(Wide(u16), [("Most", 1, 14)]);
+
+#[test]
+fn a_bit_field_holds_every_number_of_its_width() {
+    assert_both_ways([(Flags(0xF6), "{\"Side\":3,\"Level\":15}")]);
+    assert_both_ways([
+        (Wide(0x7FFE), "{\"Most\":16383}"),
+        (Wide(0x8001), "{\"Most\":0,\"_reserved\":32769}"),
+    ]);
+    assert_refused::<Wide>(&[(
+        "{\"_reserved\":65536}",
+        "_reserved: expected an integer with no bits but 0x8001, found 65536",
+    )]);
+}
+
 #[test]
 fn lists_and_variable_fields_read_as_themselves() {
     assert_both_ways([(vec![1_u8, 2], "[1,2]"), (vec![], "[]")]);
