@@ -11,10 +11,7 @@ pub trait Bits: Copy {
     fn raw(self) -> u64;
 
     /// The named values of a sub-field.
-    fn names(field: &str) -> &'static [(u64, &'static str)] {
-        let _ = field;
-        &[]
-    }
+    fn names(field: &str) -> &'static [(u64, &'static str)];
 }
 
 /// Extracts bits `from..=to` of an integer.
@@ -118,4 +115,36 @@ pub(super) fn reserved<B: Bits>() -> u64 {
     !B::FIELDS
         .iter()
         .fold(0, |owned, &(_, from, to)| owned | mask(from, to) << from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sub_field_is_read_and_replaced_without_its_neighbours() {
+        let raw = 0x8123_4567_89AB_CDEF;
+        for (from, to, value, zeros) in [
+            (0, 0, 1, 0x8123_4567_89AB_CDEE),
+            (4, 11, 0xDE, 0x8123_4567_89AB_C00F),
+            (32, 62, 0x0123_4567, 0x8000_0000_89AB_CDEF),
+            (63, 63, 1, 0x0123_4567_89AB_CDEF),
+            (0, 63, raw, 0),
+        ] {
+            assert_eq!(get(raw, from, to), value, "{from} to {to}");
+            assert_eq!(set(raw, from, to, 0), zeros, "{from} to {to}");
+            assert_eq!(set(zeros, from, to, value), raw, "{from} to {to}");
+            assert_eq!(set(raw, from, to, value), raw, "{from} to {to}");
+        }
+    }
+
+    #[test]
+    fn a_sub_field_takes_no_value_outside_its_limits() {
+        let set = |value| set_checked(0xF00F, ("Day", 4, 11), value, (2, 31));
+        assert_eq!((set(2), set(31)), (Ok(0xF02F), Ok(0xF1FF)));
+        for value in [0, 1, 32, 255] {
+            let error = set(value).unwrap_err();
+            assert_eq!(error.to_string(), format!("Day: {value} is not in 2 to 31"));
+        }
+    }
 }

@@ -158,10 +158,11 @@ impl Scale {
             return 0.0;
         }
         let value = self.unbounded(raw);
-        // Halfway to the next integer, far from rounding boundaries.
+        // Halfway to the next integer, far from rounding boundaries. The greatest has none above
+        // it: rounded down, only the upper limit stands for it.
         let inside = match self.rounding {
             Rounding::Round => value,
-            Rounding::Floor => value + self.step / 2.0,
+            Rounding::Floor => (value + self.step / 2.0).min(self.upper),
             Rounding::Ceiling => value - self.step / 2.0,
         };
         [value, inside]

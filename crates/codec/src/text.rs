@@ -95,3 +95,52 @@ impl fmt::Display for Text {
         f.pad(&self.to_string_lossy())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_octets_of_a_text_are_kept_whatever_they_are_made_of() {
+        let broken = Text::from(Bytes::from_static(b"d\xE9pot"));
+        let cases = [
+            (
+                Text::from_static("dépôt"),
+                "dépôt".as_bytes(),
+                Some("dépôt"),
+            ),
+            (Text::from("dock"), b"dock", Some("dock")),
+            (Text::from("quay".to_owned()), b"quay", Some("quay")),
+            (Text::default(), b"", Some("")),
+            (broken, b"d\xE9pot", None),
+        ];
+        for (text, octets, string) in cases {
+            assert_eq!((text.as_bytes(), text.as_str()), (octets, string));
+            assert_eq!(
+                (text.len(), text.is_empty()),
+                (octets.len(), octets.is_empty())
+            );
+            assert_eq!(Bytes::from(text), octets);
+        }
+    }
+
+    #[test]
+    fn a_text_is_compared_by_its_octets() {
+        let text = Text::from("dock");
+        assert!(text == "dock" && text != "docks" && text == *"dock" && text != *"Dock");
+    }
+
+    #[test]
+    fn a_text_prints_as_a_string_if_it_can() {
+        let broken = Text::from(Bytes::from_static(b"d\xE9pot"));
+        assert_eq!(
+            format!("{:?} {broken:?}", Text::from("a\"")),
+            r#""a\"" b"d\xe9pot""#
+        );
+        assert_eq!(
+            format!("{:>5}|{broken}", Text::from("quay")),
+            " quay|d\u{FFFD}pot"
+        );
+        assert_eq!(broken.to_string_lossy(), "d\u{FFFD}pot");
+    }
+}
