@@ -150,24 +150,17 @@ fn named(wanted: &str, available: &[Interface], ip: Ip) -> Result<Vec<Interface>
     };
     let (wanted, available) = (wanted.to_owned(), Available(available.to_vec()));
     let Some(interface) = found.first().cloned() else {
-        return Err(Error::NoSuchInterface { wanted, available });
+        return Err(Error::NoSuchInterface(wanted, available));
     };
     if !found.iter().any(|i| i.up) {
-        return Err(Error::InterfaceDown {
-            interface,
-            available,
-        });
+        return Err(Error::InterfaceDown(interface, available));
     }
     let chosen = match place {
         Some(_) => found,
         None => usual(found.iter().filter(|i| i.up), ip),
     };
     if chosen.is_empty() {
-        return Err(Error::NoAddress {
-            wanted,
-            ip,
-            available,
-        });
+        return Err(Error::NoAddress(wanted, ip, available));
     }
     Ok(chosen)
 }

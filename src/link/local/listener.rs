@@ -1,6 +1,5 @@
 //! The listener of a node for component processes.
 
-use std::io;
 use std::net::SocketAddr;
 
 use tokio::net::TcpListener;
@@ -29,20 +28,16 @@ impl Listener {
             #[cfg(unix)]
             Address::Path(path) => UnixSocket::open(path).map(Self::Unix),
             #[cfg(not(unix))]
-            Address::Default => Self::open_tcp(DEFAULT_PORT),
+            Address::Default => Self::listen(DEFAULT_PORT),
             #[cfg(not(unix))]
             Address::Path(_) => Err(Error::NoUnixSockets),
-            Address::Tcp(port) => Self::open_tcp(*port),
+            Address::Tcp(port) => Self::listen(*port),
         }
     }
 
-    fn open_tcp(port: SocketAddr) -> Result<Self, Error> {
-        let failed = |source: io::Error| match source.kind() {
-            io::ErrorKind::AddrInUse => Error::PortTaken(port),
-            _ => Error::io(format!("listening on {port}"))(source),
-        };
+    fn listen(port: SocketAddr) -> Result<Self, Error> {
         tracing::warn!(%port, "any program on this host can attach components through a TCP port");
-        listen(port).map(Self::Tcp).map_err(failed)
+        Ok(Self::Tcp(listen(port)?))
     }
 
     /// Waits for the next component. An error concerns only that component.

@@ -263,9 +263,7 @@ async fn connect_tcp(port: SocketAddr) -> Result<Stream, Error> {
 fn unreachable(place: &str, error: io::Error) -> Error {
     use io::ErrorKind::{ConnectionRefused, NotFound};
     match error.kind() {
-        ConnectionRefused | NotFound => Error::NoNode {
-            place: place.to_owned(),
-        },
+        ConnectionRefused | NotFound => Error::NoNode(place.to_owned()),
         _ => Error::io(format!("connecting to {place}"))(error),
     }
 }

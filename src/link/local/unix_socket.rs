@@ -31,10 +31,7 @@ impl UnixSocket {
         let failed = |source| Error::io(format!("listening at {}", path.display()))(source);
         let bound = SocketFile::bind(path, Type::STREAM, 0o600);
         let (socket, file) = bound.map_err(|obstacle| match obstacle {
-            Obstacle::Alive(other) => Error::Served {
-                path: path.to_owned(),
-                pid: other.and_then(server_of),
-            },
+            Obstacle::Alive(other) => Error::Served(path.to_owned(), other.and_then(server_of)),
             Obstacle::NoSocket => Error::NoSocket(path.to_owned()),
             Obstacle::Io(source) => failed(source),
         })?;

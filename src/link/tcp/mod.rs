@@ -154,7 +154,6 @@ impl TcpLink {
     /// # Errors
     /// [`Error::ListenerTaken`], [`Error::Permission`], [`Error::AddressGone`] or [`Error::Io`].
     pub fn open(settings: &Settings) -> Result<Self, Error> {
-        let listen = |address| listen(address).map_err(|error| listen_error(address, error));
         let listener = settings.listen.map(listen).transpose()?;
         let local = listener.as_ref().and_then(|l| l.local_addr().ok());
         let mut dials: Vec<Dial> = Vec::new();
@@ -506,15 +505,14 @@ fn is_of_the_peer(error: &io::Error) -> bool {
 }
 
 /// Listens at an address. On Unix, connections of a predecessor in TIME_WAIT are no obstacle.
-pub(in crate::link) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
-    let listener = std::net::TcpListener::bind(address)?;
-    listener.set_nonblocking(true)?;
-    TcpListener::from_std(listener)
-}
-
-fn listen_error(address: SocketAddr, source: io::Error) -> Error {
-    match source.kind() {
-        io::ErrorKind::AddrInUse => Error::ListenerTaken { address },
+pub(in crate::link) fn listen(address: SocketAddr) -> Result<TcpListener, Error> {
+    let open = || {
+        let listener = std::net::TcpListener::bind(address)?;
+        listener.set_nonblocking(true)?;
+        TcpListener::from_std(listener)
+    };
+    open().map_err(|source| match source.kind() {
+        io::ErrorKind::AddrInUse => Error::ListenerTaken(address),
         _ => Error::socket(format!("listening on TCP {address}"), address, source),
-    }
+    })
 }
