@@ -238,13 +238,11 @@ impl SerialLink {
 
     fn open_again(&mut self, cx: &mut Context<'_>, now: Instant) {
         let device = &self.settings.device;
-        let attempt = || {
+        let reopened = self.redial.poll(cx, now, |attempt| {
             let settings = self.settings.clone();
-            let opened = spawn_blocking(move || settings.open());
-            // An attempt that the runtime has cancelled counts as failed.
-            Box::pin(async { opened.await.map_err(io::Error::from).flatten() }) as _
-        };
-        match self.redial.poll(cx, now, attempt) {
+            attempt.spawn_blocking(move || settings.open());
+        });
+        match reopened {
             Poll::Pending => {}
             Poll::Ready(Ok(port)) => {
                 tracing::info!(device, "serial port is back");

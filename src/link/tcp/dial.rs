@@ -8,6 +8,7 @@ use std::time::Instant;
 use bytes::Bytes;
 use tokio::net::TcpStream;
 
+use super::connection::prepare;
 use super::settings::{BACKLOG, CONNECT_TIMEOUT, FIRST_PAUSE, LONGEST_PAUSE};
 use crate::link::backlog::Backlog;
 use crate::link::redial::Redial;
@@ -16,16 +17,14 @@ use crate::wire::Priority;
 /// A peer to connect to.
 #[derive(Debug)]
 pub(super) struct Dial {
-    pub(super) address: SocketAddr,
     pub(super) redial: Redial<TcpStream>,
     /// Messages for the peer during an attempt.
     pub(super) waiting: Backlog<(Priority, Bytes)>,
 }
 
 impl Dial {
-    pub(super) fn new(address: SocketAddr) -> Self {
+    pub(super) fn new() -> Self {
         Self {
-            address,
             redial: Redial::new(CONNECT_TIMEOUT, FIRST_PAUSE..=LONGEST_PAUSE),
             waiting: Backlog::new(BACKLOG),
         }
@@ -40,13 +39,15 @@ impl Dial {
         keeps.then(|| self.waiting.push(priority, payload.len(), waiting))
     }
 
-    /// A new connection, or the error of a failed attempt.
+    /// A new connection to this address, or the error of a failed attempt.
     pub(super) fn poll(
         &mut self,
         cx: &mut Context<'_>,
         now: Instant,
+        address: SocketAddr,
     ) -> Poll<io::Result<TcpStream>> {
-        let connect = || Box::pin(TcpStream::connect(self.address)) as _;
-        self.redial.poll(cx, now, connect)
+        self.redial.poll(cx, now, |attempt| {
+            attempt.spawn(async move { TcpStream::connect(address).await.and_then(prepare) });
+        })
     }
 }
