@@ -1,5 +1,6 @@
 //! Selects the host's interfaces and addresses that a node uses.
 
+use std::collections::BTreeSet;
 use std::net::{IpAddr, SocketAddr};
 
 use super::{Available, Interface, Place, list};
@@ -106,35 +107,22 @@ impl Interfaces {
             }
             Self::Loopback => usual(up.filter(|i| i.is_loopback()), ip),
             Self::Only(wanted) => {
-                let mut chosen: Vec<Interface> = Vec::new();
+                let mut seen = BTreeSet::new();
                 let found = wanted.iter().flat_map(|name| named(name, available, ip));
-                for interface in found.flatten() {
-                    if !chosen.iter().any(|c| c.at(0) == interface.at(0)) {
-                        chosen.push(interface);
-                    }
-                }
-                chosen
+                let is_new = |interface: &Interface| seen.insert(interface.at(0));
+                found.flatten().filter(is_new).collect()
             }
         }
     }
 }
 
-/// One address per interface and selected version.
+/// One address per interface and selected version, IPv4 first.
 fn usual<'a>(addresses: impl Iterator<Item = &'a Interface>, ip: Ip) -> Vec<Interface> {
-    let mut chosen: Vec<Interface> = Vec::new();
-    for address in addresses.filter(|i| ip.includes(i.address)) {
-        let same = |c: &&mut Interface| {
-            c.index == address.index && c.address.is_ipv4() == address.address.is_ipv4()
-        };
-        match chosen.iter_mut().find(same) {
-            None => chosen.push(address.clone()),
-            Some(other) if address.is_link_local() && !other.is_link_local() => {
-                *other = address.clone();
-            }
-            Some(_) => {}
-        }
-    }
-    chosen
+    let mut all: Vec<&Interface> = addresses.filter(|i| ip.includes(i.address)).collect();
+    all.sort_by_key(|i| (i.address.is_ipv6(), !i.is_link_local()));
+    let mut seen = BTreeSet::new();
+    all.retain(|i| seen.insert((i.index, i.address.is_ipv4())));
+    all.into_iter().cloned().collect()
 }
 
 /// The addresses of a requested interface, which must be up.
