@@ -28,19 +28,10 @@ pub enum Error {
          path, or move it", .0.display()
     )]
     NoSocket(PathBuf),
-    /// Other users could replace the socket by their own.
-    #[error(
-        "the directory {} of the local link's socket is unsafe: {why}. {remedy}",
-        directory.display()
-    )]
-    UnsafeDirectory {
-        /// The directory.
-        directory: PathBuf,
-        /// What is wrong with it.
-        why: String,
-        /// The remedy.
-        remedy: String,
-    },
+    /// Other users could replace the socket in this directory by their own; with what is wrong with
+    /// it and the remedy.
+    #[error("the directory {path} of the local link's socket is unsafe: {1}", path = .0.display())]
+    UnsafeDirectory(PathBuf, String),
     /// The process at the other end belongs to another user.
     #[error(
         "the process at the other end of {place} belongs to user {uid}, not to our user {own} or \
@@ -69,7 +60,7 @@ pub enum Error {
     /// This system has no Unix sockets.
     #[error("this system has no Unix sockets: use a loopback port such as 127.0.0.1:37940")]
     NoUnixSockets,
-    /// The operating system refuses the socket.
+    /// A port in use, or any other error of the operating system.
     #[error(transparent)]
     Socket(#[from] link::Error),
 }

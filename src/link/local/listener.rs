@@ -3,20 +3,24 @@
 use std::net::SocketAddr;
 
 use tokio::net::TcpListener;
+#[cfg(unix)]
+use tokio::net::UnixListener;
 
 #[cfg(not(unix))]
 use super::address::DEFAULT_PORT;
 use super::stream::{Stream, tcp_stream};
 #[cfg(unix)]
-use super::unix_socket::{self, UnixSocket};
+use super::unix_socket;
 use super::{Address, Error};
+#[cfg(unix)]
+use crate::link::socket_file::SocketFile;
 use crate::link::tcp::listen;
 
 /// The node's side of a local link.
 #[derive(Debug)]
 pub(crate) enum Listener {
     #[cfg(unix)]
-    Unix(UnixSocket),
+    Unix(UnixListener, SocketFile),
     Tcp(TcpListener),
 }
 
@@ -24,15 +28,21 @@ impl Listener {
     pub(crate) fn open(address: &Address) -> Result<Self, Error> {
         match address {
             #[cfg(unix)]
-            Address::Default => UnixSocket::open(&unix_socket::make_default()?).map(Self::Unix),
+            Address::Default => Self::listen_at(&unix_socket::make_default()?),
             #[cfg(unix)]
-            Address::Path(path) => UnixSocket::open(path).map(Self::Unix),
+            Address::Path(path) => Self::listen_at(path),
             #[cfg(not(unix))]
             Address::Default => Self::listen(DEFAULT_PORT),
             #[cfg(not(unix))]
             Address::Path(_) => Err(Error::NoUnixSockets),
             Address::Tcp(port) => Self::listen(*port),
         }
+    }
+
+    #[cfg(unix)]
+    fn listen_at(path: &std::path::Path) -> Result<Self, Error> {
+        let (listener, file) = unix_socket::listen(path)?;
+        Ok(Self::Unix(listener, file))
     }
 
     fn listen(port: SocketAddr) -> Result<Self, Error> {
@@ -44,7 +54,7 @@ impl Listener {
     pub(crate) async fn accept(&self) -> Result<Stream, Error> {
         match self {
             #[cfg(unix)]
-            Self::Unix(socket) => socket.accept().await,
+            Self::Unix(listener, file) => unix_socket::accept(listener, file.path()).await,
             Self::Tcp(listener) => {
                 let accepted = listener.accept().await;
                 let stream = accepted.and_then(|(stream, _)| tcp_stream(stream));
@@ -57,7 +67,7 @@ impl Listener {
     pub(crate) fn place(&self) -> String {
         match self {
             #[cfg(unix)]
-            Self::Unix(socket) => socket.path().display().to_string(),
+            Self::Unix(_, file) => file.path().display().to_string(),
             Self::Tcp(listener) => listener
                 .local_addr()
                 .map_or_else(|_| "a TCP port".to_owned(), |port| port.to_string()),
