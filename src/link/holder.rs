@@ -64,7 +64,7 @@ impl Holder {
 }
 
 fn process_with_socket(inode: u64) -> Option<Holder> {
-    let wanted = socket_table::file_of(inode);
+    let wanted = format!("socket:[{inode}]");
     let holds = |pid: &u32| {
         let files = fs::read_dir(format!("/proc/{pid}/fd"))
             .into_iter()

@@ -128,41 +128,34 @@ fn usual<'a>(addresses: impl Iterator<Item = &'a Interface>, ip: Ip) -> Vec<Inte
 /// The addresses of a requested interface, which must be up.
 fn named(wanted: &str, available: &[Interface], ip: Ip) -> Result<Vec<Interface>, Error> {
     let place = wanted.parse::<Place>().ok();
-    let found: Vec<Interface> = match place {
+    let of_name = |i: &&Interface| i.name == wanted;
+    let mut found: Vec<Interface> = match place {
         Some(place) => by_address(place, available).into_iter().collect(),
-        None => available
-            .iter()
-            .filter(|i| i.name == wanted)
-            .cloned()
-            .collect(),
+        None => available.iter().filter(of_name).cloned().collect(),
     };
     let (wanted, available) = (wanted.to_owned(), Available(available.to_vec()));
-    let Some(interface) = found.first().cloned() else {
+    let Some(first) = found.first().cloned() else {
         return Err(Error::NoSuchInterface(wanted, available));
     };
-    if !found.iter().any(|i| i.up) {
-        return Err(Error::InterfaceDown(interface, available));
+    found.retain(|i| i.up);
+    if found.is_empty() {
+        return Err(Error::InterfaceDown(first, available));
     }
-    let chosen = match place {
-        Some(_) => found,
-        None => usual(found.iter().filter(|i| i.up), ip),
-    };
-    if chosen.is_empty() {
+    if place.is_none() {
+        found = usual(found.iter(), ip);
+    }
+    if found.is_empty() {
         return Err(Error::NoAddress(wanted, ip, available));
     }
-    Ok(chosen)
+    Ok(found)
 }
 
 fn by_address(place: Place, available: &[Interface]) -> Option<Interface> {
     let address = place.address();
+    let any_scope = SocketAddr::new(address.ip(), address.port()) == address;
     let is_meant = |i: &&Interface| {
-        let scope = match (i.at(address.port()), address) {
-            (SocketAddr::V6(own), SocketAddr::V6(wanted)) => {
-                wanted.scope_id() == 0 || own.scope_id() == wanted.scope_id()
-            }
-            _ => true,
-        };
-        i.address == address.ip() && scope
+        let own = i.at(address.port());
+        own == address || any_scope && own.ip() == address.ip()
     };
     let loopback = || {
         let of_ipv4 = |i: &&Interface| i.is_loopback() && i.address.is_ipv4();

@@ -211,17 +211,12 @@ impl SerialLink {
         match ready!(Pin::new(port).poll_read(cx, &mut buffer)) {
             Ok(()) if !buffer.filled().is_empty() => {
                 self.decoder.push(buffer.filled());
-                Poll::Ready(())
+                return Poll::Ready(());
             }
-            Ok(()) => {
-                self.lose(&io::ErrorKind::UnexpectedEof.into());
-                Poll::Pending
-            }
-            Err(error) => {
-                self.lose(&error);
-                Poll::Pending
-            }
+            Ok(()) => self.lose(&io::ErrorKind::UnexpectedEof.into()),
+            Err(error) => self.lose(&error),
         }
+        Poll::Pending
     }
 
     /// Handles the loss of the port.
