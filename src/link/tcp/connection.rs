@@ -120,9 +120,8 @@ impl Connection {
 
     /// Drops the oldest waiting message of the lowest priority.
     pub(super) fn drop_least(&mut self) {
-        if self.backlog.drop_least() {
-            self.count_lost(1);
-        }
+        let lost = self.backlog.drop_least();
+        self.count_lost(lost.into());
     }
 
     /// Queues the output of [`jtcp::encode`](crate::wire::jtcp::encode). Returns whether it was

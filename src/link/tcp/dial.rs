@@ -1,14 +1,8 @@
 //! A configured peer: the attempts to connect to it, and the messages that wait for a connection.
 
-use std::io;
-use std::net::SocketAddr;
-use std::task::{Context, Poll};
-use std::time::Instant;
-
 use bytes::Bytes;
 use tokio::net::TcpStream;
 
-use super::connection::prepare;
 use super::settings::{BACKLOG, CONNECT_TIMEOUT, FIRST_PAUSE, LONGEST_PAUSE};
 use crate::link::backlog::Backlog;
 use crate::link::redial::Redial;
@@ -37,17 +31,5 @@ impl Dial {
         let keeps = !self.redial.is_up() && !self.redial.is_pausing();
         let waiting = (priority, payload.clone());
         keeps.then(|| self.waiting.push(priority, payload.len(), waiting))
-    }
-
-    /// A new connection to this address, or the error of a failed attempt.
-    pub(super) fn poll(
-        &mut self,
-        cx: &mut Context<'_>,
-        now: Instant,
-        address: SocketAddr,
-    ) -> Poll<io::Result<TcpStream>> {
-        self.redial.poll(cx, now, |attempt| {
-            attempt.spawn(async move { TcpStream::connect(address).await.and_then(prepare) });
-        })
     }
 }

@@ -343,6 +343,7 @@ impl TcpLink {
 
     /// Accepts connections; returns whether there may be more than one turn's share.
     fn accept(&mut self, cx: &mut Context<'_>, now: Instant) -> bool {
+        use io::ErrorKind::{ConnectionAborted, ConnectionReset, Interrupted};
         if self.accept_after.is_some_and(|after| now < after) {
             return false;
         }
@@ -354,12 +355,15 @@ impl TcpLink {
             match listener.poll_accept(cx) {
                 Poll::Pending => return false,
                 Poll::Ready(Ok((stream, remote))) => self.admit(stream, remote, now),
-                Poll::Ready(Err(error)) if is_of_the_peer(&error) => {}
-                Poll::Ready(Err(error)) => {
-                    tracing::warn!(%error, "cannot accept connections");
-                    self.accept_after = Some(now + ACCEPT_PAUSE);
-                    return false;
-                }
+                Poll::Ready(Err(error)) => match error.kind() {
+                    // Only that connection has failed; the next may succeed.
+                    ConnectionAborted | ConnectionReset | Interrupted => {}
+                    _ => {
+                        tracing::warn!(%error, "cannot accept connections");
+                        self.accept_after = Some(now + ACCEPT_PAUSE);
+                        return false;
+                    }
+                },
             }
         }
         true
@@ -416,7 +420,10 @@ impl TcpLink {
 
     fn connect(&mut self, cx: &mut Context<'_>, now: Instant) {
         for (&remote, dial) in &mut self.dials {
-            match dial.poll(cx, now, remote) {
+            let attempted = dial.redial.poll(cx, now, |attempt| {
+                attempt.spawn(async move { TcpStream::connect(remote).await.and_then(prepare) });
+            });
+            match attempted {
                 Poll::Pending => {}
                 Poll::Ready(Ok(stream)) => {
                     self.counters.connected += 1;
@@ -454,15 +461,6 @@ impl Counters {
             self.other_version += 1;
         }
     }
-}
-
-/// Whether a failure to accept concerns only that one connection, so that the next may succeed.
-fn is_of_the_peer(error: &io::Error) -> bool {
-    use io::ErrorKind::{ConnectionAborted, ConnectionReset, Interrupted};
-    matches!(
-        error.kind(),
-        ConnectionAborted | ConnectionReset | Interrupted
-    )
 }
 
 /// Listens at an address. On Unix, connections of a predecessor in TIME_WAIT are no obstacle.
