@@ -8,6 +8,10 @@
 use std::fmt;
 use std::str::FromStr;
 
+use deku::ctx::Endian;
+use deku::no_std_io::{Read, Seek, Write};
+use deku::prelude::*;
+
 /// The id of a component or, as a destination, a pattern of ids.
 ///
 /// Any 32 bits make a `JausId`, because any 32 bits can arrive; [`is_unicast`](Self::is_unicast)
@@ -27,6 +31,26 @@ pub struct JausId {
     subsystem: u16,
     node: u8,
     component: u8,
+}
+
+/// As in every message header: one number.
+impl DekuReader<'_, Endian> for JausId {
+    fn from_reader_with_ctx<R: Read + Seek>(
+        reader: &mut Reader<R>,
+        endian: Endian,
+    ) -> Result<Self, DekuError> {
+        u32::from_reader_with_ctx(reader, endian).map(Self::from_u32)
+    }
+}
+
+impl DekuWriter<Endian> for JausId {
+    fn to_writer<W: Write + Seek>(
+        &self,
+        writer: &mut Writer<W>,
+        endian: Endian,
+    ) -> Result<(), DekuError> {
+        self.to_u32().to_writer(writer, endian)
+    }
 }
 
 impl JausId {

@@ -81,6 +81,13 @@ impl<T> Backlog<T> {
         dropped
     }
 
+    /// The item that [`pop`](Self::pop) removes next.
+    #[cfg(unix)]
+    pub(crate) fn first(&self) -> Option<&T> {
+        let (_, first) = self.levels.iter().rev().find_map(VecDeque::front)?;
+        Some(first)
+    }
+
     /// Removes the oldest item of the highest priority.
     pub(crate) fn pop(&mut self) -> Option<T> {
         (0..LEVELS).rev().find_map(|level| self.pop_from(level))

@@ -11,40 +11,24 @@ use super::interface::{Available, Interface, Ip};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The name or address does not belong to this host.
-    #[error("there is no network interface `{wanted}` on this host; choose from: {available}")]
-    NoSuchInterface {
-        /// The name or address as given.
-        wanted: String,
-        /// The existing interfaces.
-        available: Available,
-    },
-    /// The interface exists but is not up.
+    /// The name or address, as given, does not belong to this host; with the existing interfaces.
+    #[error("there is no network interface `{0}` on this host; choose from: {1}")]
+    NoSuchInterface(String, Available),
+    /// The interface exists but is not up; with the existing interfaces.
     #[error(
-        "the network interface {interface} is not up: bring it up (`ip link set {name} up`) or \
-         choose another: {available}",
-        name = interface.name
+        "the network interface {0} is not up: bring it up (`ip link set {name} up`) or choose \
+         another: {1}",
+        name = .0.name
     )]
-    InterfaceDown {
-        /// The requested interface.
-        interface: Interface,
-        /// The existing interfaces.
-        available: Available,
-    },
-    /// The interface has addresses, but none of the requested IP version.
+    InterfaceDown(Interface, Available),
+    /// The interface, as given, has addresses, but none of this IP version; with the existing
+    /// interfaces.
     #[error(
-        "the network interface `{wanted}` has no {} address: give it one, or set `ip` to another \
-         version; choose from: {available}",
-        ip.name()
+        "the network interface `{0}` has no {ip} address: give it one, or set `ip` to another \
+         version; choose from: {2}",
+        ip = .1.name()
     )]
-    NoAddress {
-        /// The name or address as given.
-        wanted: String,
-        /// The requested IP version.
-        ip: Ip,
-        /// The existing interfaces.
-        available: Available,
-    },
+    NoAddress(String, Ip, Available),
     /// There is no interface to open a link on.
     #[error("no network interface is usable; found: {0}")]
     NoInterface(Available),
@@ -102,42 +86,24 @@ pub enum Error {
     #[error(
         "TCP port {} of {} is taken: choose another, or another address of this host, or stop the \
          other program (find it with `sudo ss -ltnp 'sport = :{}'`)",
-        .address.port(), .address.ip(), .address.port()
+        .0.port(), .0.ip(), .0.port()
     )]
-    ListenerTaken {
-        /// The address that could not be bound.
-        address: SocketAddr,
-    },
-    /// This process lacks a permission.
-    #[error("permission denied for {doing} ({source}){}", privileged(*port))]
-    Permission {
-        /// The attempted operation.
-        doing: String,
-        /// The port.
-        port: u16,
-        /// The error of the operating system.
-        source: io::Error,
-    },
+    ListenerTaken(SocketAddr),
+    /// This process lacks a permission for an operation on this port.
+    #[error("permission denied for {0} ({2}){hint}", hint = privileged(*.1))]
+    Permission(String, u16, #[source] io::Error),
     /// The address disappeared between listing the interfaces and binding to it.
     #[error("{0} is not (or no longer) an address of this host")]
     AddressGone(IpAddr),
-    /// Any other error of the operating system.
-    #[error("{doing} failed: {source}")]
-    Io {
-        /// The attempted operation.
-        doing: String,
-        /// The error of the operating system.
-        source: io::Error,
-    },
+    /// Any other error of the operating system, with the attempted operation.
+    #[error("{0} failed: {1}")]
+    Io(String, #[source] io::Error),
 }
 
 impl Error {
     /// Maps an error of the operating system.
     pub(super) fn io(doing: impl Into<String>) -> impl FnOnce(io::Error) -> Self {
-        |source| Self::Io {
-            doing: doing.into(),
-            source,
-        }
+        |source| Self::Io(doing.into(), source)
     }
 
     /// Maps an error of opening a socket for an address.
@@ -145,12 +111,8 @@ impl Error {
         let doing = doing.into();
         match source.kind() {
             io::ErrorKind::AddrNotAvailable => Self::AddressGone(address.ip()),
-            io::ErrorKind::PermissionDenied => Self::Permission {
-                doing,
-                port: address.port(),
-                source,
-            },
-            _ => Self::Io { doing, source },
+            io::ErrorKind::PermissionDenied => Self::Permission(doing, address.port(), source),
+            _ => Self::Io(doing, source),
         }
     }
 }

@@ -53,36 +53,28 @@ impl Holder {
 
     /// Finds the socket that prevents binding to `address`.
     pub(super) fn of(address: SocketAddr) -> Self {
-        let Some(entry) = socket_table::all()
-            .into_iter()
-            .find(|e| e.keeps_from(address))
-        else {
-            return Self::Unknown;
-        };
-        process_with_socket(entry.inode).unwrap_or(Self::User { uid: entry.uid })
+        let mut sockets = socket_table::all().into_iter();
+        match sockets.find(|entry| entry.keeps_from(address)) {
+            Some(entry) => {
+                process_with_socket(entry.inode).unwrap_or(Self::User { uid: entry.uid })
+            }
+            None => Self::Unknown,
+        }
     }
 }
 
 fn process_with_socket(inode: u64) -> Option<Holder> {
-    let wanted = socket_table::file_of(inode);
-    let pids = fs::read_dir("/proc").ok()?.flatten().filter_map(|entry| {
-        entry
-            .file_name()
-            .to_str()
-            .and_then(|name| name.parse::<u32>().ok())
-    });
-    for pid in pids {
-        let Ok(files) = fs::read_dir(format!("/proc/{pid}/fd")) else {
-            continue;
-        };
-        let holds = |file: fs::DirEntry| {
-            fs::read_link(file.path()).is_ok_and(|target| target.to_str() == Some(&wanted))
-        };
-        if files.flatten().any(holds) {
-            return Some(describe(pid));
-        }
-    }
-    None
+    let wanted = format!("socket:[{inode}]");
+    let holds = |pid: &u32| {
+        let files = fs::read_dir(format!("/proc/{pid}/fd"))
+            .into_iter()
+            .flatten();
+        let mut targets = files.flatten().flat_map(|file| fs::read_link(file.path()));
+        targets.any(|target| target.to_str() == Some(&wanted))
+    };
+    let processes = fs::read_dir("/proc").ok()?.flatten();
+    let mut pids = processes.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+    pids.find(holds).map(describe)
 }
 
 fn describe(pid: u32) -> Holder {

@@ -1,15 +1,12 @@
 //! Reopens a lost connection or device, with growing pauses between attempts.
 
-use std::fmt;
 use std::hash::{BuildHasher, RandomState};
 use std::io;
 use std::ops::RangeInclusive;
-use std::pin::Pin;
-use std::task::{Context, Poll, ready};
+use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
 
-/// An attempt to open a connection or device.
-pub(super) type Attempt<T> = Pin<Box<dyn Future<Output = io::Result<T>> + Send>>;
+use tokio::task::JoinSet;
 
 /// The reconnection of one connection or device: its schedule and the current attempt.
 #[derive(Debug)]
@@ -19,39 +16,25 @@ pub(super) struct Redial<T> {
     /// The first and the longest pause. The pause doubles with each failure, ± 25 % at random, so
     /// that many nodes do not reconnect to a restarted peer at the same time.
     pauses: RangeInclusive<Duration>,
-    state: State<T>,
     failures: u32,
+    /// Whether the connection or device is open.
+    is_up: bool,
+    /// The task of the current attempt, if any. Dropping this ends it.
+    attempt: JoinSet<io::Result<T>>,
+    /// When the attempt or the pause ends.
+    until: Option<Instant>,
 }
 
-enum State<T> {
-    /// The connection or device is open.
-    Up,
-    Attempting {
-        attempt: Attempt<T>,
-        until: Option<Instant>,
-    },
-    /// No attempt before this time; `None` means at once.
-    Pausing(Option<Instant>),
-}
-
-impl<T> fmt::Debug for State<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Up => f.write_str("Up"),
-            Self::Attempting { until, .. } => write!(f, "Attempting until {until:?}"),
-            Self::Pausing(until) => write!(f, "Pausing until {until:?}"),
-        }
-    }
-}
-
-impl<T> Redial<T> {
+impl<T: Send + 'static> Redial<T> {
     /// For a closed connection or device. The first attempt is due at once.
-    pub(super) const fn new(timeout: Duration, pauses: RangeInclusive<Duration>) -> Self {
+    pub(super) fn new(timeout: Duration, pauses: RangeInclusive<Duration>) -> Self {
         Self {
             timeout,
             pauses,
-            state: State::Pausing(None),
             failures: 0,
+            is_up: false,
+            attempt: JoinSet::new(),
+            until: None,
         }
     }
 
@@ -59,26 +42,23 @@ impl<T> Redial<T> {
     #[cfg(feature = "serial")]
     pub(super) fn up(timeout: Duration, pauses: RangeInclusive<Duration>) -> Self {
         Self {
-            state: State::Up,
+            is_up: true,
             ..Self::new(timeout, pauses)
         }
     }
 
     pub(super) const fn is_up(&self) -> bool {
-        matches!(self.state, State::Up)
+        self.is_up
     }
 
     /// Whether it pauses after a failure or a loss.
-    pub(super) const fn is_pausing(&self) -> bool {
-        matches!(self.state, State::Pausing(Some(_)))
+    pub(super) fn is_pausing(&self) -> bool {
+        self.until.is_some() && self.attempt.is_empty()
     }
 
     /// When to poll even if nothing happens.
     pub(super) const fn deadline(&self) -> Option<Instant> {
-        match self.state {
-            State::Up => None,
-            State::Attempting { until, .. } | State::Pausing(until) => until,
-        }
+        self.until
     }
 
     /// Polls the current attempt, and starts one with `attempt` when due. Ready with the opened
@@ -87,27 +67,21 @@ impl<T> Redial<T> {
         &mut self,
         cx: &mut Context<'_>,
         now: Instant,
-        attempt: impl FnOnce() -> Attempt<T>,
+        attempt: impl FnOnce(&mut JoinSet<io::Result<T>>),
     ) -> Poll<io::Result<T>> {
-        if let State::Pausing(until) = self.state
-            && until.is_none_or(|until| until <= now)
-        {
-            self.state = State::Attempting {
-                attempt: attempt(),
-                until: now.checked_add(self.timeout),
-            };
+        let is_over = |until| until <= now;
+        if !self.is_up && self.attempt.is_empty() && self.until.is_none_or(is_over) {
+            attempt(&mut self.attempt);
+            self.until = now.checked_add(self.timeout);
         }
-        let State::Attempting { attempt, until } = &mut self.state else {
-            return Poll::Pending;
-        };
-        let outcome = match attempt.as_mut().poll(cx) {
-            Poll::Pending if until.is_some_and(|until| until <= now) => {
-                Err(io::ErrorKind::TimedOut.into())
-            }
-            outcome => ready!(outcome),
+        let outcome = match self.attempt.poll_join_next(cx) {
+            // An attempt that the runtime has cancelled counts as failed.
+            Poll::Ready(Some(outcome)) => outcome.map_err(io::Error::from).flatten(),
+            Poll::Pending if self.until.is_some_and(is_over) => Err(io::ErrorKind::TimedOut.into()),
+            _ => return Poll::Pending,
         };
         match outcome {
-            Ok(_) => self.state = State::Up,
+            Ok(_) => (self.is_up, self.until) = (true, None),
             Err(_) => self.pause(now),
         }
         Poll::Ready(outcome)
@@ -123,7 +97,9 @@ impl<T> Redial<T> {
 
     fn pause(&mut self, now: Instant) {
         let pause = self.next_pause(RandomState::new().hash_one(()));
-        self.state = State::Pausing(Some(now + pause));
+        self.is_up = false;
+        self.attempt = JoinSet::new();
+        self.until = Some(now + pause);
         self.failures = self.failures.saturating_add(1);
     }
 

@@ -43,17 +43,13 @@ fn once(entries: impl Iterator<Item = Entry>) -> Vec<Entry> {
     entries
 }
 
-/// The link target of a file descriptor of the socket with this inode.
-pub(super) fn file_of(inode: u64) -> String {
-    format!("socket:[{inode}]")
-}
-
 /// The inode of one of this process's sockets.
 #[cfg(unix)]
 pub(super) fn inode_of(socket: &impl std::os::fd::AsRawFd) -> Option<u64> {
-    let file = fs::read_link(format!("/proc/self/fd/{}", socket.as_raw_fd())).ok()?;
-    let number = file.to_str()?.strip_prefix("socket:[")?.strip_suffix(']')?;
-    number.parse().ok()
+    let socket = fs::metadata(format!("/proc/self/fd/{}", socket.as_raw_fd()));
+    socket
+        .ok()
+        .map(|socket| std::os::unix::fs::MetadataExt::ino(&socket))
 }
 
 #[cfg(not(unix))]

@@ -43,9 +43,9 @@ pub struct Header {
     /// Priority, broadcast, acknowledgement, data control.
     pub flags: Flags,
     #[deku(endian = "little")]
-    destination: u32,
+    destination: JausId,
     #[deku(endian = "little")]
-    source: u32,
+    source: JausId,
 }
 
 /// The two octets added by a peer that offers header compression. They are skipped.
@@ -66,21 +66,21 @@ impl Header {
             size,
             compression: None,
             flags,
-            destination: destination.to_u32(),
-            source: source.to_u32(),
+            destination,
+            source,
         }
     }
 
     /// The destination.
     #[must_use]
     pub const fn destination(&self) -> JausId {
-        JausId::from_u32(self.destination)
+        self.destination
     }
 
     /// The source.
     #[must_use]
     pub const fn source(&self) -> JausId {
-        JausId::from_u32(self.source)
+        self.source
     }
 
     /// The length of this header on the wire, in octets.

@@ -4,6 +4,7 @@
 
 use std::fmt;
 
+use deku::ctx::Endian;
 use deku::prelude::*;
 
 /// The priority of a message, which orders the queues for sending and delivery.
@@ -144,6 +145,11 @@ display_by_name!(Priority, Broadcast, Acknowledgement, DataControl);
 /// The flags octet of an AS5669A header: priority in bits 0-1, broadcast in 2-3, acknowledgement in
 /// 4-5, data control in 6-7.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, DekuRead, DekuWrite)]
+#[deku(
+    endian = "endian",
+    ctx = "endian: Endian",
+    ctx_default = "Endian::Little"
+)]
 pub struct Flags(pub u8);
 
 impl Flags {

@@ -87,22 +87,18 @@ mod elsewhere {
     pub(crate) struct Changes;
 
     impl Changes {
-        /// Does not listen.
         pub(crate) const fn open() -> Self {
             Self
         }
 
-        /// Whether the operating system announces changes.
         pub(crate) const fn are_announced(&self) -> bool {
             false
         }
 
-        /// Waits for ever.
         pub(crate) async fn next(&mut self) {
             std::future::pending().await
         }
 
-        /// Does nothing.
         pub(crate) const fn forget(&mut self) {}
     }
 }

@@ -1,5 +1,6 @@
 //! Selects the host's interfaces and addresses that a node uses.
 
+use std::collections::BTreeSet;
 use std::net::{IpAddr, SocketAddr};
 
 use super::{Available, Interface, Place, list};
@@ -106,82 +107,55 @@ impl Interfaces {
             }
             Self::Loopback => usual(up.filter(|i| i.is_loopback()), ip),
             Self::Only(wanted) => {
-                let mut chosen: Vec<Interface> = Vec::new();
+                let mut seen = BTreeSet::new();
                 let found = wanted.iter().flat_map(|name| named(name, available, ip));
-                for interface in found.flatten() {
-                    if !chosen.iter().any(|c| c.at(0) == interface.at(0)) {
-                        chosen.push(interface);
-                    }
-                }
-                chosen
+                let is_new = |interface: &Interface| seen.insert(interface.at(0));
+                found.flatten().filter(is_new).collect()
             }
         }
     }
 }
 
-/// One address per interface and selected version.
+/// One address per interface and selected version, IPv4 first.
 fn usual<'a>(addresses: impl Iterator<Item = &'a Interface>, ip: Ip) -> Vec<Interface> {
-    let mut chosen: Vec<Interface> = Vec::new();
-    for address in addresses.filter(|i| ip.includes(i.address)) {
-        let same = |c: &&mut Interface| {
-            c.index == address.index && c.address.is_ipv4() == address.address.is_ipv4()
-        };
-        match chosen.iter_mut().find(same) {
-            None => chosen.push(address.clone()),
-            Some(other) if address.is_link_local() && !other.is_link_local() => {
-                *other = address.clone();
-            }
-            Some(_) => {}
-        }
-    }
-    chosen
+    let mut all: Vec<&Interface> = addresses.filter(|i| ip.includes(i.address)).collect();
+    all.sort_by_key(|i| (i.address.is_ipv6(), !i.is_link_local()));
+    let mut seen = BTreeSet::new();
+    all.retain(|i| seen.insert((i.index, i.address.is_ipv4())));
+    all.into_iter().cloned().collect()
 }
 
 /// The addresses of a requested interface, which must be up.
 fn named(wanted: &str, available: &[Interface], ip: Ip) -> Result<Vec<Interface>, Error> {
     let place = wanted.parse::<Place>().ok();
-    let found: Vec<Interface> = match place {
+    let of_name = |i: &&Interface| i.name == wanted;
+    let mut found: Vec<Interface> = match place {
         Some(place) => by_address(place, available).into_iter().collect(),
-        None => available
-            .iter()
-            .filter(|i| i.name == wanted)
-            .cloned()
-            .collect(),
+        None => available.iter().filter(of_name).cloned().collect(),
     };
     let (wanted, available) = (wanted.to_owned(), Available(available.to_vec()));
-    let Some(interface) = found.first().cloned() else {
-        return Err(Error::NoSuchInterface { wanted, available });
+    let Some(first) = found.first().cloned() else {
+        return Err(Error::NoSuchInterface(wanted, available));
     };
-    if !found.iter().any(|i| i.up) {
-        return Err(Error::InterfaceDown {
-            interface,
-            available,
-        });
+    found.retain(|i| i.up);
+    if found.is_empty() {
+        return Err(Error::InterfaceDown(first, available));
     }
-    let chosen = match place {
-        Some(_) => found,
-        None => usual(found.iter().filter(|i| i.up), ip),
-    };
-    if chosen.is_empty() {
-        return Err(Error::NoAddress {
-            wanted,
-            ip,
-            available,
-        });
+    if place.is_none() {
+        found = usual(found.iter(), ip);
     }
-    Ok(chosen)
+    if found.is_empty() {
+        return Err(Error::NoAddress(wanted, ip, available));
+    }
+    Ok(found)
 }
 
 fn by_address(place: Place, available: &[Interface]) -> Option<Interface> {
     let address = place.address();
+    let any_scope = SocketAddr::new(address.ip(), address.port()) == address;
     let is_meant = |i: &&Interface| {
-        let scope = match (i.at(address.port()), address) {
-            (SocketAddr::V6(own), SocketAddr::V6(wanted)) => {
-                wanted.scope_id() == 0 || own.scope_id() == wanted.scope_id()
-            }
-            _ => true,
-        };
-        i.address == address.ip() && scope
+        let own = i.at(address.port());
+        own == address || any_scope && own.ip() == address.ip()
     };
     let loopback = || {
         let of_ipv4 = |i: &&Interface| i.is_loopback() && i.address.is_ipv4();

@@ -62,12 +62,12 @@ impl Interface {
         if self.is_link_local() && scope != self.index {
             return false;
         }
-        let common = match (self.address, peer.ip()) {
-            (IpAddr::V4(own), IpAddr::V4(peer)) => (own.to_bits() ^ peer.to_bits()).leading_zeros(),
-            (IpAddr::V6(own), IpAddr::V6(peer)) => (own.to_bits() ^ peer.to_bits()).leading_zeros(),
-            _ => return false,
+        let bits = |ip: IpAddr| match ip {
+            IpAddr::V4(v4) => u128::from(v4.to_bits()) << 96,
+            IpAddr::V6(v6) => v6.to_bits(),
         };
-        common >= self.prefix.into()
+        let common = (bits(self.address) ^ bits(peer.ip())).leading_zeros();
+        self.address.is_ipv4() == peer.is_ipv4() && common >= self.prefix.into()
     }
 
     /// A socket address on this interface; a link-local address includes the interface index as its

@@ -27,7 +27,7 @@ pub enum Error {
     Folder(PathBuf),
     /// The node manager cannot be reached.
     #[error(
-        "cannot reach Junior's node manager at {} ({source}): {}", .path.display(),
+        "cannot reach Junior's node manager at {} ({source}): {}", path.display(),
         remedy(source, path, "start it (JuniorRTE, or NodeManager of the JAUS Tool Set)")
     )]
     Manager {
@@ -36,30 +36,18 @@ pub enum Error {
         /// The error of the operating system.
         source: io::Error,
     },
-    /// Another client has the id.
+    /// Another client has the id, with this socket.
     #[error(
-        "{id} is used by another client of Junior's node manager, which reads {}: choose another \
-         id, or stop that program", .path.display()
+        "{0} is used by another client of Junior's node manager, which reads {path}: choose \
+         another id, or stop that program", path = .1.display()
     )]
-    Taken {
-        /// The id.
-        id: JausId,
-        /// The other client's socket.
-        path: PathBuf,
-    },
-    /// The socket for an id cannot be created.
+    Taken(JausId, PathBuf),
+    /// This socket for an id cannot be created.
     #[error(
-        "{id} cannot connect to Junior's node manager: cannot create its socket {} ({source}): \
-         {}", .path.display(), remedy(source, path, "check that path")
+        "{0} cannot connect to Junior's node manager: cannot create its socket {path} ({2}): \
+         {remedy}", path = .1.display(), remedy = remedy(.2, .1, "check that path")
     )]
-    Socket {
-        /// The id.
-        id: JausId,
-        /// Its socket.
-        path: PathBuf,
-        /// The error of the operating system.
-        source: io::Error,
-    },
+    Socket(JausId, PathBuf, #[source] io::Error),
 }
 
 fn remedy(error: &io::Error, path: &Path, otherwise: &str) -> String {
@@ -79,10 +67,9 @@ fn remedy(error: &io::Error, path: &Path, otherwise: &str) -> String {
 /// The reason, and a remedy.
 pub fn check(folder: &Path) -> Result<(), Error> {
     check_folder(folder)?;
+    let reached = connect(folder).map(drop);
     let path = manager_in(folder);
-    connect(folder)
-        .map(drop)
-        .map_err(|source| Error::Manager { path, source })
+    reached.map_err(|source| Error::Manager { path, source })
 }
 
 pub(super) fn check_folder(folder: &Path) -> Result<(), Error> {
@@ -127,8 +114,8 @@ impl Claim {
         // The node manager may belong to another user, and must be able to write here.
         let (socket, file) = match SocketFile::bind(&path, Type::DGRAM, 0o666) {
             Ok(bound) => bound,
-            Err(Obstacle::Io(source)) => return Err(Error::Socket { id, path, source }),
-            Err(_) => return Err(Error::Taken { id, path }),
+            Err(Obstacle::Io(source)) => return Err(Error::Socket(id, path, source)),
+            Err(_) => return Err(Error::Taken(id, path)),
         };
         Ok(Self {
             id,

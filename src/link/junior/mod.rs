@@ -32,7 +32,7 @@ mod registration;
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::task::{Context, Poll};
+use std::task::{Context, Poll, ready};
 use std::time::Instant;
 
 use bytes::Bytes;
@@ -95,8 +95,6 @@ pub struct JuniorLink {
     clients: BTreeMap<JausId, Claim>,
     registration: Registration,
     outbox: Backlog<Bytes>,
-    /// The datagram that waits for room at the node manager.
-    leaving: Option<Bytes>,
     is_stuck: bool,
     last_error: Option<io::ErrorKind>,
     counters: Counters,
@@ -115,7 +113,6 @@ impl JuniorLink {
             clients: BTreeMap::new(),
             registration: Registration::default(),
             outbox: Backlog::new(OUTBOX),
-            leaving: None,
             is_stuck: false,
             last_error: None,
             counters: Counters::default(),
@@ -174,29 +171,22 @@ impl JuniorLink {
 
     /// Sends queued datagrams, as fast as the node manager reads; ready when none is left.
     pub fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<()> {
-        while let Some(manager) = &self.manager {
-            let Some(datagram) = self.leaving.take().or_else(|| self.outbox.pop()) else {
-                self.is_stuck = false;
-                break;
-            };
-            match manager.poll_send(cx, &datagram) {
-                Poll::Pending => {
-                    self.leaving = Some(datagram);
-                    return Poll::Pending;
-                }
-                Poll::Ready(Ok(_)) => self.counters.sent += 1,
-                Poll::Ready(Err(error)) if has_gone(&error) => {
-                    self.leaving = Some(datagram);
+        while let (Some(manager), Some(datagram)) = (&self.manager, self.outbox.first()) {
+            match ready!(manager.poll_send(cx, datagram)) {
+                Ok(_) => self.counters.sent += 1,
+                Err(error) if has_gone(&error) => {
                     self.lose(&error);
                     // For the next `receive`, which looks for the node manager.
                     cx.waker().wake_by_ref();
                 }
-                Poll::Ready(Err(error)) => {
+                Err(error) => {
                     tracing::debug!(%error, "lost a datagram to Junior's node manager");
                     self.counters.send_errors += 1;
                 }
             }
+            self.outbox.pop();
         }
+        self.is_stuck = false;
         Poll::Ready(())
     }
 
@@ -300,10 +290,8 @@ impl JuniorLink {
     fn lose(&mut self, error: &io::Error) {
         tracing::warn!(folder = %self.folder.display(), %error, "lost Junior's node manager");
         self.counters.failures += 1;
-        let lost = self.outbox.len() + usize::from(self.leaving.is_some());
-        self.counters.manager_away += lost as u64;
+        self.counters.manager_away += self.outbox.len() as u64;
         self.outbox = Backlog::new(OUTBOX);
-        self.leaving = None;
         self.manager = None;
         self.registration.handle_lost();
     }

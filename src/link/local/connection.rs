@@ -41,7 +41,6 @@ impl Reader {
         }
     }
 
-    /// Sets the limit of a record's length.
     pub(crate) const fn set_limit(&mut self, limit: usize) {
         self.assembler.set_limit(limit);
     }
@@ -124,7 +123,6 @@ impl Writer {
         self.stream.is_some()
     }
 
-    /// Octets that wait.
     pub(crate) const fn len(&self) -> usize {
         self.waiting
     }
@@ -133,7 +131,6 @@ impl Writer {
         self.waiting == 0
     }
 
-    /// Octets written since the connection was opened.
     pub(crate) const fn written(&self) -> u64 {
         self.written
     }

@@ -1,57 +1,37 @@
 //! Errors of a local link, with their remedies.
 
 use std::io;
-use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use super::record::RecordError;
+use crate::link;
 
 /// Why a node cannot serve the component processes of its host, or a component cannot reach it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// No node listens there.
+    /// No node listens at this address.
     #[error(
-        "no node serves components at {place}: start one with `jaus node --local` (or `local = …` \
+        "no node serves components at {0}: start one with `jaus node --local` (or `local = …` \
          in its settings), or give the component its own node"
     )]
-    NoNode {
-        /// The address.
-        place: String,
-    },
-    /// Another node is using the socket.
+    NoNode(String),
+    /// Another node is using the socket; with its process id, if the system reports it.
     #[error(
         "another node{} serves the components at {}: stop it, or choose another path for one of \
-         the two", process(*pid), path.display()
+         the two", process(*.1), .0.display()
     )]
-    Served {
-        /// The socket.
-        path: PathBuf,
-        /// The process of the other node, if the system reports it.
-        pid: Option<u32>,
-    },
-    /// The port is in use.
-    #[error("the TCP port {0} is taken: choose another for the local link")]
-    PortTaken(SocketAddr),
+    Served(PathBuf, Option<u32>),
     /// A file of another kind has the socket's path.
     #[error(
         "cannot create the local link's socket: {} exists and is not a socket. Choose another \
          path, or move it", .0.display()
     )]
     NoSocket(PathBuf),
-    /// Other users could replace the socket by their own.
-    #[error(
-        "the directory {} of the local link's socket is unsafe: {why}. {remedy}",
-        directory.display()
-    )]
-    UnsafeDirectory {
-        /// The directory.
-        directory: PathBuf,
-        /// What is wrong with it.
-        why: String,
-        /// The remedy.
-        remedy: String,
-    },
+    /// Other users could replace the socket in this directory by their own; with what is wrong with
+    /// it and the remedy.
+    #[error("the directory {path} of the local link's socket is unsafe: {1}", path = .0.display())]
+    UnsafeDirectory(PathBuf, String),
     /// The process at the other end belongs to another user.
     #[error(
         "the process at the other end of {place} belongs to user {uid}, not to our user {own} or \
@@ -71,34 +51,23 @@ pub enum Error {
     /// The other side is gone.
     #[error("the connection was closed by the other side")]
     Closed,
-    /// The other side did not answer.
+    /// The other side did not answer at this address.
     #[error(
-        "no greeting from {place}: the program there hangs or is not a node; find it with `ss \
-         -xlp` or `ss -tlp`"
+        "no greeting from {0}: the program there hangs or is not a node; find it with `ss -xlp` or \
+         `ss -tlp`"
     )]
-    Mute {
-        /// The address.
-        place: String,
-    },
+    Mute(String),
     /// This system has no Unix sockets.
     #[error("this system has no Unix sockets: use a loopback port such as 127.0.0.1:37940")]
     NoUnixSockets,
-    /// Any other error of the operating system.
-    #[error("{doing} failed: {source}")]
-    Io {
-        /// The attempted operation.
-        doing: String,
-        /// The error of the operating system.
-        source: io::Error,
-    },
+    /// A port in use, or any other error of the operating system.
+    #[error(transparent)]
+    Socket(#[from] link::Error),
 }
 
 impl Error {
     pub(crate) fn io(doing: impl Into<String>) -> impl FnOnce(io::Error) -> Self {
-        |source| Self::Io {
-            doing: doing.into(),
-            source,
-        }
+        |source| link::Error::io(doing)(source).into()
     }
 }
 

@@ -1,23 +1,26 @@
 //! The listener of a node for component processes.
 
-use std::io;
 use std::net::SocketAddr;
 
 use tokio::net::TcpListener;
+#[cfg(unix)]
+use tokio::net::UnixListener;
 
 #[cfg(not(unix))]
 use super::address::DEFAULT_PORT;
 use super::stream::{Stream, tcp_stream};
 #[cfg(unix)]
-use super::unix_socket::{self, UnixSocket};
+use super::unix_socket;
 use super::{Address, Error};
+#[cfg(unix)]
+use crate::link::socket_file::SocketFile;
 use crate::link::tcp::listen;
 
 /// The node's side of a local link.
 #[derive(Debug)]
 pub(crate) enum Listener {
     #[cfg(unix)]
-    Unix(UnixSocket),
+    Unix(UnixListener, SocketFile),
     Tcp(TcpListener),
 }
 
@@ -25,31 +28,33 @@ impl Listener {
     pub(crate) fn open(address: &Address) -> Result<Self, Error> {
         match address {
             #[cfg(unix)]
-            Address::Default => UnixSocket::open(&unix_socket::make_default()?).map(Self::Unix),
+            Address::Default => Self::listen_at(&unix_socket::make_default()?),
             #[cfg(unix)]
-            Address::Path(path) => UnixSocket::open(path).map(Self::Unix),
+            Address::Path(path) => Self::listen_at(path),
             #[cfg(not(unix))]
-            Address::Default => Self::open_tcp(DEFAULT_PORT),
+            Address::Default => Self::listen(DEFAULT_PORT),
             #[cfg(not(unix))]
             Address::Path(_) => Err(Error::NoUnixSockets),
-            Address::Tcp(port) => Self::open_tcp(*port),
+            Address::Tcp(port) => Self::listen(*port),
         }
     }
 
-    fn open_tcp(port: SocketAddr) -> Result<Self, Error> {
-        let failed = |source: io::Error| match source.kind() {
-            io::ErrorKind::AddrInUse => Error::PortTaken(port),
-            _ => Error::io(format!("listening on {port}"))(source),
-        };
+    #[cfg(unix)]
+    fn listen_at(path: &std::path::Path) -> Result<Self, Error> {
+        let (listener, file) = unix_socket::listen(path)?;
+        Ok(Self::Unix(listener, file))
+    }
+
+    fn listen(port: SocketAddr) -> Result<Self, Error> {
         tracing::warn!(%port, "any program on this host can attach components through a TCP port");
-        listen(port).map(Self::Tcp).map_err(failed)
+        Ok(Self::Tcp(listen(port)?))
     }
 
     /// Waits for the next component. An error concerns only that component.
     pub(crate) async fn accept(&self) -> Result<Stream, Error> {
         match self {
             #[cfg(unix)]
-            Self::Unix(socket) => socket.accept().await,
+            Self::Unix(listener, file) => unix_socket::accept(listener, file.path()).await,
             Self::Tcp(listener) => {
                 let accepted = listener.accept().await;
                 let stream = accepted.and_then(|(stream, _)| tcp_stream(stream));
@@ -62,7 +67,7 @@ impl Listener {
     pub(crate) fn place(&self) -> String {
         match self {
             #[cfg(unix)]
-            Self::Unix(socket) => socket.path().display().to_string(),
+            Self::Unix(_, file) => file.path().display().to_string(),
             Self::Tcp(listener) => listener
                 .local_addr()
                 .map_or_else(|_| "a TCP port".to_owned(), |port| port.to_string()),

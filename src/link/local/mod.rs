@@ -19,7 +19,6 @@
 //! | `connection` | the two halves of a connection, the same on both sides |
 //! | `stream` | the two kinds of stream, and the process at the other end |
 //! | `address` | the address at which the node listens |
-//! | `default_place` | where the Unix socket is by default |
 //! | `listener`, `unix_socket` | the node's side: directory and socket with their permissions |
 //!
 //! [`node`](crate::node) reads and answers the records.
@@ -27,8 +26,6 @@
 mod address;
 mod assembler;
 mod connection;
-#[cfg(unix)]
-mod default_place;
 mod error;
 mod listener;
 pub mod record;

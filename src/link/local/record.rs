@@ -25,6 +25,9 @@
 use std::net::{IpAddr, Ipv6Addr, SocketAddr, SocketAddrV6};
 
 use bytes::{Buf, BufMut, Bytes};
+use deku::ctx::Endian;
+use deku::no_std_io::{Read, Seek, Write};
+use deku::prelude::*;
 
 use crate::address::JausId;
 use crate::endpoint::{LinkId, Path, Remote, Shortfall, Unacknowledged};
@@ -43,8 +46,6 @@ pub const LONGEST_HELLO: usize = 512;
 /// Limit of octets of a name or an explanation; longer ones are truncated.
 const LONGEST_TEXT: usize = 255;
 
-const MAGIC: [u8; 4] = *b"JAUS";
-
 /// One record.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Record {
@@ -55,19 +56,29 @@ pub struct Record {
 }
 
 /// The kind of a record and its fields.
+#[deku_derive(DekuRead, DekuWrite)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[deku(id_type = "u8", endian = "little")]
 pub enum Head {
     /// A component's first record. The payload is its name.
+    #[deku(id = 1)]
     Hello {
         /// The version of its format. If it is another version, the rest is not read.
+        #[deku(magic = b"JAUS")]
         version: u8,
+        #[deku(temp, temp_value = "1", cond = "*version == VERSION", default = "1")]
+        #[deku(map = "|one: u8| (one == 1).then_some(one).ok_or(DekuError::IdVariantNotFound)")]
+        one: u8,
         /// The requested id. With subsystem and node 0, the component with that number on the node,
         /// whatever the node's id.
+        #[deku(cond = "*version == VERSION", default = "JausId::from_u32(0)")]
         id: JausId,
     },
     /// A message from the component. Its source id is that of the connection.
+    #[deku(id = 2)]
     Send {
         /// Priority, scope, and whether to request an acknowledgement.
+        #[deku(assert = "flags.broadcast().is_some()")]
         flags: Flags,
         /// The component's handle for it.
         handle: u64,
@@ -75,8 +86,10 @@ pub enum Head {
         destination: JausId,
     },
     /// The component leaves on purpose.
+    #[deku(id = 3)]
     Leave,
     /// The node has attached the component.
+    #[deku(id = 17)]
     Welcome {
         /// Its id.
         id: JausId,
@@ -84,23 +97,35 @@ pub enum Head {
         max_message: u32,
     },
     /// The node has not attached the component. The payload is the reason.
+    #[deku(id = 18)]
     Refused(Reason),
     /// A message for the component.
+    #[deku(id = 19)]
     Deliver {
         /// Priority and scope.
+        #[deku(assert = "flags.broadcast().is_some()")]
         flags: Flags,
         /// Its source.
         source: JausId,
         /// Its destination, as given by the sender.
         destination: JausId,
         /// The path on which it arrived; `None` from a component of the same node.
+        #[deku(
+            reader = "read_path(deku::reader)",
+            writer = "write_path(*path, deku::writer)"
+        )]
         path: Option<Path>,
     },
     /// The outcome of a message from the component.
+    #[deku(id = 20)]
     Outcome {
         /// The component's handle for it.
         handle: u64,
         /// The outcome.
+        #[deku(
+            reader = "Outcome::read(deku::reader)",
+            writer = "outcome.write(deku::writer)"
+        )]
         outcome: Outcome,
     },
 }
@@ -117,20 +142,27 @@ pub enum Outcome {
 }
 
 /// Why a node does not attach a component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, DekuRead, DekuWrite)]
+#[deku(id_type = "u8", endian = "endian", ctx = "endian: Endian")]
 #[non_exhaustive]
 pub enum Reason {
     /// The node uses another version of the format.
+    #[deku(id = 1)]
     Version,
     /// Another component has the id.
+    #[deku(id = 2)]
     Taken,
     /// The id belongs to another subsystem or node, or names no single component.
+    #[deku(id = 3)]
     WrongId,
     /// The node's limit of components is reached.
+    #[deku(id = 4)]
     TooMany,
     /// The node is about to stop.
+    #[deku(id = 5)]
     Stopping,
     /// A reason of a later version.
+    #[deku(id_pat = "_")]
     Other(u8),
 }
 
@@ -203,13 +235,13 @@ impl Record {
 
     /// Appends the record without its payload, which must follow unchanged.
     pub fn encode_head(&self, out: &mut Vec<u8>) {
-        let start = out.len();
-        out.put_u32_le(0);
-        self.head.encode(out);
-        let length = out.len() - start - LENGTH + self.payload.len();
+        let mut head = [0; LONGEST_HEAD];
+        // There is room for every head.
+        let octets = self.head.to_slice(&mut head).unwrap_or(0);
         // Longer payloads are rejected before this.
-        let length = u32::try_from(length).unwrap_or(u32::MAX);
-        out[start..start + LENGTH].copy_from_slice(&length.to_le_bytes());
+        let length = u32::try_from(octets + self.payload.len()).unwrap_or(u32::MAX);
+        out.put_u32_le(length);
+        out.put_slice(&head[..octets]);
     }
 
     /// Decodes a record without its length field.
@@ -217,13 +249,12 @@ impl Record {
     /// # Errors
     /// [`RecordError::Malformed`] if its kind is unknown or its fields are invalid.
     pub fn decode(mut octets: Bytes) -> Result<Self, RecordError> {
-        let mut rest = &octets[..];
-        let head = Head::decode(&mut rest).ok_or_else(|| RecordError::Malformed {
+        let malformed = |_| RecordError::Malformed {
             kind: octets.first().copied().unwrap_or(0),
             length: octets.len(),
-        })?;
-        let head_length = octets.len() - rest.len();
-        octets.advance(head_length);
+        };
+        let ((payload, _), head) = Head::from_bytes((&octets, 0)).map_err(malformed)?;
+        octets.advance(octets.len() - payload.len());
         Ok(Self {
             head,
             payload: octets,
@@ -239,95 +270,6 @@ impl From<Head> for Record {
     }
 }
 
-impl Head {
-    fn encode(&self, out: &mut Vec<u8>) {
-        match *self {
-            Self::Hello { version, id } => {
-                out.put_u8(1);
-                out.put_slice(&MAGIC);
-                out.put_u8(version);
-                if version == VERSION {
-                    out.put_u8(1);
-                    out.put_u32_le(id.to_u32());
-                }
-            }
-            Self::Send {
-                flags,
-                handle,
-                destination,
-            } => {
-                out.put_slice(&[2, flags.0]);
-                out.put_u64_le(handle);
-                out.put_u32_le(destination.to_u32());
-            }
-            Self::Leave => out.put_u8(3),
-            Self::Welcome { id, max_message } => {
-                out.put_u8(17);
-                out.put_u32_le(id.to_u32());
-                out.put_u32_le(max_message);
-            }
-            Self::Refused(reason) => out.put_slice(&[18, reason.code()]),
-            Self::Deliver {
-                flags,
-                source,
-                destination,
-                path,
-            } => {
-                out.put_slice(&[19, flags.0]);
-                out.put_u32_le(source.to_u32());
-                out.put_u32_le(destination.to_u32());
-                encode_path(path, out);
-            }
-            Self::Outcome { handle, outcome } => {
-                out.put_u8(20);
-                out.put_u64_le(handle);
-                outcome.encode(out);
-            }
-        }
-    }
-
-    fn decode(octets: &mut &[u8]) -> Option<Self> {
-        Some(match octets.try_get_u8().ok()? {
-            1 => {
-                let magic = octets.try_get_u32().ok()?;
-                let version = octets.try_get_u8().ok()?;
-                let is_ours = version == VERSION;
-                if magic != u32::from_be_bytes(MAGIC) || is_ours && octets.try_get_u8() != Ok(1) {
-                    return None;
-                }
-                let id = if is_ours {
-                    id(octets)?
-                } else {
-                    JausId::from_u32(0)
-                };
-                Self::Hello { version, id }
-            }
-            2 => Self::Send {
-                flags: flags(octets)?,
-                handle: octets.try_get_u64_le().ok()?,
-                destination: id(octets)?,
-            },
-            3 => Self::Leave,
-            17 => Self::Welcome {
-                id: id(octets)?,
-                max_message: octets.try_get_u32_le().ok()?,
-            },
-            18 => Self::Refused(Reason::from_code(octets.try_get_u8().ok()?)),
-            19 => Self::Deliver {
-                flags: flags(octets)?,
-                source: id(octets)?,
-                destination: id(octets)?,
-                path: decode_path(octets)?,
-            },
-            20 => Self::Outcome {
-                handle: octets.try_get_u64_le().ok()?,
-                outcome: Outcome::decode(octets)?,
-            },
-            _ => return None,
-        })
-    }
-}
-
 impl Outcome {
     /// The reasons in the order of their codes, from 1.
     const REASONS: [Unacknowledged; 3] = [
@@ -336,103 +278,79 @@ impl Outcome {
         Unacknowledged::NotSent,
     ];
 
-    fn encode(self, out: &mut Vec<u8>) {
-        match self {
-            Self::Acknowledged => out.put_u8(0),
-            Self::NotAcknowledged(shortfall) => {
-                let reasons = Self::REASONS.iter();
-                let before = reasons.take_while(|&&reason| reason != shortfall.reason);
-                out.put_u8(1 + before.count() as u8);
-                out.put_u32_le(shortfall.destination.to_u32());
-                for octets in [shortfall.acknowledged, shortfall.length] {
-                    out.put_u32_le(u32::try_from(octets).unwrap_or(u32::MAX));
-                }
-            }
-            Self::Rejected => out.put_u8(4),
-        }
-    }
-
-    fn decode(octets: &mut &[u8]) -> Option<Self> {
-        Some(match octets.try_get_u8().ok()? {
-            0 => Self::Acknowledged,
-            4 => Self::Rejected,
-            code => Self::NotAcknowledged(Shortfall {
-                reason: *Self::REASONS.get(usize::from(code) - 1)?,
-                destination: id(octets)?,
-                acknowledged: octets.try_get_u32_le().ok()? as usize,
-                length: octets.try_get_u32_le().ok()? as usize,
-            }),
-        })
-    }
-}
-
-impl Reason {
-    const KNOWN: [Self; 5] = [
-        Self::Version,
-        Self::Taken,
-        Self::WrongId,
-        Self::TooMany,
-        Self::Stopping,
-    ];
-
-    fn code(self) -> u8 {
-        match self {
-            Self::Other(code) => code,
-            known => 1 + Self::KNOWN.iter().take_while(|&&r| r != known).count() as u8,
-        }
-    }
-
-    fn from_code(code: u8) -> Self {
-        let known = usize::from(code).checked_sub(1);
-        let known = known.and_then(|at| Self::KNOWN.get(at));
-        known.copied().unwrap_or(Self::Other(code))
-    }
-}
-
-fn encode_path(path: Option<Path>, out: &mut Vec<u8>) {
-    let Some(Path { link, peer }) = path else {
-        return out.put_u8(0);
-    };
-    out.put_u8(1 + u8::from(peer != Remote::Line));
-    out.put_u16_le(link.0);
-    if let Remote::Socket(address) = peer {
-        let (ip, scope) = match address {
-            SocketAddr::V4(address) => (address.ip().to_ipv6_mapped(), 0),
-            SocketAddr::V6(address) => (*address.ip(), address.scope_id()),
+    fn read<R: Read + Seek>(reader: &mut Reader<R>) -> Result<Self, DekuError> {
+        let reason = match u8::from_reader_with_ctx(reader, ())? {
+            0 => return Ok(Self::Acknowledged),
+            4 => return Ok(Self::Rejected),
+            code => Self::REASONS.get(usize::from(code) - 1),
         };
-        out.put_slice(&ip.octets());
-        out.put_u16_le(address.port());
-        out.put_u32_le(scope);
+        let (destination, acknowledged, length): (_, u32, u32) =
+            DekuReader::from_reader_with_ctx(reader, Endian::Little)?;
+        Ok(Self::NotAcknowledged(Shortfall {
+            reason: *reason.ok_or(DekuError::IdVariantNotFound)?,
+            destination,
+            acknowledged: acknowledged as usize,
+            length: length as usize,
+        }))
+    }
+
+    fn write<W: Write + Seek>(self, writer: &mut Writer<W>) -> Result<(), DekuError> {
+        match self {
+            Self::Acknowledged => 0_u8.to_writer(writer, ()),
+            Self::NotAcknowledged(Shortfall {
+                reason,
+                destination,
+                acknowledged,
+                length,
+            }) => {
+                let before = Self::REASONS.iter().take_while(|&&r| r != reason);
+                let code = 1 + before.count() as u8;
+                let octets = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+                (code, destination, octets(acknowledged), octets(length))
+                    .to_writer(writer, Endian::Little)
+            }
+            Self::Rejected => 4_u8.to_writer(writer, ()),
+        }
     }
 }
 
-fn decode_path(octets: &mut &[u8]) -> Option<Option<Path>> {
-    let place = octets.try_get_u8().ok()?;
+fn read_path<R: Read + Seek>(reader: &mut Reader<R>) -> Result<Option<Path>, DekuError> {
+    let place = u8::from_reader_with_ctx(reader, ())?;
     if place == 0 {
-        return Some(None);
+        return Ok(None);
     }
-    let link = LinkId(octets.try_get_u16_le().ok()?);
+    let link = LinkId(u16::from_reader_with_ctx(reader, Endian::Little)?);
     let peer = match place {
         1 => Remote::Line,
         2 => {
-            let ip = Ipv6Addr::from(octets.try_get_u128().ok()?);
-            let (port, scope) = (octets.try_get_u16_le().ok()?, octets.try_get_u32_le().ok()?);
-            match IpAddr::V6(ip).to_canonical() {
+            let ip = Ipv6Addr::from_reader_with_ctx(reader, Endian::Big)?;
+            let (port, scope) = DekuReader::from_reader_with_ctx(reader, Endian::Little)?;
+            match ip.to_canonical() {
                 IpAddr::V4(ip) => SocketAddr::from((ip, port)).into(),
                 IpAddr::V6(ip) => SocketAddr::V6(SocketAddrV6::new(ip, port, 0, scope)).into(),
             }
         }
-        _ => return None,
+        _ => return Err(DekuError::IdVariantNotFound),
     };
-    Some(Some(Path { link, peer }))
+    Ok(Some(Path { link, peer }))
 }
 
-fn id(octets: &mut &[u8]) -> Option<JausId> {
-    octets.try_get_u32_le().ok().map(JausId::from_u32)
-}
-
-/// Flags of a whole message, with a valid scope.
-fn flags(octets: &mut &[u8]) -> Option<Flags> {
-    let flags = Flags(octets.try_get_u8().ok()?);
-    flags.broadcast().map(|_| flags)
+fn write_path<W: Write + Seek>(
+    path: Option<Path>,
+    writer: &mut Writer<W>,
+) -> Result<(), DekuError> {
+    let endian = Endian::Little;
+    let Some(Path { link, peer }) = path else {
+        return 0_u8.to_writer(writer, ());
+    };
+    let Remote::Socket(address) = peer else {
+        return (1_u8, link.0).to_writer(writer, endian);
+    };
+    let (ip, scope) = match address {
+        SocketAddr::V4(address) => (address.ip().to_ipv6_mapped(), 0),
+        SocketAddr::V6(address) => (*address.ip(), address.scope_id()),
+    };
+    (2_u8, link.0).to_writer(writer, endian)?;
+    ip.to_writer(writer, Endian::Big)?;
+    (address.port(), scope).to_writer(writer, endian)
 }

@@ -15,7 +15,7 @@ pub(crate) use self::on_unix::{ReadHalf, WriteHalf};
 #[cfg(not(unix))]
 use super::address::DEFAULT_PORT;
 #[cfg(unix)]
-use super::default_place::{default_path, own_uid};
+use super::unix_socket::{default_path, own_uid};
 use super::{Address, Assembler, Error};
 
 /// The process at the other end.
@@ -159,11 +159,9 @@ mod elsewhere {
 
     use super::{Assembler, Stream};
 
-    /// The reading half of a stream.
     #[derive(Debug)]
     pub(crate) struct ReadHalf(tcp::OwnedReadHalf);
 
-    /// The writing half of a stream.
     #[derive(Debug)]
     pub(crate) struct WriteHalf(tcp::OwnedWriteHalf);
 
@@ -176,7 +174,6 @@ mod elsewhere {
     }
 
     impl ReadHalf {
-        /// Reads once, as much as fits; 0 octets mean the end.
         pub(in super::super) fn poll_read(
             &mut self,
             cx: &mut Context<'_>,
@@ -189,17 +186,14 @@ mod elsewhere {
     }
 
     impl WriteHalf {
-        /// Writes as much as possible without waiting.
         pub(in super::super) fn try_write(&self, pieces: &[IoSlice<'_>]) -> io::Result<usize> {
             self.0.try_write_vectored(pieces)
         }
 
-        /// Waits until a full socket may have room again.
         pub(in super::super) fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
             self.0.as_ref().poll_write_ready(cx)
         }
 
-        /// Call this when nothing is left to write.
         pub(in super::super) fn rest(&mut self) {}
     }
 }
@@ -263,9 +257,7 @@ async fn connect_tcp(port: SocketAddr) -> Result<Stream, Error> {
 fn unreachable(place: &str, error: io::Error) -> Error {
     use io::ErrorKind::{ConnectionRefused, NotFound};
     match error.kind() {
-        ConnectionRefused | NotFound => Error::NoNode {
-            place: place.to_owned(),
-        },
+        ConnectionRefused | NotFound => Error::NoNode(place.to_owned()),
         _ => Error::io(format!("connecting to {place}"))(error),
     }
 }

@@ -12,56 +12,34 @@ use socket2::{Socket, Type};
 use tokio::net::{UnixListener, UnixStream};
 
 use super::Error;
-use super::default_place::{default_directory, default_path, own_uid};
 use super::stream::{Stream, pid_of, unix_stream};
 use crate::link::socket_file::{Obstacle, SocketFile};
 
-/// A Unix socket that is removed when the node ends.
-#[derive(Debug)]
-pub(crate) struct UnixSocket {
-    file: SocketFile,
-    listener: UnixListener,
-    owner: u32,
+/// Listens at a path. Dropping the file removes it.
+pub(super) fn listen(path: &Path) -> Result<(UnixListener, SocketFile), Error> {
+    check_directory(parent(path), own_uid(), 0o022)?;
+    let failed = |source| Error::io(format!("listening at {}", path.display()))(source);
+    let bound = SocketFile::bind(path, Type::STREAM, 0o600);
+    let (socket, file) = bound.map_err(|obstacle| match obstacle {
+        Obstacle::Alive(other) => Error::Served(path.to_owned(), other.and_then(server_of)),
+        Obstacle::NoSocket => Error::NoSocket(path.to_owned()),
+        Obstacle::Io(source) => failed(source),
+    })?;
+    let listener = UnixListener::from_std(socket.into()).map_err(failed)?;
+    Ok((listener, file))
 }
 
-impl UnixSocket {
-    pub(super) fn open(path: &Path) -> Result<Self, Error> {
-        let owner = own_uid();
-        check_directory(parent(path), owner, 0o022)?;
-        let failed = |source| Error::io(format!("listening at {}", path.display()))(source);
-        let bound = SocketFile::bind(path, Type::STREAM, 0o600);
-        let (socket, file) = bound.map_err(|obstacle| match obstacle {
-            Obstacle::Alive(other) => Error::Served {
-                path: path.to_owned(),
-                pid: other.and_then(server_of),
-            },
-            Obstacle::NoSocket => Error::NoSocket(path.to_owned()),
-            Obstacle::Io(source) => failed(source),
-        })?;
-        Ok(Self {
-            file,
-            listener: UnixListener::from_std(socket.into()).map_err(failed)?,
-            owner,
-        })
+/// Waits for the next component.
+pub(super) async fn accept(listener: &UnixListener, path: &Path) -> Result<Stream, Error> {
+    let accepted = listener.accept().await;
+    let stream = accepted.and_then(|(stream, _)| unix_stream(stream));
+    let (stream, uid) = stream.map_err(Error::io("accepting a component"))?;
+    let own = own_uid();
+    if !may_attach(uid, own) {
+        let place = path.display().to_string();
+        return Err(Error::Foreign { place, uid, own });
     }
-
-    pub(super) fn path(&self) -> &Path {
-        self.file.path()
-    }
-
-    pub(super) async fn accept(&self) -> Result<Stream, Error> {
-        let accepted = self.listener.accept().await;
-        let stream = accepted.and_then(|(stream, _)| unix_stream(stream));
-        let (stream, uid) = stream.map_err(Error::io("accepting a component"))?;
-        if !may_attach(uid, self.owner) {
-            return Err(Error::Foreign {
-                place: self.path().display().to_string(),
-                uid,
-                own: self.owner,
-            });
-        }
-        Ok(stream)
-    }
+    Ok(stream)
 }
 
 /// The process id of the node that serves a connected socket.
@@ -73,6 +51,30 @@ fn server_of(socket: Socket) -> Option<u32> {
 /// Accepts components of the owner and of root.
 const fn may_attach(uid: u32, owner: u32) -> bool {
     uid == owner || uid == 0
+}
+
+/// The default path of the socket, whether or not it exists.
+pub(super) fn default_path() -> PathBuf {
+    default_directory().join("node.sock")
+}
+
+/// The default directory: in the user's runtime directory, if there is one.
+fn default_directory() -> PathBuf {
+    let given = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
+    if let Some(directory) = given.filter(|directory| directory.is_absolute()) {
+        return directory.join("jaus");
+    }
+    let uid = own_uid();
+    let of_user = PathBuf::from(format!("/run/user/{uid}"));
+    if of_user.is_dir() {
+        return of_user.join("jaus");
+    }
+    PathBuf::from(format!("/tmp/jaus-{uid}"))
+}
+
+/// The effective user id of this process.
+pub(super) fn own_uid() -> u32 {
+    rustix::process::geteuid().as_raw()
 }
 
 /// The default path, in a directory that exists and is accessible to the owner alone.
@@ -99,14 +101,8 @@ fn parent(path: &Path) -> &Path {
 /// and its mode has none of the bits in `forbidden`, except that a sticky directory, where only
 /// owners can remove their files, is allowed for 0o022.
 fn check_directory(directory: &Path, own: u32, forbidden: u32) -> Result<(), Error> {
-    let unsafe_because = |why: String, remedy: String| {
-        Err(Error::UnsafeDirectory {
-            directory: directory.to_owned(),
-            why,
-            remedy,
-        })
-    };
-    let doing = || format!("looking at {}", directory.display());
+    let shown = directory.display();
+    let unsafe_because = |why| Err(Error::UnsafeDirectory(directory.to_owned(), why));
     let metadata = if forbidden == 0o077 {
         // The directory that this process creates itself must not be a symbolic link.
         fs::symlink_metadata(directory)
@@ -115,27 +111,28 @@ fn check_directory(directory: &Path, own: u32, forbidden: u32) -> Result<(), Err
     };
     let metadata = match metadata {
         Err(error) if error.kind() == ErrorKind::NotFound => {
-            let remedy = format!("Create it: `mkdir -m 700 {}`", directory.display());
-            return unsafe_because("it does not exist".into(), remedy);
+            return unsafe_because(format!(
+                "it does not exist. Create it: `mkdir -m 700 {shown}`"
+            ));
         }
-        other => other.map_err(Error::io(doing()))?,
+        other => other.map_err(Error::io(format!("looking at {shown}")))?,
     };
     let (uid, mode) = (metadata.uid(), metadata.mode() & 0o7777);
     if !metadata.is_dir() {
-        return unsafe_because(
-            "it is not a directory".into(),
-            "Choose another path.".into(),
-        );
+        return unsafe_because("it is not a directory. Choose another path.".to_owned());
     }
     if uid != own && uid != 0 {
-        let why = format!("it belongs to user {uid}, but this process runs as user {own}");
-        return unsafe_because(why, "Choose a directory of your own.".into());
+        return unsafe_because(format!(
+            "it belongs to user {uid}, but this process runs as user {own}. Choose a directory of \
+             your own."
+        ));
     }
     let only_owners_remove = forbidden == 0o022 && mode & 0o1000 != 0;
     if mode & forbidden != 0 && !only_owners_remove {
-        let why = format!("its mode is {mode:o}, so others can change its contents");
-        let remedy = format!("Restrict it: `chmod 700 {}`", directory.display());
-        return unsafe_because(why, remedy);
+        return unsafe_because(format!(
+            "its mode is {mode:o}, so others can change its contents. Restrict it: `chmod 700 \
+             {shown}`"
+        ));
     }
     Ok(())
 }

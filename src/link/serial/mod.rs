@@ -211,17 +211,12 @@ impl SerialLink {
         match ready!(Pin::new(port).poll_read(cx, &mut buffer)) {
             Ok(()) if !buffer.filled().is_empty() => {
                 self.decoder.push(buffer.filled());
-                Poll::Ready(())
+                return Poll::Ready(());
             }
-            Ok(()) => {
-                self.lose(&io::ErrorKind::UnexpectedEof.into());
-                Poll::Pending
-            }
-            Err(error) => {
-                self.lose(&error);
-                Poll::Pending
-            }
+            Ok(()) => self.lose(&io::ErrorKind::UnexpectedEof.into()),
+            Err(error) => self.lose(&error),
         }
+        Poll::Pending
     }
 
     /// Handles the loss of the port.
@@ -238,13 +233,11 @@ impl SerialLink {
 
     fn open_again(&mut self, cx: &mut Context<'_>, now: Instant) {
         let device = &self.settings.device;
-        let attempt = || {
+        let reopened = self.redial.poll(cx, now, |attempt| {
             let settings = self.settings.clone();
-            let opened = spawn_blocking(move || settings.open());
-            // An attempt that the runtime has cancelled counts as failed.
-            Box::pin(async { opened.await.map_err(io::Error::from).flatten() }) as _
-        };
-        match self.redial.poll(cx, now, attempt) {
+            attempt.spawn_blocking(move || settings.open());
+        });
+        match reopened {
             Poll::Pending => {}
             Poll::Ready(Ok(port)) => {
                 tracing::info!(device, "serial port is back");

@@ -9,11 +9,11 @@ use bytes::{Buf, BufMut, Bytes, BytesMut};
 use socket2::{SockRef, TcpKeepalive};
 use tokio::net::TcpStream;
 
+use super::admission::Place;
 use super::settings::{BACKLOG, STUCK};
 use crate::link::backlog::Backlog;
-use crate::wire::jtcp::{Decoder, split_version};
-use crate::wire::judp::{VERSION_AS5669, VERSION_AS5669A};
-use crate::wire::{self, Frame, Priority, Version};
+use crate::wire::jtcp::Decoder;
+use crate::wire::{self, Frame, Priority};
 
 /// Octets read or written with one call. Many small messages share a call: one call each would take
 /// most of the time.
@@ -54,17 +54,14 @@ pub enum Closed {
 #[derive(Debug)]
 pub(super) struct Connection {
     stream: TcpStream,
-    /// The address of this end, unless the connection failed at once.
-    pub(super) local: Option<SocketAddr>,
     pub(super) dialed: bool,
-    pub(super) opened: Instant,
+    /// Its remote end and its use, for admission.
+    pub(super) place: Place,
     decoder: Decoder,
     /// Frames received.
     pub(super) received: u64,
-    /// When the last frame arrived.
-    pub(super) heard: Option<Instant>,
     /// The version octet with which our direction began.
-    spoken: Option<Version>,
+    spoken: Option<u8>,
     /// The messages that wait for the other side.
     pub(super) backlog: Backlog<Bytes>,
     /// Octets being passed to the kernel; nothing overtakes them.
@@ -81,21 +78,30 @@ pub(super) struct Connection {
     hung_up: bool,
 }
 
+/// Sets the options of a stream: messages leave at once, and a dead peer is detected.
+pub(super) fn prepare(stream: TcpStream) -> io::Result<TcpStream> {
+    stream.set_nodelay(true)?;
+    let keepalive = TcpKeepalive::new()
+        .with_time(Duration::from_secs(10))
+        .with_interval(Duration::from_secs(5));
+    SockRef::from(&stream).set_tcp_keepalive(&keepalive)?;
+    Ok(stream)
+}
+
 impl Connection {
-    pub(super) fn new(stream: TcpStream, dialed: bool, now: Instant) -> io::Result<Self> {
-        stream.set_nodelay(true)?;
-        let keepalive = TcpKeepalive::new()
-            .with_time(Duration::from_secs(10))
-            .with_interval(Duration::from_secs(5));
-        SockRef::from(&stream).set_tcp_keepalive(&keepalive)?;
-        Ok(Self {
-            local: stream.local_addr().ok(),
+    /// With a [prepared](prepare) stream.
+    pub(super) fn new(stream: TcpStream, remote: SocketAddr, dialed: bool, now: Instant) -> Self {
+        tracing::info!(%remote, dialed, "connection opened");
+        Self {
             stream,
             dialed,
-            opened: now,
+            place: Place {
+                remote,
+                opened: now,
+                heard: None,
+            },
             decoder: Decoder::new(),
             received: 0,
-            heard: None,
             spoken: None,
             backlog: Backlog::new(BACKLOG),
             leaving: BytesMut::new(),
@@ -104,28 +110,33 @@ impl Connection {
             stuck: None,
             failed: None,
             hung_up: false,
-        })
+        }
+    }
+
+    /// The address of this end, unless the connection is failing.
+    pub(super) fn local(&self) -> Option<SocketAddr> {
+        self.stream.local_addr().ok()
     }
 
     /// Drops the oldest waiting message of the lowest priority.
     pub(super) fn drop_least(&mut self) {
-        if self.backlog.drop_least() {
-            self.count_lost(1);
-        }
+        let lost = self.backlog.drop_least();
+        self.count_lost(lost.into());
     }
 
     /// Queues the output of [`jtcp::encode`](crate::wire::jtcp::encode). Returns whether it was
     /// accepted: a connection carries only one version, and nothing after the shutdown.
     pub(super) fn send(&mut self, priority: Priority, encoded: &Bytes) -> bool {
-        let (version, message) = split_version(encoded.clone());
+        let mut message = encoded.clone();
+        let Ok(version) = message.try_get_u8() else {
+            return false;
+        };
         // A peer that sends the version octet before each message may need it there, too (JAUS++).
-        let repeats = self.spoken.is_some() && self.decoder.repeats_version();
-        let message = if repeats { encoded.clone() } else { message };
+        if self.spoken.is_some() && self.decoder.repeats_version() {
+            message = encoded.clone();
+        }
         let spoken = *self.spoken.get_or_insert_with(|| {
-            self.leaving.put_u8(match version {
-                Version::As5669a => VERSION_AS5669A,
-                Version::As5669 | Version::Ra => VERSION_AS5669,
-            });
+            self.leaving.put_u8(version);
             version
         });
         if spoken != version || self.hung_up {
@@ -229,7 +240,7 @@ impl Connection {
             match self.decoder.next_frame() {
                 Ok(Some(frame)) => {
                     self.received += 1;
-                    self.heard = Some(now);
+                    self.place.heard = Some(now);
                     return Poll::Ready(Ok(frame));
                 }
                 Ok(None) => {}

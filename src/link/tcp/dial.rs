@@ -1,10 +1,5 @@
 //! A configured peer: the attempts to connect to it, and the messages that wait for a connection.
 
-use std::io;
-use std::net::SocketAddr;
-use std::task::{Context, Poll};
-use std::time::Instant;
-
 use bytes::Bytes;
 use tokio::net::TcpStream;
 
@@ -16,16 +11,14 @@ use crate::wire::Priority;
 /// A peer to connect to.
 #[derive(Debug)]
 pub(super) struct Dial {
-    pub(super) address: SocketAddr,
     pub(super) redial: Redial<TcpStream>,
     /// Messages for the peer during an attempt.
     pub(super) waiting: Backlog<(Priority, Bytes)>,
 }
 
 impl Dial {
-    pub(super) fn new(address: SocketAddr) -> Self {
+    pub(super) fn new() -> Self {
         Self {
-            address,
             redial: Redial::new(CONNECT_TIMEOUT, FIRST_PAUSE..=LONGEST_PAUSE),
             waiting: Backlog::new(BACKLOG),
         }
@@ -38,15 +31,5 @@ impl Dial {
         let keeps = !self.redial.is_up() && !self.redial.is_pausing();
         let waiting = (priority, payload.clone());
         keeps.then(|| self.waiting.push(priority, payload.len(), waiting))
-    }
-
-    /// A new connection, or the error of a failed attempt.
-    pub(super) fn poll(
-        &mut self,
-        cx: &mut Context<'_>,
-        now: Instant,
-    ) -> Poll<io::Result<TcpStream>> {
-        let connect = || Box::pin(TcpStream::connect(self.address)) as _;
-        self.redial.poll(cx, now, connect)
     }
 }

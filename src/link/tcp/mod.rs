@@ -49,8 +49,8 @@ pub use settings::{CONNECT_TIMEOUT, FIRST_PAUSE, HANDSHAKE, LONGEST_PAUSE, STUCK
 use super::Error;
 use crate::endpoint::{Remote, To, Transmit};
 use crate::wire::{Frame, Priority};
-use admission::{Admission, Place};
-use connection::Connection;
+use admission::Admission;
+use connection::{Connection, prepare};
 use dial::Dial;
 use settings::MAX_WAITING;
 
@@ -137,12 +137,11 @@ pub enum Arrival {
 #[derive(Debug)]
 pub struct TcpLink {
     listener: Option<TcpListener>,
-    local: Option<SocketAddr>,
     settings: Settings,
     /// When the last warning about scarce places was logged.
     warned: Option<Instant>,
     accept_after: Option<Instant>,
-    dials: Vec<Dial>,
+    dials: BTreeMap<SocketAddr, Dial>,
     connections: BTreeMap<SocketAddr, Connection>,
     closed: VecDeque<(SocketAddr, Closed)>,
     counters: Counters,
@@ -154,33 +153,26 @@ impl TcpLink {
     /// # Errors
     /// [`Error::ListenerTaken`], [`Error::Permission`], [`Error::AddressGone`] or [`Error::Io`].
     pub fn open(settings: &Settings) -> Result<Self, Error> {
-        let listen = |address| listen(address).map_err(|error| listen_error(address, error));
         let listener = settings.listen.map(listen).transpose()?;
-        let local = listener.as_ref().and_then(|l| l.local_addr().ok());
-        let mut dials: Vec<Dial> = Vec::new();
-        for &address in &settings.connect {
-            if !dials.iter().any(|dial| dial.address == address) {
-                dials.push(Dial::new(address));
-            }
-        }
-        tracing::info!(listening = ?local, peers = ?settings.connect, "TCP link opened");
-        Ok(Self {
+        let dials = settings.connect.iter().map(|&peer| (peer, Dial::new()));
+        let link = Self {
             listener,
-            local,
             settings: settings.clone(),
             warned: None,
             accept_after: None,
-            dials,
+            dials: dials.collect(),
             connections: BTreeMap::new(),
             closed: VecDeque::new(),
             counters: Counters::default(),
-        })
+        };
+        tracing::info!(listening = ?link.local(), peers = ?settings.connect, "TCP link opened");
+        Ok(link)
     }
 
     /// The address that accepts connections, if any.
     #[must_use]
-    pub const fn local(&self) -> Option<SocketAddr> {
-        self.local
+    pub fn local(&self) -> Option<SocketAddr> {
+        self.listener.as_ref()?.local_addr().ok()
     }
 
     /// Its counters so far.
@@ -199,7 +191,7 @@ impl TcpLink {
             .iter()
             .map(|(&remote, connection)| ConnectionReport {
                 remote,
-                local: connection.local,
+                local: connection.local(),
                 dialed: connection.dialed,
                 received: connection.received,
                 waiting: connection.backlog.len(),
@@ -210,7 +202,8 @@ impl TcpLink {
     /// When to call [`receive`](Self::receive) even if nothing arrives.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let dials = self.dials.iter().filter_map(|dial| dial.redial.deadline());
+        let dials = self.dials.values();
+        let dials = dials.filter_map(|dial| dial.redial.deadline());
         let stuck = self.connections.values().filter_map(Connection::stuck_at);
         dials.chain(stuck).chain(self.accept_after).min()
     }
@@ -233,11 +226,10 @@ impl TcpLink {
             if connection.backlog.octets() > SMALL {
                 self.bound_waiting();
             }
-        } else if let Some(dial) = self.dial(peer) {
-            let kept = dial.keep(priority, payload);
-            self.counters.count_kept(kept);
         } else {
-            self.counters.not_connected += 1;
+            let dial = self.dials.get_mut(&peer);
+            let kept = dial.and_then(|dial| dial.keep(priority, payload));
+            self.counters.count_kept(kept);
         }
     }
 
@@ -246,7 +238,7 @@ impl TcpLink {
         for connection in self.connections.values_mut() {
             self.counters.count(connection.send(priority, payload));
         }
-        for dial in self.dials.iter_mut().filter(|dial| !dial.redial.is_up()) {
+        for dial in self.dials.values_mut().filter(|dial| !dial.redial.is_up()) {
             self.counters.count_kept(dial.keep(priority, payload));
         }
         self.bound_waiting();
@@ -260,10 +252,6 @@ impl TcpLink {
         {
             most.drop_least();
         }
-    }
-
-    fn dial(&mut self, address: SocketAddr) -> Option<&mut Dial> {
-        self.dials.iter_mut().find(|dial| dial.address == address)
     }
 
     /// Writes queued messages; ready when none is left.
@@ -347,7 +335,7 @@ impl TcpLink {
         self.counters.displaced += u64::from(matches!(why, Closed::Silent | Closed::Idle));
         self.counters.send_overflows += connection.overflows;
         let dialed = connection.dialed;
-        if dialed && let Some(dial) = self.dial(remote) {
+        if dialed && let Some(dial) = self.dials.get_mut(&remote) {
             dial.redial.lost(now, connection.received > 0);
         }
         dialed
@@ -355,6 +343,7 @@ impl TcpLink {
 
     /// Accepts connections; returns whether there may be more than one turn's share.
     fn accept(&mut self, cx: &mut Context<'_>, now: Instant) -> bool {
+        use io::ErrorKind::{ConnectionAborted, ConnectionReset, Interrupted};
         if self.accept_after.is_some_and(|after| now < after) {
             return false;
         }
@@ -366,12 +355,15 @@ impl TcpLink {
             match listener.poll_accept(cx) {
                 Poll::Pending => return false,
                 Poll::Ready(Ok((stream, remote))) => self.admit(stream, remote, now),
-                Poll::Ready(Err(error)) if is_of_the_peer(&error) => {}
-                Poll::Ready(Err(error)) => {
-                    tracing::warn!(%error, "cannot accept connections");
-                    self.accept_after = Some(now + ACCEPT_PAUSE);
-                    return false;
-                }
+                Poll::Ready(Err(error)) => match error.kind() {
+                    // Only that connection has failed; the next may succeed.
+                    ConnectionAborted | ConnectionReset | Interrupted => {}
+                    _ => {
+                        tracing::warn!(%error, "cannot accept connections");
+                        self.accept_after = Some(now + ACCEPT_PAUSE);
+                        return false;
+                    }
+                },
             }
         }
         true
@@ -384,17 +376,8 @@ impl TcpLink {
             tracing::debug!(%remote, "connection denied");
             return;
         }
-        let accepted = self
-            .connections
-            .iter()
-            .filter(|(_, connection)| !connection.dialed);
-        let places: Vec<_> = accepted
-            .map(|(&remote, connection)| Place {
-                remote,
-                opened: connection.opened,
-                heard: connection.heard,
-            })
-            .collect();
+        let accepted = self.connections.values().filter(|c| !c.dialed);
+        let places: Vec<_> = accepted.map(|connection| connection.place).collect();
         match self.settings.admit(remote, &places, now) {
             Admission::Admit => {}
             Admission::ReplaceSilent(other) => self.displace(other, Closed::Silent, now),
@@ -406,7 +389,13 @@ impl TcpLink {
             }
         }
         self.counters.accepted += 1;
-        self.open_connection(stream, remote, false, now);
+        match prepare(stream) {
+            Ok(stream) => {
+                let connection = Connection::new(stream, remote, false, now);
+                self.connections.insert(remote, connection);
+            }
+            Err(error) => tracing::warn!(%remote, %error, "cannot set up a connection"),
+        }
     }
 
     /// Closes a connection whose place is needed.
@@ -430,47 +419,25 @@ impl TcpLink {
     }
 
     fn connect(&mut self, cx: &mut Context<'_>, now: Instant) {
-        for index in 0..self.dials.len() {
-            let address = self.dials[index].address;
-            match self.dials[index].poll(cx, now) {
+        for (&remote, dial) in &mut self.dials {
+            let attempted = dial.redial.poll(cx, now, |attempt| {
+                attempt.spawn(async move { TcpStream::connect(remote).await.and_then(prepare) });
+            });
+            match attempted {
                 Poll::Pending => {}
                 Poll::Ready(Ok(stream)) => {
                     self.counters.connected += 1;
-                    self.open_connection(stream, address, true, now);
-                    let dial = &mut self.dials[index];
+                    let mut connection = Connection::new(stream, remote, true, now);
                     while let Some((priority, payload)) = dial.waiting.pop() {
-                        if let Some(connection) = self.connections.get_mut(&address) {
-                            self.counters.count(connection.send(priority, &payload));
-                        }
+                        self.counters.count(connection.send(priority, &payload));
                     }
+                    self.connections.insert(remote, connection);
                 }
                 Poll::Ready(Err(error)) => {
                     self.counters.connect_failures += 1;
-                    let dial = &mut self.dials[index];
                     self.counters.not_connected += dial.waiting.len() as u64;
                     while dial.waiting.pop().is_some() {}
-                    tracing::debug!(%address, %error, "no connection");
-                }
-            }
-        }
-    }
-
-    fn open_connection(
-        &mut self,
-        stream: TcpStream,
-        remote: SocketAddr,
-        dialed: bool,
-        now: Instant,
-    ) {
-        match Connection::new(stream, dialed, now) {
-            Ok(connection) => {
-                tracing::info!(%remote, dialed, "connection opened");
-                self.connections.insert(remote, connection);
-            }
-            Err(error) => {
-                tracing::warn!(%remote, %error, "cannot set up a connection");
-                if dialed && let Some(dial) = self.dial(remote) {
-                    dial.redial.lost(now, false);
+                    tracing::debug!(address = %remote, %error, "no connection");
                 }
             }
         }
@@ -496,25 +463,15 @@ impl Counters {
     }
 }
 
-/// Whether a failure to accept concerns only that one connection, so that the next may succeed.
-fn is_of_the_peer(error: &io::Error) -> bool {
-    use io::ErrorKind::{ConnectionAborted, ConnectionReset, Interrupted};
-    matches!(
-        error.kind(),
-        ConnectionAborted | ConnectionReset | Interrupted
-    )
-}
-
 /// Listens at an address. On Unix, connections of a predecessor in TIME_WAIT are no obstacle.
-pub(in crate::link) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
-    let listener = std::net::TcpListener::bind(address)?;
-    listener.set_nonblocking(true)?;
-    TcpListener::from_std(listener)
-}
-
-fn listen_error(address: SocketAddr, source: io::Error) -> Error {
-    match source.kind() {
-        io::ErrorKind::AddrInUse => Error::ListenerTaken { address },
+pub(in crate::link) fn listen(address: SocketAddr) -> Result<TcpListener, Error> {
+    let open = || {
+        let listener = std::net::TcpListener::bind(address)?;
+        listener.set_nonblocking(true)?;
+        TcpListener::from_std(listener)
+    };
+    open().map_err(|source| match source.kind() {
+        io::ErrorKind::AddrInUse => Error::ListenerTaken(address),
         _ => Error::socket(format!("listening on TCP {address}"), address, source),
-    }
+    })
 }

@@ -20,7 +20,7 @@ use nix::sys::socket::{
 
 use rustix::net::{MMsgHdr, SendAncillaryBuffer, SendFlags, SocketAddrAny, sendmmsg};
 
-use super::gso_batch::GsoBatch;
+use super::send::GsoBatch;
 use super::socket::Socket;
 use crate::link::Slab;
 use crate::link::slab::LONGEST;

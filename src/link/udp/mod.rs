@@ -7,7 +7,6 @@
 
 #[cfg(target_os = "linux")]
 mod batch;
-mod gso_batch;
 mod open;
 mod receive;
 mod send;
@@ -20,7 +19,7 @@ use std::net::SocketAddr;
 
 use bytes::Bytes;
 
-use gso_batch::GsoBatch;
+use send::GsoBatch;
 use socket::Socket;
 
 pub use settings::{Broadcasts, PortTaken, Settings};

@@ -11,14 +11,34 @@ use std::task::{Context, Poll, ready};
 use bytes::{Buf, Bytes};
 use socket2::SockRef;
 
-use super::UdpLink;
-use super::gso_batch::GsoBatch;
 use super::socket::Socket;
-use crate::endpoint::{Remote, To, Transmit};
+use super::{MAX_SEGMENTS, UdpLink};
+use crate::endpoint::{MOST_OCTETS, Remote, To, Transmit};
 use crate::wire::Priority;
 
 /// Queue length at which the link flushes at once; also the most datagrams per `sendmmsg` call.
 const BURST: usize = 64;
+
+/// Datagrams to one peer of `segment` octets each; the last may be shorter. One system call sends
+/// them, and the kernel splits them (GSO).
+#[derive(Clone, Debug)]
+pub(super) struct GsoBatch {
+    pub(super) peer: SocketAddr,
+    pub(super) octets: Bytes,
+    pub(super) segment: usize,
+}
+
+impl GsoBatch {
+    /// The datagrams to send with the next call, if those of up to `limit` octets may share one.
+    fn part(&self, limit: usize) -> &[u8] {
+        let datagrams = match self.segment {
+            segment if segment <= limit => (MOST_OCTETS / segment).clamp(1, MAX_SEGMENTS),
+            _ => 1,
+        };
+        let octets = self.octets.len().min(datagrams * self.segment);
+        &self.octets[..octets]
+    }
+}
 
 impl UdpLink {
     /// Queues a datagram or batch from the endpoint, for [`flush`](Self::flush).

@@ -1,6 +1,6 @@
 //! The settings of a UDP link: port, multicast group, broadcast, TTL, buffers.
 
-use std::net::{SocketAddr, SocketAddrV6};
+use std::net::SocketAddr;
 
 use crate::link::group::{Group, Group6, STANDARD_PORT};
 use crate::link::{Interface, InvalidGroup};
@@ -99,13 +99,11 @@ impl Settings {
         if interface.address.is_ipv4() {
             return self.group.address();
         }
-        match self.group6 {
-            Group6::Off => None,
-            Group6::At(group) => {
-                let (ip, port) = (*group.ip(), group.port());
-                Some(SocketAddrV6::new(ip, port, 0, interface.index).into())
-            }
-        }
+        let Group6::At(mut group) = self.group6 else {
+            return None;
+        };
+        group.set_scope_id(interface.index);
+        Some(group.into())
     }
 
     fn broadcast(&self, interface: &Interface) -> Option<SocketAddr> {

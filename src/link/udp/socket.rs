@@ -79,7 +79,6 @@ impl Socket {
         })
     }
 
-    /// The underlying socket.
     pub(super) fn get(&self) -> &Watched {
         &self.watched
     }
@@ -92,7 +91,6 @@ impl Socket {
         self.watched.poll_recv_ready(cx)
     }
 
-    /// Waits until a full socket may have room again.
     pub(super) fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         // The socket was full; the runtime does not know it yet.
         let full = || Err::<(), _>(io::ErrorKind::WouldBlock.into());
@@ -100,6 +98,5 @@ impl Socket {
         self.watched.poll_send_ready(cx)
     }
 
-    /// Call this when nothing is left to send.
     pub(super) fn rest(&mut self) {}
 }

@@ -137,9 +137,7 @@ impl Host {
             reader.read().await
         };
         let answer = tokio::time::timeout(HANDSHAKE, answer).await;
-        let answer = answer.map_err(|_| Error::Mute {
-            place: self.address.to_string(),
-        })??;
+        let answer = answer.map_err(|_| Error::Mute(self.address.to_string()))??;
         match answer.head {
             Head::Welcome { id, max_message } => Ok(Attached {
                 id,

@@ -67,7 +67,7 @@ pub(super) async fn serve(
             Err(error) => {
                 tracing::warn!(%error, "cannot accept a component");
                 // For instance too many open files: do not retry at once.
-                if matches!(error, Error::Io { .. }) {
+                if matches!(error, Error::Socket(_)) {
                     tokio::time::sleep(OVERLAP).await;
                 }
             }

@@ -26,7 +26,7 @@ mod decoder;
 #[cfg(test)]
 mod tests;
 
-use bytes::{Buf, BufMut, Bytes, BytesMut};
+use bytes::{BufMut, Bytes, BytesMut};
 
 pub use decoder::Decoder;
 
@@ -37,7 +37,7 @@ use super::{EncodeError, Frame, Version, as5669, as5669a, ra};
 const SIZE_LEN: usize = 2;
 
 /// Encodes one message, with the version octet in front. That octet is only sent at the beginning
-/// of a stream: see [`split_version`].
+/// of a stream.
 ///
 /// # Errors
 /// The header cannot carry the frame, or is that of the Reference Architecture, which is only used
@@ -56,15 +56,4 @@ pub fn encode(frame: &Frame) -> Result<Bytes, EncodeError> {
         Version::Ra => return Err(EncodeError::DatagramsOnly),
     }
     Ok(out.freeze())
-}
-
-/// Splits the output of [`encode`] into the version and the message.
-#[must_use]
-pub fn split_version(mut encoded: Bytes) -> (Version, Bytes) {
-    let version = match encoded.first() {
-        Some(&VERSION_AS5669) => Version::As5669,
-        _ => Version::As5669a,
-    };
-    encoded.advance(encoded.len().min(1));
-    (version, encoded)
 }
