@@ -145,7 +145,8 @@ impl Steps {
         let step = self.step();
         let inside = match self.scale.rounding {
             Rounding::Round => exact,
-            Rounding::Floor => exact + step / 2.0,
+            // The greatest integer has no next one: rounded down, only the limit stands for it.
+            Rounding::Floor => (exact + step / 2.0).min(self.scale.upper),
             Rounding::Ceiling => exact - step / 2.0,
         };
         // Most candidates are too far away to need an exact check.
@@ -375,7 +376,13 @@ mod tests {
     #[test]
     fn every_octet_comes_back_from_its_shortest_decimal() {
         for rounding in [Rounding::Round, Rounding::Floor, Rounding::Ceiling] {
-            for (lower, upper) in [(0.0, 100.0), (-0.3, 0.7), (-1e-9, 1e9), (99.9, 100.1)] {
+            for (lower, upper) in [
+                (0.0, 100.0),
+                (-0.3, 0.7),
+                (-1e-9, 1e9),
+                (99.9, 100.1),
+                (-30.0 / 7.0, -12.0 / 7.0),
+            ] {
                 let range = scale(lower, upper, rounding);
                 for raw in 0..=255 {
                     let real = shortest_real(&range, Unsigned::U8, raw);

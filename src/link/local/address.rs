@@ -12,6 +12,33 @@ use crate::as_text::serde_as_text;
 pub(super) const DEFAULT_PORT: SocketAddr =
     SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 37940);
 
+/// The default path of the socket, whether or not it exists.
+#[cfg(unix)]
+pub(super) fn default_path() -> PathBuf {
+    default_directory().join("node.sock")
+}
+
+/// The default directory: in the user's runtime directory, if there is one.
+#[cfg(unix)]
+pub(super) fn default_directory() -> PathBuf {
+    let given = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
+    if let Some(directory) = given.filter(|directory| directory.is_absolute()) {
+        return directory.join("jaus");
+    }
+    let uid = own_uid();
+    let of_user = PathBuf::from(format!("/run/user/{uid}"));
+    if of_user.is_dir() {
+        return of_user.join("jaus");
+    }
+    PathBuf::from(format!("/tmp/jaus-{uid}"))
+}
+
+/// The effective user id of this process.
+#[cfg(unix)]
+pub(super) fn own_uid() -> u32 {
+    rustix::process::geteuid().as_raw()
+}
+
 /// Where a node serves the component processes of its host: `default`, the path of a socket, or a
 /// port of loopback such as `127.0.0.1:3795`.
 ///

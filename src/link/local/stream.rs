@@ -15,7 +15,7 @@ pub(crate) use self::on_unix::{ReadHalf, WriteHalf};
 #[cfg(not(unix))]
 use super::address::DEFAULT_PORT;
 #[cfg(unix)]
-use super::unix_socket::{default_path, own_uid};
+use super::address::{default_path, own_uid};
 use super::{Address, Assembler, Error};
 
 /// The process at the other end.

@@ -12,6 +12,7 @@ use socket2::{Socket, Type};
 use tokio::net::{UnixListener, UnixStream};
 
 use super::Error;
+use super::address::{default_directory, default_path, own_uid};
 use super::stream::{Stream, pid_of, unix_stream};
 use crate::link::socket_file::{Obstacle, SocketFile};
 
@@ -51,30 +52,6 @@ fn server_of(socket: Socket) -> Option<u32> {
 /// Accepts components of the owner and of root.
 const fn may_attach(uid: u32, owner: u32) -> bool {
     uid == owner || uid == 0
-}
-
-/// The default path of the socket, whether or not it exists.
-pub(super) fn default_path() -> PathBuf {
-    default_directory().join("node.sock")
-}
-
-/// The default directory: in the user's runtime directory, if there is one.
-fn default_directory() -> PathBuf {
-    let given = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
-    if let Some(directory) = given.filter(|directory| directory.is_absolute()) {
-        return directory.join("jaus");
-    }
-    let uid = own_uid();
-    let of_user = PathBuf::from(format!("/run/user/{uid}"));
-    if of_user.is_dir() {
-        return of_user.join("jaus");
-    }
-    PathBuf::from(format!("/tmp/jaus-{uid}"))
-}
-
-/// The effective user id of this process.
-pub(super) fn own_uid() -> u32 {
-    rustix::process::geteuid().as_raw()
 }
 
 /// The default path, in a directory that exists and is accessible to the owner alone.

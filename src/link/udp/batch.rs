@@ -20,7 +20,6 @@ use nix::sys::socket::{
 
 use rustix::net::{MMsgHdr, SendAncillaryBuffer, SendFlags, SocketAddrAny, sendmmsg};
 
-use super::send::GsoBatch;
 use super::socket::Socket;
 use crate::link::Slab;
 use crate::link::slab::LONGEST;
@@ -64,13 +63,13 @@ pub(super) fn send(
 /// The error of the first datagram. The kernel reports that of a later one in the next call.
 pub(super) fn send_many<'a>(
     socket: &UdpSocket,
-    datagrams: impl Iterator<Item = &'a GsoBatch> + Clone,
+    datagrams: impl Iterator<Item = (SocketAddr, &'a Bytes)> + Clone,
 ) -> io::Result<usize> {
     let octets: Vec<_> = datagrams
         .clone()
-        .map(|d| [IoSlice::new(&d.octets)])
+        .map(|(_, octets)| [IoSlice::new(octets)])
         .collect();
-    let peers: Vec<SocketAddrAny> = datagrams.map(|d| d.peer.into()).collect();
+    let peers: Vec<SocketAddrAny> = datagrams.map(|(peer, _)| peer.into()).collect();
     let mut controls: Vec<_> = peers
         .iter()
         .map(|_| SendAncillaryBuffer::default())

@@ -130,6 +130,7 @@ impl UdpLink {
         if self.batch {
             let is_single = |batch: &&GsoBatch| batch.octets.len() <= batch.segment;
             let singles = self.leaving.iter().take_while(is_single);
+            let singles = singles.map(|batch| (batch.peer, &batch.octets));
             if singles.clone().nth(1).is_some() {
                 return match super::batch::send_many(self.sockets[0].get(), singles) {
                     Ok(sent) => (0..sent).for_each(|_| self.complete_first(1)),
