@@ -129,6 +129,8 @@ pub(in crate::service) struct Surroundings<'a> {
 pub(in crate::service) struct Sessions {
     last: u64,
     all: BTreeMap<SessionId, Session>,
+    /// The directory that the sessions know.
+    seen: Option<Arc<Directory>>,
     news: VecDeque<(SessionId, SessionState)>,
 }
 
@@ -151,6 +153,7 @@ struct Session {
 
 #[derive(Debug, Clone, Copy)]
 enum Stage {
+    /// Until the directory has a member of the audience.
     Seeking,
     Asking(JausId, ControlId),
     Held(Held),
@@ -199,7 +202,7 @@ impl Sessions {
             retake,
             patience,
             wants_ready: true,
-            stage: Stage::Seeking,
+            stage: Stage::Pausing(now),
             loss: None,
             pause: Session::FIRST_PAUSE,
             reported: SessionState::Engaging,
@@ -258,9 +261,15 @@ impl Sessions {
 
     /// Handles the time and changes of the directory.
     pub(in crate::service) fn proceed(&mut self, now: Instant, around: &mut Surroundings<'_>) {
+        let known = &around.directory;
+        let is_new = !self
+            .seen
+            .as_ref()
+            .is_some_and(|seen| Arc::ptr_eq(seen, known));
+        self.seen = (!self.all.is_empty()).then(|| known.clone());
         let news = &mut self.news;
         self.all.retain(|&id, session| {
-            session.proceed(now, around);
+            session.proceed(now, is_new, around);
             let state = session.state();
             if std::mem::replace(&mut session.reported, state) != state {
                 news.push_back((id, state));
@@ -322,7 +331,7 @@ impl Session {
             SessionOrder::Standby => self.wants_ready = false,
             SessionOrder::Retake => {
                 if matches!(self.stage, Stage::Ended | Stage::Pausing(_)) {
-                    self.stage = Stage::Seeking;
+                    self.stage = Stage::Pausing(now);
                     self.loss = None;
                 }
             }
@@ -381,20 +390,17 @@ impl Session {
         self.pause = (self.pause * 2).min(Self::LONGEST_PAUSE);
     }
 
-    fn proceed(&mut self, now: Instant, around: &mut Surroundings<'_>) {
-        if let (Some(peer), Some(control)) = (self.peer(), self.control())
+    fn proceed(&mut self, now: Instant, has_news: bool, around: &mut Surroundings<'_>) {
+        if let (true, Some(peer), Some(control)) = (has_news, self.peer(), self.control())
             && !self.members(around).contains(&peer)
         {
             around.controls.release(now, control, around.out);
             self.lose(now, peer, SessionLoss::Gone);
         }
-        if let Stage::Pausing(until) = self.stage
-            && until <= now
-        {
-            self.stage = Stage::Seeking;
-        }
-        if matches!(self.stage, Stage::Seeking) {
-            self.seek(now, around);
+        match self.stage {
+            Stage::Pausing(until) if until <= now => self.seek(now, around),
+            Stage::Seeking if has_news => self.seek(now, around),
+            _ => {}
         }
         if let Stage::Held(held) = &mut self.stage {
             held.manage(now, self.wants_ready, around.out);
@@ -403,6 +409,7 @@ impl Session {
 
     /// Asks a member of the audience for control, the lost one before others.
     fn seek(&mut self, now: Instant, around: &mut Surroundings<'_>) {
+        self.stage = Stage::Seeking;
         let members = self.members(around);
         let lost = self.loss.map(|(peer, _)| peer);
         let same = lost.filter(|peer| members.contains(peer));

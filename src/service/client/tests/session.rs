@@ -3,12 +3,12 @@
 use super::{Bench, OTHER, PEER};
 use crate::address::JausId;
 use crate::messages::core::{
-    ConfirmControl, QueryControl, RejectControl, ReleaseControl, ReportControl, ReportStatus,
-    RequestControl, Resume, Standby,
+    ConfirmControl, QueryControl, RejectControl, ReleaseControl, ReportControl,
+    ReportIdentification, ReportStatus, RequestControl, Resume, Standby,
 };
 use crate::service::{
-    ControlLost, ControlRefused, Event, Patience, Retake, SessionId, SessionLoss, SessionOrder,
-    SessionState, State,
+    Audience, ControlLost, ControlRefused, Event, Patience, Retake, Scope, SessionId, SessionLoss,
+    SessionOrder, SessionState, State,
 };
 
 const READY: SessionState = SessionState::Ready(PEER);
@@ -225,6 +225,40 @@ fn a_session_is_over_once_its_peer_has_confirmed_the_release() {
     assert_eq!(states(&mut bench), [SessionState::Released]);
     bench.run_ms(20_000);
     assert!(bench.sent::<RequestControl>().is_empty());
+}
+
+#[test]
+fn a_member_is_found_when_it_appears_and_left_when_it_is_gone() {
+    let mut bench = Bench::looking_for(Scope::System);
+    let vehicle = Audience::subsystem(PEER.subsystem());
+    let (retake, patience) = (Retake::default(), Patience::default());
+    bench
+        .stack
+        .begin_session(bench.now, vehicle, 127, retake, patience);
+    bench.run_ms(5000);
+    assert!(bench.sent::<RequestControl>().is_empty());
+    let identified = ReportIdentification {
+        query_type: 4.into(),
+        r#type: 60001.into(),
+        identification: "Rover".into(),
+    };
+    bench.hear(PEER, &identified);
+    assert_eq!(bench.sent::<RequestControl>().len(), 1);
+    confirm(&mut bench, 0);
+    report(&mut bench, State::Ready);
+    assert_eq!(states(&mut bench), [READY]);
+    bench.run_ms(20_000);
+    let SessionState::Lost { why, .. } = states(&mut bench)[0] else {
+        panic!("its peer is silent");
+    };
+    assert!(matches!(why, SessionLoss::Control(ControlLost::Silent(_))));
+    bench.run_ms(60_000);
+    assert!(!bench.sent::<RequestControl>().is_empty());
+    bench.run_ms(5000);
+    let asked = bench.sent::<RequestControl>();
+    assert!(asked.is_empty(), "it has left the directory");
+    bench.hear(PEER, &identified);
+    assert_eq!(bench.sent::<RequestControl>().len(), 1, "it is back");
 }
 
 #[test]
