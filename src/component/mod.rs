@@ -54,6 +54,10 @@
 //! # }
 //! ```
 //!
+//! [`Component::session`] does more for applications that command a vehicle through its restarts: it
+//! finds the component, takes control, makes it ready, and does so again as the chosen [`Retake`]
+//! policy says.
+//!
 //! A component runs in its own task on the current tokio runtime until the last clone of its
 //! [`Component`] is dropped. The protocol is in [`service`](crate::service); this module adds only
 //! the clock, the channels and the names.
