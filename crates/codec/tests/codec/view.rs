@@ -347,21 +347,22 @@ fn lists_and_variable_fields_read_as_themselves() {
     assert_refused::<Height>(&[("{\"value\":5}", "index: required, but absent")]);
 }
 
+fn sorted(value: Value) -> Value {
+    let Value::Object(mut members) = value else {
+        unreachable!("it was written as an object")
+    };
+    members.sort_by(|one, other| one.0.cmp(&other.0));
+    Value::Object(members)
+}
+
 #[test]
 fn a_plain_value_is_whatever_a_format_holds() {
     let text = r#"{"a":[null,true,false],"b":[1,-1,1.5],"":"x"}"#;
     let value = read_value(text);
     assert_eq!(serde_json::to_string(&value).unwrap(), text);
-    assert_eq!(
-        serde_json::from_value::<Value>(serde_json::from_str(text).unwrap()).unwrap(),
-        {
-            let Value::Object(mut members) = value else {
-                unreachable!("it was written as an object")
-            };
-            members.sort_by(|one, other| one.0.cmp(&other.0));
-            Value::Object(members)
-        }
-    );
+    // Whether serde_json's own value keeps the order of members depends on its features.
+    let through_another = serde_json::from_value(serde_json::from_str(text).unwrap()).unwrap();
+    assert_eq!(sorted(through_another), sorted(value));
     let octets = BytesDeserializer::<PlainError>::new(b"x");
     assert_eq!(
         Value::deserialize(octets).unwrap_err().to_string(),
