@@ -66,12 +66,12 @@ pub enum Head {
         /// The version of its format. If it is another version, the rest is not read.
         #[deku(magic = b"JAUS")]
         version: u8,
-        #[deku(temp, temp_value = "1", cond = "*version == VERSION", default = "1")]
-        #[deku(map = "|one: u8| (one == 1).then_some(one).ok_or(DekuError::IdVariantNotFound)")]
-        one: u8,
         /// The requested id. With subsystem and node 0, the component with that number on the node,
         /// whatever the node's id.
-        #[deku(cond = "*version == VERSION", default = "JausId::from_u32(0)")]
+        #[deku(
+            reader = "read_claim(*version, deku::reader)",
+            writer = "write_claim(*version, *id, deku::writer)"
+        )]
         id: JausId,
     },
     /// A message from the component. Its source id is that of the connection.
@@ -311,6 +311,28 @@ impl Outcome {
             }
             Self::Rejected => 4_u8.to_writer(writer, ()),
         }
+    }
+}
+
+/// Reads the rest of Hello, which is empty in a version that we do not know.
+fn read_claim<R: Read + Seek>(version: u8, reader: &mut Reader<R>) -> Result<JausId, DekuError> {
+    if version != VERSION {
+        return Ok(JausId::from_u32(0));
+    }
+    match u8::from_reader_with_ctx(reader, ())? {
+        1 => JausId::from_reader_with_ctx(reader, Endian::Little),
+        _ => Err(DekuError::IdVariantNotFound),
+    }
+}
+
+fn write_claim<W: Write + Seek>(
+    version: u8,
+    id: JausId,
+    writer: &mut Writer<W>,
+) -> Result<(), DekuError> {
+    match version {
+        VERSION => (1_u8, id).to_writer(writer, Endian::Little),
+        _ => Ok(()),
     }
 }
 

@@ -63,6 +63,9 @@ fn head() -> impl Strategy<Value = Head> {
     let version = VERSION;
     prop_oneof![
         1 => id().prop_map(move |id| Head::Hello { version, id }),
+        1 => any::<u8>().prop_filter("another version", |&it| it != VERSION).prop_map(|version| {
+            Head::Hello { version, id: JausId::from_u32(0) }
+        }),
         8 => (flags(), any::<u64>(), id()).prop_map(|(flags, handle, destination)| Head::Send {
             flags,
             handle,
