@@ -38,18 +38,24 @@ impl State {
             _ => return None,
         })
     }
-}
 
-impl fmt::Display for State {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+    /// Its name, in lower case.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
             Self::Initialize => "initialize",
             Self::Ready => "ready",
             Self::Standby => "standby",
             Self::Shutdown => "shutdown",
             Self::Failure => "failure",
             Self::Emergency => "emergency",
-        })
+        }
+    }
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
     }
 }
 

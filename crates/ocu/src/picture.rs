@@ -464,7 +464,9 @@ impl Picture {
             id: id.to_string(),
             role: part.role.name(),
             managed: part.managed,
-            state: part.status.map(|told| state_name(told.what)),
+            state: part
+                .status
+                .map(|told| State::from_code(told.what).map_or("unknown", State::name)),
             state_age_ms: part.status.map(|told| age(now, told.at)),
             controller: controller.map(|(id, _)| id.to_string()),
             authority: controller.map(|(_, authority)| authority),
@@ -520,18 +522,6 @@ fn sampled_at(clock: &mut Option<SampleClock>, now: Instant, stamp: Option<Stamp
 fn age(now: Instant, then: Instant) -> u64 {
     let age = now.saturating_duration_since(then).as_millis();
     u64::try_from(age).unwrap_or(u64::MAX)
-}
-
-fn state_name(status: u8) -> &'static str {
-    match status {
-        0 => "initialize",
-        1 => "ready",
-        2 => "standby",
-        3 => "shutdown",
-        4 => "failure",
-        5 => "emergency",
-        _ => "unknown",
-    }
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! Sessions: control of any one member of an audience, kept through the faults of a field day.
 //!
 //! A session looks for a member in the directory, takes control of it, makes it ready, and watches
-//! it. When that ends for a technical reason (the peer restarted, fell silent, left), it begins
-//! anew, with another member if need be. What somebody did on purpose it does not undo: after
-//! another client took control, [`Retake`] decides; after an emergency, the peer stays in standby
-//! until the application resumes it.
+//! it. If the peer restarts, falls silent or leaves, the session starts over, with another member if
+//! necessary. It does not override a deliberate act: after another client has taken control,
+//! [`Retake`] decides; after an emergency, the peer stays in standby until the application resumes
+//! it.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -172,7 +172,8 @@ struct Held {
     peer: JausId,
     control: ControlId,
     since: Instant,
-    /// Whether it has states. Otherwise it obeys commands as soon as it is under control.
+    /// Whether it has states. Otherwise it obeys commands as soon as it is under control, and only
+    /// the session can stand by.
     is_managed: bool,
     status: Option<u8>,
     /// When to send Resume or Standby, if the status is not as wanted.
@@ -366,9 +367,6 @@ impl Session {
             }
             (&mut Stage::Held(held), ControlNews::Lost(why)) => {
                 around.controls.release(now, held.control, around.out);
-                if now.saturating_duration_since(held.since) >= Self::LONGEST_PAUSE {
-                    self.pause = Self::FIRST_PAUSE;
-                }
                 self.lose(now, held.peer, SessionLoss::Control(why));
             }
             _ => {}
@@ -376,6 +374,11 @@ impl Session {
     }
 
     fn lose(&mut self, now: Instant, peer: JausId, why: SessionLoss) {
+        if let Stage::Held(held) = self.stage
+            && now.saturating_duration_since(held.since) >= Self::LONGEST_PAUSE
+        {
+            self.pause = Self::FIRST_PAUSE;
+        }
         self.wants_ready &= why.is_technical();
         self.loss = Some((peer, why));
         let continues = match self.retake {
@@ -403,6 +406,9 @@ impl Session {
             _ => {}
         }
         if let Stage::Held(held) = &mut self.stage {
+            if has_news {
+                held.is_managed = is_managed(held.peer, &around.directory);
+            }
             held.manage(now, self.wants_ready, around.out);
         }
     }
@@ -446,7 +452,10 @@ impl Held {
     fn state(&self, wants_ready: bool) -> SessionState {
         let peer = self.peer;
         if !self.is_managed {
-            return SessionState::Ready(peer);
+            return match wants_ready {
+                true => SessionState::Ready(peer),
+                false => SessionState::Standby(peer),
+            };
         }
         let Some(code) = self.status else {
             return SessionState::Engaging;
@@ -465,13 +474,14 @@ impl Held {
 
     /// The state command that the peer needs.
     fn order(&self, wants_ready: bool) -> Option<SessionOrder> {
-        let status = self.status.map(State::from_code);
-        match status.filter(|_| self.is_managed) {
-            None if self.is_managed && wants_ready => Some(SessionOrder::Resume),
-            Some(Some(State::Initialize | State::Standby)) if wants_ready => {
+        if !self.is_managed {
+            return None;
+        }
+        match (self.status.map(State::from_code), wants_ready) {
+            (None | Some(Some(State::Initialize | State::Standby)), true) => {
                 Some(SessionOrder::Resume)
             }
-            Some(Some(State::Ready)) if !wants_ready => Some(SessionOrder::Standby),
+            (Some(Some(State::Ready)), false) => Some(SessionOrder::Standby),
             _ => None,
         }
     }

@@ -116,8 +116,11 @@ impl Stack {
     }
 
     fn is_for_session(&mut self, now: Instant, control: ControlId, news: ControlNews) -> bool {
+        if self.sessions.is_empty() {
+            return false;
+        }
         let (sessions, mut around) = self.sessions();
-        !sessions.is_empty() && sessions.handle_control(now, control, news, &mut around)
+        sessions.handle_control(now, control, news, &mut around)
     }
 
     /// Passes the time, the directory and news of control on to sessions, and all news on to the

@@ -4,7 +4,8 @@ use super::{Bench, OTHER, PEER};
 use crate::address::JausId;
 use crate::messages::core::{
     ConfirmControl, QueryControl, RejectControl, ReleaseControl, ReportControl,
-    ReportIdentification, ReportStatus, RequestControl, Resume, Standby,
+    ReportIdentification, ReportServices, ReportStatus, RequestControl, Resume, Standby,
+    access_control, report_services,
 };
 use crate::service::{
     Audience, ControlLost, ControlRefused, Event, Patience, Retake, Scope, SessionId, SessionLoss,
@@ -78,6 +79,15 @@ fn lost(why: SessionLoss, continues: bool) -> SessionState {
         why,
         continues,
     }
+}
+
+fn identify(bench: &mut Bench) {
+    let identified = ReportIdentification {
+        query_type: 4.into(),
+        r#type: 60001.into(),
+        identification: "Rover".into(),
+    };
+    bench.hear(PEER, &identified);
 }
 
 fn reject(bench: &mut Bench) {
@@ -237,12 +247,7 @@ fn a_member_is_found_when_it_appears_and_left_when_it_is_gone() {
         .begin_session(bench.now, vehicle, 127, retake, patience);
     bench.run_ms(5000);
     assert!(bench.sent::<RequestControl>().is_empty());
-    let identified = ReportIdentification {
-        query_type: 4.into(),
-        r#type: 60001.into(),
-        identification: "Rover".into(),
-    };
-    bench.hear(PEER, &identified);
+    identify(&mut bench);
     assert_eq!(bench.sent::<RequestControl>().len(), 1);
     confirm(&mut bench, 0);
     report(&mut bench, State::Ready);
@@ -257,8 +262,42 @@ fn a_member_is_found_when_it_appears_and_left_when_it_is_gone() {
     bench.run_ms(5000);
     let asked = bench.sent::<RequestControl>();
     assert!(asked.is_empty(), "it has left the directory");
-    bench.hear(PEER, &identified);
+    identify(&mut bench);
     assert_eq!(bench.sent::<RequestControl>().len(), 1, "it is back");
+}
+
+#[test]
+fn a_peer_without_states_obeys_once_it_is_under_control_and_the_session_stands_by_for_it() {
+    let mut bench = Bench::looking_for(Scope::System);
+    identify(&mut bench);
+    let access_control = report_services::ServiceRec {
+        uri: access_control::URN.into(),
+        major_version_number: 1,
+        minor_version_number: 1,
+    };
+    let component = report_services::ComponentSeq {
+        component_rec: report_services::ComponentRec {
+            component_id: PEER.component(),
+            instance_id: 0,
+        },
+        service_list: vec![access_control],
+    };
+    let node = report_services::NodeSeq {
+        node_rec: report_services::NodeRec {
+            node_id: PEER.node(),
+        },
+        component_list: vec![component],
+    };
+    let node_list = vec![node];
+    bench.hear(PEER, &ReportServices { node_list });
+    let session = begin(&mut bench, Retake::default());
+    confirm(&mut bench, 0);
+    assert_eq!(states(&mut bench), [READY]);
+    order(&mut bench, session, SessionOrder::Standby);
+    assert_eq!(states(&mut bench), [STANDBY]);
+    order(&mut bench, session, SessionOrder::Resume);
+    assert_eq!(states(&mut bench), [READY]);
+    assert!(bench.sent::<Resume>().is_empty() && bench.sent::<Standby>().is_empty());
 }
 
 #[test]
