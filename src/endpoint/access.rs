@@ -4,9 +4,11 @@
 //! vehicles on a shared network. They do not protect against a sender that forges an id or address.
 
 use std::fmt;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
+use std::net::IpAddr;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
+
+use ipnet::IpNet;
 
 use super::Counter;
 use crate::address::JausId;
@@ -91,12 +93,10 @@ pub enum AccessError {
     )]
     Network(String),
     /// The address has bits set beyond the prefix.
-    #[error("`{text}` has bits set after the first {prefix}: write \"{meant}\"")]
+    #[error("`{text}` has bits set after the first {}: write \"{meant}\"", meant.0.prefix_len())]
     HostBits {
         /// The text.
         text: String,
-        /// The prefix length in bits.
-        prefix: u8,
         /// The network that contains the address.
         meant: Network,
     },
@@ -133,32 +133,14 @@ impl fmt::Display for Subsystems {
 
 /// An IPv4 or IPv6 network, as text `10.0.9.0/24`, `fd00::/8`, or a single address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Network {
-    address: IpAddr,
-    prefix: u8,
-}
+pub struct Network(IpNet);
 
 impl Network {
     /// Whether the network contains an address. An IPv4-mapped IPv6 address (`::ffff:10.0.9.7`)
     /// counts as the IPv4 address.
     #[must_use]
     pub fn contains(self, address: IpAddr) -> bool {
-        first_bits(address.to_canonical(), self.prefix) == self.address
-    }
-}
-
-/// The address with all but its first `count` bits set to 0.
-fn first_bits(address: IpAddr, count: u8) -> IpAddr {
-    let others = |length: u32| length.saturating_sub(count.into());
-    match address {
-        IpAddr::V4(address) => {
-            let mask = u32::MAX.checked_shl(others(u32::BITS)).unwrap_or(0);
-            Ipv4Addr::from_bits(address.to_bits() & mask).into()
-        }
-        IpAddr::V6(address) => {
-            let mask = u128::MAX.checked_shl(others(u128::BITS)).unwrap_or(0);
-            Ipv6Addr::from_bits(address.to_bits() & mask).into()
-        }
+        self.0.contains(&address.to_canonical())
     }
 }
 
@@ -166,25 +148,14 @@ impl FromStr for Network {
     type Err = AccessError;
 
     fn from_str(text: &str) -> Result<Self, AccessError> {
-        let wrong = || AccessError::Network(text.to_owned());
-        let (address, prefix) = match text.split_once('/') {
-            Some((address, prefix)) => (address, Some(prefix.parse::<u8>().map_err(|_| wrong())?)),
-            None => (text, None),
-        };
-        let address: IpAddr = address.parse().map_err(|_| wrong())?;
-        let longest = if address.is_ipv4() { 32 } else { 128 };
-        let prefix = prefix.unwrap_or(longest);
-        if prefix > longest {
-            return Err(wrong());
-        }
-        let meant = Self {
-            address: first_bits(address, prefix),
-            prefix,
-        };
-        if meant.address != address {
+        let network = text
+            .parse()
+            .or_else(|_| text.parse::<IpAddr>().map(IpNet::from))
+            .map_err(|_| AccessError::Network(text.to_owned()))?;
+        let meant = Self(network.trunc());
+        if meant.0 != network {
             return Err(AccessError::HostBits {
                 text: text.to_owned(),
-                prefix,
                 meant,
             });
         }
@@ -194,7 +165,7 @@ impl FromStr for Network {
 
 impl fmt::Display for Network {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.address, self.prefix)
+        self.0.fmt(f)
     }
 }
 

@@ -2,6 +2,8 @@
 //! messages and events.
 
 use bytes::Bytes;
+use deku::ctx::Endian;
+use deku::prelude::*;
 
 use super::Path;
 use crate::address::JausId;
@@ -147,7 +149,10 @@ pub enum Event {
 }
 
 /// How much of a message was not acknowledged, and why.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+///
+/// A component process gets it from its node in this form.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error, DekuRead, DekuWrite)]
+#[deku(endian = "endian", ctx = "endian: Endian")]
 #[error("{destination} acknowledged {acknowledged} of {length} octets: {reason}")]
 pub struct Shortfall {
     /// The destination of the message.
@@ -156,23 +161,27 @@ pub struct Shortfall {
     pub reason: Unacknowledged,
     /// How many of its octets were acknowledged: of a large message, the fragments that got
     /// through.
-    pub acknowledged: usize,
+    pub acknowledged: u32,
     /// Its length in octets.
-    pub length: usize,
+    pub length: u32,
 }
 
 /// Why a message was not acknowledged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, thiserror::Error, DekuRead, DekuWrite)]
+#[deku(id_type = "u8", endian = "endian", ctx = "endian: Endian")]
 #[non_exhaustive]
 pub enum Unacknowledged {
     /// The receiver refused it (NAK).
+    #[deku(id = 0)]
     #[error("refused by the receiver")]
     Refused,
     /// It was retransmitted, but not acknowledged, or not in full, in time. The receiver may have
     /// it all the same.
+    #[deku(id = 1)]
     #[error("not acknowledged in time")]
     TimedOut,
     /// It was never sent, because its destination did not acknowledge the messages before it.
+    #[deku(id = 2)]
     #[error("not sent: the receiver acknowledges nothing")]
     NotSent,
 }

@@ -1,6 +1,6 @@
 //! The accounts of bounded tables: how much each network address holds, and its oldest entries.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, btree_map};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::hash::Hash;
 use std::time::Instant;
 
@@ -34,12 +34,17 @@ impl<K: Copy + Ord + Hash> Tally<K> {
         self.ranking.last().copied()
     }
 
-    pub(super) fn add(&mut self, holder: K, more: usize) {
-        self.set(holder, self.of(holder) + more);
-    }
-
-    pub(super) fn subtract(&mut self, holder: K, less: usize) {
-        self.set(holder, self.of(holder).saturating_sub(less));
+    /// Counts one more for a holder, or one less.
+    pub(super) fn count(&mut self, holder: K, more: bool) {
+        let amount = self.of(holder);
+        self.set(
+            holder,
+            if more {
+                amount + 1
+            } else {
+                amount.saturating_sub(1)
+            },
+        );
     }
 
     pub(super) fn set(&mut self, holder: K, amount: usize) {
@@ -61,19 +66,17 @@ type Entry = (Instant, JausId);
 pub(super) struct Ages<G>(BTreeMap<(Option<Origin>, G), BTreeSet<Entry>>);
 
 impl<G: Copy + Ord> Ages<G> {
-    pub(super) fn insert(&mut self, origin: Origin, group: G, since: Instant, id: JausId) {
-        for of in [None, Some(origin)] {
-            self.0.entry((of, group)).or_default().insert((since, id));
-        }
-    }
-
-    pub(super) fn remove(&mut self, origin: Origin, group: G, since: Instant, id: JausId) {
-        for of in [None, Some(origin)] {
-            if let btree_map::Entry::Occupied(mut ids) = self.0.entry((of, group)) {
-                ids.get_mut().remove(&(since, id));
-                if ids.get().is_empty() {
-                    ids.remove();
-                }
+    /// Adds an entry, or removes it.
+    pub(super) fn set(&mut self, origin: Origin, group: G, entry: Entry, is_there: bool) {
+        for key in [None, Some(origin)].map(|of| (of, group)) {
+            let ids = self.0.entry(key).or_default();
+            if is_there {
+                ids.insert(entry);
+            } else {
+                ids.remove(&entry);
+            }
+            if ids.is_empty() {
+                self.0.remove(&key);
             }
         }
     }

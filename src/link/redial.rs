@@ -26,24 +26,15 @@ pub(super) struct Redial<T> {
 }
 
 impl<T: Send + 'static> Redial<T> {
-    /// For a closed connection or device. The first attempt is due at once.
-    pub(super) fn new(timeout: Duration, pauses: RangeInclusive<Duration>) -> Self {
+    /// For a connection or device that is open or not. If not, the first attempt is due at once.
+    pub(super) fn new(is_up: bool, timeout: Duration, pauses: RangeInclusive<Duration>) -> Self {
         Self {
             timeout,
             pauses,
             failures: 0,
-            is_up: false,
+            is_up,
             attempt: JoinSet::new(),
             until: None,
-        }
-    }
-
-    /// For an open connection or device.
-    #[cfg(feature = "serial")]
-    pub(super) fn up(timeout: Duration, pauses: RangeInclusive<Duration>) -> Self {
-        Self {
-            is_up: true,
-            ..Self::new(timeout, pauses)
         }
     }
 
@@ -123,7 +114,7 @@ mod tests {
         let pause = |failures, chance| {
             let redial = Redial::<()> {
                 failures,
-                ..Redial::new(Duration::MAX, first..=longest)
+                ..Redial::new(false, Duration::MAX, first..=longest)
             };
             redial.next_pause(chance)
         };

@@ -93,12 +93,13 @@ impl Waiter {
 impl Answers {
     /// Sends the outcome of a message.
     pub(super) fn send(&self, handle: u64, outcome: Result<(), Undelivered>) {
-        let record = |outcome| Head::Outcome { handle, outcome }.into();
-        self.lock().send(&match outcome {
-            Ok(()) => record(Outcome::Acknowledged),
-            Err(Undelivered::NotAcknowledged(it)) => record(Outcome::NotAcknowledged(it)),
-            Err(error) => Record::rejected(handle, &error.to_string()),
-        });
+        let (outcome, why) = match outcome {
+            Ok(()) => (Outcome::Acknowledged, String::new()),
+            Err(Undelivered::NotAcknowledged(it)) => (Outcome::NotAcknowledged(it), String::new()),
+            Err(error) => (Outcome::Rejected, error.to_string()),
+        };
+        let head = Head::Outcome { handle, outcome };
+        self.lock().send(&Record::with_text(head, &why));
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Writer> {

@@ -269,18 +269,15 @@ impl Core {
         self.driver = Some(cx.waker().clone());
         let now = now();
         let more = self.receive(now, cx);
-        if self
-            .endpoint
-            .poll_timeout()
-            .is_some_and(|deadline| deadline <= now)
+        if let Some(deadline) = self.endpoint.poll_timeout()
+            && deadline <= now
         {
             self.endpoint.handle_timeout(now);
         }
         self.pump(now);
         let flushed = self.flush(cx, now);
-        if self
-            .stop_at
-            .is_some_and(|deadline| flushed && self.hang_up() || deadline <= now)
+        if let Some(deadline) = self.stop_at
+            && (flushed && self.hang_up() || deadline <= now)
         {
             self.finish();
             return Poll::Ready(());

@@ -18,7 +18,7 @@ use bytes::Bytes;
 use super::mailbox::{Mailbox, MailboxLimits};
 use crate::address::JausId;
 use crate::endpoint::{LinkId, Path, Received, To, Transmit};
-use crate::wire::{Flags, Frame, Framing, Priority, jserial, jtcp, judp};
+use crate::wire::{Flags, Frame, Framing, Priority};
 
 /// Limit of octets that wait for one tap, whatever the number of messages.
 const OCTETS: usize = 16 << 20;
@@ -79,24 +79,15 @@ impl Passage {
         match &self.content {
             Content::Frame(frame) => vec![frame.clone()],
             Content::Octets {
+                framing: Framing::Judp,
+                ..
+            } => {
+                let datagrams = self.datagrams().into_iter();
+                datagrams.flat_map(|it| Framing::Judp.frames(it)).collect()
+            }
+            Content::Octets {
                 framing, octets, ..
-            } => match framing {
-                Framing::Jtcp => {
-                    let mut decoder = jtcp::Decoder::new();
-                    decoder.input().extend_from_slice(octets);
-                    std::iter::from_fn(|| decoder.next_frame().ok().flatten()).collect()
-                }
-                Framing::Jserial => {
-                    let mut decoder = jserial::Decoder::new();
-                    decoder.push(octets);
-                    std::iter::from_fn(|| decoder.next_frame()).collect()
-                }
-                Framing::Judp => {
-                    let datagrams = self.datagrams();
-                    let frames = datagrams.into_iter().filter_map(|d| judp::frames(d).ok());
-                    frames.flatten().map_while(Result::ok).collect()
-                }
-            },
+            } => framing.frames(octets.clone()),
         }
     }
 

@@ -28,4 +28,25 @@ impl Framing {
             Self::Jserial => jserial::encode(frame),
         }
     }
+
+    /// The frames in a datagram or in the whole of a stream, up to the first that does not decode.
+    #[must_use]
+    pub fn frames(self, octets: Bytes) -> Vec<Frame> {
+        match self {
+            Self::Judp => {
+                let frames = judp::frames(octets).into_iter().flatten();
+                frames.map_while(Result::ok).collect()
+            }
+            Self::Jtcp => {
+                let mut decoder = jtcp::Decoder::new();
+                decoder.input().extend_from_slice(&octets);
+                std::iter::from_fn(|| decoder.next_frame().ok().flatten()).collect()
+            }
+            Self::Jserial => {
+                let mut decoder = jserial::Decoder::new();
+                decoder.push(&octets);
+                std::iter::from_fn(|| decoder.next_frame()).collect()
+            }
+        }
+    }
 }

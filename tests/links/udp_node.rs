@@ -146,7 +146,7 @@ async fn who_asks_for_an_acknowledgement_is_told_when_it_comes_and_when_it_does_
             destination: nobody,
             reason: Unacknowledged::TimedOut,
             acknowledged: 0,
-            length: REPORT_HEARTBEAT.len(),
+            length: REPORT_HEARTBEAT.len() as u32,
         },
     };
     event(&mut events, |event| *event == wanted).await;

@@ -295,7 +295,7 @@ fn a_cut_wire_is_told_and_heals() {
             destination: OTHER,
             reason: Unacknowledged::TimedOut,
             acknowledged: 0,
-            length: message(1).payload.len(),
+            length: message(1).payload.len() as u32,
         },
     };
     assert!(network.owner(hosts[0]).take_news().contains(&failed));

@@ -100,7 +100,7 @@ fn component() -> Vec<u8> {
         payload: payload.into(),
     };
     records(&[
-        Record::hello(JausId::new(101, 1, 33), "rover"),
+        Record::with_text(Head::hello(JausId::new(101, 1, 33)), "rover"),
         send(vec![0x02, 0x22]),
         send(vec![0x4D; 5000]),
         Head::Leave.into(),
@@ -138,8 +138,8 @@ fn node() -> Vec<u8> {
         },
         outcome(1, Outcome::Acknowledged),
         outcome(2, unacknowledged),
-        Record::rejected(3, "no"),
-        Record::refused(Reason::Taken, "no"),
+        Record::with_text(Head::Outcome { handle: 3, outcome: Outcome::Rejected }, "no"),
+        Record::with_text(Head::Refused(Reason::Taken), "no"),
     ])
 }
 

@@ -50,7 +50,7 @@ pub(super) struct PendingMessage {
     /// How it was cut, once its first packet is sent.
     started: Option<Started>,
     /// Octets acknowledged so far.
-    pub(super) acknowledged: usize,
+    pub(super) acknowledged: u32,
 }
 
 /// The state of a message whose first packet is sent.
@@ -180,10 +180,9 @@ impl Flow {
 
     /// The highest priority at which a packet is ready and the window has room.
     pub(super) fn wants(&self) -> Option<Priority> {
-        let limit = if self.known {
-            self.window.packets()
-        } else {
-            SEEKING
+        let limit = match self.known {
+            true => self.window.packets(),
+            false => SEEKING,
         };
         Priority::ALL.into_iter().rev().find(|priority| {
             let level = usize::from(priority.bits());
@@ -335,7 +334,7 @@ impl Flow {
         if let Some(pending) = self.pending_messages.get_mut(&packet.message)
             && let Some(started) = &mut pending.started
         {
-            pending.acknowledged += started.cut.range(packet.index).len();
+            pending.acknowledged += started.cut.range(packet.index).len() as u32;
             started.missing -= 1;
             if started.missing == 0 {
                 self.finish(packet.message, None);
@@ -426,15 +425,11 @@ impl Flow {
     /// When the oldest message is given up, unless an acknowledgement arrives before.
     fn end_of_patience(&self) -> Option<Instant> {
         let (_, oldest) = self.pending_messages.first_key_value()?;
-        let patience = if self.silent {
-            self.patience / SILENT_PART
-        } else {
-            self.patience
+        let patience = match self.silent {
+            true => self.patience / SILENT_PART,
+            false => self.patience,
         };
-        let since = self
-            .heard
-            .map_or(oldest.accepted, |at| at.max(oldest.accepted));
-        Some(since + patience)
+        Some(self.heard.max(Some(oldest.accepted))? + patience)
     }
 
     /// Treats all packets in flight as lost if the retransmission timeout has passed, and gives up

@@ -361,7 +361,7 @@ impl Endpoint {
                         destination,
                         reason,
                         acknowledged: pending.acknowledged,
-                        length: pending.whole.payload.len(),
+                        length: pending.whole.payload.len() as u32,
                     },
                 },
             });

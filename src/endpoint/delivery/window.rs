@@ -44,10 +44,7 @@ impl Window {
             initial,
             most,
             threshold: most,
-            answered: 0,
-            recovery: 0,
-            next_count: 0,
-            losses: 0,
+            ..Self::default()
         }
     }
 

@@ -315,7 +315,7 @@ impl Reassembly {
         let source = frame.source;
         if let Entry::Vacant(vacant) = self.senders.entry(source) {
             vacant.insert(Sender::new(now, frame.sequence, path.into()));
-            self.listed.insert(path.into(), (), now, source);
+            self.listed.set(path.into(), (), (now, source), true);
         }
         let max_message = self.config.max_message;
         let inserted = self.change(source, |sender| -> Result<_, Counter> {
@@ -437,10 +437,10 @@ impl Reassembly {
             return;
         };
         let origin = sender.origin;
-        self.listed.remove(origin, (), sender.listed, source);
+        self.listed.set(origin, (), (sender.listed, source), false);
         if !sender.runs.is_empty() {
             sender.listed = self.idle_since(&sender);
-            self.listed.insert(origin, (), sender.listed, source);
+            self.listed.set(origin, (), (sender.listed, source), true);
             self.senders.insert(source, sender);
         } else if self.listed.oldest(Some(origin), ()).is_none() {
             self.heard.remove(&origin);

@@ -86,36 +86,36 @@ impl Peers {
 
     /// Adds a record, and enters it in the accounts.
     fn insert(&mut self, mut state: PeerState) {
-        let (id, path) = (state.peer.id, state.peer.path);
         state.placed = state.peer.last_heard;
-        self.order
-            .insert(path.into(), state.standing, state.placed, id);
-        self.held.add(path.into(), 1);
-        if state.peer.route == RouteState::Verified {
-            self.proven.add(path, 1);
-        }
-        if let Some(challenge) = &state.challenge {
-            self.due.insert((challenge.due, id));
-            self.caused.add(challenge.cause(), 1);
-        }
-        self.states.insert(id, state);
+        self.account(&state, true);
+        self.states.insert(state.peer.id, state);
     }
 
     /// Removes a record, also from the accounts.
     pub(super) fn remove(&mut self, id: JausId) -> Option<PeerState> {
         let state = self.states.remove(&id)?;
-        let path = state.peer.path;
-        self.order
-            .remove(path.into(), state.standing, state.placed, id);
-        self.held.subtract(path.into(), 1);
+        self.account(&state, false);
+        Some(state)
+    }
+
+    /// Enters a record in the accounts, or takes it out of them.
+    fn account(&mut self, state: &PeerState, enters: bool) {
+        let (id, path) = (state.peer.id, state.peer.path);
+        let placed = (state.placed, id);
+        self.order.set(path.into(), state.standing, placed, enters);
+        self.held.count(path.into(), enters);
         if state.peer.route == RouteState::Verified {
-            self.proven.subtract(path, 1);
+            self.proven.count(path, enters);
         }
         if let Some(challenge) = &state.challenge {
-            self.due.remove(&(challenge.due, id));
-            self.caused.subtract(challenge.cause(), 1);
+            self.caused.count(challenge.cause(), enters);
+            let due = (challenge.due, id);
+            if enters {
+                self.due.insert(due);
+            } else {
+                self.due.remove(&due);
+            }
         }
-        Some(state)
     }
 
     /// Changes a record in a way that matters to the accounts.

@@ -172,7 +172,7 @@ fn an_unacknowledged_message_is_sent_again_and_then_given_up() {
                 destination: PEER,
                 reason: Unacknowledged::TimedOut,
                 acknowledged: 0,
-                length: QUERY_IDENTIFICATION.len(),
+                length: QUERY_IDENTIFICATION.len() as u32,
             },
         }]
     );
@@ -219,7 +219,7 @@ fn a_refused_message_is_told() {
                 destination: PEER,
                 reason: Unacknowledged::Refused,
                 acknowledged: 0,
-                length: QUERY_IDENTIFICATION.len(),
+                length: QUERY_IDENTIFICATION.len() as u32,
             },
         }]
     );

@@ -11,6 +11,7 @@ use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV6, UdpSocket};
 
 use if_addrs::{IfAddr, IfOperStatus};
+use ipnet::{IpNet, Ipv4Net};
 
 pub(crate) use changes::Changes;
 pub use choice::{Interfaces, Ip};
@@ -62,12 +63,7 @@ impl Interface {
         if self.is_link_local() && scope != self.index {
             return false;
         }
-        let bits = |ip: IpAddr| match ip {
-            IpAddr::V4(v4) => u128::from(v4.to_bits()) << 96,
-            IpAddr::V6(v6) => v6.to_bits(),
-        };
-        let common = (bits(self.address) ^ bits(peer.ip())).leading_zeros();
-        self.address.is_ipv4() == peer.is_ipv4() && common >= self.prefix.into()
+        IpNet::new(self.address, self.prefix).is_ok_and(|network| network.contains(&peer.ip()))
     }
 
     /// A socket address on this interface; a link-local address includes the interface index as its
@@ -140,7 +136,9 @@ fn describe(found: if_addrs::Interface) -> Option<Interface> {
         IfAddr::V4(v4) => {
             let prefix = u32::from(v4.netmask).leading_ones() as u8;
             let set = |b: &Ipv4Addr| *b != v4.ip && !b.is_unspecified();
-            (v4.ip.into(), prefix, v4.broadcast.filter(set))
+            let broadcast = v4.broadcast.filter(set);
+            let broadcast = broadcast.or_else(|| last_address(v4.ip, prefix));
+            (v4.ip.into(), prefix, broadcast)
         }
         IfAddr::V6(v6) => {
             let prefix = u128::from(v6.netmask).leading_ones() as u8;
@@ -163,20 +161,16 @@ fn describe(found: if_addrs::Interface) -> Option<Interface> {
         prefix,
         up: has(IFF_UP).unwrap_or(found.oper_status != IfOperStatus::Down),
         multicast,
-        broadcast: broadcast
-            .or_else(|| last_address(address, prefix))
-            .filter(|_| broadcasts),
+        broadcast: broadcast.filter(|_| broadcasts),
         name: found.name,
     })
 }
 
-/// The last address of a network, which is its broadcast address unless another one is set.
-fn last_address(address: IpAddr, prefix: u8) -> Option<Ipv4Addr> {
-    let IpAddr::V4(v4) = address else {
-        return None;
-    };
-    // A network of two addresses has none (RFC 3021).
-    (prefix < 31).then(|| Ipv4Addr::from(u32::from(v4) | (u32::MAX >> prefix)))
+/// The last address of a network, which is its broadcast address unless another one is set. A
+/// network of two addresses has none (RFC 3021).
+fn last_address(address: Ipv4Addr, prefix: u8) -> Option<Ipv4Addr> {
+    let network = Ipv4Net::new(address, prefix).ok()?;
+    (prefix < 31).then(|| network.broadcast())
 }
 
 const IFF_UP: u32 = 0x1;
@@ -249,7 +243,6 @@ mod tests {
         assert_eq!(last("10.0.0.5", 30), Some([10, 0, 0, 7].into()));
         assert_eq!(last("10.0.0.5", 0), Some([255, 255, 255, 255].into()));
         assert_eq!(last("10.0.0.5", 31), None);
-        assert_eq!(last("fd00::5", 24), None);
     }
 
     #[test]

@@ -12,7 +12,7 @@
 //! | 17 | Welcome | id u32, longest message u32 | |
 //! | 18 | Refused | reason u8 | why |
 //! | 19 | Deliver | flags u8, source u32, destination u32, path | the message |
-//! | 20 | Outcome | handle u64, outcome u8; 1 to 3: destination, acknowledged, length u32 | why |
+//! | 20 | Outcome | handle u64, outcome u8; if 1: destination u32, reason u8, acknowledged u32, length u32 | why |
 //!
 //! A path is 00h for a message from the same node; 01h and the link u16 for a serial line or
 //! Junior's node manager; 02h, link u16, IPv6 address (IPv4 mapped), port u16 and scope u32 for a
@@ -30,11 +30,11 @@ use deku::no_std_io::{Read, Seek, Write};
 use deku::prelude::*;
 
 use crate::address::JausId;
-use crate::endpoint::{LinkId, Path, Remote, Shortfall, Unacknowledged};
+use crate::endpoint::{LinkId, Path, Remote, Shortfall};
 use crate::wire::Flags;
 
 /// The version of the format.
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;
 /// Octets of the length field before each record.
 pub const LENGTH: usize = 4;
 /// The longest message that a record carries, in octets.
@@ -122,22 +122,22 @@ pub enum Head {
         /// The component's handle for it.
         handle: u64,
         /// The outcome.
-        #[deku(
-            reader = "Outcome::read(deku::reader)",
-            writer = "outcome.write(deku::writer)"
-        )]
         outcome: Outcome,
     },
 }
 
 /// The outcome of a message from a component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, DekuRead, DekuWrite)]
+#[deku(id_type = "u8", endian = "endian", ctx = "endian: Endian")]
 pub enum Outcome {
     /// Its receiver has acknowledged it.
+    #[deku(id = 0)]
     Acknowledged,
     /// It was not acknowledged, and will not be sent again.
+    #[deku(id = 1)]
     NotAcknowledged(Shortfall),
     /// The node rejected it. The payload is the reason.
+    #[deku(id = 2)]
     Rejected,
 }
 
@@ -192,28 +192,9 @@ pub enum RecordError {
 }
 
 impl Record {
-    /// A component's first record.
+    /// With a name or an explanation, of which at most 255 octets are kept.
     #[must_use]
-    pub fn hello(id: JausId, name: &str) -> Self {
-        let version = VERSION;
-        Self::with_text(Head::Hello { version, id }, name)
-    }
-
-    /// The refusal of a component.
-    #[must_use]
-    pub fn refused(reason: Reason, why: &str) -> Self {
-        Self::with_text(Head::Refused(reason), why)
-    }
-
-    /// The rejection of a message.
-    #[must_use]
-    pub fn rejected(handle: u64, why: &str) -> Self {
-        let outcome = Outcome::Rejected;
-        Self::with_text(Head::Outcome { handle, outcome }, why)
-    }
-
-    /// With a name or an explanation, truncated at a character boundary.
-    fn with_text(head: Head, text: &str) -> Self {
+    pub fn with_text(head: Head, text: &str) -> Self {
         let mut end = text.len().min(LONGEST_TEXT);
         while !text.is_char_boundary(end) {
             end -= 1;
@@ -262,55 +243,20 @@ impl Record {
     }
 }
 
+impl Head {
+    /// A component's first record, in our version of the format.
+    #[must_use]
+    pub const fn hello(id: JausId) -> Self {
+        let version = VERSION;
+        Self::Hello { version, id }
+    }
+}
+
 impl From<Head> for Record {
     /// A record without payload.
     fn from(head: Head) -> Self {
         let payload = Bytes::new();
         Self { head, payload }
-    }
-}
-
-impl Outcome {
-    /// The reasons in the order of their codes, from 1.
-    const REASONS: [Unacknowledged; 3] = [
-        Unacknowledged::TimedOut,
-        Unacknowledged::Refused,
-        Unacknowledged::NotSent,
-    ];
-
-    fn read<R: Read + Seek>(reader: &mut Reader<R>) -> Result<Self, DekuError> {
-        let reason = match u8::from_reader_with_ctx(reader, ())? {
-            0 => return Ok(Self::Acknowledged),
-            4 => return Ok(Self::Rejected),
-            code => Self::REASONS.get(usize::from(code) - 1),
-        };
-        let (destination, acknowledged, length): (_, u32, u32) =
-            DekuReader::from_reader_with_ctx(reader, Endian::Little)?;
-        Ok(Self::NotAcknowledged(Shortfall {
-            reason: *reason.ok_or(DekuError::IdVariantNotFound)?,
-            destination,
-            acknowledged: acknowledged as usize,
-            length: length as usize,
-        }))
-    }
-
-    fn write<W: Write + Seek>(self, writer: &mut Writer<W>) -> Result<(), DekuError> {
-        match self {
-            Self::Acknowledged => 0_u8.to_writer(writer, ()),
-            Self::NotAcknowledged(Shortfall {
-                reason,
-                destination,
-                acknowledged,
-                length,
-            }) => {
-                let before = Self::REASONS.iter().take_while(|&&r| r != reason);
-                let code = 1 + before.count() as u8;
-                let octets = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
-                (code, destination, octets(acknowledged), octets(length))
-                    .to_writer(writer, Endian::Little)
-            }
-            Self::Rejected => 4_u8.to_writer(writer, ()),
-        }
     }
 }
 

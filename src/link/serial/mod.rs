@@ -105,7 +105,7 @@ impl SerialLink {
             settings: settings.clone(),
             port: Some(port),
             // A driver may take its time.
-            redial: Redial::up(Duration::MAX, FIRST_PAUSE..=LONGEST_PAUSE),
+            redial: Redial::new(true, Duration::MAX, FIRST_PAUSE..=LONGEST_PAUSE),
             decoder: Decoder::new(),
             outbox: Backlog::new(OUTBOX),
             leaving: Bytes::new(),

@@ -19,7 +19,7 @@ pub(super) struct Dial {
 impl Dial {
     pub(super) fn new() -> Self {
         Self {
-            redial: Redial::new(CONNECT_TIMEOUT, FIRST_PAUSE..=LONGEST_PAUSE),
+            redial: Redial::new(false, CONNECT_TIMEOUT, FIRST_PAUSE..=LONGEST_PAUSE),
             waiting: Backlog::new(BACKLOG),
         }
     }

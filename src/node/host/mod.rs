@@ -131,7 +131,7 @@ impl Host {
         let stream = connect(&self.address).await?;
         let mut reader = Reader::new(stream.read, LONGEST_MESSAGE + LONGEST_HEAD);
         let mut writer = Writer::new(stream.write);
-        writer.queue(&Record::hello(id, &self.own_name()));
+        writer.queue(&Record::with_text(Head::hello(id), &self.own_name()));
         let answer = async {
             writer.flush().await?;
             reader.read().await

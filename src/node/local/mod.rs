@@ -115,7 +115,7 @@ async fn attach(shared: &Arc<Shared>, stream: Stream) -> Option<(Session, Reader
         }
         Err((reason, why)) => {
             tracing::warn!(%process, why, "component refused");
-            writer.queue(&Record::refused(reason, &why));
+            writer.queue(&Record::with_text(Head::Refused(reason), &why));
             let event = ComponentEvent::Refused { process, why };
             shared.lock().components.events.send(event);
             // A component that does not read misses the reason.

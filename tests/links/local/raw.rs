@@ -54,7 +54,10 @@ async fn what_a_component_sent_before_it_went_away_arrives_though_nothing_can_be
     let path = place.path();
     let mut there = blocking(move || {
         let mut stream = UnixStream::connect(path).unwrap();
-        write(&mut stream, &Record::hello(JausId::new(0, 0, 33), "raw"));
+        write(
+            &mut stream,
+            &Record::with_text(Head::hello(JausId::new(0, 0, 33)), "raw"),
+        );
         let welcome = read(&mut stream);
         assert!(matches!(welcome.head, Head::Welcome { .. }), "{welcome:?}");
         stream
@@ -111,7 +114,7 @@ async fn a_node_of_an_older_release_is_named_as_the_reason() {
         let mut hello = [0; 15];
         stream.read_exact(&mut hello).unwrap();
         // A version 1 node reads up to here, sees another version, and refuses.
-        assert_eq!(hello[4..11], *b"\x01JAUS\x02\x01");
+        assert_eq!(hello[4..11], *b"\x01JAUS\x03\x01");
         assert_eq!(hello[11..], JausId::new(0, 0, 33).to_wire());
         stream.write_all(b"\x05\0\0\0\x12\x01old").unwrap();
     });

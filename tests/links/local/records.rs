@@ -51,8 +51,8 @@ fn outcome() -> impl Strategy<Value = Outcome> {
             Outcome::NotAcknowledged(Shortfall {
                 reason,
                 destination,
-                acknowledged: acknowledged as usize,
-                length: length as usize,
+                acknowledged,
+                length,
             })
         },
     );
@@ -190,8 +190,8 @@ fn a_first_record_of_another_protocol_cannot_be_read() {
 #[test]
 fn text_is_cut_at_a_whole_character_and_shown_without_control_characters() {
     let long = "à".repeat(200);
-    let hello = Record::hello(JausId::from_u32(0), &long);
+    let hello = Record::with_text(Head::hello(JausId::from_u32(0)), &long);
     assert_eq!(hello.text(), "à".repeat(127));
-    let hello = Record::hello(JausId::from_u32(0), "a\u{1b}[2Jb");
+    let hello = Record::with_text(Head::hello(JausId::from_u32(0)), "a\u{1b}[2Jb");
     assert_eq!(hello.text(), "a\u{fffd}[2Jb");
 }
