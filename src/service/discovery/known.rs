@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use super::pace::{Budget, Jitter};
 use super::peers::Peers;
 use super::questions::{Question, Questions, What};
+use super::register::Registrations;
 use super::{Change, Discovery, Loss, Profile, Scope, Timing};
 use crate::address::JausId;
 use crate::service::share::Share;
@@ -48,6 +49,10 @@ pub(super) struct Known {
     pub(super) again: Budget,
     pub(super) calls: u32,
     pub(super) next_call: Option<Instant>,
+    /// The components of this node that are to register with servers.
+    pub(super) registrations: BTreeMap<JausId, Registrations>,
+    /// The number of registrations so far.
+    pub(super) registered: u64,
     /// The components of this node, with the number of the next change for each to read.
     members: BTreeMap<JausId, u64>,
     log: VecDeque<Change>,
@@ -72,11 +77,12 @@ impl NodeDirectory {
         self.lock().directory.clone()
     }
 
-    /// The number of changes so far. While it stays the same, members have nothing new to read.
+    /// The number of changes and of registrations so far. While it stays the same, members have
+    /// nothing new to read or to do.
     #[must_use]
     pub fn change_count(&self) -> u64 {
         let known = self.lock();
-        known.log_start + known.log.len() as u64
+        known.log_start + known.log.len() as u64 + known.registered
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Known> {
@@ -111,6 +117,8 @@ impl Known {
             again: Budget::new(Self::AGAIN_BURST, Self::AGAIN_REFILL),
             calls: 0,
             next_call: None,
+            registrations: BTreeMap::new(),
+            registered: 0,
             members: BTreeMap::new(),
             log: VecDeque::new(),
             log_start: 0,
@@ -155,8 +163,14 @@ impl Known {
     /// Removes a component of this node.
     pub(super) fn leave(&mut self, own: JausId) {
         self.members.remove(&own);
+        self.registrations.remove(&own);
         self.tree().remove(own);
         self.tell(Change::Lost(own, Loss::Unlisted));
+    }
+
+    /// The components of this node.
+    pub(super) fn members(&self) -> impl Iterator<Item = JausId> + '_ {
+        self.members.keys().copied()
     }
 
     /// Whether a component sends calls and queries for all.

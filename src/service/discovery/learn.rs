@@ -253,6 +253,7 @@ impl Known {
             for id in gone {
                 self.lose(now, id, Loss::Unlisted);
             }
+            self.register_with(now, source, &listed);
         }
     }
 
@@ -321,6 +322,7 @@ impl Known {
         }
         if self.tree().set_services(id, services) {
             self.tell(Change::Services(id));
+            self.examine_server(now, id);
         }
     }
 }

@@ -22,6 +22,12 @@
 //! silent leaves another 33 s later. A component that was only listed leaves when its subsystem no
 //! longer lists it, or together with the component that listed it.
 //!
+//! # Registration
+//!
+//! Some discovery servers list only components that register with them (Register Services, 0B00h):
+//! fkie's, and those of the JAUS Tool Set. Each component of our subsystem that offers Discovery is
+//! queried for its configuration; if that lacks a component of this node, the component registers.
+//!
 //! # Network load
 //!
 //! At most one packet per second in the long run with up to a dozen peers, including answers to
@@ -52,6 +58,7 @@ mod pace;
 mod peers;
 mod profile;
 mod questions;
+mod register;
 mod search;
 #[cfg(test)]
 mod tests;
@@ -71,6 +78,7 @@ use crate::messages::core::{
 pub use known::{NodeDirectory, Refused};
 pub(super) use pace::Budget;
 pub use profile::{Profile, Scope, Timing};
+use register::registration;
 
 /// The Discovery service of one component.
 #[derive(Debug)]
@@ -276,6 +284,12 @@ impl Discovery {
 
     pub(super) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
         let mut known = self.known.lock();
+        let registrations = known.registrations.remove(&self.own);
+        for server in registrations.into_iter().flat_map(|it| it.servers) {
+            if let Some(own) = known.directory.component(self.own) {
+                out.send(server, &registration(own));
+            }
+        }
         if self.has_news || known.is_leader(self.own) {
             self.has_news = false;
             known.handle_timeout(now, out);
@@ -285,6 +299,8 @@ impl Discovery {
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
         let known = self.known.lock();
         let is_due = self.has_news || known.is_leader(self.own);
-        is_due.then(|| known.poll_timeout())?
+        let searches = is_due.then(|| known.poll_timeout()).flatten();
+        let registers = known.registrations.get(&self.own).map(|it| it.since);
+        registers.into_iter().chain(searches).min()
     }
 }

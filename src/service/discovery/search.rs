@@ -113,6 +113,7 @@ impl Known {
             if self.reporters.get(&id.subsystem()) == Some(&id) {
                 self.wonder(now, id, What::Configuration, share);
             }
+            self.examine_server(now, id);
         }
     }
 

@@ -1,5 +1,6 @@
 //! Tests of discovery under floods of real and forged components, in virtual time.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -7,7 +8,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 
 use super::*;
-use crate::endpoint::{LinkId, Path};
+use crate::endpoint::{LinkId, Outgoing, Path};
 use crate::messages::core::{
     ReportHeartbeatPulse, report_configuration, report_identification, report_services,
 };
@@ -26,6 +27,10 @@ struct Rig {
     start: Instant,
     /// The live peers and their addresses.
     lively: Vec<(JausId, IpAddr)>,
+    /// Those of them that offer Discovery, and whom they list.
+    servers: BTreeMap<JausId, Vec<JausId>>,
+    /// Whom it has sent Register Services.
+    registered_with: Vec<JausId>,
     /// The number of messages it has sent.
     sent: usize,
 }
@@ -43,6 +48,8 @@ impl Rig {
             now: start,
             start,
             lively: Vec::new(),
+            servers: BTreeMap::new(),
+            registered_with: Vec::new(),
             sent: 0,
         };
         rig.discovery.set_offers([], &mut Outbox::new(US));
@@ -81,6 +88,15 @@ impl Rig {
             while self.discovery.poll_change().is_some() {}
             while let Some(sent) = out.pop() {
                 self.sent += 1;
+                if let Ok(registration) = RegisterServices::decode(&sent.payload) {
+                    assert!(
+                        registration
+                            .service_list
+                            .iter()
+                            .any(|it| it.uri == core::discovery::URN)
+                    );
+                    self.registered_with.push(sent.destination);
+                }
                 let lively = self.lively.iter();
                 let peer = lively.copied().find(|(id, _)| *id == sent.destination);
                 if let Some((id, ip)) = peer {
@@ -95,9 +111,15 @@ impl Rig {
         if let Ok(query) = QueryIdentification::decode(query) {
             self.hear(id, ip, &named(query.query_type.0, "peer"));
         } else if QueryServices::decode(query).is_ok() {
-            self.hear(id, ip, &services([(id, 3)], "urn:jaus:jss:core:Some"));
+            let mut report = services([(id, 3)], "urn:jaus:jss:core:Some");
+            if self.servers.contains_key(&id) {
+                report.node_list[0].component_list[0].service_list[0].uri =
+                    core::discovery::URN.into();
+            }
+            self.hear(id, ip, &report);
         } else if QueryConfiguration::decode(query).is_ok() {
-            self.hear(id, ip, &configuration([id]));
+            let listed = self.servers.get(&id).cloned().unwrap_or(vec![id]);
+            self.hear(id, ip, &configuration(listed));
         }
     }
 
@@ -418,4 +440,66 @@ fn what_one_component_of_a_node_learns_the_others_know_also_when_it_is_gone() {
     node.second.handle_timeout(node.now, &mut out);
     let asked = std::iter::from_fn(|| out.pop()).filter(|it| it.destination == peer);
     assert_ne!(asked.count(), 0, "it asks in the place of the first");
+}
+
+#[test]
+fn a_server_of_our_subsystem_gets_a_registration_whenever_it_does_not_list_us() {
+    let mut rig = Rig::new();
+    let server = JausId::new(US.subsystem(), 2, 1);
+    rig.lively.push((server, OTHER));
+    rig.servers.insert(server, vec![server]);
+    rig.call(server, OTHER);
+    rig.run(5 * SECOND);
+    assert_eq!(rig.registered_with, [server], "soon after it is found");
+    rig.servers.insert(server, vec![server, US]);
+    rig.run(600 * SECOND);
+    assert_eq!(rig.registered_with, [server], "it lists us");
+    rig.servers.insert(server, vec![server]);
+    rig.run(60 * SECOND);
+    assert!(rig.registered_with.len() > 1, "it has forgotten us");
+}
+
+#[test]
+fn neither_other_subsystems_nor_components_without_discovery_get_registrations() {
+    let mut rig = Rig::new();
+    let elsewhere = JausId::new(7, 1, 1);
+    let without = JausId::new(US.subsystem(), 2, 1);
+    rig.servers.insert(elsewhere, vec![elsewhere]);
+    for id in [elsewhere, without] {
+        rig.lively.push((id, OTHER));
+        rig.call(id, OTHER);
+    }
+    rig.run(600 * SECOND);
+    assert!(rig.knows(elsewhere) && rig.knows(without));
+    // `without` is asked for its configuration as the reporter of the subsystem.
+    assert_eq!(rig.registered_with, []);
+}
+
+#[test]
+fn each_component_of_a_node_registers_itself_though_one_asks_for_all() {
+    let mut node = two_of_a_node();
+    let server = JausId::new(US.subsystem(), 2, 1);
+    let before = node.known.change_count();
+    {
+        let mut known = node.known.lock();
+        known.tree().insert(server);
+        let (urn, major, minor) = (core::discovery::URN.into(), 1, 0);
+        let offers = vec![Offer { urn, major, minor }];
+        known.tree().set_services(server, offers);
+        known.register_with(node.now, server, &BTreeSet::from([server]));
+    }
+    assert_ne!(node.known.change_count(), before, "which wakes the second");
+    for (own, discovery) in [(US, &mut node.first), (SIBLING, &mut node.second)] {
+        assert_eq!(discovery.poll_timeout(), Some(node.now));
+        let mut out = Outbox::new(own);
+        discovery.handle_timeout(node.now, &mut out);
+        let sent: Vec<_> = std::iter::from_fn(|| out.pop()).collect();
+        let registered = |it: &&Outgoing| RegisterServices::decode(&it.payload).is_ok();
+        let registration = sent.iter().find(registered).unwrap();
+        assert_eq!(
+            (registration.source, registration.destination),
+            (own, server)
+        );
+    }
+    assert_eq!(node.second.poll_timeout(), None);
 }
