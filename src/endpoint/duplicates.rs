@@ -131,3 +131,15 @@ impl Endpoint {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_interval_between_forwarded_repetitions_doubles_up_to_a_limit() {
+        let intervals = [0, 1, 2, 3, 8, 9, 255].map(forwarding_interval);
+        let expected = [0, 5, 15, 35, 1275, 1275, 1275].map(Duration::from_millis);
+        assert_eq!(intervals, expected);
+    }
+}

@@ -72,11 +72,8 @@ impl Sighting {
 struct AlreadyHashed(u64);
 
 impl Hasher for AlreadyHashed {
-    fn write(&mut self, octets: &[u8]) {
-        for &octet in octets {
-            self.0 = self.0.rotate_left(8) ^ u64::from(octet);
-        }
-    }
+    /// Not called: a fingerprint hashes as one `u64`.
+    fn write(&mut self, _: &[u8]) {}
 
     fn write_u64(&mut self, hash: u64) {
         self.0 = hash;
@@ -273,5 +270,31 @@ mod tests {
         assert_eq!(fingerprint(b"\x00\x2B\x02"), fingerprint(b"\x00\x2B\x02"));
         let seen = fingerprint(b"\x00\x2B\x02");
         assert_ne!(seen.in_round(1), seen.in_round(2));
+    }
+
+    #[test]
+    fn what_identifies_a_message_counts_and_nothing_else() {
+        use crate::wire::{Acknowledgement, DataControl, Priority};
+        let recent = memory(8, Duration::from_secs(1));
+        let known = frame(1, b"\x00\x2B\x02");
+        let is_another = |change: fn(&mut Frame)| {
+            let mut other = known.clone();
+            change(&mut other);
+            recent.fingerprint(&other) != recent.fingerprint(&known)
+        };
+        let identifying: [fn(&mut Frame); 5] = [
+            |it| it.source = JausId::new(1, 1, 2),
+            |it| it.destination = JausId::new(2, 1, 2),
+            |it| it.sequence = 2,
+            |it| it.flags = it.flags.with_data(DataControl::Last),
+            |it| it.flags = it.flags.with_acknowledgement(Acknowledgement::Positive),
+        ];
+        for (index, change) in identifying.into_iter().enumerate() {
+            assert!(is_another(change), "change {index}");
+        }
+        assert!(!is_another(|it| {
+            let flags = it.flags.with_priority(Priority::High);
+            it.flags = flags.with_acknowledgement(Acknowledgement::Request);
+        }));
     }
 }

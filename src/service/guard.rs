@@ -246,9 +246,7 @@ impl MotionGuard {
         let MotionPolicy::Expire(brief) = self.policy else {
             return;
         };
-        if setpoint.interval.is_some_and(|interval| interval < brief)
-            || self.logged.replace(client) == Some(client)
-        {
+        if !self.warns_of_expiry(setpoint, brief) {
             tracing::debug!(%client, "stopped: the command expired");
             return;
         }
@@ -262,6 +260,11 @@ impl MotionGuard {
              often, or choose the motion policy \"hold\"",
             brief.as_secs_f64()
         );
+    }
+
+    fn warns_of_expiry(&mut self, setpoint: &Setpoint, brief: Duration) -> bool {
+        let is_slow = setpoint.interval.is_none_or(|interval| interval >= brief);
+        is_slow && self.logged.replace(setpoint.owner) != Some(setpoint.owner)
     }
 
     /// Ends the setpoint, if there is one.
@@ -300,6 +303,188 @@ impl MotionGuard {
         match (validity, self.policy) {
             (Some(Validity::WhileAlive), _) | (Some(Validity::Brief), MotionPolicy::Hold) => true,
             (Some(Validity::UntilDone | Validity::Brief) | None, _) => false,
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
+mod tests {
+    use super::*;
+    use crate::service::Controller;
+
+    const OWNER: JausId = JausId::new(42, 1, 1);
+    const OTHER: JausId = JausId::new(42, 2, 1);
+    const BRIEF: Duration = Duration::from_millis(200);
+    const MOMENT: Duration = Duration::from_nanos(1);
+    const EXPIRE: MotionPolicy = MotionPolicy::Expire(BRIEF);
+
+    #[test]
+    fn the_validity_of_a_command_follows_from_its_code() {
+        for (codes, expected) in [
+            (&[0x0405, 0x0406, 0x0409, 0x2407][..], Validity::Brief),
+            (&[0x0407, 0x0408, 0x04A7, 0x04A8], Validity::WhileAlive),
+            (
+                &[
+                    0x040A, 0x040C, 0x040D, 0x040F, 0x0410, 0x041E, 0x04AA, 0x04AC, 0x04AD, 0x04AE,
+                    0x04AF, 0x04B0,
+                ],
+                Validity::UntilDone,
+            ),
+        ] {
+            for &code in codes {
+                assert_eq!(Validity::of(code), expected, "{code:04X}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_command_is_in_force_exactly_as_long_as_its_validity() {
+        let silent = Some((MotionGuard::LIFE, StopCause::ControllerSilent(OWNER)));
+        for (policy, validity, end) in [
+            (
+                EXPIRE,
+                Validity::Brief,
+                Some((BRIEF, StopCause::Expired(OWNER))),
+            ),
+            (MotionPolicy::Hold, Validity::Brief, silent.clone()),
+            (EXPIRE, Validity::WhileAlive, silent.clone()),
+            (MotionPolicy::Hold, Validity::WhileAlive, silent),
+            (EXPIRE, Validity::UntilDone, None),
+            (MotionPolicy::Hold, Validity::UntilDone, None),
+        ] {
+            let start = Instant::now();
+            let mut guard = MotionGuard::new(policy);
+            guard.accept(start, OWNER, validity);
+            let at = end.as_ref().map(|(after, _)| start + *after);
+            assert!(guard.is_active());
+            assert_eq!(guard.expires_at(), at, "{policy:?} {validity:?}");
+            let Some((end, (_, cause))) = at.zip(end) else {
+                let later = start + Duration::from_secs(3600);
+                assert_eq!((guard.expire(later), guard.depends_on()), (None, None));
+                continue;
+            };
+            let silence_ends_it = cause == StopCause::ControllerSilent(OWNER);
+            assert_eq!(guard.depends_on(), silence_ends_it.then_some(OWNER));
+            assert_eq!(guard.expire(end - MOMENT), None);
+            assert_eq!(guard.expire(end), Some(cause.clone()));
+            assert_eq!(guard.last_stop(), Some(&cause));
+            assert_eq!((guard.is_active(), guard.depends_on()), (false, None));
+            assert_eq!(guard.expire(end), None, "a command ends once");
+        }
+    }
+
+    #[test]
+    fn the_policy_can_change_and_is_500_ms_by_default() {
+        let start = Instant::now();
+        let mut guard = MotionGuard::default();
+        guard.accept(start, OWNER, Validity::Brief);
+        assert_eq!(guard.expires_at(), Some(start + Duration::from_millis(500)));
+        guard.set_policy(EXPIRE);
+        assert_eq!(guard.expires_at(), Some(start + BRIEF));
+        guard.set_policy(MotionPolicy::Expire(Duration::MAX));
+        assert_eq!(guard.expires_at(), None, "forever");
+    }
+
+    #[test]
+    fn only_the_latest_sign_of_life_of_the_owner_extends_a_command() {
+        let start = Instant::now();
+        let mut guard = MotionGuard::new(EXPIRE);
+        guard.accept(start, OWNER, Validity::WhileAlive);
+        let sign = start + Duration::from_millis(700);
+        for (known, latest) in [(None, start), (Some(sign), sign), (Some(start), sign)] {
+            guard.note_life(|id| known.filter(|_| id == OWNER));
+            assert_eq!(guard.expires_at(), Some(latest + MotionGuard::LIFE));
+        }
+    }
+
+    #[test]
+    fn the_last_stop_is_that_of_a_command_that_was_in_force() {
+        let start = Instant::now();
+        let mut guard = MotionGuard::new(EXPIRE);
+        guard.stop(StopCause::Requested);
+        assert_eq!(guard.last_stop(), None, "nothing was in force");
+        guard.accept(start, OWNER, Validity::UntilDone);
+        guard.stop(StopCause::Emergency);
+        guard.stop(StopCause::Requested);
+        assert_eq!(guard.last_stop(), Some(&StopCause::Emergency));
+        assert!(!guard.is_active());
+        guard.accept(start, OWNER, Validity::UntilDone);
+        assert_eq!(guard.last_stop(), None);
+        guard.finish();
+        assert_eq!((guard.is_active(), guard.last_stop()), (false, None));
+    }
+
+    #[test]
+    fn only_the_first_expiry_of_a_client_that_repeats_too_slowly_is_a_warning() {
+        let start = Instant::now();
+        let warns = |guard: &mut MotionGuard| {
+            let setpoint = guard.setpoint.unwrap();
+            guard.warns_of_expiry(&setpoint, BRIEF)
+        };
+        for (interval, is_slow) in [(BRIEF - MOMENT, false), (BRIEF, true)] {
+            let mut guard = MotionGuard::new(EXPIRE);
+            guard.accept(start, OWNER, Validity::Brief);
+            guard.accept(start + interval, OWNER, Validity::Brief);
+            assert_eq!([warns(&mut guard), warns(&mut guard)], [is_slow, false]);
+            guard.accept(start + interval, OTHER, Validity::Brief);
+            assert!(warns(&mut guard), "another client, for the first time");
+        }
+        let mut guard = MotionGuard::new(EXPIRE);
+        guard.accept(start, OWNER, Validity::WhileAlive);
+        guard.accept(start, OWNER, Validity::Brief);
+        assert!(warns(&mut guard), "a vector before it is no repetition");
+    }
+
+    #[test]
+    fn the_cause_of_a_stop_follows_from_the_state_and_the_client_in_control() {
+        let controlled = |state, id| Standing {
+            state,
+            exclusive: true,
+            controller: Some(Controller { id, authority: 1 }),
+        };
+        let released = |state| Standing {
+            controller: None,
+            ..controlled(state, OWNER)
+        };
+        let before = controlled(State::Ready, OWNER);
+        for (after, cause) in [
+            (before, None),
+            (
+                controlled(State::Emergency, OWNER),
+                Some(StopCause::Emergency),
+            ),
+            (released(State::Failure), Some(StopCause::Failure)),
+            (released(State::Shutdown), Some(StopCause::Shutdown)),
+            (released(State::Initialize), Some(StopCause::Standby)),
+            (controlled(State::Standby, OWNER), Some(StopCause::Standby)),
+            (released(State::Standby), Some(StopCause::ControlChanged)),
+            (
+                controlled(State::Ready, OTHER),
+                Some(StopCause::ControlChanged),
+            ),
+        ] {
+            assert_eq!(StopCause::of(&before, &after), cause, "{after:?}");
+        }
+    }
+
+    #[test]
+    fn a_cause_names_the_client_and_the_time() {
+        let late = Duration::from_millis(2500);
+        for (cause, expected) in [
+            (
+                StopCause::Expired(OWNER),
+                "42.1.1 did not repeat its command in time",
+            ),
+            (StopCause::ControllerSilent(OWNER), "42.1.1 is silent"),
+            (StopCause::Fault("no current".to_owned()), "no current"),
+            (StopCause::PoseStale(late), "the pose is 2.5 s old"),
+            (StopCause::Hung(late), "the component was delayed for 2.5 s"),
+        ] {
+            assert_eq!(cause.to_string(), expected);
         }
     }
 }

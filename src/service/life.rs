@@ -292,4 +292,146 @@ mod tests {
         );
         assert_eq!(life.last_sign(CLIENT), Some(last));
     }
+
+    const MOMENT: Duration = Duration::from_nanos(1);
+
+    fn millis(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    /// The number of probes at this time if all peers have this rank.
+    fn probes(life: &mut Life, now: Instant, rank: Rank) -> usize {
+        let mut out = Outbox::new(US);
+        life.handle_timeout(now, |_| Some(rank), &mut out);
+        std::iter::from_fn(|| out.pop()).count()
+    }
+
+    #[test]
+    fn a_silent_peer_is_probed_after_the_time_of_its_rank() {
+        for (rank, patience) in [
+            (Rank::Subscriber, Life::SILENCE),
+            (Rank::EmergencySetter, Life::SILENCE),
+            (Rank::Controller, Life::SILENCE),
+            (Rank::MovingController, Life::MOVING),
+        ] {
+            let (mut life, start) = (Life::default(), Instant::now());
+            life.watch(start, CLIENT, rank);
+            for silence in [patience, 2 * patience] {
+                let due = start + silence;
+                assert_eq!(life.poll_timeout(), Some(due), "{rank:?}");
+                assert_eq!(probes(&mut life, due - MOMENT, rank), 0);
+                assert_eq!(probes(&mut life, due, rank), 1);
+            }
+        }
+    }
+
+    #[test]
+    fn a_higher_rank_brings_the_next_probe_forward_unless_probes_are_under_way() {
+        let (mut life, start) = (Life::default(), Instant::now());
+        life.watch(start, CLIENT, Rank::Controller);
+        life.watch(start + millis(100), CLIENT, Rank::MovingController);
+        assert_eq!(life.poll_timeout(), Some(start + Life::MOVING));
+        life.watch(start + millis(100), CLIENT, Rank::Controller);
+        assert_eq!(life.poll_timeout(), Some(start + Life::MOVING));
+        probes(&mut life, start + Life::MOVING, Rank::Controller);
+        probes(&mut life, start + Life::SILENCE, Rank::Controller);
+        life.watch(start + Life::SILENCE, CLIENT, Rank::MovingController);
+        assert_eq!(life.poll_timeout(), Some(start + 2 * Life::SILENCE));
+        assert_eq!(life.due.len(), 1, "one entry per peer");
+    }
+
+    #[test]
+    fn after_a_sign_of_life_the_next_check_waits_for_a_new_silence_or_a_fifth_of_it() {
+        for (heard, next) in [(900, 1900), (100, 1200)] {
+            let (mut life, start) = (Life::default(), Instant::now());
+            life.watch(start, CLIENT, Rank::Controller);
+            life.hear(start + millis(heard), CLIENT, None);
+            let due = start + Life::SILENCE;
+            assert_eq!(
+                probes(&mut life, due, Rank::Controller),
+                1,
+                "its first probe"
+            );
+            assert_eq!(life.poll_timeout(), Some(start + millis(next)));
+        }
+    }
+
+    #[test]
+    fn a_peer_that_has_answered_or_acknowledged_dies_after_4_s_of_silence_and_others_never() {
+        type Sign = fn(&mut Life, Instant);
+        let signs: [(Sign, bool); 3] = [
+            (
+                |life, now| life.hear(now, CLIENT, Some(ReportHeartbeatPulse::CODE)),
+                true,
+            ),
+            (|life, now| life.acknowledged(now, CLIENT), true),
+            (
+                |life, now| life.hear(now, CLIENT, Some(QueryStatus::CODE)),
+                false,
+            ),
+        ];
+        for (sign, can_die) in signs {
+            let (mut life, start) = (Life::default(), Instant::now());
+            life.watch(start, CLIENT, Rank::Controller);
+            let sign_at = start + millis(900);
+            sign(&mut life, sign_at);
+            assert_eq!(life.last_sign(CLIENT), Some(sign_at));
+            let death = sign_at + Life::DEATH;
+            // One call is late, so that no regular probe is due at the time of death.
+            for ms in [1000, 2100, 3100, 4100] {
+                probes(&mut life, start + millis(ms), Rank::Controller);
+            }
+            assert_eq!(life.poll_timeout(), Some(death));
+            assert!(life.is_alive(death - MOMENT, CLIENT));
+            assert!(!life.is_mute(death - MOMENT, CLIENT));
+            assert!(!life.is_alive(death, CLIENT));
+            assert_eq!(life.is_mute(death, CLIENT), !can_die);
+            probes(&mut life, death, Rank::Controller);
+            assert_eq!(life.poll_dead(), can_die.then_some(CLIENT));
+            assert_eq!(life.poll_dead(), None);
+            let next = death + Life::SILENCE;
+            assert_eq!(life.poll_timeout(), (!can_die).then_some(next));
+        }
+    }
+
+    #[test]
+    fn a_component_that_was_itself_held_up_probes_twice_before_a_peer_dies() {
+        let (mut life, start) = (Life::default(), Instant::now());
+        life.watch(start, CLIENT, Rank::Controller);
+        life.hear(start, CLIENT, Some(ReportHeartbeatPulse::CODE));
+        for (at, sent) in [(60, 1), (61, 1), (62, 0)] {
+            let now = start + at * Life::SILENCE;
+            assert_eq!(life.poll_dead(), None);
+            assert_eq!(probes(&mut life, now, Rank::Controller), sent);
+        }
+        assert_eq!(life.poll_dead(), Some(CLIENT));
+    }
+
+    #[test]
+    fn a_peer_without_a_rank_is_no_longer_watched() {
+        let (mut life, start) = (Life::default(), Instant::now());
+        life.watch(start, CLIENT, Rank::Subscriber);
+        let mut out = Outbox::new(US);
+        life.handle_timeout(start + Life::SILENCE, |_| None, &mut out);
+        assert!(out.pop().is_none() && life.poll_timeout().is_none());
+        assert_eq!(life.last_sign(CLIENT), None);
+        assert!(!life.is_alive(start, CLIENT) && !life.is_mute(start, CLIENT));
+    }
+
+    #[test]
+    fn probes_to_subscribers_and_setters_have_budgets_and_those_to_controllers_do_not() {
+        for (rank, first, later) in [
+            (Rank::Subscriber, 32, 20),
+            (Rank::EmergencySetter, 32, 20),
+            (Rank::Controller, 100, 100),
+        ] {
+            let (mut life, start) = (Life::default(), Instant::now());
+            for component in 1..=100 {
+                life.watch(start, JausId::new(102, 1, component), rank);
+            }
+            let due = start + Life::SILENCE;
+            assert_eq!(probes(&mut life, due, rank), first, "{rank:?}");
+            assert_eq!(probes(&mut life, due + Life::SILENCE, rank), later);
+        }
+    }
 }

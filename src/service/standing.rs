@@ -175,4 +175,20 @@ mod tests {
     fn without_access_control_anyone_is_obeyed() {
         assert!(Standing::default().acts_for(STRANGER));
     }
+
+    #[test]
+    fn a_state_has_its_code_in_report_status_and_its_name() {
+        for (code, state, name) in [
+            (0, State::Initialize, "initialize"),
+            (1, State::Ready, "ready"),
+            (2, State::Standby, "standby"),
+            (3, State::Shutdown, "shutdown"),
+            (4, State::Failure, "failure"),
+            (5, State::Emergency, "emergency"),
+        ] {
+            assert_eq!(State::from_code(code), Some(state));
+            assert_eq!((state as u8, state.to_string()), (code, name.to_owned()));
+        }
+        assert_eq!(State::from_code(6), None);
+    }
 }

@@ -336,4 +336,31 @@ mod tests {
             "bits 0-1 belong to the message type"
         );
     }
+
+    #[test]
+    fn each_value_of_a_field_has_its_number_and_its_name() {
+        let shown = |flags: Flags| {
+            let scope = flags.broadcast().map(|scope| scope.to_string());
+            (
+                flags.priority().to_string(),
+                scope.unwrap_or_default(),
+                flags.acknowledgement().to_string(),
+                flags.data().to_string(),
+            )
+        };
+        for (value, expected) in [
+            (0, ("low", "none", "none", "single")),
+            (1, ("standard", "local", "request", "first")),
+            (2, ("high", "global", "nak", "middle")),
+            (3, ("safety_critical", "", "ack", "last")),
+        ] {
+            let (priority, scope, acknowledgement, data) = shown(Flags(value * 0b0101_0101));
+            let names = (&*priority, &*scope, &*acknowledgement, &*data);
+            assert_eq!(names, expected, "{value}");
+        }
+        assert_eq!(
+            format!("{:?}", Flags(0x5D)),
+            "5Dh (priority standard, broadcast reserved, ack request, data first)"
+        );
+    }
 }

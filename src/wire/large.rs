@@ -32,3 +32,32 @@ where
     }
     message.freeze()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fragments<const N: usize>(octets: [&'static [u8]; N]) -> [Bytes; N] {
+        octets.map(Bytes::from_static)
+    }
+
+    #[test]
+    fn a_code_is_repeated_if_every_fragment_begins_with_that_of_the_first() {
+        for (pieces, expected) in [
+            (fragments([b"ab1", b"ab2", b"ab"]), true),
+            (fragments([b"ab1", b"ab2", b"ac3"]), false),
+            (fragments([b"ab1", b"ab2", b"a"]), false),
+            (fragments([b"a", b"a", b"a"]), false),
+        ] {
+            assert_eq!(repeats_code(&pieces), expected, "{pieces:?}");
+        }
+        assert!(!repeats_code(&[]));
+    }
+
+    #[test]
+    fn joining_leaves_out_the_repeated_octets_of_later_fragments() {
+        let pieces = fragments([b"ab1", b"ab2", b"a"]);
+        assert_eq!(join(&pieces, 0), "ab1ab2a");
+        assert_eq!(join(&pieces, CODE_LEN), "ab12");
+    }
+}

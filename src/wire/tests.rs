@@ -205,6 +205,134 @@ fn an_ra_header_tells_what_a_frame_does_not() {
 }
 
 #[test]
+fn a_header_tells_its_ids_and_its_length_with_and_without_compression() {
+    for (octets, length) in [
+        ("00 1e00 19 01010200 01010100", 12),
+        ("40 1300 aa0c 01 01010200 01010100", 14),
+    ] {
+        let header = as5669a::Header::decode(&hex(octets)).unwrap();
+        assert_eq!(header.wire_len(), length);
+        assert_eq!(header.destination(), JausId::new(2, 1, 1));
+        assert_eq!(header.source(), JausId::new(1, 1, 1));
+        let mut out = BytesMut::new();
+        let written = header.encode(&mut out).map(|()| out.freeze());
+        let plain = (length == 12).then(|| hex(octets));
+        assert_eq!(written, plain.ok_or(EncodeError::NotPlain));
+    }
+    assert_eq!(as5669a::message_len(16), 30);
+}
+
+#[test]
+fn an_ra_header_is_written_from_its_fields_and_read_back() {
+    let plain = ra::Fields {
+        priority: 6,
+        acknowledgement: Acknowledgement::Positive,
+        service_connection: false,
+        experimental: false,
+        code: 0x4402,
+        destination: ra::RaId::new(1, 33, 1, 20),
+        source: ra::RaId::new(1, 35, 10, 1),
+        data_flag: 4,
+        data_size: 300,
+        sequence: 0x0102,
+    };
+    let beyond = ra::Fields {
+        priority: 16,
+        service_connection: true,
+        data_flag: 0x18,
+        data_size: ra::MAX_DATA + 1,
+        ..plain
+    };
+    let experimental = ra::Fields {
+        experimental: true,
+        ..plain
+    };
+    let (short, longest) = ((6, 4, 300), (15, 8, ra::MAX_DATA));
+    for (fields, expected) in [(plain, short), (beyond, longest), (experimental, short)] {
+        let written = ra::Header::new(&fields).octets();
+        let header = ra::Header::decode(&written).unwrap();
+        let read = (header.priority(), header.data_flag(), header.data_size());
+        assert_eq!(read, expected);
+        assert_eq!(header.service_connection(), fields.service_connection);
+        assert_eq!(header.experimental(), fields.experimental);
+        assert_eq!(header.acknowledgement(), fields.acknowledgement);
+        assert_eq!(header.source(), fields.source.into());
+        assert_eq!(header.destination(), fields.destination.into());
+        assert_eq!((header.code, header.sequence), (0x4402, 0x0102));
+        assert_eq!(header.header_version(), 2);
+    }
+}
+
+#[test]
+fn sixteen_priorities_of_the_reference_architecture_are_four_here() {
+    let read = |properties: u8| {
+        let rest = "02 0142 0101ffff 0123010a 0000 0000";
+        only_frame(&format!("4a41555330312e30 {properties:02x} {rest}"))
+    };
+    for (priority, from) in [
+        (Priority::Low, 0..=5),
+        (Priority::Standard, 6..=8),
+        (Priority::High, 9..=11),
+        (Priority::SafetyCritical, 12..=15),
+    ] {
+        for value in from.clone() {
+            assert_eq!(read(value).flags.priority(), priority, "{value}");
+        }
+        let written = judp::encode(&read(*from.start())).unwrap();
+        assert!(from.contains(&(written[8] & 0xF)), "{priority}");
+    }
+}
+
+#[test]
+fn a_frame_is_plausible_only_if_all_of_its_header_is() {
+    let (source, destination) = (JausId::new(1, 1, 1), JausId::from_u32(u32::MAX));
+    let payload = Bytes::from_static(b"\x00\x2B");
+    let sound = Frame::new(source, destination, payload);
+    assert!(sound.is_plausible());
+    let ack = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+    let changes: [fn(&mut Frame); 4] = [
+        |frame| frame.kind = Kind(1),
+        |frame| frame.source = frame.destination,
+        |frame| frame.destination = JausId::from_u32(0),
+        |frame| frame.flags = Flags(0x0D),
+    ];
+    for change in changes {
+        let mut frame = sound.clone();
+        change(&mut frame);
+        assert!(!frame.is_plausible(), "{frame:?}");
+    }
+    for (version, payload, plausible) in [
+        (Version::As5669a, &b""[..], true),
+        (Version::As5669a, b"\x00\x2B", false),
+        (Version::As5669, b"\x00\x2B", true),
+        (Version::Ra, b"\x00\x2B!", false),
+    ] {
+        let answer = Frame {
+            version,
+            flags: ack,
+            payload: Bytes::from_static(payload),
+            ..sound.clone()
+        };
+        assert_eq!(answer.is_plausible(), plausible, "{answer:?}");
+        assert_eq!(answer.is_acknowledgement(), plausible, "{answer:?}");
+    }
+}
+
+#[test]
+fn each_framing_writes_its_own_form_of_a_frame() {
+    let frame = only_frame(JUNIOR_FIRST);
+    for (framing, written) in [
+        (Framing::Judp, judp::encode(&frame)),
+        (Framing::Jtcp, jtcp::encode(&frame)),
+        (Framing::Jserial, jserial::encode(&frame)),
+    ] {
+        assert_eq!(framing.encode(&frame), written, "{framing:?}");
+    }
+    let names = [Version::As5669a, Version::As5669, Version::Ra].map(|it| it.to_string());
+    assert_eq!(names, ["judp2", "judp1", "ra"]);
+}
+
+#[test]
 fn an_ra_datagram_holds_one_message_only() {
     let mut frames = judp::frames(hex(&format!("{OPENJAUS_HEARTBEAT} 0602024201"))).unwrap();
     assert!(frames.next().unwrap().is_ok());
@@ -273,6 +401,9 @@ fn a_frame_that_its_header_cannot_carry_is_not_written() {
         judp::encode(&frame(Version::Ra, 1)),
         Err(EncodeError::NoMessageCode { length: 1 })
     );
+    // 65 507 octets of a UDP datagram over IPv4, less version and header.
+    let longest = frame(Version::As5669a, judp::MAX_PAYLOAD);
+    assert_eq!(judp::encode(&longest).unwrap().len(), 65_507);
     let mut out = BytesMut::new();
     assert!(as5669a::emit(&frame(Version::As5669a, 65_522), &mut out).is_err() && out.is_empty());
 }

@@ -126,4 +126,37 @@ mod tests {
         round_trip.measure(ms(40));
         assert_eq!(round_trip.timeout(), ms(120));
     }
+
+    #[test]
+    fn a_restart_ends_the_doubling_and_keeps_the_measurement() {
+        let mut round_trip = RoundTrip::default();
+        round_trip.measure(ms(40));
+        round_trip.back_off();
+        round_trip.restart();
+        assert_eq!(round_trip.timeout(), ms(120));
+        assert_eq!(round_trip.smoothed(), Some(ms(40)));
+    }
+
+    #[test]
+    fn the_round_trip_has_grown_from_one_and_a_half_times_the_shortest() {
+        let mut round_trip = RoundTrip::default();
+        assert!(round_trip.has_grown(), "until it is measured");
+        round_trip.measure(ms(8));
+        assert!(!round_trip.has_grown());
+        // An eighth of each new measurement counts: 8 + 36 / 8 = 12.5 ms, the limit.
+        round_trip.measure(ms(44));
+        assert_eq!(round_trip.smoothed(), Some(Duration::from_micros(12_500)));
+        assert!(!round_trip.has_grown());
+        round_trip.measure(ms(44));
+        assert!(round_trip.has_grown());
+    }
+
+    #[test]
+    fn the_margin_follows_how_much_the_measurements_vary() {
+        let mut round_trip = RoundTrip::default();
+        round_trip.measure(ms(40));
+        round_trip.measure(ms(80));
+        // Variation (3 · 20 + 40) / 4 = 25 ms, smoothed (7 · 40 + 80) / 8 = 45 ms.
+        assert_eq!(round_trip.timeout(), ms(45 + 4 * 25));
+    }
 }

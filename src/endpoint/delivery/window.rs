@@ -170,4 +170,52 @@ mod tests {
         }
         assert_eq!(window.packets(), 70);
     }
+
+    #[test]
+    fn a_window_of_which_half_is_used_grows() {
+        let mut window = Window::new(16, 100);
+        window.grow(0, 7);
+        assert_eq!(window.packets(), 16);
+        window.grow(1, 8);
+        assert_eq!(window.packets(), 17);
+    }
+
+    #[test]
+    fn losses_shrink_the_window_from_a_fifth_of_the_packets_over_which_they_are_counted() {
+        let mut window = Window::new(16, 100);
+        let lose = |window: &mut Window, orders: std::ops::Range<u64>| {
+            orders.for_each(|order| window.lose(order, 200, false));
+            window.packets()
+        };
+        assert_eq!(lose(&mut window, 0..12), 16, "of 64");
+        assert_eq!(lose(&mut window, 64..76), 16, "a new count");
+        assert_eq!(lose(&mut window, 76..77), 11);
+    }
+
+    #[test]
+    fn after_a_timeout_growth_is_fast_to_half_the_proven_size_or_to_the_most() {
+        for (has_proven, expected) in [(true, 8), (false, 12)] {
+            let mut window = Window::new(16, 100);
+            window.collapse(5, has_proven);
+            (0..5).for_each(|order| window.grow(order, 100));
+            assert_eq!(window.packets(), LEAST, "sent before the timeout");
+            (5..15).for_each(|order| window.grow(order, 100));
+            assert_eq!(window.packets(), expected);
+        }
+    }
+
+    #[test]
+    fn after_a_pause_growth_is_fast_to_the_former_size() {
+        let mut window = Window::new(16, 100);
+        (0..16).for_each(|order| window.grow(order, 32));
+        window.lose(20, 20, true);
+        (20..42).for_each(|order| window.grow(order, 32));
+        assert_eq!(window.packets(), 23);
+        window.rest();
+        assert_eq!(window.packets(), 16);
+        (42..49).for_each(|order| window.grow(order, 32));
+        assert_eq!(window.packets(), 23);
+        window.grow(49, 32);
+        assert_eq!(window.packets(), 23);
+    }
 }

@@ -106,3 +106,42 @@ impl FragmentedSend {
             .sum()
     }
 }
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_datagram_occupies_a_power_of_two_and_its_description() {
+        assert_eq!([0, 128, 129, 1440].map(occupied), [768, 768, 1280, 2304]);
+    }
+
+    #[test]
+    fn datagrams_leave_up_to_the_burst_and_then_wait_for_a_quarter_of_it() {
+        // A datagram of 1440 octets takes 1 ms, and the burst 2 ms.
+        let pacing = Pacing {
+            burst: 4608,
+            rate: 2_304_000,
+        };
+        let (mut bucket, start) = (Bucket::default(), Instant::now());
+        let ms = Duration::from_millis(1);
+        let mut take = |after| pacing.take(&mut bucket, start + after, 1440);
+        for _datagram in 0..3 {
+            assert_eq!(take(Duration::ZERO), Ok(()));
+        }
+        assert_eq!(take(Duration::ZERO), Err(ms + ms / 2));
+        assert_eq!(take(ms), Ok(()));
+        assert_eq!(take(ms), Err(ms + ms / 2));
+    }
+
+    #[test]
+    fn the_slower_of_two_pacings_counts() {
+        let pacing = |burst, rate| Pacing { burst, rate };
+        let both = pacing(1, 20).within(pacing(2, 10));
+        assert_eq!((both.burst, both.rate), (1, 10));
+    }
+}

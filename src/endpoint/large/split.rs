@@ -218,4 +218,22 @@ mod tests {
         assert_eq!(Numbers::after(0).take(65_535) as u16, 1);
         assert_eq!(Numbers::after(1).take(65_535) as u16, 1);
     }
+
+    #[test]
+    fn a_destination_that_keeps_few_fragments_gets_longer_ones() {
+        let cutting = |limit, most| Cutting {
+            limit,
+            repeat_code: false,
+            kept: Some((most, 300)),
+        };
+        for (limit, most, expected) in [(100, 10, 10), (100, 9, 4), (400, 2, 3)] {
+            assert_eq!(cutting(limit, most).cut(1000).count(), expected);
+        }
+        let repeating = Cutting {
+            repeat_code: true,
+            ..cutting(100, 10)
+        };
+        assert_eq!(cutting(100, 10).longest(), 100 * MOST);
+        assert_eq!(repeating.longest(), 98 * MOST);
+    }
 }

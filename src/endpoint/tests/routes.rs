@@ -40,6 +40,18 @@ fn at(host: u8) -> To {
 }
 
 #[test]
+fn a_connection_that_has_closed_takes_the_routes_through_it_along() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    let source = id("42.1.2");
+    rig.hear_from(ELSEWHERE, &Frame { source, ..again(1) });
+    rig.endpoint.forget_path(path(PEER_HOST));
+    let peers: Vec<_> = rig.endpoint.peers().map(|peer| peer.id).collect();
+    assert_eq!(peers, [source]);
+    assert_eq!(destination(&mut rig), To::Group);
+}
+
+#[test]
 fn a_forged_sender_steals_nothing_from_a_peer_that_answers() {
     let mut rig = Rig::new();
     rig.meet_peer();

@@ -226,6 +226,25 @@ fn a_static_peer_is_reached_where_it_is_configured_to_be() {
 }
 
 #[test]
+fn replaced_static_peers_are_those_that_are_reached() {
+    let at = |host| StaticPeer {
+        id: PEER,
+        path: path(host),
+        gets_broadcasts: true,
+    };
+    let mut rig = Rig::with(Config {
+        static_peers: vec![at(50)],
+        ..Config::default()
+    });
+    rig.endpoint.set_static_peers(vec![at(51)]);
+    rig.send(to_peer()).unwrap();
+    assert_eq!(rig.sent()[0].0, To::Peer(path(51).peer));
+    rig.endpoint.set_static_peers(Vec::new());
+    rig.send(to_peer()).unwrap();
+    assert_eq!(rig.sent()[0].0, To::Group);
+}
+
+#[test]
 fn a_static_peer_gets_only_the_broadcasts_that_match_it() {
     let known = StaticPeer {
         id: PEER,

@@ -12,7 +12,7 @@ use crate::service::{Handled, Outbox, State};
 
 /// Limit of remembered clients with an emergency. The next one replaces one that shows no life. If
 /// there is none, it is only noted, and the client in control clears it.
-const MOST_EMERGENCIES: usize = 1024;
+pub(super) const MOST_EMERGENCIES: usize = 1024;
 
 impl Condition {
     const fn leads_from(self, state: State) -> State {

@@ -4,14 +4,14 @@ mod stopping;
 
 use std::time::Duration;
 
-use super::{AccessControl, Condition, Management};
+use super::{AccessControl, Condition, Control, Management};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::messages::core::confirm_control::ResponseCode as Confirmation;
 use crate::messages::core::reject_control::ResponseCode as Rejection;
 use crate::messages::core::*;
 use crate::service::stack_rig::{Sent, StackRig as Rig};
-use crate::service::{Stack, Standing as Now, State, Transport};
+use crate::service::{Stack, Standing as Now, State, Transport, code_of};
 
 const FIRST: JausId = JausId::new(42, 2, 1);
 const SECOND: JausId = JausId::new(42, 2, 2);
@@ -124,6 +124,8 @@ fn the_client_in_control_may_change_its_authority_by_asking_again() {
     assert_eq!(rig.request(FIRST, 50), [granted]);
     assert_eq!(rig.controller(), Some((FIRST, 50)));
     assert_eq!(rig.state(), State::Ready, "renewing stops nothing");
+    let granted = confirmed(FIRST, Confirmation::CONTROL_ACCEPTED);
+    assert_eq!(rig.request(FIRST, 1), [granted], "the default authority");
     let lost = rejected(FIRST, Rejection::CONTROL_RELEASED);
     assert_eq!(rig.request(FIRST, 0), [lost]);
     assert_eq!((rig.controller(), rig.state()), (None, State::Standby));
@@ -197,6 +199,19 @@ fn control_that_is_not_renewed_times_out() {
     assert_eq!(rig.pass(Duration::from_secs(1)), [lost]);
     assert_eq!((rig.controller(), rig.state()), (None, State::Standby));
     assert_eq!(rig.pass(Duration::from_secs(60)), []);
+}
+
+#[test]
+fn control_ends_at_its_timeout_without_any_other_reason_to_wake_up() {
+    let access = AccessControl::new().timeout(3);
+    assert!(Control::with_access_control(access).has_timeout());
+    let mut rig = Rig::with(|stack| stack.access_control(access));
+    rig.dead.push(FIRST);
+    rig.request(FIRST, 1);
+    let (to, lost) = rejected(FIRST, Rejection::CONTROL_RELEASED);
+    let said = rig.run(Duration::from_secs(10));
+    assert_eq!(said, [(Duration::from_millis(3750), to, lost)]);
+    assert!(!Control::with_access_control(access.timeout(0)).has_timeout());
 }
 
 #[test]
@@ -584,6 +599,89 @@ fn a_flood_of_forged_emergencies_hides_no_real_one_and_is_cleared_by_the_client_
     // There were more emergencies than the table holds; the client in control clears the rest.
     rig.hear(FIRST, &CLEAR);
     assert_eq!(rig.state(), State::Standby);
+}
+
+/// The number of setters that the table holds.
+const MOST: u16 = super::management::MOST_EMERGENCIES as u16;
+
+fn setter(i: u16) -> JausId {
+    JausId::new(1000 + i, 1, 1)
+}
+
+#[test]
+fn a_setter_that_finds_the_table_full_is_noted_until_the_client_in_control_clears_it() {
+    let mut rig = lasting();
+    for i in 0..=MOST {
+        rig.hear(setter(i), &STOP);
+    }
+    rig.hear(FIRST, &CLEAR);
+    for i in 0..MOST {
+        rig.hear(setter(i), &CLEAR);
+    }
+    assert_eq!(rig.state(), State::Emergency, "one more has set it");
+    rig.hear(FIRST, &CLEAR);
+    assert_eq!(rig.state(), State::Standby);
+}
+
+#[test]
+fn a_full_table_holds_again_a_setter_that_repeats_and_one_in_place_of_a_dead_one() {
+    let mut rig = lasting();
+    rig.dead.push(setter(0));
+    rig.hear(setter(0), &STOP);
+    rig.run(Duration::from_secs(5));
+    for i in 1..=MOST {
+        rig.hear(setter(i), &STOP);
+    }
+    rig.hear(setter(1), &STOP);
+    for i in 1..=MOST {
+        assert_eq!(rig.state(), State::Emergency);
+        rig.hear(setter(i), &CLEAR);
+    }
+    assert_eq!(rig.state(), State::Standby);
+}
+
+#[test]
+fn only_setters_of_emergencies_are_probed_among_clients_without_control() {
+    type Send = fn(&mut Rig);
+    let sends: [(Send, bool); 2] = [
+        (|rig| _ = rig.hear(THIRD, &STOP), true),
+        (|rig| _ = rig.hear(THIRD, &QueryStatus), false),
+    ];
+    for (send, probed) in sends {
+        let mut rig = Rig::managed();
+        send(&mut rig);
+        rig.now += Duration::from_secs(5);
+        rig.stack.handle_timeout(rig.now);
+        let sent: Vec<_> = std::iter::from_fn(|| rig.stack.poll_transmit()).collect();
+        let is_probe = |payload| code_of(payload) == Some(QueryHeartbeatPulse::CODE);
+        assert_eq!(sent.iter().any(|it| is_probe(&it.payload)), probed);
+    }
+}
+
+#[test]
+fn a_component_lists_the_services_of_its_settings() {
+    type Settings = fn(Stack) -> Stack;
+    let cases: [(Settings, &[&str]); 3] = [
+        (|stack| stack, &[]),
+        (
+            |stack| stack.access_control(AccessControl::new()),
+            &[access_control::URN],
+        ),
+        (
+            |stack| stack.management(Management::new()),
+            &[access_control::URN, management::URN],
+        ),
+    ];
+    for (settings, expected) in cases {
+        let mut rig = Rig::with(settings);
+        let query = QueryServices {
+            node_list: Vec::new(),
+        };
+        let answer = format!("{:?}", rig.hear(FIRST, &query));
+        for urn in [access_control::URN, management::URN] {
+            assert_eq!(answer.contains(urn), expected.contains(&urn), "{urn}");
+        }
+    }
 }
 
 #[test]

@@ -16,7 +16,7 @@ use crate::messages::core::{CommandEvent, CreateCommandEvent};
 use crate::service::{Outbox, code_of};
 
 /// Limit of commands that run for all clients. Services do not report the end of more codes.
-const MOST_COMMANDS: usize = 64;
+pub(super) const MOST_COMMANDS: usize = 64;
 
 /// A command event that a client requests.
 #[derive(Debug)]

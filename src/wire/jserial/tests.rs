@@ -243,6 +243,17 @@ fn nested_beginnings_do_not_multiply_the_work_or_the_memory() {
     assert!(counters.bad_forms < 20_000, "{counters:?}");
 }
 
+#[test]
+fn only_an_unfinished_packet_is_buffered() {
+    let packet = hex(PACKET);
+    let mut decoder = Decoder::new();
+    decoder.push(&packet[..20]);
+    assert_eq!((decoder.next_frame(), decoder.buffered()), (None, 20));
+    decoder.push(&packet[20..]);
+    assert!(decoder.next_frame().is_some());
+    assert_eq!(decoder.buffered(), 0);
+}
+
 fn any_frames() -> impl Strategy<Value = Vec<Frame>> {
     let version = prop_oneof![Just(Version::As5669a), Just(Version::As5669)];
     prop::collection::vec(version.prop_flat_map(any_frame), 1..6)

@@ -175,6 +175,18 @@ fn no_more_than_one_unfinished_message_waits() {
 }
 
 #[test]
+fn an_idle_connection_releases_its_buffer_and_no_unfinished_message() {
+    let mut decoder = Decoder::new();
+    decoder.input().extend_from_slice(&hex("02 00 1e"));
+    assert_eq!(decoder.next_frame(), Ok(None));
+    decoder.release();
+    assert_eq!(decoder.buffered(), 2);
+    decoder.input().clear();
+    decoder.release();
+    assert_eq!((decoder.buffered(), decoder.input().capacity()), (0, 0));
+}
+
+#[test]
 fn a_small_payload_does_not_hold_on_to_the_buffer() {
     let mut decoder = Decoder::new();
     decoder

@@ -211,4 +211,15 @@ mod tests {
             assert!(error.contains("such as 20.1.33.1"), "{error}");
         }
     }
+
+    #[test]
+    fn a_header_holds_an_ra_id_if_it_is_an_older_one_with_a_subsystem() {
+        let ra = RaId::new(20, 1, 33, 1);
+        let small = JausId::new(1, 1, 1);
+        for version in [Version::Ra, Version::As5669] {
+            assert_eq!(RaId::in_header(version, ra.into()), Some(ra));
+            assert_eq!(RaId::in_header(version, small), None);
+        }
+        assert_eq!(RaId::in_header(Version::As5669a, ra.into()), None);
+    }
 }

@@ -112,21 +112,30 @@ impl Service for Fragile {
     }
 }
 
-#[test]
-fn a_failure_lasts_until_both_the_services_and_the_application_are_well() {
+const FAIL: u32 = 1;
+const RECOVER: u32 = 2;
+
+/// A component with a service that carries out the order that it finds when it is queried.
+fn fragile(settings: Management) -> (Rig, Arc<AtomicU32>) {
     let order = Arc::new(AtomicU32::new(0));
     let services: Vec<Box<dyn Service>> = vec![Box::new(Fragile(Arc::clone(&order)))];
-    let mut rig = Rig::new(services, |stack| stack.management(Management::new()));
+    let rig = Rig::new(services, |stack| stack.management(settings));
+    (rig, order)
+}
+
+#[test]
+fn a_failure_lasts_until_both_the_services_and_the_application_are_well() {
+    let (mut rig, order) = fragile(Management::new());
     let tell = |rig: &mut Rig, what| {
         order.store(what, Relaxed);
         rig.hear(SECOND, &QueryElementCount);
     };
     rig.request(FIRST, 100);
     rig.hear(FIRST, &Resume);
-    tell(&mut rig, 1);
+    tell(&mut rig, FAIL);
     assert_eq!((rig.controller(), rig.state()), (None, State::Failure));
     rig.stack.set_condition(rig.now, Condition::Failed);
-    tell(&mut rig, 2);
+    tell(&mut rig, RECOVER);
     assert_eq!(
         rig.state(),
         State::Failure,
@@ -137,10 +146,56 @@ fn a_failure_lasts_until_both_the_services_and_the_application_are_well() {
 }
 
 #[test]
+fn a_failure_of_a_service_ends_with_its_recovery_and_shows_after_other_states() {
+    let initializing = Management::new().initializes();
+    let initialized = |rig: &mut Rig| rig.stack.set_condition(rig.now, Condition::Initialized);
+    let stop = |rig: &mut Rig| _ = rig.hear(THIRD, &STOP);
+    let clear = |rig: &mut Rig| _ = rig.hear(THIRD, &CLEAR);
+    let nothing = |_: &mut Rig| {};
+    type Step = fn(&mut Rig);
+    let cases: [(Management, Step, Step, State, State); 3] = [
+        (
+            Management::new(),
+            nothing,
+            nothing,
+            State::Failure,
+            State::Standby,
+        ),
+        (
+            Management::new(),
+            stop,
+            clear,
+            State::Emergency,
+            State::Emergency,
+        ),
+        (
+            initializing,
+            nothing,
+            initialized,
+            State::Initialize,
+            State::Initialize,
+        ),
+    ];
+    for (settings, before, after, shown, recovered) in cases {
+        let (mut rig, order) = fragile(settings);
+        let tell = |rig: &mut Rig, what, expected| {
+            order.store(what, Relaxed);
+            rig.hear(SECOND, &QueryElementCount);
+            assert_eq!(rig.state(), expected);
+        };
+        before(&mut rig);
+        tell(&mut rig, FAIL, shown);
+        tell(&mut rig, RECOVER, recovered);
+        tell(&mut rig, FAIL, shown);
+        after(&mut rig);
+        assert_eq!(rig.state(), State::Failure);
+        tell(&mut rig, RECOVER, State::Standby);
+    }
+}
+
+#[test]
 fn a_fault_that_is_found_while_an_event_is_answered_counts() {
-    let order = Arc::new(AtomicU32::new(0));
-    let services: Vec<Box<dyn Service>> = vec![Box::new(Fragile(Arc::clone(&order)))];
-    let mut rig = Rig::new(services, |stack| stack.management(Management::new()));
+    let (mut rig, order) = fragile(Management::new());
     let create = CreateEvent {
         request_id: 1,
         event_type: 0.into(),
@@ -152,7 +207,7 @@ fn a_fault_that_is_found_while_an_event_is_answered_counts() {
     rig.hear(SECOND, &create);
     rig.request(FIRST, 100);
     rig.hear(FIRST, &Resume);
-    order.store(1, Relaxed);
+    order.store(FAIL, Relaxed);
     rig.run(Duration::from_secs(2));
     assert_eq!(rig.state(), State::Failure);
 }

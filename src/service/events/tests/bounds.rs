@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bytes::Bytes;
 
+use super::super::rejecting::{INVALID_EVENT, rejection};
 use super::{CLIENT, COUNTER, OTHER, Rig, SECOND, answer, events, periodic};
 use crate::address::JausId;
 use crate::codec::Message;
@@ -94,6 +95,16 @@ fn what_nobody_could_answer_is_refused() {
             ResponseCode::INVALID_EVENT_SETUP,
         ),
         (
+            "the longest query, which is unknown",
+            query(&[0x22; 1024]),
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+        ),
+        (
+            "a query that is too long",
+            query(&[0x22; 1025]),
+            ResponseCode::INVALID_EVENT_SETUP,
+        ),
+        (
             "an unknown type",
             kind(2),
             ResponseCode::INVALID_EVENT_SETUP,
@@ -113,6 +124,23 @@ fn what_nobody_could_answer_is_refused() {
             "{what}"
         );
         assert_eq!((said.len(), rig.stack.event_count()), (1, 0), "{what}");
+    }
+}
+
+#[test]
+fn a_rejection_says_why_in_words() {
+    for (why, words) in [
+        (ResponseCode::CONNECTION_REFUSED, "no room"),
+        (ResponseCode::INVALID_EVENT_SETUP, "invalid event type"),
+        (
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+            "this component does not answer",
+        ),
+        (INVALID_EVENT, "you have no event"),
+        (ResponseCode(99), "refused"),
+    ] {
+        let text = format!("{:?}", rejection(1, why).error_message);
+        assert!(text.contains(words), "{text}");
     }
 }
 
@@ -224,6 +252,24 @@ fn events_that_nobody_renews_expire_if_so_wanted() {
         (1, 1),
         "its end is told"
     );
+}
+
+#[test]
+fn an_event_expires_when_its_minutes_have_passed() {
+    let mut rig = Rig::with(EventSettings {
+        timeout: 2,
+        ..EventSettings::default()
+    });
+    let create = CreateEvent {
+        event_type: EventType(1),
+        ..periodic(5, 0.0, &QueryStatus)
+    };
+    rig.create(CLIENT, &create);
+    let said = rig.run(300 * SECOND);
+    assert_eq!(said.len(), 1, "{said:?}");
+    let confirm = ConfirmEventRequest::decode(&said[0].2).unwrap();
+    assert_eq!((said[0].0, confirm.request_id), (120 * SECOND, 5));
+    assert_eq!(rig.stack.event_count(), 0);
 }
 
 /// A network address.

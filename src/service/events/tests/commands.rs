@@ -1,8 +1,14 @@
 //! Command events: each runs once, and its end is reported once.
 
+use super::super::commands::MOST_COMMANDS;
+use super::super::{CommandTrial, Events};
 use super::*;
+use crate::endpoint::Received;
 use crate::messages::core::command_event::CommandResult;
 use crate::messages::core::reject_event_request::ResponseCode;
+use crate::service::Outbox;
+use crate::service::stack_rig::US;
+use crate::wire::{Broadcast, Priority};
 
 const FIRST: CommandResult = CommandResult::SUCCESSFUL;
 const FAILED: CommandResult = CommandResult::UNSUCCESSFUL;
@@ -152,4 +158,51 @@ fn a_cancelled_command_event_is_not_told_of_and_numbers_are_shared_with_events()
     let confirm: ConfirmEventRequest = answer(&rig.hear(CLIENT, &cancel));
     assert_eq!((confirm.request_id, confirm.event_id), (8, 2));
     assert_eq!(rig.end_job(true), []);
+}
+
+/// Begins a command event for a command with this code; returns whether the command runs.
+fn begin(events: &mut Events, rig: &Rig, source: JausId, code: u16, out: &mut Outbox) -> bool {
+    let request = Received {
+        source,
+        destination: US,
+        to: US,
+        priority: Priority::Standard,
+        broadcast: Broadcast::None,
+        payload: Bytes::new(),
+        path: None,
+    };
+    let create = CreateCommandEvent {
+        command_message: Bytes::copy_from_slice(&code.to_le_bytes()),
+        ..job(1, 0)
+    };
+    let trial = CommandTrial::new(&request, create).unwrap();
+    events.begin_command(rig.now, &trial, None, out)
+}
+
+#[test]
+fn running_commands_are_bounded_and_a_running_one_can_be_sent_again() {
+    let (mut events, rig) = (Events::new(EventSettings::default()), Rig::new());
+    let mut out = Outbox::new(US);
+    let mut begin = |code| begin(&mut events, &rig, CLIENT, code, &mut out);
+    for code in 0..MOST_COMMANDS as u16 {
+        assert!(begin(code), "{code}");
+    }
+    assert!(!begin(MOST_COMMANDS as u16));
+    assert!(begin(0));
+}
+
+#[test]
+fn only_the_commands_of_a_client_that_is_gone_are_forgotten() {
+    let (mut events, rig) = (Events::new(EventSettings::default()), Rig::new());
+    let mut out = Outbox::new(US);
+    begin(&mut events, &rig, CLIENT, 1, &mut out);
+    begin(&mut events, &rig, OTHER, 2, &mut out);
+    events.forget(CLIENT);
+    let mut out = Outbox::new(US);
+    events.end_command(1, true, &mut out);
+    events.end_command(2, true, &mut out);
+    let told: Vec<_> = std::iter::from_fn(|| out.pop())
+        .map(|it| (it.destination, it.payload))
+        .collect();
+    assert_eq!(results(&told), [(OTHER, 1, FIRST)]);
 }

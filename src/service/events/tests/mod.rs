@@ -164,6 +164,15 @@ fn a_late_wake_up_leaves_beats_out_and_keeps_to_the_others() {
 }
 
 #[test]
+fn a_wake_up_that_is_late_by_whole_beats_reports_once() {
+    let mut rig = Rig::new();
+    rig.create(CLIENT, &periodic(1, 10.0, &QueryHeartbeatPulse));
+    let period = rig.stack.poll_timeout().unwrap() - rig.now;
+    assert_eq!(rig.pass(2 * period).len(), 1);
+    assert_eq!(rig.stack.poll_timeout(), Some(rig.now + period));
+}
+
+#[test]
 fn creating_the_same_again_changes_the_rate_and_not_the_number_of_streams() {
     let mut rig = Rig::new();
     for (request, hertz) in [(1, 1.0), (2, 5.0), (3, 5.0)] {
@@ -184,6 +193,43 @@ fn creating_the_same_again_changes_the_rate_and_not_the_number_of_streams() {
         1,
         "another client"
     );
+}
+
+#[test]
+fn the_same_query_can_be_reported_periodically_and_on_change() {
+    let mut rig = Rig::new();
+    let query = QueryElement { element_uid: 7 };
+    for (create, id) in [(periodic(1, 2.0, &query), 1), (on_change(2), 2)] {
+        let confirm: ConfirmEventRequest = answer(&rig.create(CLIENT, &create));
+        assert_eq!(confirm.event_id, id);
+    }
+    let query = query.encode().unwrap();
+    let subscribed: Vec<_> = rig.stack.subscribed().collect();
+    let (periodic, on_change) = (subscribed[0], subscribed[1]);
+    assert_eq!((periodic.0, on_change), (&query, (&query, None)));
+    assert!(periodic.1.is_some_and(|hertz| (hertz - 2.0).abs() < 0.01));
+    assert_eq!((subscribed.len(), rig.stack.event_count()), (2, 2));
+}
+
+#[test]
+fn a_client_is_probed_only_while_it_has_events() {
+    let cancel = CancelEvent {
+        request_id: 2,
+        event_id: 1,
+    };
+    for (is_cancelled, expected) in [(false, true), (true, false)] {
+        let mut rig = Rig::new();
+        rig.create(CLIENT, &on_change(1));
+        if is_cancelled {
+            rig.hear(CLIENT, &cancel);
+        }
+        rig.now += 5 * SECOND;
+        let now = rig.now;
+        rig.stack.handle_timeout(now);
+        let sent: Vec<_> = std::iter::from_fn(|| rig.stack.poll_transmit()).collect();
+        let is_probe = |octets: &Bytes| QueryHeartbeatPulse::decode(octets).is_ok();
+        assert_eq!(sent.iter().any(|it| is_probe(&it.payload)), expected);
+    }
 }
 
 #[test]
@@ -310,6 +356,13 @@ fn an_update_changes_the_rate_of_the_event_that_it_names() {
     assert_eq!((confirm.request_id, confirm.event_id), (4, 1));
     assert!((confirm.confirmed_periodic_rate_hz() - 0.5).abs() < 0.01);
     assert!(rig.run(20 * SECOND).len().abs_diff(10) <= 1);
+    assert_eq!(events(&rig.hear(CLIENT, &update)), [], "the same again");
+    let another = UpdateEvent {
+        query_message: QueryStatus.encode().unwrap(),
+        ..update.clone()
+    };
+    let said = rig.hear(CLIENT, &another);
+    assert_eq!(events(&said).len(), 1, "the first report of another query");
     let said = rig.hear(OTHER, &update);
     let reject: RejectEventRequest = answer(&said);
     assert_eq!(reject.response_code, Some(INVALID_EVENT), "not its event");
