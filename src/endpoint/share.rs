@@ -95,15 +95,19 @@ mod tests {
     fn the_largest_holder_is_known_through_all_changes() {
         let mut tally = Tally::default();
         assert_eq!((tally.largest(), tally.of('a')), (None, 0));
-        tally.add('a', 2);
-        tally.add('b', 3);
+        tally.set('a', 2);
+        tally.set('b', 3);
         assert_eq!(tally.largest(), Some((3, 'b')));
-        tally.add('a', 2);
-        assert_eq!((tally.largest(), tally.of('a')), (Some((4, 'a')), 4));
-        tally.subtract('a', 3);
-        assert_eq!((tally.largest(), tally.of('a')), (Some((3, 'b')), 1));
-        tally.subtract('b', 4);
-        assert_eq!((tally.largest(), tally.of('b')), (Some((1, 'a')), 0));
+        tally.set('a', 4);
+        tally.count('a', true);
+        assert_eq!((tally.largest(), tally.of('a')), (Some((5, 'a')), 5));
+        for _ in 0..3 {
+            tally.count('a', false);
+        }
+        assert_eq!((tally.largest(), tally.of('a')), (Some((3, 'b')), 2));
+        tally.set('b', 0);
+        tally.count('b', false);
+        assert_eq!((tally.largest(), tally.of('b')), (Some((2, 'a')), 0));
         tally.set('a', 0);
         assert_eq!(tally.largest(), None);
         assert!(tally.amounts.is_empty(), "who holds nothing takes no room");
