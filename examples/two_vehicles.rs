@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use jaus::component::{Audience, Component, Kind, Retake, Session, SessionError, SessionState};
+use jaus::component::{Audience, Component, Kind, Session, SessionError};
 use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
 use jaus::node::{Config, Node};
 
@@ -22,28 +22,20 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 async fn drive(operator: &Component, subsystem: u16) -> Result<(), SessionError> {
     let driver = Audience::from(primitive_driver::LATEST).in_subsystem(subsystem);
-    let mut session = operator.session(driver, 127, Retake::Unopposed).await?;
+    let mut session = operator.session(driver, 127).await?;
     let mut beat = tokio::time::interval(Duration::from_millis(100));
     loop {
         tokio::select! {
-            state = session.changed() => report(subsystem, state?),
+            state = session.changed() => println!("subsystem {subsystem}: {}", state?),
             _ = beat.tick() => command(&session),
         }
-    }
-}
-
-fn report(subsystem: u16, state: SessionState) {
-    match state {
-        SessionState::Ready(driver) => println!("{driver} is ready"),
-        SessionState::Lost { peer, why, .. } => println!("{peer} is lost: {why}"),
-        other => println!("subsystem {subsystem}: {other:?}"),
     }
 }
 
 fn command(session: &Session) {
     let mut ahead = SetWrenchEffort::default();
     if ahead.set_propulsive_linear_effort_x_percent(20.0).is_ok() {
-        // Fails while the vehicle is lost, which `report` has said.
+        // Fails while the vehicle is lost, which the state has said.
         let _ = session.send(&ahead);
     }
 }

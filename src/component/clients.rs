@@ -12,8 +12,8 @@ use crate::address::JausId;
 use crate::node;
 use crate::service::{
     Audience, CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Patience,
-    Retake, SessionId, SessionState, Stack, SubscriptionEnd, SubscriptionId, SubscriptionNews,
-    Topic,
+    SessionId, SessionOrder, SessionSettings, SessionState, Stack, SubscriptionEnd, SubscriptionId,
+    SubscriptionNews, Topic,
 };
 
 /// A request for a subscription, for control, or for a session.
@@ -32,33 +32,39 @@ pub(super) enum Hold {
     /// A session.
     Session {
         audience: Audience,
-        authority: u8,
-        retake: Retake,
+        settings: SessionSettings,
         reply: oneshot::Sender<Begun>,
     },
 }
 
-/// The end of a subscription, of control, or of a session.
+/// What a handle wants of its subscription, control or session. Sent without waiting.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Cancellation {
-    Subscription(SubscriptionId),
-    Control(ControlId),
-    Session(SessionId),
+pub(super) enum Instruction {
+    EndSubscription(SubscriptionId),
+    EndControl(ControlId),
+    EndSession(SessionId),
+    Session(SessionId, SessionOrder),
 }
 
-/// Sends the cancellation when it is dropped, on any thread.
+/// Sends the end of its subscription, control or session when it is dropped, on any thread.
 #[derive(Debug)]
 pub(super) struct Ticket {
-    cancellation: Cancellation,
-    /// The queue cannot outgrow the limits of subscriptions and control, because each ticket sends
-    /// once.
-    cancellations: mpsc::UnboundedSender<Cancellation>,
+    end: Instruction,
+    /// Only the application fills this queue. It is emptied before everything else.
+    instructions: mpsc::UnboundedSender<Instruction>,
+}
+
+impl Ticket {
+    /// Sends an instruction. False if the component has stopped.
+    pub(super) fn instruct(&self, instruction: Instruction) -> bool {
+        self.instructions.send(instruction).is_ok()
+    }
 }
 
 impl Drop for Ticket {
     fn drop(&mut self) {
-        // An error means that the component has stopped, so it has ended already.
-        let _ = self.cancellations.send(self.cancellation);
+        // Without the component it has ended already.
+        self.instruct(self.end);
     }
 }
 
@@ -100,7 +106,7 @@ pub(super) enum Condition {
 
 /// All active and pending subscriptions and control leases.
 pub(super) struct Clients {
-    cancellations: mpsc::UnboundedSender<Cancellation>,
+    instructions: mpsc::UnboundedSender<Instruction>,
     subscribing: HashMap<SubscriptionId, oneshot::Sender<Subscribed>>,
     feeds: HashMap<SubscriptionId, Arc<Feed>>,
     asking: HashMap<ControlId, oneshot::Sender<Controlled>>,
@@ -109,10 +115,10 @@ pub(super) struct Clients {
 }
 
 impl Clients {
-    /// `cancellations` is the channel whose entries the task passes to [`part`](Self::part).
-    pub(super) fn new(cancellations: mpsc::UnboundedSender<Cancellation>) -> Self {
+    /// `instructions` is the channel whose entries the task passes to [`follow`](Self::follow).
+    pub(super) fn new(instructions: mpsc::UnboundedSender<Instruction>) -> Self {
         Self {
-            cancellations,
+            instructions,
             subscribing: HashMap::new(),
             feeds: HashMap::new(),
             asking: HashMap::new(),
@@ -121,10 +127,10 @@ impl Clients {
         }
     }
 
-    fn ticket(&self, cancellation: Cancellation) -> Ticket {
+    fn ticket(&self, end: Instruction) -> Ticket {
         Ticket {
-            cancellation,
-            cancellations: self.cancellations.clone(),
+            end,
+            instructions: self.instructions.clone(),
         }
     }
 
@@ -154,15 +160,14 @@ impl Clients {
             },
             Hold::Session {
                 audience,
-                authority,
-                retake,
+                settings,
                 reply,
             } => {
                 let now = Instant::now();
-                let id = stack.begin_session(now, audience, authority, retake, patience);
-                let (state, told) = watch::channel(SessionState::Engaging);
+                let id = stack.begin_session(now, audience, settings, patience);
+                let (state, told) = watch::channel(SessionState::Seeking);
                 self.sessions.insert(id, state);
-                let ticket = self.ticket(Cancellation::Session(id));
+                let ticket = self.ticket(Instruction::EndSession(id));
                 let begun = Begun {
                     id,
                     ticket,
@@ -174,14 +179,16 @@ impl Clients {
         }
     }
 
-    pub(super) fn part(&mut self, stack: &mut Stack, cancellation: Cancellation) {
-        match cancellation {
-            Cancellation::Subscription(id) => {
+    pub(super) fn follow(&mut self, stack: &mut Stack, instruction: Instruction) {
+        let now = Instant::now();
+        match instruction {
+            Instruction::EndSubscription(id) => {
                 self.feeds.remove(&id);
-                stack.unsubscribe(Instant::now(), id);
+                stack.unsubscribe(now, id);
             }
-            Cancellation::Control(id) => stack.release_control(Instant::now(), id),
-            Cancellation::Session(id) => stack.release_session(Instant::now(), id),
+            Instruction::EndControl(id) => stack.release_control(now, id),
+            Instruction::EndSession(id) => stack.release_session(now, id),
+            Instruction::Session(id, order) => stack.order_session(now, id, order),
         }
     }
 
@@ -194,7 +201,7 @@ impl Clients {
             let feed = Arc::new(Feed::new());
             self.feeds.insert(id, feed.clone());
             // An unclaimed ticket cancels.
-            let _ = reply.send(Ok((self.ticket(Cancellation::Subscription(id)), feed)));
+            let _ = reply.send(Ok((self.ticket(Instruction::EndSubscription(id)), feed)));
         }
         if let Some(feed) = self.feeds.get(&id) {
             feed.tell(news);
@@ -209,7 +216,7 @@ impl Clients {
                 };
                 let (condition, told) = watch::channel(Condition::Held(None));
                 self.controls.insert(id, condition);
-                let _ = reply.send(Ok((self.ticket(Cancellation::Control(id)), told)));
+                let _ = reply.send(Ok((self.ticket(Instruction::EndControl(id)), told)));
             }
             ControlNews::Refused(why) => {
                 if let Some(reply) = self.asking.remove(&id) {

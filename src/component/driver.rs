@@ -9,7 +9,7 @@ use bytes::Bytes;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::JoinSet;
 
-use super::clients::{Cancellation, Clients, Hold};
+use super::clients::{Clients, Hold, Instruction};
 use super::directories::Membership;
 use super::watch::Outlet;
 use crate::address::JausId;
@@ -18,8 +18,7 @@ use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::QueryHeartbeatPulse;
 use crate::node::{self, Port, Resident};
 use crate::service::{
-    Change, Condition, Event, Inquiry, NoAnswer, Patience, Service, SessionId, SessionOrder, Stack,
-    Standing, UnsafeService,
+    Change, Condition, Event, Inquiry, NoAnswer, Patience, Service, Stack, Standing, UnsafeService,
 };
 
 /// A request of the application to its component's task.
@@ -44,8 +43,6 @@ pub(super) enum Command {
     Announce(u16),
     /// Report the end of the command with this code, and whether it was successful.
     End(u16, bool),
-    /// Change what the application wants of a session.
-    Session(SessionId, SessionOrder),
 }
 
 /// The result of a query.
@@ -84,7 +81,7 @@ pub(super) struct Driver {
     patience: Patience,
     waiting: HashMap<Inquiry, oneshot::Sender<Answer>>,
     clients: Clients,
-    cancellations: mpsc::UnboundedReceiver<Cancellation>,
+    instructions: mpsc::UnboundedReceiver<Instruction>,
 }
 
 impl Driver {
@@ -96,7 +93,7 @@ impl Driver {
         publisher: Publisher,
         patience: Patience,
     ) -> Self {
-        let (bid, cancellations) = mpsc::unbounded_channel();
+        let (instruct, instructions) = mpsc::unbounded_channel();
         Self {
             stack,
             membership,
@@ -107,8 +104,8 @@ impl Driver {
             publisher,
             patience,
             waiting: HashMap::new(),
-            clients: Clients::new(bid),
-            cancellations,
+            clients: Clients::new(instruct),
+            instructions,
         }
     }
 
@@ -128,14 +125,14 @@ impl Driver {
                 },
                 command = self.inbox.recv() => match command {
                     Some(command) => {
-                        self.part();
+                        self.follow();
                         self.obey(command);
                     }
                     None => return self.leave().await,
                 },
                 () = self.resident.closing() => return self.leave().await,
-                Some(cancellation) = self.cancellations.recv() => {
-                    self.clients.part(&mut self.stack, cancellation);
+                Some(instruction) = self.instructions.recv() => {
+                    self.clients.follow(&mut self.stack, instruction);
                 }
                 Some((peer, delivered)) = self.probes.next() => {
                     if delivered {
@@ -149,11 +146,11 @@ impl Driver {
         }
     }
 
-    /// Ends everything that was dropped before a command was sent, so that the command finds it
-    /// ended.
-    fn part(&mut self) {
-        while let Ok(cancellation) = self.cancellations.try_recv() {
-            self.clients.part(&mut self.stack, cancellation);
+    /// Follows the instructions that were sent before a command, so that the command finds ended
+    /// what was dropped.
+    fn follow(&mut self) {
+        while let Ok(instruction) = self.instructions.try_recv() {
+            self.clients.follow(&mut self.stack, instruction);
         }
     }
 
@@ -212,9 +209,6 @@ impl Driver {
             Command::Condition(condition) => self.stack.set_condition(Instant::now(), condition),
             Command::End(command, successful) => {
                 self.stack.end_command(Instant::now(), command, successful);
-            }
-            Command::Session(id, order) => {
-                self.stack.order_session(Instant::now(), id, order);
             }
             Command::Announce(query) => self.stack.announce(Instant::now(), query),
         }

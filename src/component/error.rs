@@ -7,7 +7,7 @@ use crate::address::JausId;
 use crate::codec::{DecodeError, EncodeError};
 use crate::node;
 use crate::service::{
-    CannotSubscribe, ControlLost, ControlRefused, NoAnswer, Offer, SessionLoss, State,
+    CannotSubscribe, ControlLost, ControlRefused, NoAnswer, Offer, SessionState, State,
     SubscriptionEnd,
 };
 
@@ -198,20 +198,9 @@ pub enum ControlError {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SessionError {
-    /// No peer has been found, or it has not answered yet.
-    #[error("no component is ready yet: the session is still looking for one or asking it")]
-    Engaging,
-    /// The peer is under control, and not ready.
-    #[error("{0} is under control, but stands by; call `resume`")]
-    Standby(JausId),
-    /// The peer was lost.
-    #[error("{peer} is lost: {why}")]
-    Lost {
-        /// The component that was controlled, or asked for control.
-        peer: JausId,
-        /// The reason.
-        why: SessionLoss,
-    },
+    /// The session is in another state than the operation needs.
+    #[error("{0}")]
+    State(SessionState),
     /// A message could not be sent.
     #[error(transparent)]
     NotSent(#[from] SendError),

@@ -83,8 +83,8 @@ mod watch;
 pub use crate::service::{
     AccessControl, Audience, CannotSubscribe, Change, Condition, ControlLost, ControlRefused,
     Directory, EventSettings, Handlers, Identification, Kind, Level, Liveness, Loss, Management,
-    Offer, Outage, Patience, Rejection, Retake, Scope, Service, SessionLoss, SessionState,
-    Standing, State, SubscriptionEnd, Time, TimeOfDay, Timing, When,
+    Offer, Outage, Patience, Rejection, Retake, Scope, Service, SessionLoss, SessionSettings,
+    SessionState, Standing, State, SubscriptionEnd, TargetState, Time, TimeOfDay, Timing, When,
 };
 pub use builder::{AttachError, Builder};
 pub use control::Control;

@@ -1,20 +1,27 @@
 //! The application's handle for a session.
 
-use tokio::sync::watch;
+use std::time::Duration;
 
-use super::clients::{Begun, Hold, Ticket};
-use super::driver::Command;
+use tokio::sync::watch;
+use tokio::time::timeout;
+
+use super::clients::{Begun, Hold, Instruction, Ticket};
 use super::{Component, SessionError};
 use crate::address::JausId;
 use crate::codec::Message;
-use crate::service::{Audience, Retake, SessionId, SessionOrder, SessionState};
+use crate::service::{
+    Audience, SessionId, SessionOrder, SessionSettings, SessionState, TargetState,
+};
+
+/// The status of a peer under control is reported again within this time, even if reports are lost.
+const STATUS_LIMIT: Duration = Duration::from_millis(500);
 
 /// Control of any one member of an audience, kept through its restarts. Created by
 /// [`Component::session`]. Dropping it releases control.
 ///
-/// The session finds a member, takes control, makes it ready and watches it. Its
+/// The session finds a member, takes control, brings it into the [`TargetState`] and watches it. Its
 /// [state](Self::state) says whether commands can be sent, and if not, why. After a loss it begins
-/// anew as its [`Retake`] policy says, with the same member if that is present. After an emergency
+/// anew as its [`Retake`](super::Retake) policy says, with the same member if that is present. After an emergency
 /// or another client's control it does so in standby: the application decides when to
 /// [`resume`](Self::resume).
 ///
@@ -49,17 +56,15 @@ impl Session {
     /// Waits until a peer is ready, however often it is lost meanwhile, and returns its id.
     ///
     /// # Errors
-    /// [`SessionError::Lost`] if the session does not take control again by itself.
-    /// [`SessionError::Standby`] if the peer is under control and is not to be made ready.
-    pub async fn ready(&mut self) -> Result<JausId, SessionError> {
+    /// [`SessionError::State`] if the session does not take control again by itself, or if the peer
+    /// is under control and is not to be made ready.
+    pub async fn ready(&self) -> Result<JausId, SessionError> {
         self.wait(|state| match state {
             SessionState::Ready(peer) => Some(Ok(peer)),
-            SessionState::Lost {
-                peer,
-                why,
-                continues: false,
-            } => Some(Err(SessionError::Lost { peer, why })),
-            SessionState::Standby(peer) => Some(Err(SessionError::Standby(peer))),
+            SessionState::Standby(_)
+            | SessionState::Lost {
+                continues: false, ..
+            } => Some(Err(state)),
             _ => None,
         })
         .await
@@ -68,13 +73,18 @@ impl Session {
     /// Makes the peer ready, now and after restarts, and waits until it is.
     ///
     /// # Errors
-    /// [`SessionError::Lost`] if the peer is lost at present, for instance because of an emergency.
-    /// Otherwise as [`ready`](Self::ready).
-    pub async fn resume(&mut self) -> Result<JausId, SessionError> {
-        if let Err(lost @ SessionError::Lost { .. }) = self.check() {
-            return Err(lost);
+    /// [`SessionError::State`] if the peer is lost or disabled at present, for instance because of
+    /// an emergency. Otherwise as [`ready`](Self::ready).
+    pub async fn resume(&self) -> Result<JausId, SessionError> {
+        // The end of an emergency may not have been reported to this session yet.
+        let is_disabled = |state| matches!(state, SessionState::Disabled { .. });
+        let enabled = self.wait(|state| (!is_disabled(state)).then_some(Ok(())));
+        let _ = timeout(STATUS_LIMIT, enabled).await;
+        let state = self.state();
+        if is_disabled(state) || matches!(state, SessionState::Lost { .. }) {
+            return Err(SessionError::State(state));
         }
-        self.order(SessionOrder::Resume).await?;
+        self.set_target(TargetState::Ready)?;
         // The order ends this state.
         self.wait(|state| (!matches!(state, SessionState::Standby(_))).then_some(Ok(())))
             .await?;
@@ -84,36 +94,42 @@ impl Session {
     /// Puts the peer into standby, now and after restarts, and waits until it reports that.
     ///
     /// # Errors
-    /// [`SessionError::Lost`] if the peer is lost.
-    pub async fn standby(&mut self) -> Result<JausId, SessionError> {
-        self.order(SessionOrder::Standby).await?;
+    /// [`SessionError::State`] if the peer is lost or disabled.
+    pub async fn standby(&self) -> Result<JausId, SessionError> {
+        self.set_target(TargetState::Standby)?;
         self.wait(|state| match state {
             SessionState::Standby(peer) => Some(Ok(peer)),
-            SessionState::Lost { peer, why, .. } => Some(Err(SessionError::Lost { peer, why })),
+            SessionState::Lost { .. } | SessionState::Disabled { .. } => Some(Err(state)),
             _ => None,
         })
         .await
     }
 
-    /// Takes control again, at once. [`Retake`] says when that is needed.
+    /// Brings the peer into this state, now and after restarts, without waiting for it. Ready is
+    /// refused while the peer reports an emergency.
     ///
     /// # Errors
     /// [`SessionError::Stopped`].
-    pub async fn retake(&self) -> Result<(), SessionError> {
-        self.order(SessionOrder::Retake).await
+    pub fn set_target(&self, target: TargetState) -> Result<(), SessionError> {
+        self.order(SessionOrder::Target(target))
+    }
+
+    /// Takes control again, at once. The [`Retake`](super::Retake) policy says when that is needed.
+    ///
+    /// # Errors
+    /// [`SessionError::Stopped`].
+    pub fn retake(&self) -> Result<(), SessionError> {
+        self.order(SessionOrder::Retake)
     }
 
     /// The peer, if it obeys commands.
     ///
     /// # Errors
-    /// The reason if it does not.
+    /// [`SessionError::State`] if it does not.
     pub fn check(&self) -> Result<JausId, SessionError> {
         match self.state() {
             SessionState::Ready(peer) => Ok(peer),
-            SessionState::Engaging => Err(SessionError::Engaging),
-            SessionState::Standby(peer) => Err(SessionError::Standby(peer)),
-            SessionState::Lost { peer, why, .. } => Err(SessionError::Lost { peer, why }),
-            SessionState::Released => Err(SessionError::Stopped),
+            other => Err(SessionError::State(other)),
         }
     }
 
@@ -147,32 +163,36 @@ impl Session {
         let _ = state.wait_for(|it| *it == SessionState::Released).await;
     }
 
-    async fn order(&self, order: SessionOrder) -> Result<(), SessionError> {
-        let commands = &self.component.shared.commands;
-        let sent = commands.send(Command::Session(self.id, order)).await;
-        sent.map_err(|_| SessionError::Stopped)
+    fn order(&self, order: SessionOrder) -> Result<(), SessionError> {
+        let is_sent = self.ticket.instruct(Instruction::Session(self.id, order));
+        is_sent.then_some(()).ok_or(SessionError::Stopped)
     }
 
+    /// Waits for a state that ends an operation, well or not.
     async fn wait<T>(
-        &mut self,
-        is_over: impl Fn(SessionState) -> Option<Result<T, SessionError>>,
+        &self,
+        end: impl Fn(SessionState) -> Option<Result<T, SessionState>>,
     ) -> Result<T, SessionError> {
-        let state = self.state.wait_for(|it| is_over(*it).is_some()).await;
+        let mut states = self.state.clone();
+        let state = states.wait_for(|it| end(*it).is_some()).await;
         let state = *state.map_err(|_| SessionError::Stopped)?;
-        is_over(state).unwrap_or(Err(SessionError::Stopped))
+        end(state)
+            .unwrap_or(Err(state))
+            .map_err(SessionError::State)
     }
 }
 
 impl Component {
     /// Begins a session: finds a member of the audience, takes control of it, makes it ready, and
-    /// keeps it so through restarts. `authority` is from 0 to 255; the higher one wins.
+    /// keeps it so through restarts. An authority suffices as settings: from 0 to 255; the higher one
+    /// wins.
     ///
     /// ```no_run
-    /// # use jaus::component::{Audience, Component, Retake, SessionError};
+    /// # use jaus::component::{Audience, Component, SessionError};
     /// # use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
     /// # async fn drive(operator: Component) -> Result<(), SessionError> {
     /// let driver = Audience::from(primitive_driver::LATEST).in_subsystem(101);
-    /// let mut session = operator.session(driver, 127, Retake::Unopposed).await?;
+    /// let session = operator.session(driver, 127).await?;
     /// let rover = session.ready().await?;
     /// println!("{rover} is ready");
     /// session.send(&SetWrenchEffort::default())?;
@@ -185,14 +205,12 @@ impl Component {
     pub async fn session(
         &self,
         audience: impl Into<Audience>,
-        authority: u8,
-        retake: Retake,
+        settings: impl Into<SessionSettings>,
     ) -> Result<Session, SessionError> {
-        let audience = audience.into();
+        let (audience, settings) = (audience.into(), settings.into());
         let begun = self.hold(|reply| Hold::Session {
             audience,
-            authority,
-            retake,
+            settings,
             reply,
         });
         let Begun { id, ticket, state } = begun.await.ok_or(SessionError::Stopped)?;

@@ -60,8 +60,8 @@ pub use audience::Audience;
 pub use calendar::Date;
 pub use client::{
     CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Outage, Rejection,
-    Retake, SessionId, SessionLoss, SessionOrder, SessionState, SubscriptionEnd, SubscriptionId,
-    SubscriptionNews, Topic, When,
+    Retake, SessionId, SessionLoss, SessionOrder, SessionSettings, SessionState, SubscriptionEnd,
+    SubscriptionId, SubscriptionNews, TargetState, Topic, When,
 };
 pub use context::Context;
 pub use control::{AccessControl, Condition, Management};

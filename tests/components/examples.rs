@@ -118,7 +118,7 @@ fn two_vehicles_are_commanded_through_their_restarts() {
     operator.expect("102.1.33 is ready");
     second.expect("44.1.1 drives with 20 %");
     drop(first);
-    operator.expect("102.1.33 is lost");
+    operator.expect("no control of 102.1.33");
     let mut first = Example::start_with("driver", &["102"]);
     first.expect("44.1.1 drives with 20 %");
     operator.expect("102.1.33 is ready");
@@ -126,7 +126,7 @@ fn two_vehicles_are_commanded_through_their_restarts() {
         !operator
             .seen
             .iter()
-            .any(|line| line.contains("103.1.33 is lost"))
+            .any(|line| line.contains("no control of 103.1.33"))
     );
 }
 

@@ -117,19 +117,6 @@ impl Part {
         self.status.is_some_and(|it| it.what == state as u8)
     }
 
-    /// Whether it has reported standby since `since`.
-    pub(super) fn stands_by(&self, since: Instant) -> bool {
-        self.is(State::Standby) && self.status.is_some_and(|it| it.at > since)
-    }
-
-    /// Whether it has reported since `since` that a client other than `own`, or none, is in
-    /// control. Returns that client.
-    pub(super) fn disowns(&self, own: JausId, since: Instant) -> Option<Option<JausId>> {
-        let told = self.controller.filter(|it| it.at > since)?;
-        let controller = told.what.map(|(id, _)| id);
-        (controller != Some(own)).then_some(controller)
-    }
-
     pub(super) fn controller(&self) -> Option<JausId> {
         self.told_controller()?
     }

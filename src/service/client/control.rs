@@ -235,9 +235,8 @@ impl Controls {
                 let controller = JausId::new(it.subsystem_id, it.node_id, it.component_id);
                 control.handle_report(now, peer, controller == out.source(), out)
             }),
-            Some(ReportStatus::CODE) => {
-                read::<ReportStatus>(message).and_then(|it| control.handle_status(it.status.0))
-            }
+            Some(ReportStatus::CODE) => read::<ReportStatus>(message)
+                .and_then(|it| control.handle_status(peer, it.status.0, out)),
             Some(ReportTimeout::CODE) => {
                 if let Some(report) = read::<ReportTimeout>(message) {
                     control.handle_lifetime(now, report.timeout.0);
@@ -410,11 +409,18 @@ impl Control {
         }
     }
 
-    /// Handles a report of the peer's status.
-    fn handle_status(&mut self, status: u8) -> Option<ControlNews> {
+    /// Handles a report of the peer's status. A peer that has changed it may have restarted: who is
+    /// its client then?
+    fn handle_status(&mut self, peer: JausId, status: u8, out: &mut Outbox) -> Option<ControlNews> {
         self.status.asked = 0;
-        let is_news = self.status.reported.replace(status) != Some(status);
-        (is_news && self.state == State::Held).then_some(ControlNews::Status(status))
+        let before = self.status.reported.replace(status);
+        if self.state != State::Held || before == Some(status) {
+            return None;
+        }
+        if before.is_some() {
+            out.send(peer, &QueryControl {});
+        }
+        Some(ControlNews::Status(status))
     }
 
     /// Handles a report of the peer's controller. Control whose renewal was denied continues if its

@@ -18,7 +18,9 @@ pub(super) use control::Controls;
 pub use control::{ControlId, ControlLost, ControlNews, ControlRefused};
 pub use news::{Outage, SubscriptionEnd, SubscriptionNews};
 pub use rejection::Rejection;
-pub use session::{Retake, SessionId, SessionLoss, SessionOrder, SessionState};
+pub use session::{
+    Retake, SessionId, SessionLoss, SessionOrder, SessionSettings, SessionState, TargetState,
+};
 pub(super) use session::{Sessions, Surroundings};
 pub use subscriptions::SubscriptionId;
 pub(super) use subscriptions::Subscriptions;

@@ -10,7 +10,7 @@ use crate::endpoint::Received;
 use crate::service::client::{Sessions, Surroundings};
 use crate::service::{
     Audience, CannotSubscribe, ControlId, ControlNews, ControlRefused, Handled, Inquiry, Patience,
-    Retake, SessionId, SessionOrder, SubscriptionId, Topic,
+    SessionId, SessionOrder, SessionSettings, SubscriptionId, Topic,
 };
 
 impl Stack {
@@ -76,18 +76,16 @@ impl Stack {
     }
 
     /// Begins a session: control of a member of the audience, kept through restarts and losses.
-    /// [`Event::Session`] brings its progress. The peer is made ready unless the application
-    /// [orders](Self::order_session) otherwise.
+    /// [`Event::Session`] brings its progress.
     pub fn begin_session(
         &mut self,
         now: Instant,
         audience: Audience,
-        authority: u8,
-        retake: Retake,
+        settings: SessionSettings,
         patience: Patience,
     ) -> SessionId {
         let (sessions, mut around) = self.sessions();
-        let session = sessions.begin(now, audience, authority, retake, patience, &mut around);
+        let session = sessions.begin(now, audience, settings, patience, &mut around);
         self.collect(now);
         session
     }
@@ -151,9 +149,11 @@ impl Stack {
         let Self {
             subscriptions,
             controls,
+            sessions,
             out,
             ..
         } = self;
+        sessions.handle_message(message);
         match subscriptions.handle_message(now, message, out) {
             Handled::Yes => Handled::Yes,
             Handled::No => controls.handle_message(now, message, out),

@@ -12,16 +12,18 @@ use crate::state::Edition;
 use crate::stick::Push;
 use jaus::address::JausId;
 use jaus::codec::{Message, OutOfRange};
-use jaus::component::{Component, Control, ControlError, DeliverError};
+use jaus::component::{
+    Component, DeliverError, Retake, Session, SessionError, SessionSettings, TargetState,
+};
 use jaus::messages::core::{QueryStatus, ReportStatus};
 use jaus::messages::mobility::SetWrenchEffort;
 
 /// Completion of a job.
 pub(super) enum Finished {
-    /// Result of a control request.
-    Taken {
+    /// A session with a part has begun.
+    Begun {
         peer: JausId,
-        result: Result<Control, ControlError>,
+        result: Result<Session, SessionError>,
     },
     /// Result of a page's request.
     Requested {
@@ -96,12 +98,16 @@ impl Client {
         self.jobs.spawn(job);
     }
 
-    /// Requests control.
-    pub(super) fn take(&mut self, peer: JausId) {
-        let (component, authority) = (self.component.clone(), self.authority);
+    /// Begins a session, which leaves the part as it is found. Another client may have taken control
+    /// for a reason, so the session does not contend.
+    pub(super) fn begin(&mut self, peer: JausId) {
+        let component = self.component.clone();
+        let settings = SessionSettings::new(self.authority)
+            .retake(Retake::WhenFree)
+            .target(TargetState::AsFound);
         self.jobs.spawn(async move {
-            let result = component.control(peer, authority).await;
-            Finished::Taken { peer, result }
+            let result = component.session(peer, settings).await;
+            Finished::Begun { peer, result }
         });
     }
 
@@ -123,7 +129,7 @@ impl Client {
 
     /// Sends the stick's setpoint to the primitive driver. The newest one counts: an older one
     /// still in flight is dropped when it is late, and immediately if the vehicle has to stop.
-    pub(super) fn steer(&mut self, now: Instant, control: &Arc<Control>, push: Push) {
+    pub(super) fn steer(&mut self, now: Instant, session: &Arc<Session>, push: Push) {
         if let Some(effort) = self.effort.take_if(|it| !it.job.is_finished()) {
             let stops = push == Push::NONE && effort.push != Push::NONE;
             let late = now.saturating_duration_since(effort.sent) >= Self::EFFORT_PATIENCE;
@@ -137,9 +143,9 @@ impl Client {
             // Cannot happen: a push is within the range of the message.
             return;
         };
-        let control = Arc::clone(control);
+        let session = Arc::clone(session);
         let job = self.jobs.spawn(async move {
-            let acknowledged = control.deliver(&message).await.is_ok();
+            let acknowledged = session.deliver(&message).await.is_ok();
             Finished::Steered { push, acknowledged }
         });
         self.effort = Some(Effort {
@@ -180,17 +186,9 @@ fn note(peer: JausId, delivered: Result<(), DeliverError>) {
 }
 
 /// Delivers a command with acknowledgement. Errors are returned as text.
-pub(super) async fn deliver<M: Message>(control: &Control, command: &M) -> Result<(), String> {
-    let delivered = control.deliver(command).await;
+pub(super) async fn deliver<M: Message>(session: &Session, command: &M) -> Result<(), String> {
+    let delivered = session.deliver(command).await;
     delivered.map_err(|error| error.to_string())
-}
-
-/// Releases control and waits for the confirmation. If a job still uses the control, that job
-/// releases it at its end.
-pub(super) async fn release(control: Arc<Control>) {
-    if let Ok(control) = Arc::try_unwrap(control) {
-        control.release().await;
-    }
 }
 
 /// The only functions that send an emergency, so that its priority is set in one place.

@@ -133,9 +133,7 @@ impl Session {
 
     fn handle_finished(&mut self, now: Instant, finished: Finished) {
         match finished {
-            Finished::Taken { peer, result } => {
-                self.lease.handle_taken(now, peer, result, &mut self.client);
-            }
+            Finished::Begun { peer, result } => self.lease.handle_begun(peer, result),
             Finished::Requested { reply, result } => reply(result),
             Finished::Steered { push, acknowledged } => {
                 if acknowledged && push == Push::NONE {
@@ -159,11 +157,11 @@ impl Session {
         if self.alarm.is_wanted() || self.picture.in_emergency().next().is_some() {
             // Whatever the source of the emergency: nothing resumes on its own afterwards.
             self.stick.stop(now);
-            self.lease.set_ready(now, false);
+            self.lease.set_ready(false);
         }
         self.alarm.handle_time(now, &self.picture, &mut self.client);
         self.stop_after_lost_planner(now);
-        self.lease.handle_time(now, &self.picture, &mut self.client);
+        self.lease.handle_time(&self.picture, &mut self.client);
         self.steer(now);
         self.seq += 1;
         if self.seq.is_multiple_of(Self::SNAPSHOT) {
@@ -220,7 +218,7 @@ impl Session {
                 "the planner {planner} is {} while it drives: stopping the vehicle",
                 how.name()
             );
-            self.lease.want_stopped(now, &self.picture);
+            self.lease.want_stopped(&self.picture);
         }
     }
 
@@ -240,9 +238,9 @@ impl Session {
         };
         let driver = self.picture.find(Role::PrimitiveDriver);
         match driver.and_then(|driver| self.lease.held(driver)) {
-            Some(control) => self.client.steer(now, &control, push),
-            // Without control, earlier commands no longer affect the vehicle.
-            None => self.stick.handle_stopped(),
+            Some(session) if session.check().is_ok() => self.client.steer(now, &session, push),
+            // Without control and in standby, earlier commands no longer affect the vehicle.
+            _ => self.stick.handle_stopped(),
         }
     }
 

@@ -11,7 +11,7 @@ use crate::request::OperatorRequest;
 use crate::role::Role;
 use crate::stick::Push;
 use jaus::address::JausId;
-use jaus::component::Control;
+use jaus::component::Session as PartSession;
 use jaus::service::State;
 use jaus_vehicle::messages::ground::set_destination::Approved;
 use jaus_vehicle::messages::ground::{ApproveMission, SetDestination, StopMission};
@@ -38,7 +38,7 @@ impl Session {
     fn handle_wish(&mut self, now: Instant, page: PageId, request: OperatorRequest, reply: Reply) {
         match request {
             OperatorRequest::Select { subsystem } => reply(self.select(now, subsystem)),
-            OperatorRequest::Control { on: true } => self.take_control(now, reply),
+            OperatorRequest::Control { on: true } => self.take_control(reply),
             OperatorRequest::Control { on: false } => self.release_control(now, reply),
             OperatorRequest::Resume => self.set_ready(now, true, reply),
             OperatorRequest::Standby => self.set_ready(now, false, reply),
@@ -74,7 +74,7 @@ impl Session {
         Ok(())
     }
 
-    fn take_control(&mut self, now: Instant, reply: Reply) {
+    fn take_control(&mut self, reply: Reply) {
         if self.picture.parts().is_empty() {
             return reply(Err(NO_VEHICLE.to_owned()));
         }
@@ -89,29 +89,29 @@ impl Session {
             Wanted::Everything
         };
         self.lease
-            .take(now, wanted, reply, &self.picture, &mut self.client);
+            .take(wanted, reply, &self.picture, &mut self.client);
     }
 
     fn release_control(&mut self, now: Instant, reply: Reply) {
         self.stick.stop(now);
         self.steer(now);
-        let controls = self.lease.release(&self.picture);
+        let sessions = self.lease.release(&self.picture);
         self.client.tell(reply, async move {
-            release_all(controls).await;
+            release_all(sessions).await;
             Ok(())
         });
     }
 
     /// Resumes all held parts or sends them to standby.
     fn set_ready(&mut self, now: Instant, ready: bool, reply: Reply) {
-        let controls = self.lease.all_held();
-        if controls.is_empty() {
+        let sessions = self.lease.all_held();
+        if sessions.is_empty() {
             return reply(Err(NO_CONTROL.to_owned()));
         }
         if ready && self.picture.in_emergency().next().is_some() {
             return reply(Err("clear the emergency first".to_owned()));
         }
-        self.lease.set_ready(now, ready);
+        self.lease.set_ready(ready);
         if ready && self.lease.wanted() == Wanted::Planner && !self.is_driven_by_planner() {
             // The planner's mission is over, so the operator continues with all parts.
             drop(self.lease.want(Wanted::Everything, &self.picture));
@@ -120,7 +120,7 @@ impl Session {
             self.stick.stop(now);
             self.steer(now);
         }
-        self.client.tell(reply, manage(controls, ready));
+        self.client.tell(reply, manage(sessions, ready));
     }
 
     fn set_emergency(&mut self, now: Instant, reply: Reply) {
@@ -128,7 +128,7 @@ impl Session {
             return reply(Err(NO_VEHICLE.to_owned()));
         }
         self.stick.stop(now);
-        self.lease.set_ready(now, false);
+        self.lease.set_ready(false);
         self.steer(now);
         self.alarm.set(now, &self.picture, &mut self.client, reply);
     }
@@ -156,7 +156,7 @@ impl Session {
             .handle_push(now, page, push)
             .map_err(|busy| busy.to_string())?;
         self.halted = None;
-        self.take_over(now);
+        self.take_over();
         if let Some(why) = self.lease.obstacle(driver) {
             self.stick.handle_release(now, page);
             return Err(why);
@@ -166,7 +166,7 @@ impl Session {
     }
 
     /// Takes over from the planner if it drives.
-    fn take_over(&mut self, now: Instant) {
+    fn take_over(&mut self) {
         if self.lease.wanted() != Wanted::Planner {
             return;
         }
@@ -179,7 +179,7 @@ impl Session {
             );
         }
         drop(self.lease.want(Wanted::Everything, &self.picture));
-        self.lease.handle_time(now, &self.picture, &mut self.client);
+        self.lease.handle_time(&self.picture, &mut self.client);
     }
 
     fn go_to(&mut self, x: f64, y: f64, speed: Option<f64>, reply: Reply) {
@@ -244,25 +244,25 @@ impl Session {
         );
     }
 
-    /// The control over the planner, if held.
-    fn planner(&self) -> Option<Arc<Control>> {
+    /// The session with the planner, if held.
+    fn planner(&self) -> Option<Arc<PartSession>> {
         self.lease.held(self.picture.find(Role::Planner)?)
     }
 
-    /// The control over the planner, if it is held and ready.
-    fn ready_planner(&self) -> Result<Arc<Control>, String> {
+    /// The session with the planner, if it is held and ready.
+    fn ready_planner(&self) -> Result<Arc<PartSession>, String> {
         let planner = self.picture.find(Role::Planner);
         let planner = planner.ok_or("the vehicle has no planner")?;
         if self.alarm.is_wanted() || self.is(planner, State::Emergency) {
             return Err("the vehicle is in emergency; clear it first".to_owned());
         }
-        let control = self.lease.held(planner);
-        let control = control.ok_or_else(|| {
+        let session = self.lease.held(planner);
+        let session = session.ok_or_else(|| {
             let why = self.lease.obstacle(planner);
             why.unwrap_or_else(|| NO_CONTROL.to_owned())
         })?;
         if self.lease.is_ready() {
-            Ok(control)
+            Ok(session)
         } else {
             Err("the planner is in standby; resume first".to_owned())
         }
@@ -284,13 +284,13 @@ const NO_VEHICLE: &str = "no vehicle is known yet";
 const NO_CONTROL: &str = "take control first";
 
 /// Resumes these parts or sends them to standby. Errors are combined as text.
-async fn manage(controls: Vec<Arc<Control>>, ready: bool) -> Outcome {
+async fn manage(sessions: Vec<Arc<PartSession>>, ready: bool) -> Outcome {
     let mut wrong = Vec::new();
-    for control in controls {
+    for session in sessions {
         let managed = if ready {
-            control.resume().await
+            session.resume().await
         } else {
-            control.standby().await
+            session.standby().await
         };
         if let Err(error) = managed {
             wrong.push(error.to_string());

@@ -165,7 +165,7 @@ async fn of_two_stations_with_the_same_authority_the_second_is_told_who_is_in_co
         .await;
     let refused = other.ask(json!({"type": "control", "on": true})).await;
     let reason = refused.unwrap_err();
-    assert!(reason.contains("authority"), "{reason}");
+    assert!(reason.contains("42.1.1 is in control"), "{reason}");
     let state = other
         .until(|state| state["control"]["wanted"] == true)
         .await;

@@ -7,7 +7,6 @@ mod next;
 mod remote_platform;
 mod senses;
 mod standing;
-mod verdict;
 
 pub(super) use fault_monitor::FaultMonitor;
 pub(super) use freshness::Freshness;

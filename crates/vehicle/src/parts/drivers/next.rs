@@ -1,10 +1,9 @@
-//! The link from one driver to the next: discovery, control, resume, commands, supervision and
-//! release.
+//! The link from one driver to the next: a session, its commands, and standing down.
 //!
 //! Commands are acknowledged one at a time. While one is in flight, later ones wait, and only the
-//! latest is sent. When the next driver restarts or is briefly unreachable, the link is
-//! re-established. When it was stopped by an emergency or taken over, the driver stands down: it
-//! drops its command and waits for a new one.
+//! latest is sent. When the next driver restarts, fails for a while or is briefly unreachable, the
+//! session takes control of it again. When it was stopped by an emergency or taken over, the driver
+//! stands down: it drops its command and waits for a new one.
 #![expect(
     clippy::disallowed_methods,
     reason = "gives the driver its clock and timer"
@@ -16,7 +15,6 @@ use std::time::{Duration, Instant};
 use tokio::time::{Interval, MissedTickBehavior, interval, sleep, timeout};
 
 use super::remote_platform::{Order, Plan, RemotePlatform};
-use super::verdict::{DriverStatus, Verdict, judge};
 use super::{FaultMonitor, Watchman};
 use crate::ground::{StageBoard, StageReport, StageState};
 use crate::messages::ground::{QueryStage, ReportStage};
@@ -26,9 +24,8 @@ use crate::parts::PartError;
 use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::component::{
-    Audience, Component, Control, ControlError, ControlRefused, ManageError, QueryError, State,
+    Audience, Component, Retake, Session, SessionLoss, SessionSettings, SessionState,
 };
-use jaus::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatus};
 
 /// The command interface of the next driver.
 pub(in crate::parts) trait Language: Send + 'static {
@@ -64,25 +61,13 @@ pub(in crate::parts) struct Next<L> {
     pub(in crate::parts) sensors: FaultMonitor,
 }
 
-/// How a link to the next driver ended.
-enum End {
-    /// Nothing left to do.
-    Rest,
-    /// The link can be re-established.
-    Anew { peer: Option<JausId>, why: String },
-    /// The stop was intentional.
-    StandDown(String),
-}
-
 impl<L: Language> Next<L> {
     /// How long control of the next driver is kept while there is nothing to do.
     const LINGER: Duration = Duration::from_millis(500);
     /// Timeout for the acknowledgement of a command. A later command then replaces it.
     const PATIENCE: Duration = Duration::from_millis(400);
-    /// Without any acknowledgement for this time, the link is re-established.
+    /// Without any acknowledgement for this time, the driver reports that it is blocked.
     const SILENCE: Duration = Duration::from_secs(2);
-    /// First and longest delay before the link is re-established.
-    const PAUSES: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(2));
 
     /// Runs until the component has stopped. The owner also notices that by other means.
     pub(in crate::parts) async fn run(mut self) -> Result<Infallible, PartError> {
@@ -90,28 +75,12 @@ impl<L: Language> Next<L> {
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut watchman = Watchman::default();
         let mut down: Option<String> = None;
-        let mut pause = Self::PAUSES.0;
         loop {
             self.rest(&mut ticks, &mut watchman, down.take()).await;
-            let begun = Instant::now();
-            match self.work(&mut ticks, &mut watchman).await {
-                End::Rest => pause = Self::PAUSES.0,
-                End::Anew { peer, why } => {
-                    if begun.elapsed() > Self::PAUSES.1 {
-                        pause = Self::PAUSES.0;
-                    }
-                    // Blocked without a next driver would mean standing down.
-                    let state = peer.map_or(StageState::Engaging, |_| StageState::Blocked);
-                    self.tell(state, peer, why).await;
-                    sleep(pause).await;
-                    pause = (pause * 2).min(Self::PAUSES.1);
-                }
-                End::StandDown(why) => {
-                    tracing::warn!("motion suspended: {why}");
-                    self.stand_down(&mut ticks, &mut watchman, &why).await;
-                    down = Some(why);
-                    pause = Self::PAUSES.0;
-                }
+            down = self.work(&mut ticks, &mut watchman).await?;
+            if let Some(why) = &down {
+                tracing::warn!("motion suspended: {why}");
+                self.stand_down(&mut ticks, &mut watchman, why).await;
             }
         }
     }
@@ -134,7 +103,8 @@ impl<L: Language> Next<L> {
             self.check_sensors(None).await;
             if let Some(failure) = self.sensors.failure() {
                 let reason = format!("failure: {failure}");
-                self.tell(StageState::Blocked, self.find(), reason).await;
+                let next = self.component.members(self.providers()).first().copied();
+                self.tell(StageState::Blocked, next, reason).await;
             } else if let Some(reason) = down.as_deref().or(watchman.emergency()) {
                 self.tell_down(reason).await;
             } else if let Some(cause) = self.vehicle.last_stop() {
@@ -169,122 +139,101 @@ impl<L: Language> Next<L> {
         }
     }
 
-    /// Takes control of the next driver and commands it until the link ends.
-    async fn work(&mut self, ticks: &mut Interval, watchman: &mut Watchman) -> End {
-        let Some(peer) = self.find() else {
-            let why = format!("no {} is known", L::NAME);
-            return End::Anew { peer: None, why };
-        };
-        self.tell(StageState::Engaging, Some(peer), String::new())
-            .await;
-        let control = match self.engage(peer).await {
-            Ok(control) => control,
-            Err(end) => return end,
-        };
-        tracing::info!("in control of {peer}");
+    /// Takes control of the next driver and commands it as long as there is work. Returns the
+    /// reason if the driver has to stand down.
+    async fn work(
+        &mut self,
+        ticks: &mut Interval,
+        watchman: &mut Watchman,
+    ) -> Result<Option<String>, PartError> {
+        let settings = SessionSettings::new(self.authority).retake(Retake::WhenFree);
+        let session = self.component.session(self.providers(), settings).await;
+        let session = session.map_err(|_| PartError::NodeStopped)?;
         let component = self.component.clone();
         let end = tokio::select! {
-            end = self.command(&control, ticks, watchman) => end,
-            end = supervise(&component, peer) => end,
+            end = self.command(&session, ticks, watchman) => end,
+            why = stood_down(&component, &session) => Some(why),
         };
         // Limit the wait, in case the next driver is gone.
-        let _ = timeout(Self::PATIENCE, control.release()).await;
-        end
+        let _ = timeout(Self::PATIENCE, session.release()).await;
+        Ok(end)
     }
 
-    fn find(&self) -> Option<JausId> {
-        let subsystem = self.component.id().subsystem();
-        let providers = Audience::providers(L::URN).in_subsystem(subsystem);
-        self.component.members(providers).first().copied()
+    fn providers(&self) -> Audience {
+        Audience::providers(L::URN).in_subsystem(self.component.id().subsystem())
     }
 
-    async fn engage(&self, peer: JausId) -> Result<Control, End> {
-        let anew = |why: String| End::Anew {
-            peer: Some(peer),
-            why,
-        };
-        let control = match self.component.control(peer, self.authority).await {
-            Ok(control) => control,
-            Err(ControlError::Refused {
-                why: ControlRefused::NotAvailable,
-                ..
-            }) => {
-                // A failure also refuses control, but it ends without intervention.
-                return Err(match examine(&self.component, peer).await {
-                    Ok(Verdict::Anew) => anew(format!("{peer} failed or was restarted")),
-                    _ => End::StandDown(format!(
-                        "{peer} refuses control, for example because of an emergency"
-                    )),
-                });
+    /// Commands the next driver whenever it is ready, until there is no more work.
+    async fn command(
+        &mut self,
+        session: &Session,
+        ticks: &mut Interval,
+        watchman: &mut Watchman,
+    ) -> Option<String> {
+        let mut busy = Instant::now();
+        let mut acknowledged = busy;
+        let mut had_control = false;
+        loop {
+            watchman.note(self.component.standing());
+            let (now, state) = (Instant::now(), session.state());
+            let plan = self.remote_platform.plan(now);
+            if plan != Plan::Rest {
+                busy = now;
+            } else if now - busy > Self::LINGER {
+                return None;
             }
-            Err(error) => {
-                return Err(match examine(&self.component, peer).await {
-                    Ok(Verdict::StandDown(why)) => anew(why),
-                    _ => anew(error.to_string()),
-                });
+            if stands_down_in(state, had_control) {
+                return Some(state.to_string());
             }
-        };
-        match control.resume().await {
-            Ok(()) => Ok(control),
-            Err(ManageError::State { found, .. }) if found == State::Emergency as u8 => {
-                Err(End::StandDown(format!("{peer} is stopped by an emergency")))
+            if let SessionState::Ready(peer) = state {
+                had_control = true;
+                let is_silent = now.saturating_duration_since(acknowledged) > Self::SILENCE;
+                let command = self.carry_out(now, plan, peer, is_silent).await;
+                match timeout(Self::PATIENCE, session.deliver(&command)).await {
+                    Ok(Ok(())) => acknowledged = Instant::now(),
+                    Ok(Err(error)) => tracing::debug!(%error, "not delivered"),
+                    Err(_) => tracing::debug!(%peer, "not acknowledged in time"),
+                }
+            } else {
+                acknowledged = now;
+                self.tell_engaging(state).await;
             }
-            Err(error) => Err(anew(error.to_string())),
+            ticks.tick().await;
         }
     }
 
-    /// Commands the next driver as long as there is work.
-    async fn command(
+    /// Reports what the driver does, and returns the command for it.
+    async fn carry_out(
         &mut self,
-        control: &Control,
-        ticks: &mut Interval,
-        watchman: &mut Watchman,
-    ) -> End {
-        let peer = control.peer();
-        let mut busy = Instant::now();
-        let mut acknowledged = Instant::now();
-        loop {
-            watchman.note(self.component.standing());
-            let now = Instant::now();
-            let command = match self.remote_platform.plan(now) {
-                Plan::Go(order, motion) => {
-                    busy = now;
-                    self.check_sensors(None).await;
-                    self.tell(StageState::Active, Some(peer), String::new())
-                        .await;
-                    self.language.command(now, order, &motion)
-                }
-                Plan::Wait(why) => {
-                    busy = now;
-                    self.check_sensors(Some(&why)).await;
-                    self.tell(StageState::Blocked, Some(peer), why).await;
-                    self.language.halt()
-                }
-                Plan::Rest if now - busy > Self::LINGER => return End::Rest,
-                Plan::Rest => {
-                    if self.vehicle.has_arrived() {
-                        self.tell(StageState::Done, None, String::new()).await;
-                    }
-                    self.language.halt()
-                }
-            };
-            match timeout(Self::PATIENCE, control.deliver(&command)).await {
-                Ok(Ok(())) => acknowledged = Instant::now(),
-                Ok(Err(ControlError::Lost { why, .. })) => {
-                    let why = format!("control of {peer} is lost: {why}");
-                    return self.after_loss(peer, why).await;
-                }
-                Ok(Err(_)) | Err(_) if acknowledged.elapsed() > Self::SILENCE => {
-                    let why = format!("{peer} does not acknowledge commands");
-                    return End::Anew {
-                        peer: Some(peer),
-                        why,
-                    };
-                }
-                Ok(Err(error)) => tracing::debug!(%error, "not delivered"),
-                Err(_) => tracing::debug!(%peer, "not acknowledged in time"),
+        now: Instant,
+        plan: Plan,
+        peer: JausId,
+        is_silent: bool,
+    ) -> L::Command {
+        match plan {
+            Plan::Go(order, motion) => {
+                self.check_sensors(None).await;
+                let (state, why) = match is_silent {
+                    true => (
+                        StageState::Blocked,
+                        format!("{peer} does not acknowledge commands"),
+                    ),
+                    false => (StageState::Active, String::new()),
+                };
+                self.tell(state, Some(peer), why).await;
+                self.language.command(now, order, &motion)
             }
-            ticks.tick().await;
+            Plan::Wait(why) => {
+                self.check_sensors(Some(&why)).await;
+                self.tell(StageState::Blocked, Some(peer), why).await;
+                self.language.halt()
+            }
+            Plan::Rest => {
+                if self.vehicle.has_arrived() {
+                    self.tell(StageState::Done, None, String::new()).await;
+                }
+                self.language.halt()
+            }
         }
     }
 
@@ -307,15 +256,21 @@ impl<L: Language> Next<L> {
         }
     }
 
-    /// Determines why control was lost.
-    async fn after_loss(&self, peer: JausId, why: String) -> End {
-        match examine(&self.component, peer).await {
-            Ok(Verdict::StandDown(why)) => End::StandDown(why),
-            _ => End::Anew {
-                peer: Some(peer),
-                why,
-            },
-        }
+    /// Reports why the next driver is not ready. Blocked without a next driver would mean standing
+    /// down.
+    async fn tell_engaging(&self, state: SessionState) {
+        let (stage, peer, why) = match state {
+            SessionState::Seeking => {
+                let why = format!("no {} is known", L::NAME);
+                (StageState::Engaging, None, why)
+            }
+            SessionState::Lost { peer, .. } | SessionState::Disabled { peer, .. } => {
+                (StageState::Blocked, Some(peer), state.to_string())
+            }
+            SessionState::Requesting(peer) => (StageState::Engaging, Some(peer), String::new()),
+            _ => (StageState::Engaging, state.held(), String::new()),
+        };
+        self.tell(stage, peer, why).await;
     }
 
     /// Reports standing down: blocked, without a next driver.
@@ -348,40 +303,119 @@ impl<L: Language> Next<L> {
     }
 }
 
-/// Interval between two status checks of the next driver.
+/// Whether a state of the session was caused on purpose, so that nothing must move again on its own.
+/// Before it `had_control`, a session waits until another client releases the next driver.
+fn stands_down_in(state: SessionState, had_control: bool) -> bool {
+    match state {
+        // A failure ends without intervention, if `stood_down` does not find otherwise.
+        SessionState::Disabled { state, .. } => !SessionLoss::State(state).is_technical(),
+        SessionState::Lost { why, .. } if why.is_opposition() => had_control,
+        SessionState::Lost { why, .. } => !why.is_technical(),
+        SessionState::Standby(_) => true,
+        _ => false,
+    }
+}
+
+/// Interval between two queries of the next driver's stage.
 const LOOK: Duration = Duration::from_millis(250);
 
-/// Supervises the next driver until it needs a reaction.
-async fn supervise(component: &Component, peer: JausId) -> End {
-    // Status from before the resume does not count.
-    sleep(2 * LOOK).await;
+/// Waits until the next driver reports that it has stood down itself, and returns the reason.
+async fn stood_down(component: &Component, session: &Session) -> String {
+    let mut looks = 0;
     loop {
         sleep(LOOK).await;
-        match examine(component, peer).await {
-            // Silence shows in missing acknowledgements.
-            Ok(Verdict::GoOn) | Err(_) => {}
-            Ok(Verdict::Anew) => {
-                let why = format!("{peer} failed or was restarted");
-                return End::Anew {
-                    peer: Some(peer),
-                    why,
-                };
+        let (peer, is_current) = match session.state() {
+            SessionState::Ready(peer) => (peer, looks >= 2),
+            SessionState::Disabled { peer, .. } => (peer, true),
+            SessionState::Lost {
+                peer,
+                why: SessionLoss::State(_),
+                ..
+            } => (peer, true),
+            _ => {
+                looks = 0;
+                continue;
             }
-            Ok(Verdict::StandDown(why)) => return End::StandDown(why),
+        };
+        looks += 1;
+        // A stage from before the resume does not count.
+        if is_current
+            && let Ok(report) = component
+                .query::<ReportStage, _>(peer, &QueryStage {})
+                .await
+        {
+            let stage = StageReport::from(&report);
+            if stage.stands_down() {
+                return format!("{peer}: {}", stage.reason);
+            }
         }
     }
 }
 
-/// Queries the status of the next driver.
-async fn examine(component: &Component, peer: JausId) -> Result<Verdict, QueryError> {
-    let status: ReportStatus = component.query(peer, &QueryStatus {}).await?;
-    let control: ReportControl = component.query(peer, &QueryControl {}).await?;
-    let stage: ReportStage = component.query(peer, &QueryStage {}).await?;
-    let controller = JausId::new(control.subsystem_id, control.node_id, control.component_id);
-    let told = DriverStatus {
-        status: status.status.0,
-        controller: controller.is_unicast().then_some(controller),
-        stage: StageReport::from(&stage),
-    };
-    Ok(judge(component.id(), peer, &told))
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jaus::component::{ControlLost, State};
+
+    const PEER: JausId = JausId::new(101, 2, 33);
+    const OPERATOR: JausId = JausId::new(42, 1, 1);
+
+    const fn lost(why: SessionLoss) -> SessionState {
+        SessionState::Lost {
+            peer: PEER,
+            why,
+            continues: true,
+        }
+    }
+
+    fn disabled(state: State) -> SessionState {
+        SessionState::Disabled {
+            peer: PEER,
+            state: state as u8,
+        }
+    }
+
+    #[test]
+    fn it_goes_on_after_restarts_and_failures() {
+        for state in [
+            SessionState::Seeking,
+            SessionState::Ready(PEER),
+            SessionState::Preparing(PEER),
+            disabled(State::Failure),
+            disabled(State::Shutdown),
+            lost(SessionLoss::State(State::Failure as u8)),
+            lost(SessionLoss::Control(ControlLost::Restarted)),
+            lost(SessionLoss::Dropped),
+            lost(SessionLoss::Gone),
+        ] {
+            assert!(!stands_down_in(state, true), "{state}");
+        }
+    }
+
+    #[test]
+    fn it_stands_down_after_an_emergency_or_a_take_over() {
+        for (state, reason) in [
+            (disabled(State::Emergency), "101.2.33 reports emergency"),
+            (
+                lost(SessionLoss::State(State::Emergency as u8)),
+                "no control of 101.2.33: it reports emergency",
+            ),
+            (
+                lost(SessionLoss::Taken(OPERATOR)),
+                "no control of 101.2.33: 42.1.1 is in control of it",
+            ),
+            (
+                SessionState::Standby(PEER),
+                "101.2.33 is under control and stands by",
+            ),
+        ] {
+            assert!(stands_down_in(state, true), "{state}");
+            assert_eq!(state.to_string(), reason);
+        }
+    }
+
+    #[test]
+    fn it_waits_for_a_driver_that_another_client_has_from_the_beginning() {
+        assert!(!stands_down_in(lost(SessionLoss::Taken(OPERATOR)), false));
+    }
 }

@@ -6,116 +6,29 @@
 //! [`Retake`] decides; after an emergency, the peer stays in standby until the application resumes
 //! it.
 
+mod examination;
+mod held;
+mod settings;
+mod state;
+
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use self::examination::Examination;
+use self::held::Held;
+pub use self::settings::{Retake, SessionOrder, SessionSettings, TargetState};
+pub use self::state::{SessionLoss, SessionState};
 use super::Controls;
 use super::control::{ControlId, ControlLost, ControlNews, ControlRefused};
 use crate::address::JausId;
-use crate::messages::core::{Resume, Standby, management};
-use crate::service::{Audience, Directory, Outbox, Patience, State};
-use crate::wire::Priority;
+use crate::endpoint::Received;
+use crate::messages::core::management;
+use crate::service::{Audience, Directory, Outbox, Patience};
 
 /// Identifies one session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SessionId(u64);
-
-/// When a session takes control again after losing it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Retake {
-    /// Only when the application asks for it.
-    Never,
-    /// After restarts, silence and emergencies, but not after another client took control or was
-    /// found to have it: it may have had a reason. Then only when the application asks for it.
-    #[default]
-    Unopposed,
-    /// Whenever the peer grants it. Two such clients with equal authorities share a vehicle in
-    /// turns.
-    Always,
-}
-
-/// The progress of a session.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SessionState {
-    /// It looks for a member of its audience, asks it for control, or brings it into the wanted
-    /// state.
-    Engaging,
-    /// This peer obeys commands.
-    Ready(JausId),
-    /// This peer is under control and stands by, because the application wants that or has to
-    /// decide anew after an emergency or a loss.
-    Standby(JausId),
-    /// There is no use of the peer at present.
-    Lost {
-        /// The peer.
-        peer: JausId,
-        /// The reason.
-        why: SessionLoss,
-        /// Whether the session goes on by itself. Otherwise the application must ask for that.
-        continues: bool,
-    },
-    /// The session was released.
-    Released,
-}
-
-/// Why a session has no use of its peer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SessionLoss {
-    /// Control was not granted.
-    #[error("control was not granted: {0}")]
-    Refused(ControlRefused),
-    /// Control was lost.
-    #[error("control was lost: {0}")]
-    Control(ControlLost),
-    /// The peer reports a state in which it can neither stand by nor act, by its code in Report
-    /// Status.
-    #[error("it reports {}", in_words(*.0))]
-    State(u8),
-    /// The peer left the directory, or no longer offers the service.
-    #[error("it left the network, or no longer offers the service")]
-    Gone,
-}
-
-impl SessionLoss {
-    /// Whether nobody caused it on purpose.
-    const fn is_technical(self) -> bool {
-        match self {
-            Self::Control(why) => matches!(why, ControlLost::Restarted | ControlLost::Silent(_)),
-            Self::Refused(why) => {
-                matches!(why, ControlRefused::NoAnswer(_) | ControlRefused::Already)
-            }
-            Self::Gone => true,
-            Self::State(_) => false,
-        }
-    }
-
-    /// Whether another client has control.
-    const fn is_opposition(self) -> bool {
-        match self {
-            Self::Control(why) => matches!(why, ControlLost::TakenBack | ControlLost::Outranked),
-            Self::Refused(why) => matches!(why, ControlRefused::InsufficientAuthority(_)),
-            Self::Gone | Self::State(_) => false,
-        }
-    }
-}
-
-fn in_words(code: u8) -> String {
-    let known = State::from_code(code).map(|state| state.to_string());
-    known.unwrap_or_else(|| format!("the unknown state {code}"))
-}
-
-/// What the application wants of a session.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SessionOrder {
-    /// Make the peer ready, now and after restarts.
-    Resume,
-    /// Keep the peer in standby.
-    Standby,
-    /// Take control again.
-    Retake,
-}
 
 /// What a session needs of its component.
 pub(in crate::service) struct Surroundings<'a> {
@@ -137,14 +50,13 @@ pub(in crate::service) struct Sessions {
 #[derive(Debug)]
 struct Session {
     audience: Audience,
-    authority: u8,
-    retake: Retake,
+    settings: SessionSettings,
     patience: Patience,
-    /// Whether the peer is to be ready.
-    wants_ready: bool,
     stage: Stage,
     /// The last loss, until the peer is under control again or the application asks for that.
     loss: Option<(JausId, SessionLoss)>,
+    /// Whether it had control since the application last asked for that.
+    was_held: bool,
     /// The pause after the next loss.
     pause: Duration,
     /// The state that the application knows.
@@ -155,6 +67,8 @@ struct Session {
 enum Stage {
     /// Until the directory has a member of the audience.
     Seeking,
+    /// Until the peer has answered or the examination has timed out.
+    Examining(Examination),
     Asking(JausId, ControlId),
     Held(Held),
     /// Until the next attempt.
@@ -164,20 +78,6 @@ enum Stage {
     /// Until the peer confirms, or the release times out.
     Releasing(ControlId),
     Released,
-}
-
-/// A peer under control.
-#[derive(Debug, Clone, Copy)]
-struct Held {
-    peer: JausId,
-    control: ControlId,
-    since: Instant,
-    /// Whether it has states. Otherwise it obeys commands as soon as it is under control, and only
-    /// the session can stand by.
-    is_managed: bool,
-    status: Option<u8>,
-    /// When to send Resume or Standby, if the status is not as wanted.
-    due: Instant,
 }
 
 impl Sessions {
@@ -190,8 +90,7 @@ impl Sessions {
         &mut self,
         now: Instant,
         audience: Audience,
-        authority: u8,
-        retake: Retake,
+        settings: SessionSettings,
         patience: Patience,
         around: &mut Surroundings<'_>,
     ) -> SessionId {
@@ -199,14 +98,13 @@ impl Sessions {
         let id = SessionId(self.last);
         let session = Session {
             audience,
-            authority,
-            retake,
+            settings,
             patience,
-            wants_ready: true,
             stage: Stage::Pausing(now),
             loss: None,
+            was_held: false,
             pause: Session::FIRST_PAUSE,
-            reported: SessionState::Engaging,
+            reported: SessionState::Seeking,
         };
         self.all.insert(id, session);
         self.proceed(now, around);
@@ -241,6 +139,15 @@ impl Sessions {
             });
         }
         self.proceed(now, around);
+    }
+
+    /// Handles a message that may answer an examination. Others may need it, too.
+    pub(in crate::service) fn handle_message(&mut self, message: &Received) {
+        for session in self.all.values_mut() {
+            if let Stage::Examining(examination) = &mut session.stage {
+                examination.handle_message(message);
+            }
+        }
     }
 
     /// Handles news of control; false if it belongs to no session.
@@ -293,9 +200,6 @@ impl Session {
     const FIRST_PAUSE: Duration = Duration::from_millis(250);
     /// … to this, and starts again once the peer was under control for as long.
     const LONGEST_PAUSE: Duration = Duration::from_secs(2);
-    /// Interval of Resume and Standby until the peer reports that state. A large machine takes a
-    /// moment to change it.
-    const REPEAT: Duration = Duration::from_millis(500);
 
     const fn control(&self) -> Option<ControlId> {
         match self.stage {
@@ -316,29 +220,41 @@ impl Session {
         match (self.stage, self.loss) {
             (Stage::Released, _) => SessionState::Released,
             (Stage::Releasing(_), _) => self.reported,
-            (Stage::Held(held), _) => held.state(self.wants_ready),
-            (_, None) => SessionState::Engaging,
+            (Stage::Held(held), _) => held.state(self.settings.target),
             (stage, Some((peer, why))) => SessionState::Lost {
                 peer,
                 why,
                 continues: !matches!(stage, Stage::Ended),
             },
+            (Stage::Asking(peer, _), None) => SessionState::Requesting(peer),
+            (Stage::Examining(it), None) => SessionState::Requesting(it.peer),
+            (Stage::Seeking | Stage::Pausing(_) | Stage::Ended, None) => SessionState::Seeking,
         }
     }
 
     fn obey(&mut self, now: Instant, order: SessionOrder) {
-        match order {
-            SessionOrder::Resume => self.wants_ready = true,
-            SessionOrder::Standby => self.wants_ready = false,
-            SessionOrder::Retake => {
-                if matches!(self.stage, Stage::Ended | Stage::Pausing(_)) {
-                    self.stage = Stage::Pausing(now);
-                    self.loss = None;
+        match (order, &mut self.stage) {
+            (SessionOrder::Target(TargetState::Ready), Stage::Held(held))
+                if held.is_in_emergency() => {}
+            (SessionOrder::Target(target), stage) => {
+                self.settings.target = target;
+                if let Stage::Held(held) = stage {
+                    held.due = now;
                 }
             }
+            (SessionOrder::Retake, Stage::Ended | Stage::Pausing(_) | Stage::Examining(_)) => {
+                self.stage = Stage::Pausing(now);
+                self.loss = None;
+                self.was_held = false;
+            }
+            (SessionOrder::Retake, _) => {}
         }
-        if let Stage::Held(held) = &mut self.stage {
-            held.due = now;
+    }
+
+    /// Nothing moves again by itself: from now on the application decides when the peer is ready.
+    const fn stand_by(&mut self) {
+        if matches!(self.settings.target, TargetState::Ready) {
+            self.settings.target = TargetState::Standby;
         }
     }
 
@@ -349,6 +265,7 @@ impl Session {
             }
             (&mut Stage::Asking(peer, control), ControlNews::Granted) => {
                 self.loss = None;
+                self.was_held = true;
                 self.stage = Stage::Held(Held {
                     peer,
                     control,
@@ -359,32 +276,64 @@ impl Session {
                 });
             }
             (&mut Stage::Asking(peer, _), ControlNews::Refused(why)) => {
-                self.lose(now, peer, SessionLoss::Refused(why));
+                self.explain(now, peer, SessionLoss::Refused(why), around);
             }
             (Stage::Held(held), ControlNews::Status(status)) => {
                 held.status = Some(status);
-                self.wants_ready &= status != State::Emergency as u8;
+                if held.is_in_emergency() {
+                    self.stand_by();
+                }
             }
             (&mut Stage::Held(held), ControlNews::Lost(why)) => {
                 around.controls.release(now, held.control, around.out);
-                self.lose(now, held.peer, SessionLoss::Control(why));
+                self.explain(now, held.peer, SessionLoss::Control(why), around);
             }
             _ => {}
         }
     }
 
-    fn lose(&mut self, now: Instant, peer: JausId, why: SessionLoss) {
+    /// Asks the peer for the precise reason of a loss, if it can be expected to answer.
+    fn explain(&mut self, now: Instant, peer: JausId, why: SessionLoss, around: &Surroundings<'_>) {
         if let Stage::Held(held) = self.stage
             && now.saturating_duration_since(held.since) >= Self::LONGEST_PAUSE
         {
             self.pause = Self::FIRST_PAUSE;
         }
-        self.wants_ready &= why.is_technical();
+        match why {
+            SessionLoss::Refused(
+                ControlRefused::NotAvailable | ControlRefused::InsufficientAuthority(_),
+            )
+            | SessionLoss::Control(
+                ControlLost::TakenBack
+                | ControlLost::NotAvailable
+                | ControlLost::Outranked
+                | ControlLost::Restarted,
+            ) => self.examine(now, peer, Some(why), around),
+            _ => self.lose(now, peer, why),
+        }
+    }
+
+    fn examine(
+        &mut self,
+        now: Instant,
+        peer: JausId,
+        why: Option<SessionLoss>,
+        around: &Surroundings<'_>,
+    ) {
+        let is_managed = is_managed(peer, &around.directory);
+        self.stage = Stage::Examining(Examination::new(now, peer, is_managed, why));
+    }
+
+    fn lose(&mut self, now: Instant, peer: JausId, why: SessionLoss) {
+        let is_first_come = why.is_opposition() && !self.was_held;
+        if !why.is_technical() && !is_first_come {
+            self.stand_by();
+        }
         self.loss = Some((peer, why));
-        let continues = match self.retake {
+        let continues = match self.settings.retake {
             Retake::Never => false,
             Retake::Unopposed => !why.is_opposition(),
-            Retake::Always => true,
+            Retake::WhenFree | Retake::Always => true,
         };
         self.stage = match continues {
             true => Stage::Pausing(now + self.pause),
@@ -398,22 +347,36 @@ impl Session {
             && !self.members(around).contains(&peer)
         {
             around.controls.release(now, control, around.out);
-            self.lose(now, peer, SessionLoss::Gone);
+            self.explain(now, peer, SessionLoss::Gone, around);
         }
         match self.stage {
             Stage::Pausing(until) if until <= now => self.seek(now, around),
             Stage::Seeking if has_news => self.seek(now, around),
             _ => {}
         }
+        if let Stage::Examining(examination) = &mut self.stage
+            && examination.proceed(now, around.out)
+        {
+            let examination = *examination;
+            let (peer, result) = (examination.peer, examination.result(around.out.source()));
+            match (result, self.settings.retake) {
+                (Some(SessionLoss::Taken(_)), Retake::Always) if examination.why.is_none() => {
+                    self.stand_by();
+                    self.ask(now, peer, around);
+                }
+                (Some(why), _) => self.lose(now, peer, why),
+                (None, _) => self.ask(now, peer, around),
+            }
+        }
         if let Stage::Held(held) = &mut self.stage {
             if has_news {
                 held.is_managed = is_managed(held.peer, &around.directory);
             }
-            held.manage(now, self.wants_ready, around.out);
+            held.manage(now, self.settings.target, around.out);
         }
     }
 
-    /// Asks a member of the audience for control, the lost one before others.
+    /// Turns to a member of the audience, the lost one before others.
     fn seek(&mut self, now: Instant, around: &mut Surroundings<'_>) {
         self.stage = Stage::Seeking;
         let members = self.members(around);
@@ -422,8 +385,17 @@ impl Session {
         let Some(peer) = same.or_else(|| members.first().copied()) else {
             return;
         };
+        match self.loss {
+            None => self.ask(now, peer, around),
+            // Another client may have taken control meanwhile.
+            Some(_) => self.examine(now, peer, None, around),
+        }
+    }
+
+    fn ask(&mut self, now: Instant, peer: JausId, around: &mut Surroundings<'_>) {
+        let (authority, patience) = (self.settings.authority, self.patience);
         let Surroundings { controls, out, .. } = around;
-        match controls.request(now, peer, self.authority, self.patience, out) {
+        match controls.request(now, peer, authority, patience, out) {
             Ok(control) => self.stage = Stage::Asking(peer, control),
             Err(why) => self.lose(now, peer, SessionLoss::Refused(why)),
         }
@@ -442,60 +414,10 @@ impl Session {
     fn poll_timeout(&self) -> Option<Instant> {
         match self.stage {
             Stage::Pausing(until) => Some(until),
-            Stage::Held(held) => held.order(self.wants_ready).map(|_| held.due),
+            Stage::Examining(examination) => Some(examination.poll_timeout()),
+            Stage::Held(held) => held.poll_timeout(self.settings.target),
             _ => None,
         }
-    }
-}
-
-impl Held {
-    fn state(&self, wants_ready: bool) -> SessionState {
-        let peer = self.peer;
-        if !self.is_managed {
-            return match wants_ready {
-                true => SessionState::Ready(peer),
-                false => SessionState::Standby(peer),
-            };
-        }
-        let Some(code) = self.status else {
-            return SessionState::Engaging;
-        };
-        match (State::from_code(code), wants_ready) {
-            (Some(State::Ready), true) => SessionState::Ready(peer),
-            (Some(State::Standby), false) => SessionState::Standby(peer),
-            (Some(State::Initialize | State::Ready | State::Standby), _) => SessionState::Engaging,
-            _ => SessionState::Lost {
-                peer,
-                why: SessionLoss::State(code),
-                continues: true,
-            },
-        }
-    }
-
-    /// The state command that the peer needs.
-    fn order(&self, wants_ready: bool) -> Option<SessionOrder> {
-        if !self.is_managed {
-            return None;
-        }
-        match (self.status.map(State::from_code), wants_ready) {
-            (None | Some(Some(State::Initialize | State::Standby)), true) => {
-                Some(SessionOrder::Resume)
-            }
-            (Some(Some(State::Ready)), false) => Some(SessionOrder::Standby),
-            _ => None,
-        }
-    }
-
-    fn manage(&mut self, now: Instant, wants_ready: bool, out: &mut Outbox) {
-        if self.due > now {
-            return;
-        }
-        match self.order(wants_ready) {
-            Some(SessionOrder::Resume) => out.send_with(self.peer, Priority::High, &Resume {}),
-            Some(_) => out.send_with(self.peer, Priority::High, &Standby {}),
-            None => return,
-        }
-        self.due = now + Session::REPEAT;
     }
 }
 
