@@ -10,7 +10,7 @@ use super::{
     code_of,
 };
 use crate::address::JausId;
-use crate::codec::{DecodeError, Message, ServiceId};
+use crate::codec::{DecodeError, Message, Query, ServiceId};
 use crate::endpoint::Received;
 
 type Stop = Box<dyn FnMut(&mut Context<'_>) + Send>;
@@ -104,19 +104,14 @@ impl Handlers {
         self
     }
 
-    /// Answers every query of type `Q`. The answer goes to the sender of the query.
+    /// Answers every query of type `Q`. The report goes to the sender of the query. To report in
+    /// the layout of an older version, [`receive`](Self::receive) the query and
+    /// [reply](Context::reply).
     #[must_use]
-    pub fn answer<Q: Message, R: Message>(
+    pub fn answer<Q: Query>(
         mut self,
-        mut function: impl FnMut(Q) -> R + Send + 'static,
+        mut function: impl FnMut(Q) -> Q::Report + Send + 'static,
     ) -> Self {
-        const {
-            assert!(
-                !Q::NEEDS_CONTROL,
-                "this is a command of a service with Access Control, not a query: register it \
-                 with `command` or `configure`"
-            );
-        }
         self.handle::<Q>(move |received, context| {
             let query = Q::decode(&received.payload)?;
             context.reply(received, &function(query));

@@ -5,8 +5,7 @@ use std::time::Duration;
 use jaus::address::JausId;
 use jaus::component::{Component, Kind, When};
 use jaus::messages::mobility::{
-    QueryGlobalPose, QueryVelocityState, ReportGlobalPose, ReportVelocityState, SetWrenchEffort,
-    global_pose_sensor,
+    QueryGlobalPose, QueryVelocityState, SetWrenchEffort, global_pose_sensor,
 };
 use jaus::node::{Config, Node};
 use tokio::time::{Instant, sleep, timeout_at};
@@ -48,7 +47,7 @@ async fn ask(operator: &Component) {
     let query = QueryGlobalPose {
         presence_vector: 0xFFFF,
     };
-    let pose: ReportGlobalPose = operator.query(POSE, &query).await.unwrap();
+    let pose = operator.query(POSE, &query).await.unwrap();
     println!("latitude {:.4}", pose.latitude_deg().unwrap());
 }
 
@@ -57,12 +56,12 @@ async fn watch(operator: &Component) {
         presence_vector: 0xFF,
     };
     let when = When::hz(10.0);
-    let poses = operator.subscribe::<ReportGlobalPose, _>(POSE, &query, when);
+    let poses = operator.subscribe(POSE, &query, when);
     let mut poses = poses.await.unwrap();
     let query = QueryVelocityState {
         presence_vector: 0xFF,
     };
-    let velocities = operator.subscribe::<ReportVelocityState, _>(VELOCITY, &query, when);
+    let velocities = operator.subscribe(VELOCITY, &query, when);
     let mut velocities = velocities.await.unwrap();
     let end = Instant::now() + Duration::from_secs(3);
     let (mut many, mut fast) = (0, 0);
@@ -91,7 +90,7 @@ async fn drive(operator: &Component) {
         sleep(Duration::from_millis(50)).await;
     }
     let query = QueryVelocityState { presence_vector: 1 };
-    let speed: ReportVelocityState = operator.query(VELOCITY, &query).await.unwrap();
+    let speed = operator.query(VELOCITY, &query).await.unwrap();
     println!("speed {:.2} m/s", speed.velocity_x_m_per_s().unwrap());
     control.release().await;
     println!("released");

@@ -19,7 +19,7 @@ use super::remote_platform::{Order, Plan, RemotePlatform};
 use super::verdict::{DriverStatus, Verdict, judge};
 use super::{FaultMonitor, Watchman};
 use crate::ground::{StageBoard, StageReport, StageState};
-use crate::messages::ground::{QueryStage, ReportStage};
+use crate::messages::ground::QueryStage;
 use crate::mobility::Vehicle;
 use crate::motion::Motion;
 use crate::parts::PartError;
@@ -28,7 +28,7 @@ use jaus::codec::Message;
 use jaus::component::{
     Audience, Component, Control, ControlError, ControlRefused, ManageError, QueryError, State,
 };
-use jaus::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatus};
+use jaus::messages::core::{QueryControl, QueryStatus};
 
 /// The command interface of the next driver.
 pub(in crate::parts) trait Language: Send + 'static {
@@ -374,9 +374,9 @@ async fn supervise(component: &Component, peer: JausId) -> End {
 
 /// Queries the status of the next driver.
 async fn examine(component: &Component, peer: JausId) -> Result<Verdict, QueryError> {
-    let status: ReportStatus = component.query(peer, &QueryStatus {}).await?;
-    let control: ReportControl = component.query(peer, &QueryControl {}).await?;
-    let stage: ReportStage = component.query(peer, &QueryStage {}).await?;
+    let status = component.query(peer, &QueryStatus {}).await?;
+    let control = component.query(peer, &QueryControl {}).await?;
+    let stage = component.query(peer, &QueryStage {}).await?;
     let controller = JausId::new(control.subsystem_id, control.node_id, control.component_id);
     let told = DriverStatus {
         status: status.status.0,

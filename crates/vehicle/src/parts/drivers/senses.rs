@@ -9,7 +9,7 @@ use super::RemotePlatform;
 use super::freshness::time_in_month;
 use crate::parts::PartError;
 use jaus::address::JausId;
-use jaus::codec::Message;
+use jaus::codec::{Message, Query};
 use jaus::component::{Audience, Component, GroupSubscription, GroupUpdate, When};
 use jaus::messages::mobility::{
     QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState, local_pose_sensor,
@@ -29,7 +29,7 @@ pub(in crate::parts) struct Sense<R> {
 
 impl<R: Message> Sense<R> {
     /// Starts discovery of providers and subscribes to them. `what` names the data in log messages.
-    pub(in crate::parts) fn of<Q: Message>(
+    pub(in crate::parts) fn of<Q: Query<Report = R>>(
         component: &Component,
         urn: &'static str,
         query: &Q,

@@ -1,4 +1,13 @@
-//! Message codes: mapping a query to its report.
+//! Queries and the reports that answer them: by type and by message code.
+
+use super::Message;
+
+/// A query, which its report answers. Generated for each message `QueryX` whose service declares a
+/// `ReportX` with the code of [`report_code`].
+pub trait Query: Message {
+    /// The report. Of several layouts the newest that a service declares beside the query.
+    type Report: Message;
+}
 
 /// The code of the report that answers a query; `None` if the code is not a query.
 ///
