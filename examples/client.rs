@@ -11,7 +11,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let client = Component::builder(Kind::OperatorControlUnit, "Client").attach(&node, 1)?;
 
     let sensor = client.find(velocity_state_sensor::URN).await?;
-    let query = QueryVelocityState { presence_vector: 1 };
+    let query = QueryVelocityState::none().with_velocity_x();
     let mut speeds = client.subscribe(sensor, &query, When::hz(5.0)).await?;
     while let Some(update) = speeds.next().await {
         match update {

@@ -15,7 +15,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let watch = Component::builder(Kind::OperatorControlUnit, "Watch").attach(&node, 1)?;
 
     // All current and future providers of the service.
-    let query = QueryVelocityState { presence_vector: 1 };
+    let query = QueryVelocityState::none().with_velocity_x();
     let mut speeds = watch.subscribe_all(velocity_state_sensor::URN, &query, When::hz(5.0))?;
     while let Some((sensor, update)) = speeds.next().await {
         match update {

@@ -16,7 +16,7 @@ use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::within_limit;
 
-const QUERY: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
+const QUERY: QueryVelocityState = QueryVelocityState::none().with_velocity_x();
 
 /// A separate network, isolated from other tests.
 struct Network(Group);

@@ -48,9 +48,7 @@ async fn an_operator_finds_a_rover_and_asks_for_its_speed() {
         .await
         .unwrap();
     assert_eq!(sensor, rover.id());
-    let query = QueryVelocityState {
-        presence_vector: 0xFFFF,
-    };
+    let query = QueryVelocityState::all();
     let report = within_limit(operator.query(sensor, &query)).await.unwrap();
     let speed = report.velocity_x_m_per_s().expect("it was asked for");
     assert!((speed - 1.5).abs() < 0.001, "{speed}");

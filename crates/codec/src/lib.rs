@@ -17,6 +17,7 @@ pub mod arbitrary;
 #[doc(hidden)]
 pub mod bits;
 mod blob;
+mod calendar;
 mod composite;
 mod enumeration;
 mod error;
@@ -38,6 +39,7 @@ pub use bytes::Bytes;
 
 pub use bits::Bits;
 pub use blob::FormattedBlob;
+pub use calendar::{Date, time_stamp};
 pub use composite::Composite;
 pub use enumeration::Enumeration;
 pub use error::{DecodeError, DecodeErrorKind, EncodeError, EncodeErrorKind};

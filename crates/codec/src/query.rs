@@ -7,6 +7,10 @@ use super::Message;
 pub trait Query: Message {
     /// The report. Of several layouts the newest that a service declares beside the query.
     type Report: Message;
+
+    /// Removes the optional fields of a report that the query's presence vector does not request.
+    /// Without effect if the query has no presence vector for the report's own fields.
+    fn drop_unrequested(&self, _report: &mut Self::Report) {}
 }
 
 /// The code of the report that answers a query; `None` if the code is not a query.

@@ -91,7 +91,7 @@ impl Component {
     /// # use jaus::component::{Component, GroupUpdate, When};
     /// # use jaus::messages::mobility::{QueryVelocityState, velocity_state_sensor};
     /// # async fn watch(operator: Component) -> Result<(), Box<dyn std::error::Error>> {
-    /// let query = QueryVelocityState { presence_vector: 1 };
+    /// let query = QueryVelocityState::none().with_velocity_x();
     /// let mut speeds = operator
     ///     .subscribe_all(velocity_state_sensor::URN, &query, When::hz(5.0))?;
     /// while let Some((sensor, update)) = speeds.next().await {

@@ -106,15 +106,11 @@ impl Following {
             tasks.spawn(self.ask(peer, QueryStage {}, STATUS));
         }
         if topics.pose {
-            let query = QueryLocalPose {
-                presence_vector: u16::MAX,
-            };
+            let query = QueryLocalPose::all();
             tasks.spawn(self.ask(peer, query, MOTION));
         }
         if topics.velocity {
-            let query = QueryVelocityState {
-                presence_vector: u16::MAX,
-            };
+            let query = QueryVelocityState::all();
             tasks.spawn(self.ask(peer, query, MOTION));
         }
         if topics.mission {

@@ -383,9 +383,7 @@ async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_st
     };
     let pose = scene.start(POSE, |slot| sensor.run(slot));
     let ask = async || {
-        let query = QueryLocalPose {
-            presence_vector: 0x0103,
-        };
+        let query = QueryLocalPose::none().with_x().with_y().with_time_stamp();
         let report = scene.client.query(POSE, &query).await.ok();
         let report = report?;
         report.x_m()?;

@@ -112,7 +112,7 @@ impl Scene {
     }
 
     async fn pose(&self) -> Option<(f64, f64)> {
-        let query = QueryLocalPose { presence_vector: 3 };
+        let query = QueryLocalPose::none().with_x().with_y();
         let report = self.client.query(POSE, &query).await.ok()?;
         report.x_m().zip(report.y_m())
     }

@@ -55,7 +55,7 @@ pub(crate) async fn client() {
     let client = builder.attach(&node, CLIENT.component()).unwrap();
     let found = client.find_within(local_pose_sensor::URN, SEARCH).await;
     assert_eq!(found.unwrap(), VEHICLE);
-    let query = QueryLocalPose { presence_vector: 3 };
+    let query = QueryLocalPose::none().with_x().with_y();
     let events = client.subscribe(VEHICLE, &query, When::hz(25.0));
     let mut events = events.await.unwrap();
     let echo = tokio::net::UdpSocket::bind(("0.0.0.0", 0)).await.unwrap();
@@ -119,7 +119,7 @@ pub(crate) async fn newcomer() {
     let newcomer = builder.attach(&node, 1).unwrap();
     let found = newcomer.find_within(local_pose_sensor::URN, SEARCH).await;
     assert_eq!(found.unwrap(), VEHICLE);
-    let query = QueryLocalPose { presence_vector: 3 };
+    let query = QueryLocalPose::none().with_x().with_y();
     while newcomer.query(VEHICLE, &query).await.is_err() {
         assert!(begun.elapsed() < SEARCH, "no answer");
     }
@@ -133,7 +133,7 @@ pub(crate) async fn subscriber() {
     let builder = Component::builder(Kind::OtherSubsystem, "Subscriber");
     let subscriber = builder.attach(&node, 1).unwrap();
     let found = subscriber.find_within(local_pose_sensor::URN, SEARCH).await;
-    let query = QueryLocalPose { presence_vector: 3 };
+    let query = QueryLocalPose::none().with_x().with_y();
     let often = When::hz(1000.0);
     let events = subscriber.subscribe(found.unwrap(), &query, often);
     let mut events = events.await.unwrap();

@@ -104,12 +104,8 @@ fn choose(maps: Vec<MapRec>, name: &str, store: JausId) -> Result<MapRec, String
 pub(super) async fn fetch_pose(component: &Component) -> Result<Point, String> {
     let services = [local_pose_sensor::URN];
     let sensor = find_soon(component, &services, "local pose sensor").await?;
-    let query = QueryLocalPose {
-        presence_vector: X_AND_Y,
-    };
+    let query = QueryLocalPose::none().with_x().with_y();
     let pose = component.query(sensor, &query).await.map_err(in_words)?;
     let place = pose.x_m().zip(pose.y_m());
     place.ok_or_else(|| format!("{sensor} reports no pose: set the vehicle's pose"))
 }
-
-const X_AND_Y: u16 = 0b11;

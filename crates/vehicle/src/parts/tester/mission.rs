@@ -350,14 +350,14 @@ async fn find(
 }
 
 async fn pose(component: &Component, sensor: JausId) -> Result<Point, String> {
-    let query = QueryLocalPose { presence_vector: 3 };
+    let query = QueryLocalPose::none().with_x().with_y();
     let report = ask(component, sensor, &query).await?;
     let place = report.x_m().zip(report.y_m());
     place.ok_or_else(|| format!("{sensor} reports no pose: set the vehicle's pose"))
 }
 
 async fn speed(component: &Component, sensor: JausId) -> Result<f64, String> {
-    let query = QueryVelocityState { presence_vector: 1 };
+    let query = QueryVelocityState::none().with_velocity_x();
     let report = ask(component, sensor, &query).await?;
     let speed = report.velocity_x_m_per_s();
     speed.ok_or_else(|| format!("{sensor} reports no velocity"))

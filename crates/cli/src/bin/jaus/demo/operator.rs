@@ -16,8 +16,6 @@ use super::story::{Story, Who};
 
 /// Below the page's authority, which is 200, so that a person can always take over.
 const AUTHORITY: u8 = 150;
-/// X, Y and yaw, as bits in the presence vector of a query and its report.
-const POSE: u16 = 0b100_0011;
 /// Interval of progress lines.
 const LOOK: Duration = Duration::from_secs(2);
 
@@ -158,9 +156,7 @@ impl<'s> Operator<'s> {
     }
 
     async fn tell_pose(&mut self, sensor: JausId) -> Result<(), Failure> {
-        let query = QueryLocalPose {
-            presence_vector: POSE,
-        };
+        let query = QueryLocalPose::none().with_x().with_y().with_yaw();
         let pose = self.component.query(sensor, &query).await;
         match pose {
             Ok(pose) => self.tell(

@@ -6,7 +6,7 @@ use jaus::messages::mobility::QueryVelocityState;
 use super::{Outcome, RoleArguments};
 
 /// The query for the forward velocity alone, which every vehicle reports.
-pub(super) const FORWARD: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
+pub(super) const FORWARD: QueryVelocityState = QueryVelocityState::none().with_velocity_x();
 /// Consecutive reports that prove a subscription.
 const ENOUGH: usize = 10;
 /// Report rate.
