@@ -2,7 +2,7 @@
 //! `cargo run --example sensor`, and start it again.
 
 use jaus::component::{Component, Kind, Update, When};
-use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+use jaus::messages::mobility::{QueryVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
 
 #[tokio::main(flavor = "current_thread")]
@@ -11,10 +11,8 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let client = Component::builder(Kind::OperatorControlUnit, "Client").attach(&node, 1)?;
 
     let sensor = client.find(velocity_state_sensor::URN).await?;
-    let query = QueryVelocityState { presence_vector: 1 };
-    let mut speeds = client
-        .subscribe::<ReportVelocityState, _>(sensor, &query, When::hz(5.0))
-        .await?;
+    let query = QueryVelocityState::none().with_velocity_x();
+    let mut speeds = client.subscribe(sensor, &query, When::hz(5.0)).await?;
     while let Some(update) = speeds.next().await {
         match update {
             Update::Up => println!("{sensor} reports its speed at {:.1?} Hz", speeds.hz()),

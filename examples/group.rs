@@ -3,7 +3,7 @@
 
 use jaus::component::{Audience, Component, GroupUpdate, Kind, When};
 use jaus::messages::core::{ClearEmergency, SetEmergency, management};
-use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+use jaus::messages::mobility::{QueryVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
 
 /// All vehicles are stopped above this speed.
@@ -15,12 +15,8 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let watch = Component::builder(Kind::OperatorControlUnit, "Watch").attach(&node, 1)?;
 
     // All current and future providers of the service.
-    let query = QueryVelocityState { presence_vector: 1 };
-    let mut speeds = watch.subscribe_all::<ReportVelocityState, _>(
-        velocity_state_sensor::URN,
-        &query,
-        When::hz(5.0),
-    )?;
+    let query = QueryVelocityState::none().with_velocity_x();
+    let mut speeds = watch.subscribe_all(velocity_state_sensor::URN, &query, When::hz(5.0))?;
     while let Some((sensor, update)) = speeds.next().await {
         match update {
             GroupUpdate::Up => println!("{sensor} reports its speed"),

@@ -28,7 +28,7 @@ use jaus::service::Patience;
 use jaus_vehicle::ground::WorldStore;
 use jaus_vehicle::messages::ground::{
     QueryRasterCells, QueryVksTraversability, ReportRasterCells, ReportRasterChange,
-    ReportVksTraversability, SetRasterCells, raster_maps, report_raster_change,
+    SetRasterCells, raster_maps, report_raster_change,
 };
 use jaus_vehicle::motion::Frame;
 use jaus_vehicle::world::{Change, Raster, World};
@@ -179,7 +179,7 @@ async fn fetch(client: &Component, store: JausId, map: u16, side: u16) {
         map,
         ..QueryRasterCells::default()
     };
-    let report: ReportRasterCells = client.query(store, &query).await.expect("an answer");
+    let report = client.query(store, &query).await.expect("an answer");
     assert_eq!((report.rows, report.columns), (side, side));
     assert_eq!(report.cells.len(), usize::from(side) * usize::from(side));
 }
@@ -187,7 +187,7 @@ async fn fetch(client: &Component, store: JausId, map: u16, side: u16) {
 async fn traversability(client: &Component) {
     let mut query = QueryVksTraversability::default();
     query.request_rec.response_presence_vector = 1;
-    let report: Result<ReportVksTraversability, _> = client.query(STORE, &query).await;
+    let report = client.query(STORE, &query).await;
     report.expect("an answer");
 }
 

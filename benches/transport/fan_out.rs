@@ -98,7 +98,7 @@ async fn cost(subscribers: usize, time: Duration, placement: Placement) -> f64 {
 
 /// Subscribes, and waits for the first event.
 async fn subscribe(port: &mut Port) {
-    let query = QueryVelocityState { presence_vector: 1 };
+    let query = QueryVelocityState::none().with_velocity_x();
     let create = CreateEvent {
         event_type: create_event::EventType::EVERY_CHANGE,
         query_message: query.encode().expect("a query"),

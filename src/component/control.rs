@@ -9,9 +9,7 @@ use super::clients::{Condition, Ticket};
 use super::{Component, ControlError, ManageError};
 use crate::address::JausId;
 use crate::codec::Message;
-use crate::messages::core::{
-    ClearEmergency, QueryStatus, ReportStatus, Reset, Resume, SetEmergency, Standby,
-};
+use crate::messages::core::{ClearEmergency, QueryStatus, Reset, Resume, SetEmergency, Standby};
 use crate::service::State;
 use crate::wire::Priority;
 
@@ -240,7 +238,7 @@ impl Component {
         loop {
             self.send_with(priority, peer, command)
                 .map_err(ControlError::from)?;
-            let report: ReportStatus = self.query(peer, &QueryStatus {}).await?;
+            let report = self.query(peer, &QueryStatus {}).await?;
             let found = report.status.0;
             if wanted(found) || start.elapsed() > STATE_LIMIT {
                 return Ok(found);

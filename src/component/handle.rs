@@ -15,7 +15,7 @@ use super::{
     SubscribeError, Subscription, Watch,
 };
 use crate::address::JausId;
-use crate::codec::{Message, ServiceId};
+use crate::codec::{Message, Query, ServiceId};
 use crate::endpoint::{Outgoing, Received};
 use crate::messages;
 use crate::node;
@@ -103,7 +103,7 @@ impl Component {
     }
 
     /// Notifies the subscribers of the query `Q` that its answer has changed.
-    pub async fn changed<Q: Message>(&self) {
+    pub async fn changed<Q: Query>(&self) {
         // As in `set_condition`.
         let _ = self.shared.commands.send(Command::Announce(Q::CODE)).await;
     }
@@ -191,34 +191,44 @@ impl Component {
         Ok(self.shared.sender.deliver(outgoing).await?)
     }
 
-    /// Sends a query to a component, and waits for its answer; repeats the query on timeout.
+    /// Sends a query to a component, and waits for its report; repeats the query on timeout.
     ///
     /// If `peer` has wildcards, the first answer of any matching component counts.
     ///
     /// # Errors
     /// [`QueryError`] names the peer and the query, and how long it waited.
-    pub async fn query<R: Message, Q: Message>(
+    pub async fn query<Q: Query>(&self, peer: JausId, query: &Q) -> Result<Q::Report, QueryError> {
+        self.request(peer, query).await
+    }
+
+    /// Like [`query`](Self::query), for a message whose answer does not follow from its type: a
+    /// request with a confirmation, or a query to a peer that reports in the layout of an older
+    /// version.
+    ///
+    /// # Errors
+    /// Those of [`query`](Self::query).
+    pub async fn request<R: Message, M: Message>(
         &self,
         peer: JausId,
-        query: &Q,
+        message: &M,
     ) -> Result<R, QueryError> {
         let directory = self.directory();
         let services = directory.component(peer).map_or_else(Vec::new, |peer| {
-            missing_for(&messages::registry(), peer, Q::CODE)
+            missing_for(&messages::registry(), peer, M::CODE)
         });
         if !services.is_empty() {
             return Err(QueryError::NotOffered {
                 peer,
-                query: Q::NAME,
+                query: M::NAME,
                 services,
             });
         }
         let not_sent = |source| QueryError::NotSent {
             peer,
-            query: Q::NAME,
+            query: M::NAME,
             source,
         };
-        let payload = query.encode().map_err(|error| not_sent(error.into()))?;
+        let payload = message.encode().map_err(|error| not_sent(error.into()))?;
         let (reply, answer) = oneshot::channel();
         let command = Command::Ask {
             peer,
@@ -231,10 +241,10 @@ impl Component {
         match answer.await.map_err(|_| QueryError::Stopped)? {
             Answer::Report(octets) => R::decode(&octets).map_err(|source| QueryError::Unreadable {
                 peer,
-                query: Q::NAME,
+                query: M::NAME,
                 source,
             }),
-            Answer::None(failure) => Err(QueryError::no_answer(Q::NAME, R::NAME, &failure)),
+            Answer::None(failure) => Err(QueryError::no_answer(M::NAME, R::NAME, &failure)),
             Answer::NotSent(error) => Err(not_sent(error.into())),
         }
     }
@@ -247,12 +257,12 @@ impl Component {
     ///
     /// # Errors
     /// [`SubscribeError`] gives the peer's reason, or how long it was silent.
-    pub async fn subscribe<R: Message, Q: Message>(
+    pub async fn subscribe<Q: Query>(
         &self,
         peer: JausId,
         query: &Q,
         when: When,
-    ) -> Result<Subscription<R>, SubscribeError> {
+    ) -> Result<Subscription<Q::Report>, SubscribeError> {
         let query_message = query.encode().map_err(|error| SubscribeError::Impossible {
             peer,
             query: Q::NAME,
@@ -261,7 +271,7 @@ impl Component {
         let topic = Topic {
             peer,
             query: query_message,
-            report: R::CODE,
+            report: Q::Report::CODE,
             when,
         };
         self.subscribe_to(topic, Q::NAME).await

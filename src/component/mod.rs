@@ -21,8 +21,8 @@
 //! let desk = Node::start(Config::loopback(42, 1))?;
 //! let operator = Component::builder(Kind::OperatorControlUnit, "Operator").attach(&desk, 1)?;
 //! let sensor = operator.find(velocity_state_sensor::URN).await?;
-//! let query = QueryVelocityState { presence_vector: 0xFFFF };
-//! let report: ReportVelocityState = operator.query(sensor, &query).await?;
+//! let query = QueryVelocityState::all();
+//! let report = operator.query(sensor, &query).await?;
 //! assert_eq!(sensor, rover.id());
 //! assert!((report.velocity_x_m_per_s().unwrap_or_default() - 1.5).abs() < 0.01);
 //! # Ok(())
@@ -36,9 +36,9 @@
 //! # use jaus::component::{Component, Update, When};
 //! # use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, SetWrenchEffort};
 //! # async fn drive(operator: Component, rover: jaus::address::JausId) -> Result<(), Box<dyn std::error::Error>> {
-//! let query = QueryVelocityState { presence_vector: 1 };
+//! let query = QueryVelocityState::none().with_velocity_x();
 //! let mut speeds = operator
-//!     .subscribe::<ReportVelocityState, _>(rover, &query, When::hz(10.0).at_least(5.0))
+//!     .subscribe(rover, &query, When::hz(10.0).at_least(5.0))
 //!     .await?;
 //! let control = operator.control(rover, 127).await?;
 //! control.resume().await?;

@@ -62,6 +62,13 @@ impl<R: Message> Subscription<R> {
         }
     }
 
+    /// Reads the reports in the layout of another version, from a peer that offers only that.
+    #[must_use]
+    pub fn with_layout<L: Message>(self) -> Subscription<L> {
+        const { assert!(L::CODE == R::CODE, "this is a layout of another report") }
+        Subscription::new(self._ticket, self._component, self.peer, self.feed)
+    }
+
     /// Waits for the next update. `None` at the end, because the component has stopped or for the
     /// reason given by [`end`](Self::end).
     ///

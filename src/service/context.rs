@@ -9,7 +9,7 @@ use bytes::Bytes;
 use super::life::Life;
 use super::{Outbox, Standing, StopCause};
 use crate::address::JausId;
-use crate::codec::Message;
+use crate::codec::{Message, Query};
 use crate::endpoint::Received;
 
 /// What services have reported since the stack last looked.
@@ -101,7 +101,7 @@ impl<'a> Context<'a> {
     }
 
     /// Reports that the answer to the query `Q` has changed, which notifies its subscribers.
-    pub fn changed<Q: Message>(&mut self) {
+    pub fn changed<Q: Query>(&mut self) {
         self.news.changed.insert(Q::CODE);
     }
 

@@ -10,7 +10,7 @@ use super::{
     code_of,
 };
 use crate::address::JausId;
-use crate::codec::{DecodeError, Message, ServiceId};
+use crate::codec::{DecodeError, Message, Query, ServiceId};
 use crate::endpoint::Received;
 
 type Stop = Box<dyn FnMut(&mut Context<'_>) + Send>;
@@ -104,22 +104,20 @@ impl Handlers {
         self
     }
 
-    /// Answers every query of type `Q`. The answer goes to the sender of the query.
+    /// Answers every query of type `Q`. The report goes to the sender of the query, and to
+    /// subscribers, without the optional fields that they did not
+    /// [request](Query::drop_unrequested). To report in the layout of an older version,
+    /// [`receive`](Self::receive) the query and [reply](Context::reply).
     #[must_use]
-    pub fn answer<Q: Message, R: Message>(
+    pub fn answer<Q: Query>(
         mut self,
-        mut function: impl FnMut(Q) -> R + Send + 'static,
+        mut function: impl FnMut(Q) -> Q::Report + Send + 'static,
     ) -> Self {
-        const {
-            assert!(
-                !Q::NEEDS_CONTROL,
-                "this is a command of a service with Access Control, not a query: register it \
-                 with `command` or `configure`"
-            );
-        }
         self.handle::<Q>(move |received, context| {
             let query = Q::decode(&received.payload)?;
-            context.reply(received, &function(query));
+            let mut report = function(query.clone());
+            query.drop_unrequested(&mut report);
+            context.reply(received, &report);
             Ok(Taken::Message)
         });
         self
@@ -333,7 +331,10 @@ mod tests {
     use std::sync::atomic::{AtomicU32, Ordering};
 
     use super::*;
-    use crate::messages::core::{QueryTimeout, SetAuthority, list_manager};
+    use crate::messages::core::report_time::{DateStamp, TimeStamp};
+    use crate::messages::core::{
+        QueryTime, QueryTimeout, ReportTime, SetAuthority, list_manager, time,
+    };
     use crate::service::State;
     use crate::service::rig::{CLIENT, Rig, STRANGER};
 
@@ -368,6 +369,26 @@ mod tests {
             say_everything(&mut rig, source);
             let counted = [0, 1, 2].map(|i: usize| counts[i].load(Ordering::Relaxed));
             assert_eq!(counted, expected, "{state}, {source}");
+        }
+    }
+
+    #[test]
+    fn an_answer_has_the_optional_fields_that_the_query_requests() {
+        let everything = ReportTime {
+            time_stamp: Some(TimeStamp::default()),
+            date_stamp: Some(DateStamp::default()),
+        };
+        let clock = Handlers::new(time::LATEST).answer(move |_: QueryTime| everything.clone());
+        let mut rig = Rig::new(vec![Box::new(clock)]);
+        for (query, has_time, has_date) in [
+            (QueryTime::all(), true, true),
+            (QueryTime::none(), false, false),
+            (QueryTime::none().with_time_stamp(), true, false),
+            (QueryTime::none().with_date_stamp(), false, true),
+        ] {
+            let report: ReportTime = rig.ask(&query).unwrap();
+            let has = (report.time_stamp.is_some(), report.date_stamp.is_some());
+            assert_eq!(has, (has_time, has_date), "{query:?}");
         }
     }
 

@@ -21,7 +21,6 @@
 //! [keeps it](Stack::begin_session). It keeps all of them until the application cancels them.
 
 mod audience;
-mod calendar;
 mod client;
 #[cfg(test)]
 mod contest;
@@ -56,8 +55,8 @@ use crate::address::JausId;
 use crate::codec::ServiceId;
 use crate::endpoint::Received;
 
+pub use crate::codec::Date;
 pub use audience::Audience;
-pub use calendar::Date;
 pub use client::{
     CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Outage, Rejection,
     Retake, SessionId, SessionLoss, SessionOrder, SessionSettings, SessionState, SubscriptionEnd,

@@ -16,9 +16,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{Duration, Instant};
 
-use super::calendar::Date;
 use super::{Context, Handled, Hazards, Service, code_of, read};
-use crate::codec::{Message, ServiceId};
+use crate::codec::{Date, Message, Query, ServiceId};
 use crate::endpoint::Received;
 use crate::messages::core::report_time::{DateStamp, TimeStamp};
 use crate::messages::core::{self, QueryTime, ReportTime, SetTime};
@@ -104,22 +103,20 @@ pub struct Time {
 }
 
 impl Time {
-    /// Bits of the presence vector of Query Time.
-    const TIME_STAMP: u8 = 1;
-    const DATE_STAMP: u8 = 2;
-
     /// Reports `time`, and sets it for all its clones.
     #[must_use]
     pub const fn new(time: TimeOfDay) -> Self {
         Self { time }
     }
 
-    fn report(&self, presence: u8) -> ReportTime {
+    fn report(&self, query: &QueryTime) -> ReportTime {
         let now = self.time.milliseconds();
-        ReportTime {
-            time_stamp: time_stamp(now).filter(|_| presence & Self::TIME_STAMP != 0),
-            date_stamp: date_stamp(now).filter(|_| presence & Self::DATE_STAMP != 0),
-        }
+        let mut report = ReportTime {
+            time_stamp: time_stamp(now),
+            date_stamp: date_stamp(now),
+        };
+        query.drop_unrequested(&mut report);
+        report
     }
 
     /// Returns whether the message gives a valid time.
@@ -153,7 +150,7 @@ impl Service for Time {
         match code_of(&message.payload) {
             Some(QueryTime::CODE) => {
                 if let Some(query) = read::<QueryTime>(message) {
-                    context.reply(message, &self.report(query.presence_vector));
+                    context.reply(message, &self.report(&query));
                 }
             }
             Some(SetTime::CODE) => {
@@ -221,17 +218,8 @@ fn date_on(day: i64) -> Option<Date> {
 }
 
 fn time_stamp(now: i64) -> Option<TimeStamp> {
-    let of_day = now.rem_euclid(DAY);
-    let part = |value: i64| u8::try_from(value).ok();
-    let day = date_on(now.div_euclid(DAY))?.day;
-    let stamp = TimeStamp::default()
-        .with_day(u8::try_from(day).ok()?)
-        .ok()?;
-    let stamp = stamp.with_hour(part(of_day / 3_600_000)?).ok()?;
-    let stamp = stamp.with_minutes(part(of_day / 60_000 % 60)?).ok()?;
-    let stamp = stamp.with_seconds(part(of_day / 1000 % 60)?).ok()?;
-    let milliseconds = u16::try_from(of_day % 1000).ok()?;
-    stamp.with_milliseconds(milliseconds).ok()
+    let since_1970 = Duration::from_millis(u64::try_from(now).ok()?);
+    Some(TimeStamp::at(since_1970))
 }
 
 /// `None` before 2000 and after 2127, which the field cannot hold.
@@ -284,8 +272,7 @@ mod tests {
     }
 
     fn shown(rig: &mut Rig) -> (DateStamp, TimeStamp) {
-        let query = QueryTime { presence_vector: 3 };
-        let report: ReportTime = rig.ask(&query).unwrap();
+        let report: ReportTime = rig.ask(&QueryTime::all()).unwrap();
         (report.date_stamp.unwrap(), report.time_stamp.unwrap())
     }
 

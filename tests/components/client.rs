@@ -194,9 +194,7 @@ async fn a_peer_that_rejects_or_says_nothing_is_named_with_what_it_did() {
     let id = scene.peer.id();
     let asking = async || {
         let query = QueryStatus {};
-        let asked = scene
-            .operator
-            .subscribe::<ReportStatus, _>(id, &query, When::OnChange);
+        let asked = scene.operator.subscribe(id, &query, When::OnChange);
         asked.await.unwrap_err()
     };
     let silent = within_limit(asking()).await;
@@ -333,7 +331,7 @@ async fn the_greater_authority_takes_control_and_an_emergency_stops_everybody() 
         .unwrap();
     assert_eq!(peer, rover.id());
     let query = QueryStatus {};
-    let subscribing = teacher.subscribe::<ReportStatus, _>(peer, &query, When::OnChange);
+    let subscribing = teacher.subscribe(peer, &query, When::OnChange);
     let mut states = within_limit(subscribing).await.unwrap();
     // Wait for each change, because changes in quick succession are reported as one.
     let mut state = async || within_limit(states.report()).await.unwrap().status.0;

@@ -10,15 +10,13 @@ use jaus::component::{
     SubscriptionEnd, Timing, When,
 };
 use jaus::link::Group;
-use jaus::messages::core::{
-    QueryIdentification, ReportHeartbeatPulse, ReportIdentification, discovery,
-};
+use jaus::messages::core::{QueryIdentification, ReportHeartbeatPulse, discovery};
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::within_limit;
 
-const QUERY: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
+const QUERY: QueryVelocityState = QueryVelocityState::none().with_velocity_x();
 
 /// A separate network, isolated from other tests.
 struct Network(Group);
@@ -139,8 +137,7 @@ async fn everybody_who_acknowledged_or_answered_is_told_apart_from_who_did_not()
     let told = within_limit(operator.deliver_all(Audience::EVERYBODY, &pulse)).await;
     assert!(told.is_complete() && told.len() == 2, "{told:?}");
     let name = QueryIdentification::default();
-    let named =
-        within_limit(operator.query_all::<ReportIdentification, _>(Audience::EVERYBODY, &name));
+    let named = within_limit(operator.query_all(Audience::EVERYBODY, &name));
     assert_eq!(named.await.successes().count(), 2);
 
     drop((doomed, doomed_node));
@@ -158,7 +155,7 @@ async fn a_group_subscription_follows_providers_as_they_come_restart_and_go() {
     let network = Network::new();
     let operator = network.operator();
     let mut speeds = operator
-        .subscribe_all::<ReportVelocityState, _>(velocity_state_sensor::URN, &QUERY, When::hz(20.0))
+        .subscribe_all(velocity_state_sensor::URN, &QUERY, When::hz(20.0))
         .unwrap();
     let first = network.sensor(101, 1.0);
     let mut next = async || within_limit(speeds.next()).await.expect("a running node");
@@ -200,7 +197,7 @@ async fn a_member_that_takes_its_service_back_is_gone_and_one_that_refuses_is_to
     let operator = network.operator();
     let slow = When::hz(1000.0).at_least(1000.0);
     let mut speeds = operator
-        .subscribe_all::<ReportVelocityState, _>(velocity_state_sensor::URN, &QUERY, slow)
+        .subscribe_all(velocity_state_sensor::URN, &QUERY, slow)
         .unwrap();
     let sensor = network.sensor(101, 1.0);
     let (id, update) = within_limit(speeds.next()).await.unwrap();
@@ -223,9 +220,7 @@ async fn what_no_member_could_grant_is_refused_at_once_and_a_stopped_node_ends_t
     let node = network.node(42, 1);
     let operator = Component::builder(Kind::OperatorControlUnit, "Operator");
     let operator = operator.attach(&node, 1).unwrap();
-    let subscribe = |when| {
-        operator.subscribe_all::<ReportVelocityState, _>(velocity_state_sensor::URN, &QUERY, when)
-    };
+    let subscribe = |when| operator.subscribe_all(velocity_state_sensor::URN, &QUERY, when);
     let refused = subscribe(When::hz(2000.0)).unwrap_err();
     assert_eq!(refused, CannotSubscribe::Rate { hz: 2000.0 });
     let mut speeds = subscribe(When::OnChange).unwrap();

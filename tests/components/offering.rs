@@ -9,9 +9,7 @@ use jaus::component::{
     QueryError, SendError,
 };
 use jaus::link::Group;
-use jaus::messages::core::{
-    QueryHeartbeatPulse, QueryStatus, ReportHeartbeatPulse, ReportStatus, liveness,
-};
+use jaus::messages::core::{QueryHeartbeatPulse, QueryStatus, ReportStatus, liveness};
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
@@ -50,10 +48,8 @@ async fn an_operator_finds_a_rover_and_asks_for_its_speed() {
         .await
         .unwrap();
     assert_eq!(sensor, rover.id());
-    let query = QueryVelocityState {
-        presence_vector: 0xFFFF,
-    };
-    let report: ReportVelocityState = within_limit(operator.query(sensor, &query)).await.unwrap();
+    let query = QueryVelocityState::all();
+    let report = within_limit(operator.query(sensor, &query)).await.unwrap();
     let speed = report.velocity_x_m_per_s().expect("it was asked for");
     assert!((speed - 1.5).abs() < 0.001, "{speed}");
 }
@@ -61,7 +57,7 @@ async fn an_operator_finds_a_rover_and_asks_for_its_speed() {
 #[tokio::test]
 async fn queries_at_the_same_time_all_get_their_answers() {
     let (rover, operator) = rover_and_operator();
-    let beat = || operator.query::<ReportHeartbeatPulse, _>(rover.id(), &QueryHeartbeatPulse {});
+    let beat = || operator.query(rover.id(), &QueryHeartbeatPulse {});
     let (first, second, third) = within_limit(async { tokio::join!(beat(), beat(), beat()) }).await;
     assert!(first.is_ok() && second.is_ok() && third.is_ok());
 }
@@ -69,7 +65,7 @@ async fn queries_at_the_same_time_all_get_their_answers() {
 #[tokio::test]
 async fn who_does_not_answer_is_named_with_what_was_asked_and_for_how_long() {
     let (rover, operator) = rover_and_operator();
-    let asked = operator.query::<ReportStatus, _>(rover.id(), &QueryStatus {});
+    let asked = operator.query(rover.id(), &QueryStatus {});
     let error = within_limit(asked).await.unwrap_err();
     assert!(
         matches!(error, QueryError::NoAnswer { tries: 2, .. }),
@@ -86,7 +82,7 @@ async fn who_does_not_answer_is_named_with_what_was_asked_and_for_how_long() {
 async fn a_query_to_nobody_is_refused_at_once() {
     let (_rover, operator) = rover_and_operator();
     let nobody = JausId::new(0, 1, 1);
-    let asked = operator.query::<ReportStatus, _>(nobody, &QueryStatus {});
+    let asked = operator.query(nobody, &QueryStatus {});
     let error = within_limit(asked).await.unwrap_err();
     assert!(
         matches!(
@@ -151,7 +147,7 @@ async fn a_message_that_no_service_handles_goes_to_the_application() {
 #[tokio::test]
 async fn a_service_can_be_offered_and_withdrawn_while_the_component_runs() {
     let (rover, operator) = rover_and_operator();
-    let ask = || operator.query::<ReportStatus, _>(rover.id(), &QueryStatus {});
+    let ask = || operator.query(rover.id(), &QueryStatus {});
     let id = jaus::messages::core::management::LATEST;
     rover
         .offer(Handlers::new(id).answer(|_: QueryStatus| ReportStatus::default()))
@@ -215,7 +211,7 @@ async fn a_component_notices_that_its_node_has_stopped() {
     let mut watch = rover.watch();
     within_limit(node.shutdown()).await;
     assert_eq!(within_limit(watch.next()).await, None);
-    let asked = rover.query::<ReportStatus, _>(JausId::new(1, 1, 1), &QueryStatus {});
+    let asked = rover.query(JausId::new(1, 1, 1), &QueryStatus {});
     assert_eq!(within_limit(asked).await, Err(QueryError::Stopped));
     assert_eq!(
         rover.find("urn:test:Nothing").await,

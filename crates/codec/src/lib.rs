@@ -17,7 +17,7 @@ pub mod arbitrary;
 #[doc(hidden)]
 pub mod bits;
 mod blob;
-mod code;
+mod calendar;
 mod composite;
 mod enumeration;
 mod error;
@@ -25,6 +25,7 @@ mod exact;
 mod fixed;
 pub mod machine;
 mod message;
+mod query;
 mod reader;
 mod registry;
 mod scale;
@@ -38,7 +39,7 @@ pub use bytes::Bytes;
 
 pub use bits::Bits;
 pub use blob::FormattedBlob;
-pub use code::report_code;
+pub use calendar::{Date, time_stamp};
 pub use composite::Composite;
 pub use enumeration::Enumeration;
 pub use error::{DecodeError, DecodeErrorKind, EncodeError, EncodeErrorKind};
@@ -47,6 +48,7 @@ pub use fixed::{Count, Fixed};
 #[doc(hidden)]
 pub use message::View;
 pub use message::{AnyMessage, Message};
+pub use query::{Query, report_code};
 pub use reader::Reader;
 #[doc(hidden)]
 pub use registry::RandomMessage;

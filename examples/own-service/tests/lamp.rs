@@ -3,7 +3,7 @@
 use jaus::component::{AccessControl, Component, Kind};
 use jaus::node::{Config, Node};
 use own_service::messages::set_lamp::Brightness;
-use own_service::messages::{QueryLamp, ReportLamp, SetLamp};
+use own_service::messages::{QueryLamp, SetLamp};
 
 #[tokio::test]
 async fn the_lamp_is_as_bright_as_the_client_in_control_sets_it()
@@ -17,11 +17,11 @@ async fn the_lamp_is_as_bright_as_the_client_in_control_sets_it()
 
     let brightness = Brightness::new(40.0)?;
     client.send(lamp.id(), &SetLamp { brightness })?;
-    let report: ReportLamp = client.query(lamp.id(), &QueryLamp).await?;
+    let report = client.query(lamp.id(), &QueryLamp).await?;
     assert_eq!(report.brightness_percent(), 0.0, "nobody is in control");
     let control = client.control(lamp.id(), 127).await?;
     control.send(&SetLamp { brightness })?;
-    let report: ReportLamp = client.query(lamp.id(), &QueryLamp).await?;
+    let report = client.query(lamp.id(), &QueryLamp).await?;
     assert_eq!(report.brightness_percent(), 40.0);
     Ok(())
 }

@@ -26,7 +26,7 @@ pub(super) fn variant(
     out.push(format!("pub enum {ident} {{"));
     for field in alternatives {
         out.doc([
-            docs::field(field).as_str(),
+            docs::field(field, None).as_str(),
             &docs::interpretation(field.item),
         ]);
         out.push(format!("{}({}),", field.ident, field.ty.rust("")));

@@ -27,9 +27,11 @@ pub(super) fn prose(text: &str) -> String {
     escaped
 }
 
-/// The first paragraph of a field's documentation: name, unit, range, limits.
-pub(super) fn field(field: &Field<'_>) -> String {
-    let facts = facts(&field.item.shape, &field.ty);
+/// The first paragraph of a field's documentation: name, unit, range, limits, and its bit in the
+/// presence vector.
+pub(super) fn field(field: &Field<'_>, bit: Option<usize>) -> String {
+    let mut facts = facts(&field.item.shape, &field.ty);
+    facts.extend(bit.map(|bit| format!("bit {bit} of the presence vector")));
     if facts.is_empty() {
         format!("`{}`.", field.item.name)
     } else {

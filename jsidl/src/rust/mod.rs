@@ -16,6 +16,7 @@ mod ident;
 mod machine;
 mod messages;
 mod newtypes;
+mod queries;
 mod random;
 mod registry;
 mod structs;
@@ -170,6 +171,7 @@ fn write(out: &mut Writer, plans: &[Plan<'_>]) {
     let mut shared = HashMap::new();
     for (plan, sections) in all().filter(|(plan, _)| plan.version.is_none()) {
         messages::message(out, plan, sections, &mut shared);
+        queries::implement(out, plan, plans);
     }
     let mut versions: Vec<_> = plans
         .iter()
@@ -186,6 +188,7 @@ fn write(out: &mut Writer, plans: &[Plan<'_>]) {
         out.push(format!("pub mod {version} {{\nuse super::codec;"));
         for (plan, sections) in all().filter(|(plan, _)| plan.version.as_ref() == Some(version)) {
             messages::message(out, plan, sections, &mut shared);
+            queries::implement(out, plan, plans);
         }
         out.push("}");
     }

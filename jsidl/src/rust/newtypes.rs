@@ -4,7 +4,9 @@ use super::docs;
 use super::types::{SubType, number_type, unsigned_type, width};
 use super::writer::Writer;
 use crate::dynamic::Steps;
-use crate::model::{BitField, Item, NamedValue, Number, Rounding, Scale, Unsigned, ValueSet};
+use crate::model::{
+    BitField, Item, NamedValue, Number, Rounding, Scale, SubField, Unsigned, ValueSet,
+};
 
 const DERIVES: &str = "#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]";
 
@@ -107,6 +109,12 @@ pub(super) fn bits(
     for field in fields {
         sub_field(out, bits.base, field);
     }
+    if is_time_stamp(bits, fields) {
+        out.gap();
+        out.push("/// The stamp of a time since the beginning of 1970 (UTC).\n#[must_use]");
+        out.push("pub const fn at(since_1970: ::std::time::Duration) -> Self {");
+        out.push("Self(codec::time_stamp(since_1970))\n}");
+    }
     out.push("}");
     out.gap();
     out.push(format!("codec::bit_field!({ident}({ty}), ["));
@@ -124,6 +132,23 @@ pub(super) fn bits(
     }
     out.push("]);");
 }
+
+/// Whether it is the standard's time stamp, in the layout of `jaus_codec::time_stamp`.
+fn is_time_stamp(bits: &BitField, fields: &[SubType<'_>]) -> bool {
+    let layout = fields.iter().map(|sub| {
+        let SubField { name, from, to, .. } = sub.field;
+        (&**name, *from, *to)
+    });
+    bits.base == Unsigned::U32 && layout.eq(TIME_STAMP)
+}
+
+const TIME_STAMP: [(&str, u8, u8); 5] = [
+    ("Milliseconds", 0, 9),
+    ("Seconds", 10, 15),
+    ("Minutes", 16, 21),
+    ("Hour", 22, 26),
+    ("Day", 27, 31),
+];
 
 fn sub_field(out: &mut Writer, base: Unsigned, sub: &SubType<'_>) {
     let SubType {

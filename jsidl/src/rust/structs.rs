@@ -25,9 +25,11 @@ pub(super) fn declare(
         return;
     }
     out.push(format!("pub struct {ident} {{"));
+    let mut bits = 0..;
     for field in fields {
         let interpretation = docs::interpretation(field.item);
-        out.doc([docs::field(field).as_str(), &interpretation]);
+        let bit = if optional(field) { bits.next() } else { None };
+        out.doc([docs::field(field, bit).as_str(), &interpretation]);
         out.push(format!(
             "pub {}: {},",
             field.ident,

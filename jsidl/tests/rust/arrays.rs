@@ -62,7 +62,7 @@ pub struct ReportArrays {
     pub grid: [[codec::Text; 2]; 2],
     /// `Stamps`.
     pub stamps: [report_arrays::Stamp; 2],
-    /// `Maybe`.
+    /// `Maybe`: bit 0 of the presence vector.
     pub maybe: Option<[u8; 4]>,
     /// `Codes`: at most 3 octets of text.
     pub codes: [codec::Text; 2],

@@ -47,11 +47,11 @@ pub static MESSAGES: &[codec::MessageInfo] = &[
 pub struct ReportTime {
     /// `TimeStamp`.
     pub time_stamp: report_time::TimeStamp,
-    /// `Flags`.
+    /// `Flags`: bit 0 of the presence vector.
     pub flags: Option<report_time::Flags>,
-    /// `Wide`.
+    /// `Wide`: bit 1 of the presence vector.
     pub wide: Option<report_time::Wide>,
-    /// `Whole`.
+    /// `Whole`: bit 2 of the presence vector.
     pub whole: Option<report_time::Whole>,
 }
 
@@ -270,6 +270,12 @@ pub mod report_time {
                 Ok(raw) => Ok(Self(raw as u32)),
                 Err(error) => Err(error),
             }
+        }
+
+        /// The stamp of a time since the beginning of 1970 (UTC).
+        #[must_use]
+        pub const fn at(since_1970: ::std::time::Duration) -> Self {
+            Self(codec::time_stamp(since_1970))
         }
     }
 

@@ -47,11 +47,11 @@ pub static MESSAGES: &[codec::MessageInfo] = &[
 pub struct SetLean {
     /// `Lean`: degree, -127 to 127.
     pub lean: set_lean::Lean,
-    /// `Effort`: percent, -100 to 100.
+    /// `Effort`: percent, -100 to 100, bit 0 of the presence vector.
     pub effort: Option<set_lean::Effort>,
-    /// `Height`: meter, -10000 to 35000.
+    /// `Height`: meter, -10000 to 35000, bit 1 of the presence vector.
     pub height: Option<set_lean::Height>,
-    /// `Latitude`: degree, -90 to 90.
+    /// `Latitude`: degree, -90 to 90, bit 2 of the presence vector.
     pub latitude: Option<set_lean::Latitude>,
 }
 

@@ -739,7 +739,7 @@ pub mod set_choice {
     /// `EmptyPresenceRec`.
     #[derive(Debug, Clone, Default, PartialEq)]
     pub struct EmptyPresenceRec {
-        /// `Maybe`.
+        /// `Maybe`: bit 0 of the presence vector.
         pub maybe: Option<u8>,
     }
 
@@ -1372,11 +1372,11 @@ pub mod report_empty_variant {
 pub struct ReportOptional {
     /// `AlwaysRec`.
     pub always_rec: report_optional::AlwaysRec,
-    /// `MaybeRec`.
+    /// `MaybeRec`: bit 0 of the presence vector.
     pub maybe_rec: Option<report_optional::MaybeRec>,
-    /// `MaybeList`: up to 255 elements.
+    /// `MaybeList`: up to 255 elements, bit 1 of the presence vector.
     pub maybe_list: Option<Vec<report_optional::ItemRec>>,
-    /// `MaybeVariant`.
+    /// `MaybeVariant`: bit 2 of the presence vector.
     pub maybe_variant: Option<report_optional::MaybeVariant>,
 }
 
@@ -1529,7 +1529,7 @@ pub mod report_optional {
     pub struct MaybeRec {
         /// `B`.
         pub b: u16,
-        /// `C`.
+        /// `C`: bit 0 of the presence vector.
         pub c: Option<u8>,
     }
 
@@ -1878,29 +1878,29 @@ pub mod report_optional {
 /// Declared by `urn:example:Composites 1.0`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReportManyOptional {
-    /// `M0`.
+    /// `M0`: bit 0 of the presence vector.
     pub m0: Option<u16>,
-    /// `M1`.
+    /// `M1`: bit 1 of the presence vector.
     pub m1: Option<u8>,
-    /// `M2`.
+    /// `M2`: bit 2 of the presence vector.
     pub m2: Option<u16>,
-    /// `M3`.
+    /// `M3`: bit 3 of the presence vector.
     pub m3: Option<u8>,
-    /// `M4`.
+    /// `M4`: bit 4 of the presence vector.
     pub m4: Option<u16>,
-    /// `M5`.
+    /// `M5`: bit 5 of the presence vector.
     pub m5: Option<u8>,
-    /// `M6`.
+    /// `M6`: bit 6 of the presence vector.
     pub m6: Option<u16>,
-    /// `M7`.
+    /// `M7`: bit 7 of the presence vector.
     pub m7: Option<u8>,
-    /// `M8`.
+    /// `M8`: bit 8 of the presence vector.
     pub m8: Option<u16>,
-    /// `M9`.
+    /// `M9`: bit 9 of the presence vector.
     pub m9: Option<u8>,
-    /// `M10`.
+    /// `M10`: bit 10 of the presence vector.
     pub m10: Option<u16>,
-    /// `M11`.
+    /// `M11`: bit 11 of the presence vector.
     pub m11: Option<u8>,
 }
 

@@ -47,7 +47,7 @@ pub static MESSAGES: &[codec::MessageInfo] = &[
 pub struct SetPosition {
     /// `Position`.
     pub position: set_position::Position,
-    /// `Reading`.
+    /// `Reading`: bit 0 of the presence vector.
     pub reading: Option<set_position::Reading>,
 }
 

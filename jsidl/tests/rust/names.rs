@@ -80,9 +80,9 @@ pub struct Option_ {
     pub output: u16,
     /// `run`.
     pub run: u16,
-    /// `present`.
+    /// `present`: bit 0 of the presence vector.
     pub present: Option<u16>,
-    /// `value`.
+    /// `value`: bit 1 of the presence vector.
     pub value: Option<u16>,
 }
 
@@ -321,17 +321,17 @@ pub mod option_2 {
 /// Declared by `urn:example:Option 1.0`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Result_ {
-    /// `input`.
+    /// `input`: bit 0 of the presence vector.
     pub input: Option<u8>,
-    /// `present`.
+    /// `present`: bit 1 of the presence vector.
     pub present: Option<u8>,
-    /// `run`.
+    /// `run`: bit 2 of the presence vector.
     pub run: Option<u8>,
-    /// `object`.
+    /// `object`: bit 3 of the presence vector.
     pub object: Option<u8>,
-    /// `random`.
+    /// `random`: bit 4 of the presence vector.
     pub random: Option<u8>,
-    /// `output`.
+    /// `output`: bit 5 of the presence vector.
     pub output: Option<u8>,
 }
 

@@ -450,11 +450,11 @@ pub mod set_scaled {
 /// Declared by `urn:example:Numbers 1.0`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SetScaledOptional {
-    /// `Latitude`: degree, -90 to 90.
+    /// `Latitude`: degree, -90 to 90, bit 0 of the presence vector.
     pub latitude: Option<set_scaled_optional::Latitude>,
     /// `Request`.
     pub request: u8,
-    /// `Heading`: radian, -3.141592653589793 to 3.141592653589793.
+    /// `Heading`: radian, -3.141592653589793 to 3.141592653589793, bit 1 of the presence vector.
     pub heading: Option<set_scaled_optional::Heading>,
 }
 

@@ -52,9 +52,9 @@ pub struct SetTexts {
     pub name: codec::Text,
     /// `Comment`: at most 80 octets of text.
     pub comment: codec::Text,
-    /// `Long`: 2 to 60000 octets of text.
+    /// `Long`: 2 to 60000 octets of text, bit 0 of the presence vector.
     pub long: Option<codec::Text>,
-    /// `Code`: at most 3 octets of text.
+    /// `Code`: at most 3 octets of text, bit 1 of the presence vector.
     pub code: Option<codec::Text>,
 }
 
@@ -152,11 +152,11 @@ codec::if_arbitrary! {
 pub struct SetBlobs {
     /// `Message`: 2 to 2147483647 octets, JAUS MESSAGE.
     pub message: codec::Bytes,
-    /// `Raw`: up to 65535 octets, User Defined.
+    /// `Raw`: up to 65535 octets, User Defined, bit 0 of the presence vector.
     pub raw: Option<codec::Bytes>,
     /// `Image`: up to 4294967295 octets.
     pub image: codec::FormattedBlob<set_blobs::ImageFormat>,
-    /// `Extra`: up to 255 octets.
+    /// `Extra`: up to 255 octets, bit 1 of the presence vector.
     pub extra: Option<codec::FormattedBlob<set_blobs::ExtraFormat>>,
 }
 

@@ -33,20 +33,30 @@ pub static SERVICES: &[codec::ServiceInfo] = &[
         name: "Versions",
         id: versions::V1_0,
         inherits_from: None,
-        inputs: &[0xF081, 0xF082],
+        inputs: &[0xF081, 0xF082, 0xE081, 0xE082],
         outputs: &[],
     },
     codec::ServiceInfo {
         name: "Versions",
         id: versions::V1_1,
         inherits_from: None,
-        inputs: &[0xF081, 0xF082],
+        inputs: &[0xF081, 0xF082, 0xE081, 0xE082],
         outputs: &[],
     },
 ];
 
 /// The message types of the set, by code; of several with one code the newest first.
 pub static MESSAGES: &[codec::MessageInfo] = &[
+    codec::MessageInfo::of::<QueryState>(&[
+        versions::V1_1,
+    ]),
+    codec::MessageInfo::of::<v1_0::QueryState>(&[
+        versions::V1_0,
+    ]),
+    codec::MessageInfo::of::<QueryMode>(&[
+        versions::V1_1,
+        versions::V1_0,
+    ]),
     codec::MessageInfo::of::<ReportState>(&[
         versions::V1_1,
     ]),
@@ -58,6 +68,133 @@ pub static MESSAGES: &[codec::MessageInfo] = &[
         versions::V1_0,
     ]),
 ];
+
+/// `QueryState` (E081h).
+///
+/// Asks for the state.
+///
+/// Declared by `urn:example:Versions 1.1`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct QueryState {
+    /// `Detail`.
+    pub detail: u8,
+}
+
+impl codec::Message for QueryState {
+    const CODE: u16 = 0xE081;
+    const NAME: &'static str = "QueryState";
+    const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
+
+    fn encoded_len(&self) -> usize {
+        3
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        let run = output.run::<3>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.detail, run, 2);
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
+        let detail = input.member("Detail", codec::Reader::fixed)?;
+        Ok(Self {
+            detail,
+        })
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for QueryState {
+        #[inline(never)]
+        fn view(&self) -> codec::view::Value {
+            codec::view::Value::object(1)
+            .with("Detail", codec::view::View::view(&self.detail))
+        }
+
+        #[inline(never)]
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            let object = codec::view::Object::new(value, &["Detail"])?;
+            Ok(Self {
+                detail: object.member("Detail")?,
+            })
+        }
+    }
+    codec::view::serde_by_view!(QueryState);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for QueryState {
+        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self {
+                detail: codec::arbitrary::Arbitrary::arbitrary(random)?,
+            })
+        }
+    }
+}
+
+impl codec::Query for QueryState {
+    type Report = ReportState;
+}
+
+/// `QueryMode` (E082h).
+///
+/// Asks for the mode.
+///
+/// Declared by `urn:example:Versions 1.1`, `urn:example:Versions 1.0`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct QueryMode;
+
+impl codec::Message for QueryMode {
+    const CODE: u16 = 0xE082;
+    const NAME: &'static str = "QueryMode";
+    const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
+
+    fn encoded_len(&self) -> usize {
+        2
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
+        Ok(Self)
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for QueryMode {
+        #[inline(never)]
+        fn view(&self) -> codec::view::Value {
+            codec::view::Value::object(0)
+        }
+
+        #[inline(never)]
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            codec::view::Object::new(value, &[])?;
+            Ok(Self)
+        }
+    }
+    codec::view::serde_by_view!(QueryMode);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for QueryMode {
+        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self)
+        }
+    }
+}
+
+impl codec::Query for QueryMode {
+    type Report = ReportMode;
+}
 
 /// `ReportState` (F081h).
 ///
@@ -255,6 +392,63 @@ pub mod report_mode {
 /// Messages as services of version 1.0 had them, where newer ones differ.
 pub mod v1_0 {
     use super::codec;
+
+    /// `QueryState` (E081h).
+    ///
+    /// Asks for the state.
+    ///
+    /// Declared by `urn:example:Versions 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct QueryState;
+
+    impl codec::Message for QueryState {
+        const CODE: u16 = 0xE081;
+        const NAME: &'static str = "QueryState";
+        const IS_COMMAND: bool = false;
+        const NEEDS_CONTROL: bool = false;
+
+        fn encoded_len(&self) -> usize {
+            2
+        }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            output.fixed(<Self as codec::Message>::CODE);
+            Ok(())
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
+            Ok(Self)
+        }
+    }
+
+    codec::if_serde! {
+        impl codec::view::View for QueryState {
+            #[inline(never)]
+            fn view(&self) -> codec::view::Value {
+                codec::view::Value::object(0)
+            }
+
+            #[inline(never)]
+            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+                codec::view::Object::new(value, &[])?;
+                Ok(Self)
+            }
+        }
+        codec::view::serde_by_view!(QueryState);
+    }
+
+    codec::if_arbitrary! {
+        impl<'a> codec::arbitrary::Arbitrary<'a> for QueryState {
+            fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+                Ok(Self)
+            }
+        }
+    }
+
+    impl codec::Query for QueryState {
+        type Report = ReportState;
+    }
 
     /// `ReportState` (F081h).
     ///

@@ -10,7 +10,7 @@ mod results;
 
 use super::{Component, DeliverError, QueryError, SendError};
 use crate::address::JausId;
-use crate::codec::Message;
+use crate::codec::{Message, Query};
 use crate::endpoint::Outgoing;
 use crate::service::{Audience, CannotSubscribe, Topic, When};
 
@@ -75,11 +75,11 @@ impl Component {
     }
 
     /// Queries each member of an audience, and waits until each has answered or timed out.
-    pub async fn query_all<R: Message, Q: Message>(
+    pub async fn query_all<Q: Query>(
         &self,
         audience: impl Into<Audience>,
         query: &Q,
-    ) -> Results<R, QueryError> {
+    ) -> Results<Q::Report, QueryError> {
         let members = self.members(audience);
         results::of_each(members, AT_ONCE, |member| self.query(member, query)).await
     }
@@ -89,11 +89,11 @@ impl Component {
     ///
     /// ```no_run
     /// # use jaus::component::{Component, GroupUpdate, When};
-    /// # use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+    /// # use jaus::messages::mobility::{QueryVelocityState, velocity_state_sensor};
     /// # async fn watch(operator: Component) -> Result<(), Box<dyn std::error::Error>> {
-    /// let query = QueryVelocityState { presence_vector: 1 };
+    /// let query = QueryVelocityState::none().with_velocity_x();
     /// let mut speeds = operator
-    ///     .subscribe_all::<ReportVelocityState, _>(velocity_state_sensor::URN, &query, When::hz(5.0))?;
+    ///     .subscribe_all(velocity_state_sensor::URN, &query, When::hz(5.0))?;
     /// while let Some((sensor, update)) = speeds.next().await {
     ///     match update {
     ///         GroupUpdate::Report(report) => println!("{sensor}: {:?} m/s", report.velocity_x_m_per_s()),
@@ -107,16 +107,16 @@ impl Component {
     /// # Errors
     /// If the wire cannot carry the query or the rate. Refusals of single members arrive as
     /// [`GroupUpdate::NotSubscribed`].
-    pub fn subscribe_all<R: Message, Q: Message>(
+    pub fn subscribe_all<Q: Query>(
         &self,
         audience: impl Into<Audience>,
         query: &Q,
         when: When,
-    ) -> Result<GroupSubscription<R>, CannotSubscribe> {
+    ) -> Result<GroupSubscription<Q::Report>, CannotSubscribe> {
         let topic = Topic {
             peer: self.id(),
             query: query.encode()?,
-            report: R::CODE,
+            report: Q::Report::CODE,
             when,
         };
         topic.check()?;

@@ -12,18 +12,13 @@ use crate::picture::Picture;
 use crate::report::Report;
 use crate::role;
 use jaus::address::JausId;
-use jaus::codec::Message;
+use jaus::codec::Query;
 use jaus::component::{Component, SubscribeError, Update, When};
-use jaus::messages::core::{
-    QueryControl, QueryStatus, ReportControl, ReportStatus, access_control,
-};
-use jaus::messages::mobility::{
-    QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState,
-};
+use jaus::messages::core::{QueryControl, QueryStatus, access_control};
+use jaus::messages::mobility::{QueryLocalPose, QueryVelocityState};
 use jaus::service::Component as Known;
 use jaus_vehicle::messages::ground::{
-    QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, ReportMission, ReportPlannedPath,
-    ReportRasterMaps, ReportStage, mission_planner, raster_maps,
+    QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, mission_planner, raster_maps,
 };
 
 /// A report with its sender.
@@ -102,53 +97,48 @@ impl Following {
     fn start(&self, peer: JausId, topics: Topics) -> JoinSet<()> {
         let mut tasks = JoinSet::new();
         if topics.status {
-            tasks.spawn(self.ask::<ReportStatus, _>(peer, QueryStatus {}, STATUS));
+            tasks.spawn(self.ask(peer, QueryStatus {}, STATUS));
         }
         if topics.control {
-            tasks.spawn(self.ask::<ReportControl, _>(peer, QueryControl {}, STATUS));
+            tasks.spawn(self.ask(peer, QueryControl {}, STATUS));
         }
         if topics.stage {
-            tasks.spawn(self.ask::<ReportStage, _>(peer, QueryStage {}, STATUS));
+            tasks.spawn(self.ask(peer, QueryStage {}, STATUS));
         }
         if topics.pose {
-            let query = QueryLocalPose {
-                presence_vector: u16::MAX,
-            };
-            tasks.spawn(self.ask::<ReportLocalPose, _>(peer, query, MOTION));
+            let query = QueryLocalPose::all();
+            tasks.spawn(self.ask(peer, query, MOTION));
         }
         if topics.velocity {
-            let query = QueryVelocityState {
-                presence_vector: u16::MAX,
-            };
-            tasks.spawn(self.ask::<ReportVelocityState, _>(peer, query, MOTION));
+            let query = QueryVelocityState::all();
+            tasks.spawn(self.ask(peer, query, MOTION));
         }
         if topics.mission {
-            tasks.spawn(self.ask::<ReportMission, _>(peer, QueryMission {}, STATUS));
+            tasks.spawn(self.ask(peer, QueryMission {}, STATUS));
             let path = QueryPlannedPath {};
-            tasks.spawn(self.ask::<ReportPlannedPath, _>(peer, path, When::OnChange));
+            tasks.spawn(self.ask(peer, path, When::OnChange));
         }
         if topics.maps {
             let maps = QueryRasterMaps {};
-            tasks.spawn(self.ask::<ReportRasterMaps, _>(peer, maps, When::OnChange));
+            tasks.spawn(self.ask(peer, maps, When::OnChange));
         }
         tasks
     }
 
     /// Maintains one subscription until the future is dropped.
-    fn ask<R, Q>(
+    fn ask<Q: Query>(
         &self,
         peer: JausId,
         query: Q,
         when: When,
-    ) -> impl Future<Output = ()> + Send + use<R, Q>
+    ) -> impl Future<Output = ()> + Send + use<Q>
     where
-        R: Message + Into<Report> + Send + 'static,
-        Q: Message + Sync + Send + 'static,
+        Q::Report: Into<Report>,
     {
         let (component, sighted) = (self.component.clone(), self.sighted.clone());
         async move {
             loop {
-                match component.subscribe::<R, Q>(peer, &query, when).await {
+                match component.subscribe(peer, &query, when).await {
                     Ok(mut reports) => {
                         while let Some(update) = reports.next().await {
                             let report = match update {

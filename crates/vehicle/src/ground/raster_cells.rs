@@ -1,6 +1,6 @@
 //! The client's side of Raster Maps: fetches the cells of a map in blocks of rows.
 
-use crate::messages::ground::{QueryRasterCells, ReportRasterCells};
+use crate::messages::ground::QueryRasterCells;
 use jaus::address::JausId;
 use jaus::component::{Component, QueryError};
 
@@ -42,7 +42,7 @@ pub async fn fetch_cells(
             rows: step.min(edition.rows - row),
             columns,
         };
-        let block: ReportRasterCells = component.query(store, &query).await?;
+        let block = component.query(store, &query).await?;
         let is_asked = (block.map, block.row, block.rows, block.columns)
             == (query.map, query.row, query.rows, query.columns);
         let is_full = block.cells.len() == usize::from(query.rows) * width;

@@ -3,7 +3,6 @@
 use super::behaviour::Behaviour;
 use super::controls::Controls;
 use super::exchange::Exchange;
-use super::wanted::Wanted;
 use jaus::codec::{Message, ServiceId};
 use jaus::messages::mobility::report_acceleration_state as fields;
 use jaus::messages::mobility::report_acceleration_state_ext as ext;
@@ -35,42 +34,37 @@ impl Behaviour for AccelerationStateSensor {
     }
 }
 
-fn report(
-    query: &QueryAccelerationState,
-    exchange: &mut Exchange<'_, '_>,
-) -> ReportAccelerationState {
+fn report(_: &QueryAccelerationState, exchange: &mut Exchange<'_, '_>) -> ReportAccelerationState {
     let acceleration = exchange.controls.pilot.motion().acceleration;
-    let wanted = Wanted(query.presence_vector.into());
     ReportAccelerationState {
-        acceleration_x: wanted.real(0, acceleration.x, fields::AccelerationX::new),
-        acceleration_y: wanted.real(1, acceleration.y, fields::AccelerationY::new),
-        acceleration_z: wanted.real(2, acceleration.z, fields::AccelerationZ::new),
+        acceleration_x: fields::AccelerationX::new(acceleration.x).ok(),
+        acceleration_y: fields::AccelerationY::new(acceleration.y).ok(),
+        acceleration_z: fields::AccelerationZ::new(acceleration.z).ok(),
         acceleration_rms: None,
-        roll_acceleration: wanted.real(4, acceleration.roll, fields::RollAcceleration::new),
-        pitch_acceleration: wanted.real(5, acceleration.pitch, fields::PitchAcceleration::new),
-        yaw_acceleration: wanted.real(6, acceleration.yaw, fields::YawAcceleration::new),
+        roll_acceleration: fields::RollAcceleration::new(acceleration.roll).ok(),
+        pitch_acceleration: fields::PitchAcceleration::new(acceleration.pitch).ok(),
+        yaw_acceleration: fields::YawAcceleration::new(acceleration.yaw).ok(),
         rotational_acceleration_rms: None,
-        time_stamp: wanted.field(8, exchange.stamp()),
+        time_stamp: exchange.stamp(),
     }
 }
 
 fn report_ext(
-    query: &QueryAccelerationStateExt,
+    _: &QueryAccelerationStateExt,
     exchange: &mut Exchange<'_, '_>,
 ) -> ReportAccelerationStateExt {
     let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
     let acceleration = exchange.controls.pilot.motion().acceleration;
-    let wanted = Wanted(query.presence_vector.into());
     ReportAccelerationStateExt {
-        acceleration_x: wanted.real(0, acceleration.x, ext::AccelerationX::new),
-        acceleration_y: wanted.real(1, acceleration.y, ext::AccelerationY::new),
-        acceleration_z: wanted.real(2, acceleration.z, ext::AccelerationZ::new),
+        acceleration_x: ext::AccelerationX::new(acceleration.x).ok(),
+        acceleration_y: ext::AccelerationY::new(acceleration.y).ok(),
+        acceleration_z: ext::AccelerationZ::new(acceleration.z).ok(),
         acceleration_rms: None,
-        roll_acceleration: wanted.real(4, acceleration.roll, ext::RollAcceleration::new),
-        pitch_acceleration: wanted.real(5, acceleration.pitch, ext::PitchAcceleration::new),
-        yaw_acceleration: wanted.real(6, acceleration.yaw, ext::YawAcceleration::new),
+        roll_acceleration: ext::RollAcceleration::new(acceleration.roll).ok(),
+        pitch_acceleration: ext::PitchAcceleration::new(acceleration.pitch).ok(),
+        yaw_acceleration: ext::YawAcceleration::new(acceleration.yaw).ok(),
         rotational_acceleration_rms: None,
-        time_seconds: wanted.field(8, seconds),
-        time_nano_seconds: wanted.field(9, nanoseconds),
+        time_seconds: seconds,
+        time_nano_seconds: nanoseconds,
     }
 }

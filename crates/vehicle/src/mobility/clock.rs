@@ -2,8 +2,6 @@
 
 use std::time::{Duration, Instant};
 
-use jaus::messages::mobility::report_local_pose::TimeStamp;
-use jaus::service::Date;
 use jaus::service::TimeOfDay;
 
 /// Stamps samples. A sample keeps its stamp until the time is set.
@@ -34,33 +32,5 @@ impl SampleClock {
         let stamp = self.time.now().saturating_sub(age);
         self.last = Some((sampled_at, ahead, stamp));
         stamp
-    }
-}
-
-/// The time stamp of version 1.0 reports: day of the month and time of day.
-pub(super) fn stamp(since_1970: Duration) -> Option<TimeStamp> {
-    let seconds = since_1970.as_secs();
-    let part = |value: u64| u8::try_from(value).ok();
-    let stamp = TimeStamp::default();
-    let stamp = stamp
-        .with_day(part(Date::after_1970(seconds / 86_400).day)?)
-        .ok()?;
-    let stamp = stamp.with_hour(part(seconds / 3600 % 24)?).ok()?;
-    let stamp = stamp.with_minutes(part(seconds / 60 % 60)?).ok()?;
-    let stamp = stamp.with_seconds(part(seconds % 60)?).ok()?;
-    let milliseconds = u16::try_from(since_1970.subsec_millis()).ok()?;
-    stamp.with_milliseconds(milliseconds).ok()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_stamp_tells_day_and_time() {
-        // 2015-06-08 01:02:03.004 UTC.
-        let stamp = stamp(Duration::from_millis(1_433_725_323_004)).unwrap();
-        assert_eq!((stamp.day(), stamp.hour(), stamp.minutes()), (8, 1, 2));
-        assert_eq!((stamp.seconds(), stamp.milliseconds()), (3, 4));
     }
 }

@@ -2,11 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use super::clock;
 use super::controls::Controls;
 use crate::motion::{Goal, Ticket};
 use jaus::address::JausId;
-use jaus::codec::{Message, OutOfRange};
+use jaus::codec::{Message, OutOfRange, Query};
 use jaus::endpoint::Received;
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::service::{Context, Standing, State, Validity, read};
@@ -33,26 +32,29 @@ impl Exchange<'_, '_> {
     }
 
     /// Answers a query from any client with this report.
-    pub(super) fn answer<Q: Message, R: Message>(
-        &mut self,
-        report: impl FnOnce(&Q, &mut Self) -> R,
-    ) {
-        if let Some(query) = self.query() {
-            let report = report(&query, self);
-            self.reply(&report);
-        }
+    pub(super) fn answer<Q: Query>(&mut self, report: impl FnOnce(&Q, &mut Self) -> Q::Report) {
+        self.answer_if(|query, exchange| Ok(report(query, exchange)));
     }
 
     /// As [`answer`](Self::answer), unless the report contains a number outside the range of its
     /// field.
-    pub(super) fn answer_if<Q: Message, R: Message>(
+    pub(super) fn answer_if<Q: Query>(
         &mut self,
-        report: impl FnOnce(&Q, &mut Self) -> Result<R, OutOfRange>,
+        report: impl FnOnce(&Q, &mut Self) -> Result<Q::Report, OutOfRange>,
     ) {
-        if let Some(query) = self.query() {
-            let report = report(&query, self);
-            self.reply_if(report);
+        let Some(query) = self.query::<Q>() else {
+            return;
+        };
+        match report(&query, self) {
+            Ok(report) => self.report(&query, report),
+            Err(error) => tracing::debug!(query = Q::NAME, %error, "cannot encode the report"),
         }
+    }
+
+    /// Sends the report with the fields that the query requests.
+    pub(super) fn report<Q: Query>(&mut self, query: &Q, mut report: Q::Report) {
+        query.drop_unrequested(&mut report);
+        self.reply(&report);
     }
 
     /// Reads a configuration command, which only the client in control may send.
@@ -101,14 +103,6 @@ impl Exchange<'_, '_> {
         self.context.reply(self.message, report);
     }
 
-    /// Sends the reply, unless it contains a number outside the range of its field.
-    pub(super) fn reply_if<R: Message>(&mut self, report: Result<R, OutOfRange>) {
-        match report {
-            Ok(report) => self.reply(&report),
-            Err(error) => tracing::debug!(report = R::NAME, %error, "cannot encode the report"),
-        }
-    }
-
     /// Sample time of the vehicle's motion since the start of 1970; `None` without a clock.
     fn sampled_since_1970(&mut self) -> Option<Duration> {
         let sampled_at = self.controls.pilot.motion().sampled_at;
@@ -130,6 +124,6 @@ impl Exchange<'_, '_> {
 
     /// Sample time of the motion for version 1.0 reports.
     pub(super) fn stamp(&mut self) -> Option<TimeStamp> {
-        clock::stamp(self.sampled_since_1970()?)
+        self.sampled_since_1970().map(TimeStamp::at)
     }
 }

@@ -4,7 +4,6 @@ use super::behaviour::Behaviour;
 use super::both_versions;
 use super::controls::Controls;
 use super::exchange::Exchange;
-use super::wanted::Wanted;
 use crate::motion::GlobalPose;
 use jaus::codec::{Message, ServiceId};
 use jaus::messages::mobility::report_global_pose as fields;
@@ -110,35 +109,33 @@ fn told_ext(message: &SetGlobalPoseExt, pose: &GlobalPose) -> GlobalPose {
     }
 }
 
-fn report(query: &QueryGlobalPose, exchange: &mut Exchange<'_, '_>) -> ReportGlobalPose {
+fn report(_: &QueryGlobalPose, exchange: &mut Exchange<'_, '_>) -> ReportGlobalPose {
     let pose = pose(exchange);
-    let wanted = Wanted(query.presence_vector.into());
     ReportGlobalPose {
-        latitude: wanted.real(0, pose.latitude, fields::Latitude::new),
-        longitude: wanted.real(1, pose.longitude, fields::Longitude::new),
-        altitude: wanted.real(2, pose.altitude, fields::Altitude::new),
+        latitude: fields::Latitude::new(pose.latitude).ok(),
+        longitude: fields::Longitude::new(pose.longitude).ok(),
+        altitude: fields::Altitude::new(pose.altitude).ok(),
         position_rms: None,
-        roll: wanted.real(4, pose.roll, fields::Roll::new),
-        pitch: wanted.real(5, pose.pitch, fields::Pitch::new),
-        yaw: wanted.real(6, pose.yaw, fields::Yaw::new),
+        roll: fields::Roll::new(pose.roll).ok(),
+        pitch: fields::Pitch::new(pose.pitch).ok(),
+        yaw: fields::Yaw::new(pose.yaw).ok(),
         attitude_rms: None,
-        time_stamp: wanted.field(8, exchange.stamp()),
+        time_stamp: exchange.stamp(),
     }
 }
 
-fn report_ext(query: &QueryGlobalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportGlobalPoseExt {
+fn report_ext(_: &QueryGlobalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportGlobalPoseExt {
     let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
     let pose = pose(exchange);
-    let wanted = Wanted(query.presence_vector.into());
     ReportGlobalPoseExt {
-        latitude: wanted.real(0, pose.latitude, ext::Latitude::new),
-        longitude: wanted.real(1, pose.longitude, ext::Longitude::new),
-        altitude_msl: wanted.real(3, pose.altitude, ext::AltitudeMsl::new),
-        roll: wanted.real(8, pose.roll, ext::Roll::new),
-        pitch: wanted.real(9, pose.pitch, ext::Pitch::new),
-        heading: wanted.real(10, pose.yaw, ext::Heading::new),
-        time_seconds: wanted.field(13, seconds),
-        time_nano_seconds: wanted.field(14, nanoseconds),
+        latitude: ext::Latitude::new(pose.latitude).ok(),
+        longitude: ext::Longitude::new(pose.longitude).ok(),
+        altitude_msl: ext::AltitudeMsl::new(pose.altitude).ok(),
+        roll: ext::Roll::new(pose.roll).ok(),
+        pitch: ext::Pitch::new(pose.pitch).ok(),
+        heading: ext::Heading::new(pose.yaw).ok(),
+        time_seconds: seconds,
+        time_nano_seconds: nanoseconds,
         ..ReportGlobalPoseExt::default()
     }
 }

@@ -1,6 +1,5 @@
 //! A waypoint on the globe, independent of the message version.
 
-use super::wanted::Wanted;
 use crate::motion::{Frame, GlobalPose, Waypoint};
 use jaus::codec::OutOfRange;
 use jaus::messages::mobility::report_global_waypoint as fields;
@@ -76,33 +75,39 @@ impl GlobalWaypoint {
     }
 
     /// The report of version 1.0.
-    pub(super) fn report(&self, wanted: Wanted) -> Result<ReportGlobalWaypoint, OutOfRange> {
+    pub(super) fn report(&self) -> Result<ReportGlobalWaypoint, OutOfRange> {
         let tolerance = fields::WaypointTolerance::new;
         Ok(ReportGlobalWaypoint {
             latitude: fields::Latitude::new(self.latitude)?,
             longitude: fields::Longitude::new(self.longitude)?,
-            altitude: wanted.optional(0, self.altitude, fields::Altitude::new),
-            roll: wanted.optional(1, self.roll, fields::Roll::new),
-            pitch: wanted.optional(2, self.pitch, fields::Pitch::new),
-            yaw: wanted.optional(3, self.yaw, fields::Yaw::new),
-            waypoint_tolerance: wanted.optional(4, self.waypoint_tolerance, tolerance),
-            path_tolerance: wanted.optional(5, self.path_tolerance, fields::PathTolerance::new),
+            altitude: self.altitude.and_then(|it| fields::Altitude::new(it).ok()),
+            roll: self.roll.and_then(|it| fields::Roll::new(it).ok()),
+            pitch: self.pitch.and_then(|it| fields::Pitch::new(it).ok()),
+            yaw: self.yaw.and_then(|it| fields::Yaw::new(it).ok()),
+            waypoint_tolerance: self.waypoint_tolerance.and_then(|it| tolerance(it).ok()),
+            path_tolerance: self
+                .path_tolerance
+                .and_then(|it| fields::PathTolerance::new(it).ok()),
         })
     }
 
     /// The report of version 1.1.
-    pub(super) fn report_ext(&self, wanted: Wanted) -> Result<ReportGlobalWaypointExt, OutOfRange> {
+    pub(super) fn report_ext(&self) -> Result<ReportGlobalWaypointExt, OutOfRange> {
         let tolerance = ext::WaypointTolerance::new;
-        let altitude = wanted.optional(0, self.altitude, ZPositionAltitudeMsl::new);
+        let altitude = self
+            .altitude
+            .and_then(|it| ZPositionAltitudeMsl::new(it).ok());
         Ok(ReportGlobalWaypointExt {
             latitude: ext::Latitude::new(self.latitude)?,
             longitude: ext::Longitude::new(self.longitude)?,
             z_position: altitude.map(ZPosition::AltitudeMsl),
-            roll: wanted.optional(1, self.roll, ext::Roll::new),
-            pitch: wanted.optional(2, self.pitch, ext::Pitch::new),
-            heading: wanted.optional(3, self.yaw, ext::Heading::new),
-            waypoint_tolerance: wanted.optional(4, self.waypoint_tolerance, tolerance),
-            path_tolerance: wanted.optional(5, self.path_tolerance, ext::PathTolerance::new),
+            roll: self.roll.and_then(|it| ext::Roll::new(it).ok()),
+            pitch: self.pitch.and_then(|it| ext::Pitch::new(it).ok()),
+            heading: self.yaw.and_then(|it| ext::Heading::new(it).ok()),
+            waypoint_tolerance: self.waypoint_tolerance.and_then(|it| tolerance(it).ok()),
+            path_tolerance: self
+                .path_tolerance
+                .and_then(|it| ext::PathTolerance::new(it).ok()),
         })
     }
 }

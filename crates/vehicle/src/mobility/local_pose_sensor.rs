@@ -4,7 +4,6 @@ use super::behaviour::Behaviour;
 use super::both_versions;
 use super::controls::Controls;
 use super::exchange::Exchange;
-use super::wanted::Wanted;
 use crate::motion::Pose;
 use jaus::codec::{Message, ServiceId};
 use jaus::messages::mobility::report_local_pose as fields;
@@ -96,35 +95,33 @@ fn told_ext(message: &SetLocalPoseExt, pose: &Pose) -> Pose {
     }
 }
 
-fn report(query: &QueryLocalPose, exchange: &mut Exchange<'_, '_>) -> ReportLocalPose {
+fn report(_: &QueryLocalPose, exchange: &mut Exchange<'_, '_>) -> ReportLocalPose {
     let pose = pose(exchange);
-    let wanted = Wanted(query.presence_vector.into());
     ReportLocalPose {
-        x: wanted.real(0, pose.x, fields::X::new),
-        y: wanted.real(1, pose.y, fields::Y::new),
-        z: wanted.real(2, pose.z, fields::Z::new),
+        x: fields::X::new(pose.x).ok(),
+        y: fields::Y::new(pose.y).ok(),
+        z: fields::Z::new(pose.z).ok(),
         position_rms: None,
-        roll: wanted.real(4, pose.roll, fields::Roll::new),
-        pitch: wanted.real(5, pose.pitch, fields::Pitch::new),
-        yaw: wanted.real(6, pose.yaw, fields::Yaw::new),
+        roll: fields::Roll::new(pose.roll).ok(),
+        pitch: fields::Pitch::new(pose.pitch).ok(),
+        yaw: fields::Yaw::new(pose.yaw).ok(),
         attitude_rms: None,
-        time_stamp: wanted.field(8, exchange.stamp()),
+        time_stamp: exchange.stamp(),
     }
 }
 
-fn report_ext(query: &QueryLocalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportLocalPoseExt {
+fn report_ext(_: &QueryLocalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportLocalPoseExt {
     let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
     let pose = pose(exchange);
-    let wanted = Wanted(query.presence_vector.into());
     ReportLocalPoseExt {
-        x: wanted.real(0, pose.x, ext::X::new),
-        y: wanted.real(1, pose.y, ext::Y::new),
-        z_local: wanted.real(6, pose.z, ext::ZLocal::new),
-        roll: wanted.real(9, pose.roll, ext::Roll::new),
-        pitch: wanted.real(10, pose.pitch, ext::Pitch::new),
-        heading: wanted.real(11, pose.yaw, ext::Heading::new),
-        time_seconds: wanted.field(14, seconds),
-        time_nano_seconds: wanted.field(15, nanoseconds),
+        x: ext::X::new(pose.x).ok(),
+        y: ext::Y::new(pose.y).ok(),
+        z_local: ext::ZLocal::new(pose.z).ok(),
+        roll: ext::Roll::new(pose.roll).ok(),
+        pitch: ext::Pitch::new(pose.pitch).ok(),
+        heading: ext::Heading::new(pose.yaw).ok(),
+        time_seconds: seconds,
+        time_nano_seconds: nanoseconds,
         ..ReportLocalPoseExt::default()
     }
 }

@@ -1,6 +1,5 @@
 //! A waypoint in the local frame, independent of the message version.
 
-use super::wanted::Wanted;
 use crate::motion::Waypoint;
 use jaus::codec::OutOfRange;
 use jaus::messages::mobility::report_local_waypoint as fields;
@@ -70,33 +69,37 @@ impl LocalWaypoint {
     }
 
     /// The report of version 1.0.
-    pub(super) fn report(&self, wanted: Wanted) -> Result<ReportLocalWaypoint, OutOfRange> {
+    pub(super) fn report(&self) -> Result<ReportLocalWaypoint, OutOfRange> {
         let tolerance = fields::WaypointTolerance::new;
         Ok(ReportLocalWaypoint {
             x: fields::X::new(self.x)?,
             y: fields::Y::new(self.y)?,
-            z: wanted.optional(0, self.z, fields::Z::new),
-            roll: wanted.optional(1, self.roll, fields::Roll::new),
-            pitch: wanted.optional(2, self.pitch, fields::Pitch::new),
-            yaw: wanted.optional(3, self.yaw, fields::Yaw::new),
-            waypoint_tolerance: wanted.optional(4, self.waypoint_tolerance, tolerance),
-            path_tolerance: wanted.optional(5, self.path_tolerance, fields::PathTolerance::new),
+            z: self.z.and_then(|it| fields::Z::new(it).ok()),
+            roll: self.roll.and_then(|it| fields::Roll::new(it).ok()),
+            pitch: self.pitch.and_then(|it| fields::Pitch::new(it).ok()),
+            yaw: self.yaw.and_then(|it| fields::Yaw::new(it).ok()),
+            waypoint_tolerance: self.waypoint_tolerance.and_then(|it| tolerance(it).ok()),
+            path_tolerance: self
+                .path_tolerance
+                .and_then(|it| fields::PathTolerance::new(it).ok()),
         })
     }
 
     /// The report of version 1.1.
-    pub(super) fn report_ext(&self, wanted: Wanted) -> Result<ReportLocalWaypointExt, OutOfRange> {
+    pub(super) fn report_ext(&self) -> Result<ReportLocalWaypointExt, OutOfRange> {
         let tolerance = ext::WaypointTolerance::new;
-        let z = wanted.optional(0, self.z, ZPositionZLocal::new);
+        let z = self.z.and_then(|it| ZPositionZLocal::new(it).ok());
         Ok(ReportLocalWaypointExt {
             x: ext::X::new(self.x)?,
             y: ext::Y::new(self.y)?,
             z_position: z.map(ZPosition::ZLocal),
-            roll: wanted.optional(1, self.roll, ext::Roll::new),
-            pitch: wanted.optional(2, self.pitch, ext::Pitch::new),
-            heading: wanted.optional(3, self.yaw, ext::Heading::new),
-            waypoint_tolerance: wanted.optional(4, self.waypoint_tolerance, tolerance),
-            path_tolerance: wanted.optional(5, self.path_tolerance, ext::PathTolerance::new),
+            roll: self.roll.and_then(|it| ext::Roll::new(it).ok()),
+            pitch: self.pitch.and_then(|it| ext::Pitch::new(it).ok()),
+            heading: self.yaw.and_then(|it| ext::Heading::new(it).ok()),
+            waypoint_tolerance: self.waypoint_tolerance.and_then(|it| tolerance(it).ok()),
+            path_tolerance: self
+                .path_tolerance
+                .and_then(|it| ext::PathTolerance::new(it).ok()),
         })
     }
 }

@@ -41,7 +41,6 @@ mod vector_driver;
 mod vehicle;
 mod velocity_state_driver;
 mod velocity_state_sensor;
-mod wanted;
 mod waypoint_driver;
 mod waypoint_kinds;
 

@@ -4,8 +4,7 @@ use super::exchange::Exchange;
 use super::kind::Kind;
 use super::path_segment::{self, PathSegment};
 use super::place::Place;
-use super::wanted::Wanted;
-use jaus::codec::{Message, ServiceId};
+use jaus::codec::{Message, OutOfRange, Query, ServiceId};
 use jaus::messages::core::reject_element_request::ResponseCode;
 use jaus::messages::mobility::{
     QueryGlobalPathSegment, QueryGlobalPathSegmentExt, QueryLocalPathSegment,
@@ -26,18 +25,14 @@ impl Kind for LocalPath {
     fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
         match code {
             QueryLocalPathSegment::CODE => {
-                if let Some(query) = exchange.query::<QueryLocalPathSegment>() {
-                    let wanted = Wanted(query.presence_vector.into());
-                    tell(local(exchange), exchange, |path| path.report_local(wanted));
-                }
+                tell::<QueryLocalPathSegment>(local(exchange), exchange, PathSegment::report_local);
             }
             QueryLocalPathSegmentExt::CODE => {
-                if let Some(query) = exchange.query::<QueryLocalPathSegmentExt>() {
-                    let wanted = Wanted(query.presence_vector.into());
-                    tell(local(exchange), exchange, |path| {
-                        path.report_local_ext(wanted)
-                    });
-                }
+                tell::<QueryLocalPathSegmentExt>(
+                    local(exchange),
+                    exchange,
+                    PathSegment::report_local_ext,
+                );
             }
             _ => return Handled::No,
         }
@@ -58,20 +53,18 @@ impl Kind for GlobalPath {
     fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
         match code {
             QueryGlobalPathSegment::CODE => {
-                if let Some(query) = exchange.query::<QueryGlobalPathSegment>() {
-                    let wanted = Wanted(query.presence_vector.into());
-                    tell(global(exchange), exchange, |path| {
-                        path.report_global(wanted)
-                    });
-                }
+                tell::<QueryGlobalPathSegment>(
+                    global(exchange),
+                    exchange,
+                    PathSegment::report_global,
+                );
             }
             QueryGlobalPathSegmentExt::CODE => {
-                if let Some(query) = exchange.query::<QueryGlobalPathSegmentExt>() {
-                    let wanted = Wanted(query.presence_vector.into());
-                    tell(global(exchange), exchange, |path| {
-                        path.report_global_ext(wanted)
-                    });
-                }
+                tell::<QueryGlobalPathSegmentExt>(
+                    global(exchange),
+                    exchange,
+                    PathSegment::report_global_ext,
+                );
             }
             _ => return Handled::No,
         }
@@ -108,12 +101,12 @@ fn global(exchange: &Exchange<'_, '_>) -> Option<PathSegment> {
 }
 
 /// Reports the current segment or the first of the list. Without one there is no reply.
-fn tell<R: Message>(
+fn tell<Q: Query>(
     path: Option<PathSegment>,
     exchange: &mut Exchange<'_, '_>,
-    report: impl FnOnce(&PathSegment) -> Result<R, jaus::codec::OutOfRange>,
+    report: impl FnOnce(&PathSegment) -> Result<Q::Report, OutOfRange>,
 ) {
     if let Some(path) = path {
-        exchange.reply_if(report(&path));
+        exchange.answer_if(|_: &Q, _| report(&path));
     }
 }

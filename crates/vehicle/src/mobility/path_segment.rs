@@ -5,7 +5,6 @@
 
 use bytes::Bytes;
 
-use super::wanted::Wanted;
 use crate::motion::{Curve, Frame, GlobalPose, Waypoint};
 use jaus::codec::{Message, OutOfRange};
 use jaus::messages::mobility::report_global_path_segment as global;
@@ -126,10 +125,7 @@ impl PathSegment {
     }
 
     /// Report Local Path Segment.
-    pub(super) fn report_local(
-        &self,
-        wanted: Wanted,
-    ) -> Result<ReportLocalPathSegment, OutOfRange> {
+    pub(super) fn report_local(&self) -> Result<ReportLocalPathSegment, OutOfRange> {
         let tolerance = local::PathTolerance::new;
         Ok(ReportLocalPathSegment {
             p1_x: local::P1X::new(self.control.0)?,
@@ -137,16 +133,13 @@ impl PathSegment {
             p2_x: local::P2X::new(self.end.0)?,
             p2_y: local::P2Y::new(self.end.1)?,
             weighting_factor: local::WeightingFactor::new(self.weight)?,
-            path_tolerance: wanted.optional(2, self.path_tolerance, tolerance),
+            path_tolerance: self.path_tolerance.and_then(|it| tolerance(it).ok()),
             ..ReportLocalPathSegment::default()
         })
     }
 
     /// Report Local Path Segment Ext.
-    pub(super) fn report_local_ext(
-        &self,
-        wanted: Wanted,
-    ) -> Result<ReportLocalPathSegmentExt, OutOfRange> {
+    pub(super) fn report_local_ext(&self) -> Result<ReportLocalPathSegmentExt, OutOfRange> {
         let tolerance = local_ext::PathTolerance::new;
         Ok(ReportLocalPathSegmentExt {
             p1_x: local_ext::P1X::new(self.control.0)?,
@@ -154,16 +147,13 @@ impl PathSegment {
             p2_x: local_ext::P2X::new(self.end.0)?,
             p2_y: local_ext::P2Y::new(self.end.1)?,
             weighting_factor: local_ext::WeightingFactor::new(self.weight)?,
-            path_tolerance: wanted.optional(2, self.path_tolerance, tolerance),
+            path_tolerance: self.path_tolerance.and_then(|it| tolerance(it).ok()),
             ..ReportLocalPathSegmentExt::default()
         })
     }
 
     /// Report Global Path Segment.
-    pub(super) fn report_global(
-        &self,
-        wanted: Wanted,
-    ) -> Result<ReportGlobalPathSegment, OutOfRange> {
+    pub(super) fn report_global(&self) -> Result<ReportGlobalPathSegment, OutOfRange> {
         let tolerance = global::PathTolerance::new;
         Ok(ReportGlobalPathSegment {
             p1_latitude: global::P1Latitude::new(self.control.0)?,
@@ -171,16 +161,13 @@ impl PathSegment {
             p2_latitude: global::P2Latitude::new(self.end.0)?,
             p2_longitude: global::P2Longitude::new(self.end.1)?,
             weighting_factor: global::WeightingFactor::new(self.weight)?,
-            path_tolerance: wanted.optional(2, self.path_tolerance, tolerance),
+            path_tolerance: self.path_tolerance.and_then(|it| tolerance(it).ok()),
             ..ReportGlobalPathSegment::default()
         })
     }
 
     /// Report Global Path Segment Ext.
-    pub(super) fn report_global_ext(
-        &self,
-        wanted: Wanted,
-    ) -> Result<ReportGlobalPathSegmentExt, OutOfRange> {
+    pub(super) fn report_global_ext(&self) -> Result<ReportGlobalPathSegmentExt, OutOfRange> {
         let tolerance = global_ext::PathTolerance::new;
         Ok(ReportGlobalPathSegmentExt {
             p1_latitude: global_ext::P1Latitude::new(self.control.0)?,
@@ -188,7 +175,7 @@ impl PathSegment {
             p2_latitude: global_ext::P2Latitude::new(self.end.0)?,
             p2_longitude: global_ext::P2Longitude::new(self.end.1)?,
             weighting_factor: global_ext::WeightingFactor::new(self.weight)?,
-            path_tolerance: wanted.optional(2, self.path_tolerance, tolerance),
+            path_tolerance: self.path_tolerance.and_then(|it| tolerance(it).ok()),
             ..ReportGlobalPathSegmentExt::default()
         })
     }

@@ -4,7 +4,6 @@ use super::behaviour::Behaviour;
 use super::both_versions;
 use super::controls::Controls;
 use super::exchange::{Command, Exchange};
-use super::wanted::Wanted;
 use crate::motion::{Effort, Goal, Ticket};
 use jaus::codec::{Message, ServiceId};
 use jaus::messages::mobility::report_wrench_effort as fields;
@@ -33,9 +32,9 @@ impl Behaviour for PrimitiveDriver {
                     self.set(command, exchange);
                 }
             }
-            QueryWrenchEffort::CODE => exchange.answer(|query, exchange| {
+            QueryWrenchEffort::CODE => exchange.answer(|_: &QueryWrenchEffort, exchange| {
                 self.forget_what_others_replaced(exchange.controls);
-                self.report(query)
+                self.report()
             }),
             _ => return Handled::No,
         }
@@ -79,71 +78,58 @@ impl PrimitiveDriver {
     }
 
     /// Reports the efforts that were set, and 0 for the others.
-    fn report(&self, query: &QueryWrenchEffort) -> ReportWrenchEffort {
-        let wanted = Wanted(query.presence_vector.into());
+    fn report(&self) -> ReportWrenchEffort {
         let effort = &self.effort;
         let or_none = Option::unwrap_or_default;
         ReportWrenchEffort {
-            propulsive_linear_effort_x: wanted.real(
-                0,
-                or_none(effort.propulsive_linear_effort_x_percent()),
-                fields::PropulsiveLinearEffortX::new,
-            ),
-            propulsive_linear_effort_y: wanted.real(
-                1,
-                or_none(effort.propulsive_linear_effort_y_percent()),
-                fields::PropulsiveLinearEffortY::new,
-            ),
-            propulsive_linear_effort_z: wanted.real(
-                2,
-                or_none(effort.propulsive_linear_effort_z_percent()),
-                fields::PropulsiveLinearEffortZ::new,
-            ),
-            propulsive_rotational_effort_x: wanted.real(
-                3,
-                or_none(effort.propulsive_rotational_effort_x_percent()),
-                fields::PropulsiveRotationalEffortX::new,
-            ),
-            propulsive_rotational_effort_y: wanted.real(
-                4,
-                or_none(effort.propulsive_rotational_effort_y_percent()),
-                fields::PropulsiveRotationalEffortY::new,
-            ),
-            propulsive_rotational_effort_z: wanted.real(
-                5,
-                or_none(effort.propulsive_rotational_effort_z_percent()),
-                fields::PropulsiveRotationalEffortZ::new,
-            ),
-            resistive_linear_effort_x: wanted.real(
-                6,
-                or_none(effort.resistive_linear_effort_x_percent()),
-                fields::ResistiveLinearEffortX::new,
-            ),
-            resistive_linear_effort_y: wanted.real(
-                7,
-                or_none(effort.resistive_linear_effort_y_percent()),
-                fields::ResistiveLinearEffortY::new,
-            ),
-            resistive_linear_effort_z: wanted.real(
-                8,
-                or_none(effort.resistive_linear_effort_z_percent()),
-                fields::ResistiveLinearEffortZ::new,
-            ),
-            resistive_rotational_effort_x: wanted.real(
-                9,
-                or_none(effort.resistive_rotational_effort_x_percent()),
-                fields::ResistiveRotationalEffortX::new,
-            ),
-            resistive_rotational_effort_y: wanted.real(
-                10,
-                or_none(effort.resistive_rotational_effort_y_percent()),
-                fields::ResistiveRotationalEffortY::new,
-            ),
-            resistive_rotational_effort_z: wanted.real(
-                11,
-                or_none(effort.resistive_rotational_effort_z_percent()),
-                fields::ResistiveRotationalEffortZ::new,
-            ),
+            propulsive_linear_effort_x: fields::PropulsiveLinearEffortX::new(or_none(
+                effort.propulsive_linear_effort_x_percent(),
+            ))
+            .ok(),
+            propulsive_linear_effort_y: fields::PropulsiveLinearEffortY::new(or_none(
+                effort.propulsive_linear_effort_y_percent(),
+            ))
+            .ok(),
+            propulsive_linear_effort_z: fields::PropulsiveLinearEffortZ::new(or_none(
+                effort.propulsive_linear_effort_z_percent(),
+            ))
+            .ok(),
+            propulsive_rotational_effort_x: fields::PropulsiveRotationalEffortX::new(or_none(
+                effort.propulsive_rotational_effort_x_percent(),
+            ))
+            .ok(),
+            propulsive_rotational_effort_y: fields::PropulsiveRotationalEffortY::new(or_none(
+                effort.propulsive_rotational_effort_y_percent(),
+            ))
+            .ok(),
+            propulsive_rotational_effort_z: fields::PropulsiveRotationalEffortZ::new(or_none(
+                effort.propulsive_rotational_effort_z_percent(),
+            ))
+            .ok(),
+            resistive_linear_effort_x: fields::ResistiveLinearEffortX::new(or_none(
+                effort.resistive_linear_effort_x_percent(),
+            ))
+            .ok(),
+            resistive_linear_effort_y: fields::ResistiveLinearEffortY::new(or_none(
+                effort.resistive_linear_effort_y_percent(),
+            ))
+            .ok(),
+            resistive_linear_effort_z: fields::ResistiveLinearEffortZ::new(or_none(
+                effort.resistive_linear_effort_z_percent(),
+            ))
+            .ok(),
+            resistive_rotational_effort_x: fields::ResistiveRotationalEffortX::new(or_none(
+                effort.resistive_rotational_effort_x_percent(),
+            ))
+            .ok(),
+            resistive_rotational_effort_y: fields::ResistiveRotationalEffortY::new(or_none(
+                effort.resistive_rotational_effort_y_percent(),
+            ))
+            .ok(),
+            resistive_rotational_effort_z: fields::ResistiveRotationalEffortZ::new(or_none(
+                effort.resistive_rotational_effort_z_percent(),
+            ))
+            .ok(),
         }
     }
 }

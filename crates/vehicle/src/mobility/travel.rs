@@ -64,15 +64,14 @@ pub(super) fn handle_list(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled
 fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
     let speed = exchange.controls.travel.speed();
     match code {
-        QueryTravelSpeed::CODE => {
+        QueryTravelSpeed::CODE => exchange.answer_if(|_: &QueryTravelSpeed, _| {
             let mut report = ReportTravelSpeed::default();
-            let report = report.set_speed_m_per_s(speed).map(|()| report);
-            exchange.reply_if(report);
-        }
-        QueryTravelSpeedExt::CODE => {
+            report.set_speed_m_per_s(speed).map(|()| report)
+        }),
+        QueryTravelSpeedExt::CODE => exchange.answer_if(|_: &QueryTravelSpeedExt, _| {
             let speed = SpeedSpeedOverGround::new(speed).map(Speed::SpeedOverGround);
-            exchange.reply_if(speed.map(|speed| ReportTravelSpeedExt { speed }));
-        }
+            speed.map(|speed| ReportTravelSpeedExt { speed })
+        }),
         _ => return Handled::No,
     }
     Handled::Yes

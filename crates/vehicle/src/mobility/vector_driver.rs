@@ -3,7 +3,6 @@
 use super::behaviour::Behaviour;
 use super::controls::Controls;
 use super::exchange::{Command, Exchange};
-use super::wanted::Wanted;
 use crate::mobility::travel::metres_per_second;
 use crate::motion::{Goal, Heading, Ticket};
 use jaus::codec::{Message, OutOfRange, ServiceId};
@@ -95,14 +94,14 @@ impl Behaviour for LocalVectorDriver {
                     self.0.set(vector, Heading::Local, acts, exchange);
                 }
             }
-            QueryLocalVector::CODE => exchange.answer_if(|query: &QueryLocalVector, exchange| {
+            QueryLocalVector::CODE => exchange.answer_if(|_: &QueryLocalVector, exchange| {
                 let vector = self.0.current(exchange.controls);
-                local(&vector, Wanted(query.presence_vector.into()))
+                local(&vector)
             }),
             QueryLocalVectorExt::CODE => {
-                exchange.answer_if(|query: &QueryLocalVectorExt, exchange| {
+                exchange.answer_if(|_: &QueryLocalVectorExt, exchange| {
                     let vector = self.0.current(exchange.controls);
-                    local_ext(&vector, Wanted(query.presence_vector.into()))
+                    local_ext(&vector)
                 });
             }
             _ => return Handled::No,
@@ -143,14 +142,14 @@ impl Behaviour for GlobalVectorDriver {
                     self.0.set(vector, Heading::North, acts, exchange);
                 }
             }
-            QueryGlobalVector::CODE => exchange.answer(|query: &QueryGlobalVector, exchange| {
+            QueryGlobalVector::CODE => exchange.answer(|_: &QueryGlobalVector, exchange| {
                 let vector = self.0.current(exchange.controls);
-                global(&vector, Wanted(query.presence_vector.into()))
+                global(&vector)
             }),
             QueryGlobalVectorExt::CODE => {
-                exchange.answer_if(|query: &QueryGlobalVectorExt, exchange| {
+                exchange.answer_if(|_: &QueryGlobalVectorExt, exchange| {
                     let vector = self.0.current(exchange.controls);
-                    global_ext(&vector, Wanted(query.presence_vector.into()))
+                    global_ext(&vector)
                 });
             }
             _ => return Handled::No,
@@ -168,36 +167,40 @@ impl Behaviour for GlobalVectorDriver {
     }
 }
 
-fn local(vector: &Vector, wanted: Wanted) -> Result<ReportLocalVector, OutOfRange> {
+fn local(vector: &Vector) -> Result<ReportLocalVector, OutOfRange> {
     Ok(ReportLocalVector {
         speed: report_local_vector::Speed::new(vector.speed)?,
-        heading: wanted.optional(1, vector.heading, report_local_vector::Heading::new),
+        heading: vector
+            .heading
+            .and_then(|it| report_local_vector::Heading::new(it).ok()),
         ..ReportLocalVector::default()
     })
 }
 
-fn local_ext(vector: &Vector, wanted: Wanted) -> Result<ReportLocalVectorExt, OutOfRange> {
+fn local_ext(vector: &Vector) -> Result<ReportLocalVectorExt, OutOfRange> {
     use report_local_vector_ext::{Heading, Speed, SpeedSpeedOverGround};
     Ok(ReportLocalVectorExt {
         speed: Speed::SpeedOverGround(SpeedSpeedOverGround::new(vector.speed)?),
-        heading: wanted.optional(3, vector.heading, Heading::new),
+        heading: vector.heading.and_then(|it| Heading::new(it).ok()),
         ..ReportLocalVectorExt::default()
     })
 }
 
-fn global(vector: &Vector, wanted: Wanted) -> ReportGlobalVector {
+fn global(vector: &Vector) -> ReportGlobalVector {
     ReportGlobalVector {
-        speed: wanted.real(0, vector.speed, report_global_vector::Speed::new),
-        heading: wanted.optional(2, vector.heading, report_global_vector::Heading::new),
+        speed: report_global_vector::Speed::new(vector.speed).ok(),
+        heading: vector
+            .heading
+            .and_then(|it| report_global_vector::Heading::new(it).ok()),
         ..ReportGlobalVector::default()
     }
 }
 
-fn global_ext(vector: &Vector, wanted: Wanted) -> Result<ReportGlobalVectorExt, OutOfRange> {
+fn global_ext(vector: &Vector) -> Result<ReportGlobalVectorExt, OutOfRange> {
     use report_global_vector_ext::{Heading, Speed, SpeedSpeedOverGround};
     Ok(ReportGlobalVectorExt {
         speed: Speed::SpeedOverGround(SpeedSpeedOverGround::new(vector.speed)?),
-        heading: wanted.optional(3, vector.heading, Heading::new),
+        heading: vector.heading.and_then(|it| Heading::new(it).ok()),
         ..ReportGlobalVectorExt::default()
     })
 }

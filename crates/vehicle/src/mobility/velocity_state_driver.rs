@@ -4,7 +4,6 @@ use super::behaviour::Behaviour;
 use super::both_versions;
 use super::controls::Controls;
 use super::exchange::Exchange;
-use super::wanted::Wanted;
 use crate::motion::{Acceleration, Goal, Limits, Ticket, Velocity};
 use jaus::codec::{Message, ServiceId};
 use jaus::messages::mobility::report_acceleration_limit as acceleration;
@@ -183,16 +182,16 @@ impl VelocityStateDriver {
             return;
         };
         let velocity = self.velocity(which, exchange.controls);
-        let wanted = Wanted(query.presence_vector.into());
-        exchange.reply(&ReportVelocityCommand {
+        let report = ReportVelocityCommand {
             command_type: command::CommandType(query.command_type),
-            velocity_x: wanted.real(0, velocity.x, command::VelocityX::new),
-            velocity_y: wanted.real(1, velocity.y, command::VelocityY::new),
-            velocity_z: wanted.real(2, velocity.z, command::VelocityZ::new),
-            roll_rate: wanted.real(3, velocity.roll, command::RollRate::new),
-            pitch_rate: wanted.real(4, velocity.pitch, command::PitchRate::new),
-            yaw_rate: wanted.real(5, velocity.yaw, command::YawRate::new),
-        });
+            velocity_x: command::VelocityX::new(velocity.x).ok(),
+            velocity_y: command::VelocityY::new(velocity.y).ok(),
+            velocity_z: command::VelocityZ::new(velocity.z).ok(),
+            roll_rate: command::RollRate::new(velocity.roll).ok(),
+            pitch_rate: command::PitchRate::new(velocity.pitch).ok(),
+            yaw_rate: command::YawRate::new(velocity.yaw).ok(),
+        };
+        exchange.report(query, report);
     }
 
     fn report_ext(&self, query: &QueryVelocityCommandExt, exchange: &mut Exchange<'_, '_>) {
@@ -200,16 +199,16 @@ impl VelocityStateDriver {
             return;
         };
         let velocity = self.velocity(which, exchange.controls);
-        let wanted = Wanted(query.presence_vector.into());
-        exchange.reply(&ReportVelocityCommandExt {
+        let report = ReportVelocityCommandExt {
             command_type: ext::CommandType(query.command_type),
-            velocity_x: wanted.real(0, velocity.x, ext::VelocityX::new),
-            velocity_y: wanted.real(1, velocity.y, ext::VelocityY::new),
-            velocity_z: wanted.real(2, velocity.z, ext::VelocityZ::new),
-            roll_rate: wanted.real(3, velocity.roll, ext::RollRate::new),
-            pitch_rate: wanted.real(4, velocity.pitch, ext::PitchRate::new),
-            yaw_rate: wanted.real(5, velocity.yaw, ext::YawRate::new),
-        });
+            velocity_x: ext::VelocityX::new(velocity.x).ok(),
+            velocity_y: ext::VelocityY::new(velocity.y).ok(),
+            velocity_z: ext::VelocityZ::new(velocity.z).ok(),
+            roll_rate: ext::RollRate::new(velocity.roll).ok(),
+            pitch_rate: ext::PitchRate::new(velocity.pitch).ok(),
+            yaw_rate: ext::YawRate::new(velocity.yaw).ok(),
+        };
+        exchange.report(query, report);
     }
 }
 
@@ -253,14 +252,14 @@ fn report_limit(query: &QueryAccelerationLimit, exchange: &mut Exchange<'_, '_>)
         yaw,
         ..Acceleration::default()
     };
-    let wanted = Wanted(query.presence_vector.into());
-    exchange.reply(&ReportAccelerationLimit {
+    let report = ReportAccelerationLimit {
         command_type: acceleration::CommandType(query.command_type),
-        acceleration_x: wanted.real(0, limit.x, acceleration::AccelerationX::new),
-        acceleration_y: wanted.real(1, limit.y, acceleration::AccelerationY::new),
-        acceleration_z: wanted.real(2, limit.z, acceleration::AccelerationZ::new),
-        roll_acceleration: wanted.real(3, limit.roll, acceleration::RollAcceleration::new),
-        pitch_acceleration: wanted.real(4, limit.pitch, acceleration::PitchAcceleration::new),
-        yaw_acceleration: wanted.real(5, limit.yaw, acceleration::YawAcceleration::new),
-    });
+        acceleration_x: acceleration::AccelerationX::new(limit.x).ok(),
+        acceleration_y: acceleration::AccelerationY::new(limit.y).ok(),
+        acceleration_z: acceleration::AccelerationZ::new(limit.z).ok(),
+        roll_acceleration: acceleration::RollAcceleration::new(limit.roll).ok(),
+        pitch_acceleration: acceleration::PitchAcceleration::new(limit.pitch).ok(),
+        yaw_acceleration: acceleration::YawAcceleration::new(limit.yaw).ok(),
+    };
+    exchange.report(query, report);
 }

@@ -4,13 +4,12 @@ use super::behaviour::Behaviour;
 use super::both_versions;
 use super::controls::Controls;
 use super::exchange::Exchange;
-use super::wanted::Wanted;
 use jaus::codec::{Message, ServiceId};
 use jaus::messages::mobility::report_velocity_state::{
     PitchRate, RollRate, VelocityX, VelocityY, VelocityZ, YawRate,
 };
 use jaus::messages::mobility::report_velocity_state_ext::{
-    self, SpeedOverGround, VelocityVar, VelocityVehicleXyzRec,
+    self as ext, SpeedOverGround, VelocityVar, VelocityVehicleXyzRec,
 };
 use jaus::messages::mobility::{
     QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, ReportVelocityStateExt,
@@ -40,19 +39,18 @@ impl Behaviour for VelocityStateSensor {
     }
 }
 
-fn report(query: &QueryVelocityState, exchange: &mut Exchange<'_, '_>) -> ReportVelocityState {
+fn report(_: &QueryVelocityState, exchange: &mut Exchange<'_, '_>) -> ReportVelocityState {
     let velocity = exchange.controls.pilot.motion().velocity;
-    let wanted = Wanted(query.presence_vector.into());
     ReportVelocityState {
-        velocity_x: wanted.real(0, velocity.x, VelocityX::new),
-        velocity_y: wanted.real(1, velocity.y, VelocityY::new),
-        velocity_z: wanted.real(2, velocity.z, VelocityZ::new),
+        velocity_x: VelocityX::new(velocity.x).ok(),
+        velocity_y: VelocityY::new(velocity.y).ok(),
+        velocity_z: VelocityZ::new(velocity.z).ok(),
         velocity_rms: None,
-        roll_rate: wanted.real(4, velocity.roll, RollRate::new),
-        pitch_rate: wanted.real(5, velocity.pitch, PitchRate::new),
-        yaw_rate: wanted.real(6, velocity.yaw, YawRate::new),
+        roll_rate: RollRate::new(velocity.roll).ok(),
+        pitch_rate: PitchRate::new(velocity.pitch).ok(),
+        yaw_rate: YawRate::new(velocity.yaw).ok(),
         rate_rms: None,
-        time_stamp: wanted.field(8, exchange.stamp()),
+        time_stamp: exchange.stamp(),
     }
 }
 
@@ -62,23 +60,30 @@ fn report_ext(
 ) -> ReportVelocityStateExt {
     let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
     let velocity = exchange.controls.pilot.motion().velocity;
-    let wanted = Wanted(query.velocity_var_presence_vector.into());
+    let asked = query.velocity_var_presence_vector.into();
     let along = VelocityVehicleXyzRec {
-        velocity_x: wanted.real(0, velocity.x, VelocityX::new),
-        velocity_y: wanted.real(1, velocity.y, VelocityY::new),
-        velocity_z: wanted.real(2, velocity.z, VelocityZ::new),
+        velocity_x: requested(asked, 0, VelocityX::new(velocity.x).ok()),
+        velocity_y: requested(asked, 1, VelocityY::new(velocity.y).ok()),
+        velocity_z: requested(asked, 2, VelocityZ::new(velocity.z).ok()),
     };
-    let wanted = Wanted(query.report_velocity_state_ext_rec_presence_vector.into());
+    let asked = query.report_velocity_state_ext_rec_presence_vector;
+    let over_ground = SpeedOverGround::new(velocity.x.hypot(velocity.y));
     ReportVelocityStateExt {
         velocity_var: VelocityVar::VelocityVehicleXyzRec(along),
-        report_velocity_state_ext_rec: report_velocity_state_ext::ReportVelocityStateExtRec {
-            roll_rate: wanted.real(1, velocity.roll, report_velocity_state_ext::RollRate::new),
-            pitch_rate: wanted.real(2, velocity.pitch, report_velocity_state_ext::PitchRate::new),
-            yaw_rate: wanted.real(3, velocity.yaw, report_velocity_state_ext::YawRate::new),
-            speed_over_ground: wanted.real(5, velocity.x.hypot(velocity.y), SpeedOverGround::new),
-            time_seconds: wanted.field(9, seconds),
-            time_nano_seconds: wanted.field(10, nanoseconds),
+        report_velocity_state_ext_rec: ext::ReportVelocityStateExtRec {
+            roll_rate: requested(asked, 1, ext::RollRate::new(velocity.roll).ok()),
+            pitch_rate: requested(asked, 2, ext::PitchRate::new(velocity.pitch).ok()),
+            yaw_rate: requested(asked, 3, ext::YawRate::new(velocity.yaw).ok()),
+            speed_over_ground: requested(asked, 5, over_ground.ok()),
+            time_seconds: requested(asked, 9, seconds),
+            time_nano_seconds: requested(asked, 10, nanoseconds),
             ..Default::default()
         },
     }
+}
+
+/// The field of a nested record, if its bit of the presence vector is set. Queries select only the
+/// report's own fields by themselves.
+fn requested<T>(presence_vector: u16, bit: u32, field: Option<T>) -> Option<T> {
+    field.filter(|_| presence_vector >> bit & 1 == 1)
 }

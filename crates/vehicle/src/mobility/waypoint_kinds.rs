@@ -3,7 +3,6 @@
 use super::exchange::Exchange;
 use super::kind::{Kind, Waypoints};
 use super::place::Place;
-use super::wanted::Wanted;
 use jaus::codec::{Message, ServiceId};
 use jaus::messages::mobility::{
     QueryGlobalWaypoint, QueryGlobalWaypointExt, QueryLocalWaypoint, QueryLocalWaypointExt,
@@ -35,13 +34,11 @@ impl Kind for Global {
             return Handled::No;
         };
         match code {
-            QueryGlobalWaypoint::CODE => exchange.answer_if(|query: &QueryGlobalWaypoint, _| {
-                waypoint.report(Wanted(query.presence_vector.into()))
-            }),
+            QueryGlobalWaypoint::CODE => {
+                exchange.answer_if(|_: &QueryGlobalWaypoint, _| waypoint.report());
+            }
             QueryGlobalWaypointExt::CODE => {
-                exchange.answer_if(|query: &QueryGlobalWaypointExt, _| {
-                    waypoint.report_ext(Wanted(query.presence_vector.into()))
-                });
+                exchange.answer_if(|_: &QueryGlobalWaypointExt, _| waypoint.report_ext());
             }
             _ => return Handled::No,
         }
@@ -71,13 +68,11 @@ impl Kind for Local {
             return Handled::No;
         };
         match code {
-            QueryLocalWaypoint::CODE => exchange.answer_if(|query: &QueryLocalWaypoint, _| {
-                waypoint.report(Wanted(query.presence_vector.into()))
-            }),
+            QueryLocalWaypoint::CODE => {
+                exchange.answer_if(|_: &QueryLocalWaypoint, _| waypoint.report());
+            }
             QueryLocalWaypointExt::CODE => {
-                exchange.answer_if(|query: &QueryLocalWaypointExt, _| {
-                    waypoint.report_ext(Wanted(query.presence_vector.into()))
-                });
+                exchange.answer_if(|_: &QueryLocalWaypointExt, _| waypoint.report_ext());
             }
             _ => return Handled::No,
         }

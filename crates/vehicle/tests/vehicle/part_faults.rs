@@ -17,20 +17,17 @@ use std::time::{Duration, Instant};
 use jaus::address::JausId;
 use jaus::component::{Component, Control, Kind, State};
 use jaus::link::Group;
-use jaus::messages::core::{QueryStatus, ReportStatus, Shutdown};
+use jaus::messages::core::{QueryStatus, Shutdown};
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::messages::mobility::{
-    QueryLocalPose, ReportLocalPose, SetLocalVector, SetWrenchEffort, local_vector_driver,
-    primitive_driver,
+    QueryLocalPose, SetLocalVector, SetWrenchEffort, local_vector_driver, primitive_driver,
 };
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::{LIMIT, within_limit};
 use jaus_vehicle::actuator::{Actuator, MotorConfig, SimulatedMotor, SimulatedStop};
 use jaus_vehicle::ground::{StageReport, StageState};
-use jaus_vehicle::messages::ground::{
-    QueryStage, QueryWheelOdometry, ReportStage, ReportWheelOdometry,
-};
+use jaus_vehicle::messages::ground::{QueryStage, QueryWheelOdometry};
 use jaus_vehicle::parts::{
     Hardware, Part, PartError, PoseSensor, PrimitiveDriver, Slot, VectorDriver, VelocitySensor,
 };
@@ -105,18 +102,18 @@ impl Scene {
     }
 
     async fn state(&self, id: JausId) -> Option<u8> {
-        let report: ReportStatus = self.client.query(id, &QueryStatus {}).await.ok()?;
+        let report = self.client.query(id, &QueryStatus {}).await.ok()?;
         Some(report.status.0)
     }
 
     async fn stage(&self, id: JausId) -> Option<StageReport> {
-        let report: ReportStage = self.client.query(id, &QueryStage {}).await.ok()?;
+        let report = self.client.query(id, &QueryStage {}).await.ok()?;
         Some(StageReport::from(&report))
     }
 
     async fn wheels(&self) -> (f64, f64) {
         let query = QueryWheelOdometry {};
-        let report: ReportWheelOdometry = self.client.query(PRIMITIVE, &query).await.unwrap();
+        let report = self.client.query(PRIMITIVE, &query).await.unwrap();
         (report.left, report.right)
     }
 
@@ -236,8 +233,7 @@ async fn a_sensor_that_stays_away_is_a_failure_of_the_driver_until_it_is_back() 
         .until("motion", || async {
             control.send(&vector).unwrap();
             let query = QueryWheelOdometry {};
-            let report: Option<ReportWheelOdometry> =
-                scene.client.query(PRIMITIVE, &query).await.ok();
+            let report = scene.client.query(PRIMITIVE, &query).await.ok();
             report.filter(|wheels| wheels.left > 0.2)
         })
         .await;
@@ -387,10 +383,8 @@ async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_st
     };
     let pose = scene.start(POSE, |slot| sensor.run(slot));
     let ask = async || {
-        let query = QueryLocalPose {
-            presence_vector: 0x0103,
-        };
-        let report: Option<ReportLocalPose> = scene.client.query(POSE, &query).await.ok();
+        let query = QueryLocalPose::none().with_x().with_y().with_time_stamp();
+        let report = scene.client.query(POSE, &query).await.ok();
         let report = report?;
         report.x_m()?;
         Some(milliseconds(report.time_stamp?))

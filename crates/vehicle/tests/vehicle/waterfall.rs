@@ -20,16 +20,12 @@ use jaus::component::{Component, Control, Kind};
 use jaus::link::Group;
 use jaus::messages::core::set_element::{ElementDataFormat, ElementRec, RequestIdRec};
 use jaus::messages::core::{ConfirmElementRequest, SetElement};
-use jaus::messages::mobility::{
-    ExecuteList, QueryLocalPose, ReportLocalPathSegment, ReportLocalPose,
-};
+use jaus::messages::mobility::{ExecuteList, QueryLocalPose, ReportLocalPathSegment};
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::LIMIT;
 use jaus_vehicle::ground::{StageReport, StageState};
-use jaus_vehicle::messages::ground::{
-    QueryStage, QueryWheelOdometry, ReportStage, ReportWheelOdometry,
-};
+use jaus_vehicle::messages::ground::{QueryStage, QueryWheelOdometry};
 use jaus_vehicle::parts::{
     Part, PathDriver, PoseSensor, PrimitiveDriver, Slot, VectorDriver, VelocitySensor,
 };
@@ -116,19 +112,19 @@ impl Scene {
     }
 
     async fn pose(&self) -> Option<(f64, f64)> {
-        let query = QueryLocalPose { presence_vector: 3 };
-        let report: ReportLocalPose = self.client.query(POSE, &query).await.ok()?;
+        let query = QueryLocalPose::none().with_x().with_y();
+        let report = self.client.query(POSE, &query).await.ok()?;
         report.x_m().zip(report.y_m())
     }
 
     async fn stage(&self, id: JausId) -> Option<StageReport> {
-        let report: ReportStage = self.client.query(id, &QueryStage {}).await.ok()?;
+        let report = self.client.query(id, &QueryStage {}).await.ok()?;
         Some(StageReport::from(&report))
     }
 
     async fn travelled(&self) -> f64 {
         let query = QueryWheelOdometry {};
-        let report: ReportWheelOdometry = self.client.query(PRIMITIVE, &query).await.unwrap();
+        let report = self.client.query(PRIMITIVE, &query).await.unwrap();
         report.left + report.right
     }
 
@@ -152,7 +148,7 @@ impl Scene {
             request_id_rec: RequestIdRec { request_id: 1 },
             element_list: elements.collect(),
         };
-        let _: ConfirmElementRequest = client.query(PATH, &request).await.unwrap();
+        let _: ConfirmElementRequest = client.request(PATH, &request).await.unwrap();
         let mut execute = ExecuteList {
             element_uid: Some(1),
             ..ExecuteList::default()

@@ -306,9 +306,9 @@ fn whatever_one_address_takes_under_many_ids_another_can_subscribe() {
 fn a_query_is_answered_once_for_all_clients_that_are_told_together() {
     let asked = Arc::new(AtomicUsize::new(0));
     let count = asked.clone();
-    let counter = Handlers::new(COUNTER).answer(move |_: QueryElement| {
+    let counter = Handlers::new(COUNTER).receive(move |_: QueryElement, query, context| {
         let element_count = count.fetch_add(1, Ordering::Relaxed) as u16;
-        ReportElementCount { element_count }
+        context.reply(query, &ReportElementCount { element_count });
     });
     let mut rig = StackRig::new(vec![Box::new(counter)], |stack| stack);
     for client in 1..=100 {

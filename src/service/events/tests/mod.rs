@@ -56,8 +56,9 @@ impl Rig {
     fn with(settings: EventSettings) -> Self {
         let number = Arc::new(AtomicU16::new(0));
         let shown = number.clone();
-        let counter = Handlers::new(COUNTER).answer(move |_: QueryElement| ReportElementCount {
-            element_count: shown.load(Ordering::Relaxed),
+        let counter = Handlers::new(COUNTER).receive(move |_: QueryElement, query, context| {
+            let element_count = shown.load(Ordering::Relaxed);
+            context.reply(query, &ReportElementCount { element_count });
         });
         let services: Vec<Box<dyn crate::service::Service>> = vec![
             Box::new(Transport),

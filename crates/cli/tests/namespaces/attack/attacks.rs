@@ -80,7 +80,7 @@ pub(crate) async fn run(attack: &str) {
 }
 
 fn pose() -> QueryLocalPose {
-    QueryLocalPose { presence_vector: 3 }
+    QueryLocalPose::none().with_x().with_y()
 }
 
 fn effort() -> SetWrenchEffort {

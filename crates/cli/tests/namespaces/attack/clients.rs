@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use jaus::address::JausId;
 use jaus::component::{Component, Kind, Update, When};
 use jaus::link::Ip;
-use jaus::messages::core::{QueryControl, ReportControl};
-use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
+use jaus::messages::core::QueryControl;
+use jaus::messages::mobility::{QueryLocalPose, local_pose_sensor};
 use jaus::node::{Config, Node};
 use tokio::time::{interval, timeout};
 
@@ -55,14 +55,14 @@ pub(crate) async fn client() {
     let client = builder.attach(&node, CLIENT.component()).unwrap();
     let found = client.find_within(local_pose_sensor::URN, SEARCH).await;
     assert_eq!(found.unwrap(), VEHICLE);
-    let query = QueryLocalPose { presence_vector: 3 };
-    let events = client.subscribe::<ReportLocalPose, _>(VEHICLE, &query, When::hz(25.0));
+    let query = QueryLocalPose::none().with_x().with_y();
+    let events = client.subscribe(VEHICLE, &query, When::hz(25.0));
     let mut events = events.await.unwrap();
     let echo = tokio::net::UdpSocket::bind(("0.0.0.0", 0)).await.unwrap();
     echo.connect((TO_CLIENT, ECHO)).await.unwrap();
     let asks_echo = std::env::var(SETTINGS).is_ok_and(|it| it == "echo");
     let place = async || {
-        let pose: Result<ReportLocalPose, _> = client.query(VEHICLE, &query).await;
+        let pose = client.query(VEHICLE, &query).await;
         pose.ok()
             .map(|pose| (pose.x_m().unwrap(), pose.y_m().unwrap()))
     };
@@ -98,7 +98,7 @@ pub(crate) async fn client() {
             }
         }
         gap = gap.max(last.elapsed());
-        let control: Result<ReportControl, _> = client.query(VEHICLE, &QueryControl {}).await;
+        let control = client.query(VEHICLE, &QueryControl {}).await;
         let controller = control.map_or(0, |it| it.subsystem_id);
         let now = place().await.unwrap_or(start);
         let moved = (now.0 - start.0).hypot(now.1 - start.1) * 1000.0;
@@ -119,12 +119,8 @@ pub(crate) async fn newcomer() {
     let newcomer = builder.attach(&node, 1).unwrap();
     let found = newcomer.find_within(local_pose_sensor::URN, SEARCH).await;
     assert_eq!(found.unwrap(), VEHICLE);
-    let query = QueryLocalPose { presence_vector: 3 };
-    while newcomer
-        .query::<ReportLocalPose, _>(VEHICLE, &query)
-        .await
-        .is_err()
-    {
+    let query = QueryLocalPose::none().with_x().with_y();
+    while newcomer.query(VEHICLE, &query).await.is_err() {
         assert!(begun.elapsed() < SEARCH, "no answer");
     }
     println!("\nnewcomer ms={}", begun.elapsed().as_millis());
@@ -137,9 +133,9 @@ pub(crate) async fn subscriber() {
     let builder = Component::builder(Kind::OtherSubsystem, "Subscriber");
     let subscriber = builder.attach(&node, 1).unwrap();
     let found = subscriber.find_within(local_pose_sensor::URN, SEARCH).await;
-    let query = QueryLocalPose { presence_vector: 3 };
+    let query = QueryLocalPose::none().with_x().with_y();
     let often = When::hz(1000.0);
-    let events = subscriber.subscribe::<ReportLocalPose, _>(found.unwrap(), &query, often);
+    let events = subscriber.subscribe(found.unwrap(), &query, often);
     let mut events = events.await.unwrap();
     let mut number = 0;
     while let Some(update) = events.next().await {

@@ -5,8 +5,7 @@ use std::time::Duration;
 use jaus::address::JausId;
 use jaus::component::{Component, Kind, When};
 use jaus::messages::mobility::{
-    QueryGlobalPose, QueryVelocityState, ReportGlobalPose, ReportVelocityState, SetWrenchEffort,
-    global_pose_sensor,
+    QueryGlobalPose, QueryVelocityState, SetWrenchEffort, global_pose_sensor,
 };
 use jaus::node::{Config, Node};
 use tokio::time::{Instant, sleep, timeout_at};
@@ -45,24 +44,34 @@ async fn find(operator: &Component) {
 }
 
 async fn ask(operator: &Component) {
-    let query = QueryGlobalPose {
-        presence_vector: 0xFFFF,
-    };
-    let pose: ReportGlobalPose = operator.query(POSE, &query).await.unwrap();
+    let query = QueryGlobalPose::all();
+    let pose = operator.query(POSE, &query).await.unwrap();
     println!("latitude {:.4}", pose.latitude_deg().unwrap());
 }
 
 async fn watch(operator: &Component) {
-    let query = QueryGlobalPose {
-        presence_vector: 0xFF,
-    };
+    let query = QueryGlobalPose::none()
+        .with_latitude()
+        .with_longitude()
+        .with_altitude()
+        .with_position_rms()
+        .with_roll()
+        .with_pitch()
+        .with_yaw()
+        .with_attitude_rms();
     let when = When::hz(10.0);
-    let poses = operator.subscribe::<ReportGlobalPose, _>(POSE, &query, when);
+    let poses = operator.subscribe(POSE, &query, when);
     let mut poses = poses.await.unwrap();
-    let query = QueryVelocityState {
-        presence_vector: 0xFF,
-    };
-    let velocities = operator.subscribe::<ReportVelocityState, _>(VELOCITY, &query, when);
+    let query = QueryVelocityState::none()
+        .with_velocity_x()
+        .with_velocity_y()
+        .with_velocity_z()
+        .with_velocity_rms()
+        .with_roll_rate()
+        .with_pitch_rate()
+        .with_yaw_rate()
+        .with_rate_rms();
+    let velocities = operator.subscribe(VELOCITY, &query, when);
     let mut velocities = velocities.await.unwrap();
     let end = Instant::now() + Duration::from_secs(3);
     let (mut many, mut fast) = (0, 0);
@@ -90,8 +99,8 @@ async fn drive(operator: &Component) {
         control.send(&effort).unwrap();
         sleep(Duration::from_millis(50)).await;
     }
-    let query = QueryVelocityState { presence_vector: 1 };
-    let speed: ReportVelocityState = operator.query(VELOCITY, &query).await.unwrap();
+    let query = QueryVelocityState::none().with_velocity_x();
+    let speed = operator.query(VELOCITY, &query).await.unwrap();
     println!("speed {:.2} m/s", speed.velocity_x_m_per_s().unwrap());
     control.release().await;
     println!("released");

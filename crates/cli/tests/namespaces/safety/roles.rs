@@ -204,9 +204,9 @@ pub(crate) async fn observe() {
     println!();
     loop {
         beats.tick().await;
-        let pose = QueryLocalPose { presence_vector: 3 };
+        let pose = QueryLocalPose::none().with_x().with_y();
         let pose = observer.query(VEHICLE, &pose).await;
-        let velocity = QueryVelocityState { presence_vector: 1 };
+        let velocity = QueryVelocityState::none().with_velocity_x();
         let velocity = observer.query(VEHICLE, &velocity).await;
         let control = observer.query(VEHICLE, &QueryControl {}).await;
         let (pose, velocity, control): (ReportLocalPose, ReportVelocityState, ReportControl) =

@@ -17,6 +17,17 @@ fn the_core_services_pass_every_step_that_they_are_in() {
     judge(management, &["--only", "A1-A3,B1-B26"]);
 }
 
+#[path = "../../../../../examples/sensor.rs"]
+#[expect(dead_code, reason = "the example's own component")]
+mod sensor;
+
+#[test]
+fn the_example_of_a_sensor_answers_with_the_fields_that_were_asked_for() {
+    let sensor = |component: Builder| component.offer(sensor::speedometer());
+    let judged = judge(sensor, &["--only", "A4,B33"]);
+    assert!(judged.contains("4 passed"), "{judged}");
+}
+
 #[test]
 fn a_service_of_the_ground_vehicle_passes_its_steps() {
     let stage = |component: Builder| component.offer(StageBoard::default().service());

@@ -44,8 +44,9 @@ fn the_waypoints_of_a_list_are_reached_in_order_and_the_vehicle_stops_at_the_las
     rig.send(CLIENT, &execute(Some(1), 2.0));
     assert_eq!(active(&mut rig), 1);
     for (&(x, y), next) in SQUARE.iter().zip([2, 3, 4, 0]) {
-        let report: ReportLocalWaypoint =
-            rig.ask(&QueryLocalWaypoint { presence_vector: 3 }).unwrap();
+        let report: ReportLocalWaypoint = rig
+            .ask(&QueryLocalWaypoint::none().with_z().with_roll())
+            .unwrap();
         assert!((report.x_m() - x).abs() < 0.01 && (report.y_m() - y).abs() < 0.01);
         let (reached, pose) = run_to_next(&mut rig, &vehicle);
         assert_eq!(reached, next);
@@ -110,7 +111,7 @@ fn a_list_can_be_filled_in_standby_and_its_first_waypoint_is_told() {
     let (mut rig, _) = rig();
     rig.stand(State::Standby, Some(CLIENT));
     assert!(set_elements(&mut rig, square()));
-    let report: ReportLocalWaypoint = rig.ask(&QueryLocalWaypoint { presence_vector: 0 }).unwrap();
+    let report: ReportLocalWaypoint = rig.ask(&QueryLocalWaypoint::none()).unwrap();
     assert!((report.x_m() - 8.0).abs() < 0.01);
 }
 

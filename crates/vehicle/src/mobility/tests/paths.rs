@@ -37,8 +37,7 @@ fn two_quarters_of_a_circle_are_driven_one_after_the_other() {
     ];
     assert!(set_elements(&mut rig, elements));
     rig.send(CLIENT, &execute(Some(1), 1.0));
-    let presence_vector = 0xFF;
-    let query = QueryLocalPathSegment { presence_vector };
+    let query = QueryLocalPathSegment::all();
     let report: ReportLocalPathSegment = rig.ask(&query).unwrap();
     assert!(report.p1_x == first.p1_x && report.weighting_factor == first.weighting_factor);
     let mut seen = Vec::new();
@@ -98,9 +97,7 @@ fn segments_of_version_1_1_are_driven_as_well() {
         vec![segment(1, 0, 0, 0x04B0, &path)]
     ));
     rig.send(CLIENT, &execute(Some(1), 2.0));
-    let query = QueryLocalPathSegmentExt {
-        presence_vector: 0xFF,
-    };
+    let query = QueryLocalPathSegmentExt::all();
     let report: ReportLocalPathSegmentExt = rig.ask(&query).unwrap();
     assert!(report.p2_x == path.p2_x && report.path_tolerance == path.path_tolerance);
     rig.run(seconds(20.0));
@@ -121,8 +118,7 @@ fn a_segment_on_the_globe_leads_where_it_says() {
         vec![segment(1, 0, 0, 0x040F, &path)]
     ));
     rig.send(CLIENT, &execute(Some(0), 2.0));
-    let presence_vector = 0;
-    let query = QueryGlobalPathSegment { presence_vector };
+    let query = QueryGlobalPathSegment::none();
     let report: ReportGlobalPathSegment = rig.ask(&query).unwrap();
     assert_eq!(report.p2_longitude, path.p2_longitude);
     rig.run(seconds(30.0));

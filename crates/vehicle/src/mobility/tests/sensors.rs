@@ -10,13 +10,11 @@ use jaus::messages::mobility::{
 };
 
 fn velocity(rig: &mut Rig) -> ReportVelocityState {
-    let presence_vector = 0xFFFF;
-    rig.ask(&QueryVelocityState { presence_vector }).unwrap()
+    rig.ask(&QueryVelocityState::all()).unwrap()
 }
 
 fn local_pose(rig: &mut Rig) -> ReportLocalPose {
-    let presence_vector = 0xFFFF;
-    rig.ask(&QueryLocalPose { presence_vector }).unwrap()
+    rig.ask(&QueryLocalPose::all()).unwrap()
 }
 
 fn effort(forward: f64, turn: f64) -> SetWrenchEffort {
@@ -40,14 +38,14 @@ fn pose(x: f64, y: f64) -> SetLocalPose {
 #[test]
 fn a_report_has_the_fields_that_were_asked_for_and_no_others() {
     let (mut rig, _) = rig();
-    let presence_vector = 0x0140;
-    let report: ReportVelocityState = rig.ask(&QueryVelocityState { presence_vector }).unwrap();
+    let report: ReportVelocityState = rig
+        .ask(&QueryVelocityState::none().with_yaw_rate().with_time_stamp())
+        .unwrap();
     assert!(report.yaw_rate.is_some() && report.time_stamp.is_some());
     assert_eq!(report.encode().unwrap()[2..4], [0x40, 0x01]);
-    let presence_vector = 0;
-    let report: ReportLocalPose = rig.ask(&QueryLocalPose { presence_vector }).unwrap();
+    let report: ReportLocalPose = rig.ask(&QueryLocalPose::none()).unwrap();
     assert_eq!(report, ReportLocalPose::default());
-    let report: ReportGlobalPose = rig.ask(&QueryGlobalPose { presence_vector }).unwrap();
+    let report: ReportGlobalPose = rig.ask(&QueryGlobalPose::none()).unwrap();
     assert_eq!(report, ReportGlobalPose::default());
 }
 
@@ -151,8 +149,7 @@ fn what_a_new_pose_does_not_tell_stays_as_it_is() {
 #[test]
 fn the_global_pose_is_where_it_was_put_and_the_local_one_stays() {
     let (mut rig, _) = rig();
-    let presence_vector = 0xFFFF;
-    let query = QueryGlobalPose { presence_vector };
+    let query = QueryGlobalPose::all();
     let report: ReportGlobalPose = rig.ask(&query).unwrap();
     assert!((report.latitude_deg().unwrap() - FRAME.0).abs() < 1e-6);
     let mut pose = SetGlobalPose::default();
@@ -183,10 +180,7 @@ fn effort_moves_the_vehicle_and_all_sensors_agree_on_it() {
     rig.send(CLIENT, &effort(100.0, 0.0));
     rig.changed().clear();
     rig.run(seconds(0.5));
-    let presence_vector = 0xFFFF;
-    let report: ReportAccelerationState = rig
-        .ask(&QueryAccelerationState { presence_vector })
-        .unwrap();
+    let report: ReportAccelerationState = rig.ask(&QueryAccelerationState::all()).unwrap();
     assert!(report.acceleration_x_m_per_s2().unwrap() > 0.5);
     rig.run(seconds(4.5));
     let speed = velocity(&mut rig).velocity_x_m_per_s().unwrap();
@@ -202,10 +196,10 @@ fn effort_moves_the_vehicle_and_all_sensors_agree_on_it() {
         .speed_over_ground
         .unwrap();
     assert!((over_ground.value() - speed).abs() < 0.02);
-    let report: ReportLocalPoseExt = rig.ask(&QueryLocalPoseExt { presence_vector }).unwrap();
+    let report: ReportLocalPoseExt = rig.ask(&QueryLocalPoseExt::all()).unwrap();
     let difference = report.x_m().unwrap() - local_pose(&mut rig).x_m().unwrap();
     assert!(difference.abs() < 0.02);
-    let report: ReportGlobalPose = rig.ask(&QueryGlobalPose { presence_vector }).unwrap();
+    let report: ReportGlobalPose = rig.ask(&QueryGlobalPose::all()).unwrap();
     assert!(report.latitude_deg().unwrap() > FRAME.0 + 1e-5);
     for code in [
         QueryVelocityState::CODE,
@@ -220,8 +214,7 @@ fn effort_moves_the_vehicle_and_all_sensors_agree_on_it() {
 #[test]
 fn effort_is_reported_as_it_was_set_and_0_where_nothing_was() {
     let (mut rig, _) = rig();
-    let presence_vector = 0xFFFF;
-    let query = QueryWrenchEffort { presence_vector };
+    let query = QueryWrenchEffort::all();
     let report: ReportWrenchEffort = rig.ask(&query).unwrap();
     assert!(report.propulsive_linear_effort_x_percent().unwrap().abs() < 0.01);
     rig.send(CLIENT, &effort(-100.0, 100.0));

@@ -23,8 +23,8 @@ fn velocity(command_type: CommandType, x: f64, yaw: f64) -> SetVelocityCommand {
 
 fn told(rig: &mut Rig, command_type: CommandType) -> (f64, f64) {
     let query = QueryVelocityCommand {
-        presence_vector: 0xFF,
         command_type: command_type.0,
+        ..QueryVelocityCommand::all()
     };
     let report: ReportVelocityCommand = rig.ask(&query).unwrap();
     assert_eq!(report.command_type.0, command_type.0);
@@ -94,8 +94,8 @@ fn acceleration_is_limited() {
     limit.set_acceleration_x_m_per_s2(0.1).unwrap();
     rig.send(CLIENT, &limit);
     let query = QueryAccelerationLimit {
-        presence_vector: 1,
         command_type: 1,
+        ..QueryAccelerationLimit::none().with_acceleration_x()
     };
     let report: ReportAccelerationLimit = rig.ask(&query).unwrap();
     assert!((report.acceleration_x_m_per_s2().unwrap() - 0.1).abs() < 1e-3);
@@ -121,8 +121,7 @@ fn a_local_vector_is_kept_and_reported() {
     rig.run(seconds(5.0));
     let motion = vehicle.motion();
     assert!((motion.pose.yaw - 1.0).abs() < 0.01 && (motion.velocity.x - 1.0).abs() < 0.01);
-    let presence_vector = 0xFF;
-    let report: ReportLocalVector = rig.ask(&QueryLocalVector { presence_vector }).unwrap();
+    let report: ReportLocalVector = rig.ask(&QueryLocalVector::all()).unwrap();
     assert!(report.speed == vector.speed && report.heading == vector.heading);
     let straight = SetLocalVectorExt {
         speed: Speed::SpeedOverGround(SpeedSpeedOverGround::new(0.5).unwrap()),
@@ -146,8 +145,7 @@ fn a_global_vector_is_measured_from_north_however_the_local_frame_lies() {
     rig.send(CLIENT, &vector);
     rig.run(seconds(5.0));
     assert!((vehicle.global_pose().yaw + 1.0).abs() < 0.01);
-    let presence_vector = 0xFF;
-    let report: ReportGlobalVector = rig.ask(&QueryGlobalVector { presence_vector }).unwrap();
+    let report: ReportGlobalVector = rig.ask(&QueryGlobalVector::all()).unwrap();
     assert!(report.speed == vector.speed && report.heading == vector.heading);
 }
 

@@ -11,9 +11,7 @@ use jaus::messages::mobility::{
     SetTravelSpeed, SetTravelSpeedExt, SetWrenchEffort,
 };
 
-const QUERY: QueryLocalWaypoint = QueryLocalWaypoint {
-    presence_vector: 0xFF,
-};
+const QUERY: QueryLocalWaypoint = QueryLocalWaypoint::all();
 
 fn speed(metres_per_second: f64) -> SetTravelSpeed {
     let mut speed = SetTravelSpeed::default();
@@ -42,14 +40,12 @@ fn a_waypoint_is_reported_as_it_was_set_with_the_wanted_fields_it_has() {
     waypoint.set_yaw_rad(0.5).unwrap();
     waypoint.set_waypoint_tolerance_m(0.25).unwrap();
     rig.send(CLIENT, &waypoint);
-    let presence_vector = 0;
-    let report: ReportLocalWaypoint = rig.ask(&QueryLocalWaypoint { presence_vector }).unwrap();
+    let report: ReportLocalWaypoint = rig.ask(&QueryLocalWaypoint::none()).unwrap();
     assert!(report.x == waypoint.x && report.y == waypoint.y && report.yaw.is_none());
     let report: ReportLocalWaypoint = rig.ask(&QUERY).unwrap();
     assert!(report.yaw == waypoint.yaw && report.z.is_none());
     assert_eq!(report.waypoint_tolerance, waypoint.waypoint_tolerance);
-    let presence_vector = 0xFF;
-    let query = QueryLocalWaypointExt { presence_vector };
+    let query = QueryLocalWaypointExt::all();
     let report: ReportLocalWaypointExt = rig.ask(&query).unwrap();
     assert!((report.x_m() - 1.0).abs() < 0.01 && report.heading.is_some());
     assert!(rig.changed().contains(&QueryLocalWaypoint::CODE));
@@ -197,8 +193,7 @@ fn a_global_waypoint_is_driven_to_and_the_local_one_is_gone() {
     waypoint.set_latitude_deg(FRAME.0 + 0.0001).unwrap();
     waypoint.set_longitude_deg(FRAME.1).unwrap();
     rig.send(CLIENT, &waypoint);
-    let presence_vector = 0xFF;
-    let report: ReportGlobalWaypoint = rig.ask(&QueryGlobalWaypoint { presence_vector }).unwrap();
+    let report: ReportGlobalWaypoint = rig.ask(&QueryGlobalWaypoint::all()).unwrap();
     assert_eq!(report.latitude, waypoint.latitude);
     rig.send(STRANGER, &QUERY);
     assert!(rig.answer_code().is_none());
@@ -247,7 +242,6 @@ fn a_waypoint_on_another_continent_is_ignored() {
     far.set_latitude_deg(-33.9).unwrap();
     far.set_longitude_deg(18.4).unwrap();
     rig.send(CLIENT, &far);
-    let presence_vector = 0xFF;
-    rig.send(STRANGER, &QueryGlobalWaypoint { presence_vector });
+    rig.send(STRANGER, &QueryGlobalWaypoint::all());
     assert!(rig.answer_code().is_none());
 }

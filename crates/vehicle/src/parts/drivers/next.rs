@@ -17,7 +17,7 @@ use tokio::time::{Interval, MissedTickBehavior, interval, sleep, timeout};
 use super::remote_platform::{Order, Plan, RemotePlatform};
 use super::{FaultMonitor, Watchman};
 use crate::ground::{StageBoard, StageReport, StageState};
-use crate::messages::ground::{QueryStage, ReportStage};
+use crate::messages::ground::QueryStage;
 use crate::mobility::Vehicle;
 use crate::motion::Motion;
 use crate::parts::PartError;
@@ -339,11 +339,7 @@ async fn stood_down(component: &Component, session: &Session) -> String {
         };
         looks += 1;
         // A stage from before the resume does not count.
-        if is_current
-            && let Ok(report) = component
-                .query::<ReportStage, _>(peer, &QueryStage {})
-                .await
-        {
+        if is_current && let Ok(report) = component.query(peer, &QueryStage {}).await {
             let stage = StageReport::from(&report);
             if stage.stands_down() {
                 return format!("{peer}: {}", stage.reason);

@@ -9,7 +9,7 @@ use super::RemotePlatform;
 use super::freshness::time_in_month;
 use crate::parts::PartError;
 use jaus::address::JausId;
-use jaus::codec::Message;
+use jaus::codec::{Message, Query};
 use jaus::component::{Audience, Component, GroupSubscription, GroupUpdate, When};
 use jaus::messages::mobility::{
     QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState, local_pose_sensor,
@@ -29,7 +29,7 @@ pub(in crate::parts) struct Sense<R> {
 
 impl<R: Message> Sense<R> {
     /// Starts discovery of providers and subscribes to them. `what` names the data in log messages.
-    pub(in crate::parts) fn of<Q: Message>(
+    pub(in crate::parts) fn of<Q: Query<Report = R>>(
         component: &Component,
         urn: &'static str,
         query: &Q,
@@ -86,14 +86,13 @@ impl<R: Message> Sense<R> {
 }
 
 impl Sense<ReportLocalPose> {
-    /// X, Y, yaw and time stamp.
-    const FIELDS: u16 = 0b1_0100_0011;
-
     /// The pose in the local frame.
     pub(in crate::parts) fn pose(component: &Component, hz: f64) -> Result<Self, PartError> {
-        let query = QueryLocalPose {
-            presence_vector: Self::FIELDS,
-        };
+        let query = QueryLocalPose::none()
+            .with_x()
+            .with_y()
+            .with_yaw()
+            .with_time_stamp();
         Self::of(component, local_pose_sensor::URN, &query, hz, "pose")
     }
 
@@ -116,14 +115,12 @@ impl Sense<ReportLocalPose> {
 }
 
 impl Sense<ReportVelocityState> {
-    /// Velocity along X, yaw rate and time stamp.
-    const FIELDS: u16 = 0b1_0100_0001;
-
     /// The velocity along and about the vehicle's own axes.
     pub(in crate::parts) fn velocity(component: &Component, hz: f64) -> Result<Self, PartError> {
-        let query = QueryVelocityState {
-            presence_vector: Self::FIELDS,
-        };
+        let query = QueryVelocityState::none()
+            .with_velocity_x()
+            .with_yaw_rate()
+            .with_time_stamp();
         Self::of(
             component,
             velocity_state_sensor::URN,

@@ -12,6 +12,7 @@ use crate::mission::{Link, LinkState, Point};
 use crate::parts::PartError;
 use crate::parts::drivers::Sense;
 use jaus::address::JausId;
+use jaus::codec::Query;
 use jaus::component::{Component, Subscription, Update, When};
 use jaus::messages::core::report_status::Status;
 use jaus::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatus};
@@ -130,11 +131,7 @@ async fn watch_peer(
     }
 }
 
-async fn ask<R: jaus::codec::Message, Q: jaus::codec::Message>(
-    component: &Component,
-    peer: JausId,
-    query: &Q,
-) -> Option<R> {
+async fn ask<Q: Query>(component: &Component, peer: JausId, query: &Q) -> Option<Q::Report> {
     component.query(peer, query).await.ok()
 }
 

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use super::{find_soon, hand_over::in_words};
 use crate::ground::{RasterEdition, fetch_cells};
 use crate::messages::ground::report_raster_maps::MapRec;
-use crate::messages::ground::{QueryRasterMaps, ReportRasterMaps, raster_maps};
+use crate::messages::ground::{QueryRasterMaps, raster_maps};
 use crate::mission::{Point, Terrain};
 use jaus::address::JausId;
 use jaus::component::Component;
-use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
+use jaus::messages::mobility::{QueryLocalPose, local_pose_sensor};
 
 /// Number of attempts to fetch a map that changes during the transfer.
 const TRIES: u32 = 3;
@@ -40,7 +40,7 @@ pub(in crate::parts) async fn fetch_from(
     known: Option<Map>,
 ) -> Result<Map, String> {
     for _ in 0..TRIES {
-        let report: ReportRasterMaps = component
+        let report = component
             .query(store, &QueryRasterMaps {})
             .await
             .map_err(in_words)?;
@@ -104,12 +104,8 @@ fn choose(maps: Vec<MapRec>, name: &str, store: JausId) -> Result<MapRec, String
 pub(super) async fn fetch_pose(component: &Component) -> Result<Point, String> {
     let services = [local_pose_sensor::URN];
     let sensor = find_soon(component, &services, "local pose sensor").await?;
-    let query = QueryLocalPose {
-        presence_vector: X_AND_Y,
-    };
-    let pose: ReportLocalPose = component.query(sensor, &query).await.map_err(in_words)?;
+    let query = QueryLocalPose::none().with_x().with_y();
+    let pose = component.query(sensor, &query).await.map_err(in_words)?;
     let place = pose.x_m().zip(pose.y_m());
     place.ok_or_else(|| format!("{sensor} reports no pose: set the vehicle's pose"))
 }
-
-const X_AND_Y: u16 = 0b11;

@@ -24,8 +24,7 @@ use jaus::address::JausId;
 use jaus::component::{Component, Control};
 use jaus::messages::core::report_status::Status;
 use jaus::messages::core::{
-    QueryControl, QueryHeartbeatPulse, QueryStatus, ReportControl, ReportHeartbeatPulse,
-    ReportStatus,
+    QueryControl, QueryHeartbeatPulse, QueryStatus, ReportControl, ReportStatus,
 };
 
 /// Time limit for stopping the driver and releasing control.
@@ -164,7 +163,7 @@ impl<'a> PlannerTask<'a> {
                     let component = self.component.clone();
                     self.job = Some(Box::pin(async move {
                         let query = QueryHeartbeatPulse {};
-                        let answer = component.query::<ReportHeartbeatPulse, _>(client, &query);
+                        let answer = component.query(client, &query);
                         Done::Checked(run, answer.await.is_ok())
                     }));
                 }

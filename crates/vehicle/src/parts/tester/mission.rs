@@ -12,18 +12,16 @@ use crate::messages::ground::report_mission::Stage;
 use crate::messages::ground::set_destination::Approved;
 use crate::messages::ground::{
     ApproveMission, QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, ReportMission,
-    ReportPlannedPath, ReportRasterMaps, ReportStage, SetDestination, mission_planner, raster_maps,
-    stage,
+    SetDestination, mission_planner, raster_maps, stage,
 };
 use crate::mission::{Link, Path, Point, Vehicle, plan};
 use crate::parts::planner::{chain, map};
 use jaus::address::JausId;
-use jaus::codec::Message;
+use jaus::codec::Query;
 use jaus::component::{Component, Control, Subscription, When};
-use jaus::messages::core::{QueryControl, ReportControl};
+use jaus::messages::core::QueryControl;
 use jaus::messages::mobility::{
-    QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState, local_pose_sensor,
-    velocity_state_sensor,
+    QueryLocalPose, QueryVelocityState, local_pose_sensor, velocity_state_sensor,
 };
 
 /// Settings of a mission test.
@@ -147,7 +145,7 @@ impl<T: FnMut(&Step)> Running<'_, T> {
     async fn ask_sensors(&mut self, cast: &Cast) -> Option<()> {
         let (component, test) = (self.component, self.test);
         self.step(async {
-            let report: ReportRasterMaps = ask(component, cast.store, &QueryRasterMaps {}).await?;
+            let report = ask(component, cast.store, &QueryRasterMaps {}).await?;
             let maps = report.map_list.iter();
             let maps: Vec<_> = maps
                 .map(|map| {
@@ -174,7 +172,7 @@ impl<T: FnMut(&Step)> Running<'_, T> {
         self.step(async {
             let mut told = Vec::new();
             for driver in cast.drivers {
-                let report: ReportStage = ask(component, driver, &QueryStage {}).await?;
+                let report = ask(component, driver, &QueryStage {}).await?;
                 told.push(format!("{driver} {:?}", report.state));
             }
             Ok(((), told.join(", ")))
@@ -305,11 +303,11 @@ fn name(stage: Stage) -> String {
     format!("{stage:?}")
 }
 
-async fn ask<R: Message, Q: Message>(
+async fn ask<Q: Query>(
     component: &Component,
     peer: JausId,
     query: &Q,
-) -> Result<R, String> {
+) -> Result<Q::Report, String> {
     component
         .query(peer, query)
         .await
@@ -352,15 +350,15 @@ async fn find(
 }
 
 async fn pose(component: &Component, sensor: JausId) -> Result<Point, String> {
-    let query = QueryLocalPose { presence_vector: 3 };
-    let report: ReportLocalPose = ask(component, sensor, &query).await?;
+    let query = QueryLocalPose::none().with_x().with_y();
+    let report = ask(component, sensor, &query).await?;
     let place = report.x_m().zip(report.y_m());
     place.ok_or_else(|| format!("{sensor} reports no pose: set the vehicle's pose"))
 }
 
 async fn speed(component: &Component, sensor: JausId) -> Result<f64, String> {
-    let query = QueryVelocityState { presence_vector: 1 };
-    let report: ReportVelocityState = ask(component, sensor, &query).await?;
+    let query = QueryVelocityState::none().with_velocity_x();
+    let report = ask(component, sensor, &query).await?;
     let speed = report.velocity_x_m_per_s();
     speed.ok_or_else(|| format!("{sensor} reports no velocity"))
 }
@@ -458,7 +456,7 @@ async fn look_at_path(
     cast: &Cast,
     to: Point,
 ) -> Result<((), String), String> {
-    let report: ReportPlannedPath = ask(component, cast.planner, &QueryPlannedPath {}).await?;
+    let report = ask(component, cast.planner, &QueryPlannedPath {}).await?;
     let points = report.point_list.iter().map(|point| (point.x, point.y));
     let path = Path::new(points.collect());
     match path.points().last() {
@@ -492,7 +490,7 @@ async fn look_at_chain(component: &Component, cast: &Cast) -> Result<((), String
     let [path, vector, primitive] = cast.drivers;
     let mut told = Vec::new();
     for (driver, commander) in [(path, cast.planner), (vector, path), (primitive, vector)] {
-        let report: ReportControl = ask(component, driver, &QueryControl {}).await?;
+        let report = ask(component, driver, &QueryControl {}).await?;
         match chain::controller(&report) {
             Some(client) if client == commander => told.push(format!("{client} → {driver}")),
             Some(client) => {
@@ -536,7 +534,7 @@ async fn give_back(
     loop {
         let mut held = Vec::new();
         for part in [cast.planner].into_iter().chain(cast.drivers) {
-            let report: ReportControl = ask(component, part, &QueryControl {}).await?;
+            let report = ask(component, part, &QueryControl {}).await?;
             if let Some(client) = chain::controller(&report) {
                 held.push(format!("{part} by {client}"));
             }

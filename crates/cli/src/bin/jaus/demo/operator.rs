@@ -5,20 +5,17 @@ use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::component::{Component, Control, Update, When};
-use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
+use jaus::messages::mobility::{QueryLocalPose, local_pose_sensor};
 use jaus_cli::failure::Failure;
 use jaus_vehicle::messages::ground::report_mission::Stage;
 use jaus_vehicle::messages::ground::{
-    QueryMission, QueryPlannedPath, ReportMission, ReportPlannedPath, SetDestination,
-    mission_planner,
+    QueryMission, QueryPlannedPath, ReportMission, SetDestination, mission_planner,
 };
 
 use super::story::{Story, Who};
 
 /// Below the page's authority, which is 200, so that a person can always take over.
 const AUTHORITY: u8 = 150;
-/// X, Y and yaw, as bits in the presence vector of a query and its report.
-const POSE: u16 = 0b100_0011;
 /// Interval of progress lines.
 const LOOK: Duration = Duration::from_secs(2);
 
@@ -76,7 +73,7 @@ impl<'s> Operator<'s> {
     async fn watch(&mut self, planner: JausId, sensor: JausId) -> Result<Ending, Failure> {
         let component = self.component.clone();
         let mut missions = component
-            .subscribe::<ReportMission, _>(planner, &QueryMission {}, When::OnChange)
+            .subscribe(planner, &QueryMission {}, When::OnChange)
             .await
             .map_err(Failure::of)?;
         let mut looks = tokio::time::interval(LOOK);
@@ -150,8 +147,7 @@ impl<'s> Operator<'s> {
 
     /// The number of path segments, as text.
     async fn pieces(&self, planner: JausId) -> String {
-        let report: Result<ReportPlannedPath, _> =
-            self.component.query(planner, &QueryPlannedPath {}).await;
+        let report = self.component.query(planner, &QueryPlannedPath {}).await;
         match report.map(|path| path.point_list.len().saturating_sub(1)) {
             Ok(1) => "a straight path".to_owned(),
             Ok(pieces) if pieces > 1 => format!("a path of {pieces} pieces"),
@@ -160,10 +156,8 @@ impl<'s> Operator<'s> {
     }
 
     async fn tell_pose(&mut self, sensor: JausId) -> Result<(), Failure> {
-        let query = QueryLocalPose {
-            presence_vector: POSE,
-        };
-        let pose: Result<ReportLocalPose, _> = self.component.query(sensor, &query).await;
+        let query = QueryLocalPose::none().with_x().with_y().with_yaw();
+        let pose = self.component.query(sensor, &query).await;
         match pose {
             Ok(pose) => self.tell(
                 Who::Vehicle,

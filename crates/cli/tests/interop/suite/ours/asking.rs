@@ -1,12 +1,12 @@
 //! Subscriptions that only receive.
 
 use jaus::component::When;
-use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState};
+use jaus::messages::mobility::QueryVelocityState;
 
 use super::{Outcome, RoleArguments};
 
 /// The query for the forward velocity alone, which every vehicle reports.
-pub(super) const FORWARD: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
+pub(super) const FORWARD: QueryVelocityState = QueryVelocityState::none().with_velocity_x();
 /// Consecutive reports that prove a subscription.
 const ENOUGH: usize = 10;
 /// Report rate.
@@ -16,7 +16,7 @@ const HZ: f64 = 10.0;
 pub(super) async fn periodic(arguments: &RoleArguments) -> Outcome {
     let (_node, component) = arguments.component()?;
     let mut reports = component
-        .subscribe::<ReportVelocityState, _>(arguments.sensor(), &FORWARD, When::hz(HZ))
+        .subscribe(arguments.sensor(), &FORWARD, When::hz(HZ))
         .await
         .map_err(|error| error.to_string())?;
     for _ in 0..ENOUGH {
@@ -39,7 +39,7 @@ pub(super) async fn keep(arguments: &RoleArguments) -> Outcome {
     loop {
         // Retry if the peer has not started yet.
         let subscribed = component
-            .subscribe::<ReportVelocityState, _>(arguments.sensor(), &FORWARD, When::hz(HZ))
+            .subscribe(arguments.sensor(), &FORWARD, When::hz(HZ))
             .await;
         let mut reports = match subscribed {
             Ok(reports) => reports,

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use jaus::component::{Component, Control, When};
 use jaus::messages::core::{QueryControl, ReportControl};
-use jaus::messages::mobility::{ReportVelocityState, SetWrenchEffort};
+use jaus::messages::mobility::SetWrenchEffort;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::asking::FORWARD;
@@ -81,8 +81,7 @@ pub(super) async fn drive(arguments: &RoleArguments) -> Outcome {
     let control = ready(&component, arguments).await?;
     push_until(&control, async {
         loop {
-            let report: Result<ReportVelocityState, _> =
-                component.query(arguments.sensor(), &FORWARD).await;
+            let report = component.query(arguments.sensor(), &FORWARD).await;
             let velocity = report.map_err(in_words)?.velocity_x_m_per_s();
             if velocity.is_some_and(|velocity| velocity > MOTION) {
                 println!("it moves at {velocity:?} m/s");
@@ -99,7 +98,7 @@ pub(super) async fn drive(arguments: &RoleArguments) -> Outcome {
 pub(super) async fn on_change(arguments: &RoleArguments) -> Outcome {
     let (_node, component) = arguments.component()?;
     let mut reports = component
-        .subscribe::<ReportVelocityState, _>(arguments.sensor(), &FORWARD, When::OnChange)
+        .subscribe(arguments.sensor(), &FORWARD, When::OnChange)
         .await
         .map_err(in_words)?;
     let control = ready(&component, arguments).await?;

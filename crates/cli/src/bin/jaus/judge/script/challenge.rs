@@ -64,9 +64,7 @@ pub(super) fn steps() -> Vec<Step> {
             .needs(&[VELOCITY_STATE_SENSOR])
             .ask(
                 Main,
-                QueryVelocityState {
-                    presence_vector: 0x0140,
-                },
+                QueryVelocityState::none().with_yaw_rate().with_time_stamp(),
                 "yaw rate and time stamp",
                 |report: &ReportVelocityState, _| {
                     present("the yaw rate", report.yaw_rate)?;
@@ -75,9 +73,10 @@ pub(super) fn steps() -> Vec<Step> {
             )
             .ask(
                 Main,
-                QueryVelocityState {
-                    presence_vector: 0x0141,
-                },
+                QueryVelocityState::none()
+                    .with_velocity_x()
+                    .with_yaw_rate()
+                    .with_time_stamp(),
                 "velocity X, yaw rate and time stamp",
                 |report: &ReportVelocityState, _| {
                     present("velocity X", report.velocity_x)?;
@@ -91,14 +90,14 @@ pub(super) fn steps() -> Vec<Step> {
             .act(set_pose(SET_POSE).into())
             .ask(
                 Main,
-                query_pose(0x0103),
+                QueryLocalPose::none().with_x().with_y().with_time_stamp(),
                 "the set position and the time",
                 is_at_set_position,
             )
             .act(Act::Pause(Duration::from_millis(200)))
             .ask(
                 Main,
-                query_pose(0x0103),
+                QueryLocalPose::none().with_x().with_y().with_time_stamp(),
                 "the same position, and a later time",
                 |report, memory| {
                     let before = memory.time;
@@ -108,7 +107,7 @@ pub(super) fn steps() -> Vec<Step> {
             )
             .ask(
                 Main,
-                query_pose(0x0140),
+                QueryLocalPose::none().with_yaw().with_time_stamp(),
                 "the set yaw, and the time",
                 |report: &ReportLocalPose, _| {
                     present("the time stamp", report.time_stamp)?;
@@ -159,10 +158,6 @@ pub(super) fn set_pose([x, y, yaw]: [f64; 3]) -> Exchange {
             .map_err(|error| error.to_string())?;
         Ok(pose)
     })
-}
-
-pub(super) const fn query_pose(presence_vector: u16) -> QueryLocalPose {
-    QueryLocalPose { presence_vector }
 }
 
 fn is_at_set_position(report: &ReportLocalPose, memory: &mut Memory) -> Check {

@@ -10,15 +10,15 @@ use jaus::messages::core::{
     Standby, delete_element::DeleteElementRec,
 };
 use jaus::messages::mobility::{
-    ExecuteList, QueryActiveElement, QueryLocalWaypoint, QueryTravelSpeed, ReportActiveElement,
-    ReportLocalPose, ReportLocalWaypoint, ReportTravelSpeed, SetLocalWaypoint,
+    ExecuteList, QueryActiveElement, QueryLocalPose, QueryLocalWaypoint, QueryTravelSpeed,
+    ReportActiveElement, ReportLocalPose, ReportLocalWaypoint, ReportTravelSpeed, SetLocalWaypoint,
 };
 
 use super::super::memory::Memory;
 use super::super::step::{
     Act, Check, Exchange, Part, Speaker::Main, Step, Until, equal, near, present, step,
 };
-use super::challenge::{accepted, query_pose, released, request_control, set_pose};
+use super::challenge::{accepted, released, request_control, set_pose};
 use super::{ACCESS_CONTROL, LOCAL_POSE_SENSOR, LOCAL_WAYPOINT_LIST_DRIVER, MANAGEMENT};
 
 /// The waypoints, X and Y in metres; the drive starts at 0, 0, heading along X.
@@ -79,7 +79,7 @@ pub(super) fn steps() -> Vec<Step> {
         )
         .ask(
             Main,
-            QueryLocalWaypoint { presence_vector: 3 },
+            QueryLocalWaypoint::none().with_z().with_roll(),
             "the first waypoint",
             |report: &ReportLocalWaypoint, _| is_waypoint(report, WAYPOINTS[0]),
         )
@@ -88,7 +88,7 @@ pub(super) fn steps() -> Vec<Step> {
             // Some subjects revoke control that is not renewed.
             exchanges: vec![
                 Exchange::new(Main, request_control()).expect(Main, "control accepted", accepted),
-                Exchange::new(Main, query_pose(0x0003)).expect(
+                Exchange::new(Main, QueryLocalPose::none().with_x().with_y()).expect(
                     Main,
                     "the position",
                     takes_position,

@@ -10,15 +10,14 @@ use jaus::messages::core::{
     QueryStatus, RejectEventRequest, ReportControl, ReportEvents, ReportHeartbeatPulse,
     ReportStatus, UpdateEvent,
 };
-use jaus::messages::mobility::{
-    QueryLocalPose, QueryVelocityState, ReportGlobalPose, ReportLocalPose, ReportVelocityState,
-};
+use jaus::messages::mobility::{ReportGlobalPose, ReportLocalPose, ReportVelocityState};
 
 use super::super::memory::Memory;
 use super::super::step::{
     Act, Check, Exchange, Part, Speaker::Main, Step, Stream, Watch, equal, near, step,
 };
 use super::VELOCITY_STATE_SENSOR;
+use super::mobility::{EVERY_POSE_BIT, EVERY_VELOCITY_BIT};
 use super::{ACCESS_CONTROL, EVENTS, LIVENESS, LOCAL_POSE_SENSOR, MANAGEMENT};
 
 /// Tolerance of a confirmed rate, in hertz: one step of the field.
@@ -100,14 +99,8 @@ pub(super) fn steps() -> Vec<Step> {
 pub(super) fn observer() -> Vec<Step> {
     let heartbeat = subscribe(21, QueryHeartbeatPulse, ReportHeartbeatPulse::CODE);
     let control = subscribe(22, QueryControl, ReportControl::CODE);
-    let velocity = QueryVelocityState {
-        presence_vector: u16::MAX,
-    };
-    let velocity = subscribe(23, velocity, ReportVelocityState::CODE);
-    let pose = QueryLocalPose {
-        presence_vector: u16::MAX,
-    };
-    let pose = subscribe(24, pose, ReportLocalPose::CODE);
+    let velocity = subscribe(23, EVERY_VELOCITY_BIT, ReportVelocityState::CODE);
+    let pose = subscribe(24, EVERY_POSE_BIT, ReportLocalPose::CODE);
     let status = subscribe(25, QueryStatus, ReportStatus::CODE);
     let mut observer = step(
         Part::B,

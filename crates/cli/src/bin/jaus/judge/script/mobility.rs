@@ -6,14 +6,14 @@ use jaus::messages::core::{
     ReportElementList, SetElement,
 };
 use jaus::messages::mobility::{
-    QueryActiveElement, QueryLocalWaypoint, QueryTravelSpeed, QueryVelocityState,
+    QueryActiveElement, QueryLocalPose, QueryLocalWaypoint, QueryTravelSpeed, QueryVelocityState,
     ReportActiveElement, ReportLocalPose, ReportLocalWaypoint, ReportTravelSpeed,
     ReportVelocityState, SetLocalPose,
 };
 
 use super::super::memory::Memory;
 use super::super::step::{Check, Exchange, Part, Speaker::Main, Step, equal, near, present, step};
-use super::challenge::{accepted, query_pose, released, request_control};
+use super::challenge::{accepted, released, request_control};
 use super::drive::{element_data, is_waypoint, list_is, waypoint};
 use super::{ACCESS_CONTROL, LOCAL_POSE_SENSOR, LOCAL_WAYPOINT_DRIVER};
 use super::{LOCAL_WAYPOINT_LIST_DRIVER, VELOCITY_STATE_SENSOR};
@@ -52,7 +52,7 @@ fn waypoints() -> Vec<Step> {
             .act(set_waypoint().into())
             .ask(
                 Main,
-                QueryLocalWaypoint { presence_vector: 0 },
+                QueryLocalWaypoint::none(),
                 "X = Y = 1 m",
                 |report: &ReportLocalWaypoint, _| is_waypoint(report, WAYPOINT),
             ),
@@ -103,7 +103,7 @@ fn waypoints() -> Vec<Step> {
         )
         .ask(
             Main,
-            QueryLocalWaypoint { presence_vector: 0 },
+            QueryLocalWaypoint::none(),
             "a waypoint",
             |_: &ReportLocalWaypoint, _| Ok(()),
         ),
@@ -123,7 +123,7 @@ fn sensors() -> Vec<Step> {
             .needs(&[VELOCITY_STATE_SENSOR])
             .ask(
                 Main,
-                query_velocity(u16::MAX),
+                EVERY_VELOCITY_BIT,
                 "all available fields",
                 |report: &ReportVelocityState, _| {
                     if *report == ReportVelocityState::default() {
@@ -134,26 +134,21 @@ fn sensors() -> Vec<Step> {
             )
             .ask(
                 Main,
-                query_velocity(0),
+                QueryVelocityState::none(),
                 "no fields",
                 |report: &ReportVelocityState, _| {
                     is_empty(*report == ReportVelocityState::default())
                 },
             ),
         pose(34, "Set Local Pose without control is ignored")
-            .ask(
-                Main,
-                query_pose(u16::MAX),
-                "a position",
-                |report, memory| {
-                    memory.position = Some(position(report)?);
-                    Ok(())
-                },
-            )
+            .ask(Main, EVERY_POSE_BIT, "a position", |report, memory| {
+                memory.position = Some(position(report)?);
+                Ok(())
+            })
             .act(set_far_away().into())
             .ask(
                 Main,
-                query_pose(u16::MAX),
+                EVERY_POSE_BIT,
                 "the same position",
                 |report, memory| {
                     let [x, y] = memory.position.unwrap_or_default();
@@ -164,23 +159,18 @@ fn sensors() -> Vec<Step> {
             ),
         pose(35, "Set Local Pose with control")
             .ask(Main, request_control(), "control accepted", accepted)
-            .ask(Main, query_pose(u16::MAX), "a position", |report, _| {
+            .ask(Main, EVERY_POSE_BIT, "a position", |report, _| {
                 position(report).map(drop)
             })
             .act(set_far_away().into())
+            .ask(Main, EVERY_POSE_BIT, "X = Y = -1000 m", |report, _| {
+                let [x, y] = position(report)?;
+                near("X", x, FAR_AWAY, POSE_SLACK)?;
+                near("Y", y, FAR_AWAY, POSE_SLACK)
+            })
             .ask(
                 Main,
-                query_pose(u16::MAX),
-                "X = Y = -1000 m",
-                |report, _| {
-                    let [x, y] = position(report)?;
-                    near("X", x, FAR_AWAY, POSE_SLACK)?;
-                    near("Y", y, FAR_AWAY, POSE_SLACK)
-                },
-            )
-            .ask(
-                Main,
-                query_pose(0),
+                QueryLocalPose::none(),
                 "no fields",
                 |report: &ReportLocalPose, _| is_empty(*report == ReportLocalPose::default()),
             )
@@ -188,9 +178,13 @@ fn sensors() -> Vec<Step> {
     ]
 }
 
-const fn query_velocity(presence_vector: u16) -> QueryVelocityState {
-    QueryVelocityState { presence_vector }
-}
+/// All 16 bits, as the contests' tools set them, also those of no field.
+pub(super) const EVERY_POSE_BIT: QueryLocalPose = QueryLocalPose {
+    presence_vector: u16::MAX,
+};
+pub(super) const EVERY_VELOCITY_BIT: QueryVelocityState = QueryVelocityState {
+    presence_vector: u16::MAX,
+};
 
 fn set_waypoint() -> Exchange {
     Exchange::with(Main, |_| waypoint(WAYPOINT))

@@ -138,8 +138,7 @@ fn effort(from: super::super::step::Speaker) -> Exchange {
 }
 
 const fn query_velocity() -> QueryVelocityState {
-    // Velocity X.
-    QueryVelocityState { presence_vector: 1 }
+    QueryVelocityState::none().with_velocity_x()
 }
 
 fn ask_velocity() -> Exchange {

@@ -1,5 +1,7 @@
 //! Converts between calendar dates (in messages) and day counts (in clocks).
 
+use std::time::Duration;
+
 /// A day of the Gregorian calendar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Date {
@@ -20,6 +22,7 @@ impl Date {
     /// The date `days` days after 1 January 1970.
     ///
     /// Years are counted from March, so that the leap day is the last day of a year.
+    #[must_use]
     pub const fn after_1970(days: u64) -> Self {
         let days = days + DAYS_BEFORE_1970;
         let of_era = days % DAYS_OF_ERA;
@@ -36,6 +39,7 @@ impl Date {
     }
 
     /// Days from 1 January 1970 to this date. `None` if the date does not exist or is earlier.
+    #[must_use]
     pub fn days_after_1970(self) -> Option<u64> {
         if !(1..=12).contains(&self.month) || !(1..=31).contains(&self.day) || self.year > 9999 {
             return None;
@@ -51,6 +55,18 @@ impl Date {
         // 30 February would become 1 or 2 March.
         (Self::after_1970(days) == self).then_some(days)
     }
+}
+
+/// The standard's time stamp: day of the month and time of day, in the bit field of that layout.
+/// The time counts from the beginning of 1970 (UTC).
+#[must_use]
+pub const fn time_stamp(since_1970: Duration) -> u32 {
+    let seconds = since_1970.as_secs();
+    let day = Date::after_1970(seconds / 86_400).day as u32;
+    let hour = (seconds / 3600 % 24) as u32;
+    let minutes = (seconds / 60 % 60) as u32;
+    let milliseconds = since_1970.subsec_millis();
+    day << 27 | hour << 22 | minutes << 16 | ((seconds % 60) as u32) << 10 | milliseconds
 }
 
 #[cfg(test)]
@@ -77,6 +93,15 @@ mod tests {
             assert_eq!(Date::after_1970(days), expected);
             assert_eq!(expected.days_after_1970(), Some(days));
         }
+    }
+
+    #[test]
+    fn a_time_stamp_has_the_day_of_the_month_and_the_time_of_day() {
+        // 2015-06-08 01:02:03.004 UTC.
+        let stamp = time_stamp(Duration::from_millis(1_433_725_323_004));
+        assert_eq!((stamp >> 27, stamp >> 22 & 0x1F), (8, 1));
+        assert_eq!((stamp >> 16 & 0x3F, stamp >> 10 & 0x3F), (2, 3));
+        assert_eq!(stamp & 0x3FF, 4);
     }
 
     #[test]

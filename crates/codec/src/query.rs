@@ -1,4 +1,17 @@
-//! Message codes: mapping a query to its report.
+//! Queries and the reports that answer them: by type and by message code.
+
+use super::Message;
+
+/// A query, which its report answers. Generated for each message `QueryX` whose service declares a
+/// `ReportX` with the code of [`report_code`].
+pub trait Query: Message {
+    /// The report. Of several layouts the newest that a service declares beside the query.
+    type Report: Message;
+
+    /// Removes the optional fields of a report that the query's presence vector does not request.
+    /// Without effect if the query has no presence vector for the report's own fields.
+    fn drop_unrequested(&self, _report: &mut Self::Report) {}
+}
 
 /// The code of the report that answers a query; `None` if the code is not a query.
 ///
