@@ -7,8 +7,9 @@ use std::time::Duration;
 use bytes::Bytes;
 
 use crate::mission::{Path, Point};
+use jaus::address::JausId;
 use jaus::codec::{FormattedBlob, Message, OutOfRange};
-use jaus::component::{Component, Control, Messages};
+use jaus::component::{Messages, Session};
 use jaus::messages::core::delete_element::DeleteElementRec;
 use jaus::messages::core::set_element::{ElementDataFormat, ElementRec, RequestIdRec};
 use jaus::messages::core::{
@@ -31,8 +32,9 @@ const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Hands over all segments and starts their execution.
 pub(super) async fn hand_over(
-    component: &Component,
-    control: &Control,
+    messages: Messages,
+    session: &Session,
+    driver: JausId,
     path: &Path,
     speed: f64,
     tolerance: f64,
@@ -41,8 +43,9 @@ pub(super) async fn hand_over(
         format!("cannot encode the path as path segments: {error}; choose a closer destination")
     })?;
     let mut list = List {
-        messages: component.messages(),
-        control,
+        messages,
+        session,
+        driver,
         request: 0,
     };
     list.clear().await?;
@@ -56,7 +59,7 @@ pub(super) async fn hand_over(
     execute
         .set_speed_m_per_s(speed)
         .map_err(|error| format!("cannot encode the speed: {error}"))?;
-    list.control.deliver(&execute).await.map_err(in_words)
+    list.session.deliver(&execute).await.map_err(in_words)
 }
 
 /// Converts the segments to list elements, numbered from 1.
@@ -100,7 +103,8 @@ fn segment(from: Point, to: Point, tolerance: f64) -> Result<Bytes, OutOfRange> 
 /// The list of a driver under control.
 struct List<'a> {
     messages: Messages,
-    control: &'a Control,
+    session: &'a Session,
+    driver: JausId,
     request: u8,
 }
 
@@ -137,20 +141,20 @@ impl List<'_> {
 
     /// Sends a command that changes the list, and waits for its confirmation.
     async fn request(&mut self, command: &impl Message) -> Result<(), String> {
-        self.control.deliver(command).await.map_err(in_words)?;
+        self.session.deliver(command).await.map_err(in_words)?;
         let answer = self.answer();
         match tokio::time::timeout(PATIENCE, answer).await {
             Ok(answer) => answer,
             Err(_) => Err(format!(
                 "{} has not confirmed its list within {} s",
-                self.control.peer(),
+                self.driver,
                 PATIENCE.as_secs()
             )),
         }
     }
 
     async fn answer(&mut self) -> Result<(), String> {
-        let peer = self.control.peer();
+        let peer = self.driver;
         while let Some(message) = self.messages.next().await {
             if message.source != peer {
                 continue;

@@ -14,18 +14,17 @@ use tokio::sync::{Notify, mpsc};
 
 use super::chain::{self, News};
 use super::map::{self, Map};
-use super::{Planner, find_soon, hand_over};
+use super::{PATIENCE, Planner, find_soon, hand_over};
 use crate::ground::Missions;
 use crate::messages::ground::{QueryMission, QueryPlannedPath, QueryStage, ReportStage, stage};
 use crate::mission::{
     self, Action, Destination, Link, LinkState, Mission, NotPlanned, Path, Run, Stage,
 };
 use jaus::address::JausId;
-use jaus::component::{Component, Control};
-use jaus::messages::core::report_status::Status;
-use jaus::messages::core::{
-    QueryControl, QueryHeartbeatPulse, QueryStatus, ReportControl, ReportStatus,
+use jaus::component::{
+    Component, Retake, Session, SessionLoss, SessionSettings, SessionState, State,
 };
+use jaus::messages::core::QueryHeartbeatPulse;
 
 /// Time limit for stopping the driver and releasing control.
 const HALT: Duration = Duration::from_secs(2);
@@ -36,11 +35,9 @@ type Job = Pin<Box<dyn Future<Output = Done> + Send>>;
 enum Done {
     Map(Run, Result<Map, String>),
     Planned(Run, Result<Path, NotPlanned>),
-    HandedOver(Run, Result<(Control, Vec<(Link, LinkState)>), String>),
+    HandedOver(Run, Result<(Session, Vec<(Link, LinkState)>), String>),
     /// Whether the client that lost control is alive.
     Checked(Run, bool),
-    /// Why control was lost; `Err` after a takeover or an emergency.
-    Lost(Run, Result<String, String>),
 }
 
 /// State of the planner's task.
@@ -50,8 +47,8 @@ pub(super) struct PlannerTask<'a> {
     missions: Missions,
     wake: &'a Notify,
     map: Option<Map>,
-    /// Control of the path segment driver during a mission.
-    control: Option<Control>,
+    /// The session with the path segment driver during a mission.
+    session: Option<Session>,
     job: Option<Job>,
     /// The drivers, indexed by link.
     peers: [Option<JausId>; 3],
@@ -75,7 +72,7 @@ impl<'a> PlannerTask<'a> {
             missions,
             wake,
             map: None,
-            control: None,
+            session: None,
             job: None,
             peers: [None; 3],
             controllers: [None; 3],
@@ -101,7 +98,7 @@ impl<'a> PlannerTask<'a> {
                 () = until(timeout) => {
                     self.tell(|mission, now| mission.handle_time(now)).await;
                 }
-                error = lost(&mut self.control) => self.look_why_lost(&error.to_string()),
+                why = lost(&mut self.session) => self.handle_lost(why).await,
             }
         }
     }
@@ -152,9 +149,9 @@ impl<'a> PlannerTask<'a> {
                 None => return,
                 Some(Action::Halt) => {
                     self.job = None;
-                    if let Some(control) = self.control.take() {
+                    if let Some(session) = self.session.take() {
                         // Bounded, and before anything else.
-                        let _ = tokio::time::timeout(HALT, halt(control)).await;
+                        let _ = tokio::time::timeout(HALT, halt(session)).await;
                     }
                 }
                 Some(Action::FetchMap(run)) => self.job = Some(self.fetch_map(run)),
@@ -217,11 +214,10 @@ impl<'a> PlannerTask<'a> {
                 let services = [chain::service(Link::Path), stage::URN];
                 let what = "local path segment driver";
                 let driver = find_soon(&component, &services, what).await?;
-                let control = component.control(driver, authority).await;
-                let control = control.map_err(hand_over::in_words)?;
-                control.resume().await.map_err(hand_over::in_words)?;
-                hand_over::hand_over(&component, &control, &path, speed, tolerance).await?;
-                Ok((control, look(&component).await))
+                let session = engage(&component, driver, authority).await?;
+                let messages = component.messages();
+                hand_over::hand_over(messages, &session, driver, &path, speed, tolerance).await?;
+                Ok((session, look(&component).await))
             };
             Done::HandedOver(run, given.await)
         })
@@ -238,8 +234,8 @@ impl<'a> PlannerTask<'a> {
                 self.tell(|mission, now| mission.handle_path(now, run, result))
                     .await;
             }
-            Done::HandedOver(run, Ok((control, states))) => {
-                self.control = Some(control);
+            Done::HandedOver(run, Ok((session, states))) => {
+                self.session = Some(session);
                 self.tell(|mission, now| {
                     mission.handle_handed_over(now, run, Ok(()));
                     for (link, state) in states {
@@ -256,11 +252,6 @@ impl<'a> PlannerTask<'a> {
                 self.tell(|mission, now| mission.handle_lost_client(now, run, is_alive))
                     .await;
             }
-            Done::Lost(run, Ok(setback)) => {
-                self.tell(|mission, now| mission.handle_setback(now, run, &setback))
-                    .await;
-            }
-            Done::Lost(_, Err(stop)) => self.tell(|mission, _| mission.stop(&stop)).await,
         }
     }
 
@@ -326,37 +317,27 @@ impl<'a> PlannerTask<'a> {
         self.peers[link as usize].map_or_else(String::new, |id| format!(" ({id})"))
     }
 
-    /// Handles the loss of control of the path segment driver: queries it for the cause.
-    fn look_why_lost(&mut self, error: &str) {
-        let Some(control) = self.control.take() else {
-            return;
-        };
-        let (run, _) = self.missions.tell(|mission| mission.report().run);
-        let (component, peer) = (self.component.clone(), control.peer());
-        let error = error.to_owned();
-        self.job = Some(Box::pin(async move {
-            let why = why_lost(&component, peer, error).await;
-            Done::Lost(run, why)
-        }));
+    /// Handles the loss of the path segment driver, which may be tried again, or ends the mission.
+    async fn handle_lost(&mut self, why: Result<String, String>) {
+        self.session = None;
+        self.tell(|mission, now| match why {
+            Ok(setback) => mission.handle_setback(now, mission.report().run, &setback),
+            Err(stop) => mission.stop(&stop),
+        })
+        .await;
     }
 }
 
-/// Determines why control of a driver was lost. Errors end the mission.
-async fn why_lost(component: &Component, peer: JausId, error: String) -> Result<String, String> {
-    let status = component.query(peer, &QueryStatus {}).await;
-    if status.is_ok_and(|report: ReportStatus| report.status == Status::EMERGENCY) {
-        return Err(format!("the {} ({peer}) is in emergency", Link::Path));
-    }
-    let control = component.query(peer, &QueryControl {}).await;
-    let client = control
-        .ok()
-        .and_then(|it: ReportControl| chain::controller(&it));
-    match client.filter(|&client| client != component.id()) {
-        Some(client) => Err(format!(
-            "{client} has taken control of the {} ({peer})",
-            Link::Path
-        )),
-        None => Ok(error),
+/// Begins a session with a driver and waits until it is ready. After a loss the mission decides
+/// whether to try again, with a new path.
+async fn engage(component: &Component, driver: JausId, authority: u8) -> Result<Session, String> {
+    let settings = SessionSettings::new(authority).retake(Retake::Never);
+    let session = component.session(driver, settings).await;
+    let session = session.map_err(hand_over::in_words)?;
+    match tokio::time::timeout(PATIENCE, session.ready()).await {
+        Ok(Ok(_)) => Ok(session),
+        Ok(Err(error)) => Err(error.to_string()),
+        Err(_) => Err(session.state().to_string()),
     }
 }
 
@@ -375,11 +356,11 @@ async fn look(component: &Component) -> Vec<(Link, LinkState)> {
 }
 
 /// Stops a driver and releases control.
-async fn halt(control: Control) {
-    if let Err(error) = control.standby().await {
+async fn halt(session: Session) {
+    if let Err(error) = session.standby().await {
         tracing::debug!(%error, "not stopped; releasing control will stop it");
     }
-    control.release().await;
+    session.release().await;
 }
 
 /// Waits for the job, if there is one.
@@ -390,11 +371,41 @@ async fn working(job: &mut Option<Job>) -> Done {
     }
 }
 
-/// Waits for the loss of control, if there is control.
-async fn lost(control: &mut Option<Control>) -> jaus::component::ControlError {
-    match control {
-        Some(control) => control.lost().await,
-        None => std::future::pending().await,
+/// Waits until a session, if there is one, loses its driver. `Err` after a takeover or an emergency,
+/// which end the mission.
+async fn lost(session: &mut Option<Session>) -> Result<String, String> {
+    let Some(session) = session else {
+        return std::future::pending().await;
+    };
+    loop {
+        let state = session.state();
+        match state {
+            SessionState::Lost {
+                peer,
+                why: SessionLoss::Taken(client),
+                ..
+            } => {
+                return Err(format!(
+                    "{client} has taken control of the {} ({peer})",
+                    Link::Path
+                ));
+            }
+            SessionState::Disabled { peer, state: code }
+            | SessionState::Lost {
+                peer,
+                why: SessionLoss::State(code),
+                ..
+            } if code == State::Emergency as u8 => {
+                return Err(format!("the {} ({peer}) is in emergency", Link::Path));
+            }
+            SessionState::Lost { .. } | SessionState::Disabled { .. } => {
+                return Ok(state.to_string());
+            }
+            _ => {}
+        }
+        if let Err(error) = session.changed().await {
+            return Ok(error.to_string());
+        }
     }
 }
 
