@@ -153,3 +153,64 @@ impl HopQueue {
         self.waiting() == [0; PRIORITIES] && self.fragments().0 == 0 && self.bucket.is_full(now)
     }
 }
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
+mod tests {
+    use super::*;
+    use crate::address::JausId;
+    use crate::endpoint::large::Cut;
+
+    const LEVEL: Level = Level::fragments(Priority::Standard);
+
+    /// A queue with a message of 10 octets in fragments of 4.
+    fn queue() -> HopQueue {
+        let payload = Bytes::from_static(b"0123456789");
+        let mut queue = HopQueue::default();
+        queue.push_fragmented(FragmentedSend {
+            cut: Cut::new(payload.len(), 4, false),
+            whole: Frame::new(JausId::new(1, 1, 1), JausId::new(2, 1, 1), payload),
+            first: 1,
+            next: 0,
+            pacing: None,
+        });
+        queue
+    }
+
+    #[test]
+    fn only_fragments_that_have_not_left_count_as_queued() {
+        let (mut queue, now) = (queue(), Instant::now());
+        for left in [(3, 10), (2, 6), (1, 2), (0, 0)] {
+            assert_eq!(queue.fragments(), left);
+            queue.next_fragment(now, LEVEL, None);
+        }
+    }
+
+    #[test]
+    fn a_fragment_joins_others_of_the_same_header_and_at_least_its_length() {
+        for (like, joins) in [
+            ((Version::As5669a, 4), true),
+            ((Version::As5669a, 3), false),
+            ((Version::Ra, 4), false),
+        ] {
+            let next = queue().next_fragment(Instant::now(), LEVEL, Some(like));
+            assert_eq!(next.is_some(), joins, "{like:?}");
+        }
+    }
+
+    #[test]
+    fn held_messages_leave_when_they_fill_a_datagram_without_their_version_octets() {
+        let (mut queue, until) = (HopQueue::default(), Instant::now());
+        let level = Level::whole(Priority::Standard);
+        for _message in 0..3 {
+            let octets = Bytes::from_static(b"12345");
+            queue.push(Priority::Standard, octets, Some(until));
+        }
+        assert!(queue.is_ready(level, 12) && !queue.is_ready(level, 13));
+        queue.handle_timeout(until);
+        assert!(queue.is_ready(level, 13));
+    }
+}

@@ -125,6 +125,44 @@ fn only_so_many_messages_wait_for_acknowledgements() {
 }
 
 #[test]
+fn results_count_as_waiting_messages_until_they_are_polled_and_not_as_news() {
+    let mut rig = Rig::with(Config {
+        limits: Limits::default(),
+        max_unacknowledged_octets: 1000,
+        ..small()
+    });
+    rig.meet_peer();
+    let message = |length| Outgoing {
+        acknowledge: true,
+        ..Outgoing::new(US, PEER, vec![7; length].into())
+    };
+    rig.send(message(600)).unwrap();
+    let too_much = Err(SendError::TooMuchUnacknowledged { limit: 1000 });
+    assert_eq!(rig.send(message(401)), too_much);
+    rig.send(message(400)).unwrap();
+    for (_, frame) in rig.sent() {
+        let flags = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+        rig.hear(&Frame {
+            flags,
+            sequence: frame.sequence,
+            ..Frame::new(PEER, US, Bytes::new())
+        });
+    }
+    let too_many = Err(SendError::TooManyUnacknowledged { limit: 2 });
+    assert_eq!(rig.send(message(2)), too_many);
+    for (component, dropped) in [(2, 0), (3, 0), (4, 0), (5, 0), (6, 1)] {
+        let source = JausId::new(42, 1, component);
+        rig.hear(&Frame {
+            source,
+            ..from_peer(QUERY_HEARTBEAT)
+        });
+        assert_eq!(rig.count(Counter::NewsQueueFull), dropped);
+    }
+    assert_eq!(rig.events().len(), 2 + 4);
+    assert!(rig.send(message(1001)).is_ok(), "no other waits");
+}
+
+#[test]
 fn counters_are_listed_by_name_and_only_if_something_happened() {
     let mut rig = Rig::new();
     assert_eq!(rig.endpoint.counters().to_string(), "");

@@ -74,6 +74,20 @@ fn our_own_multicast_is_known_when_its_sender_has_gone() {
 }
 
 #[test]
+fn the_fragments_of_our_own_multicast_are_known_too() {
+    let mut rig = Rig::new();
+    rig.send(Outgoing::new(US, JausId::EVERYONE, vec![7; 3000].into()))
+        .unwrap();
+    let sent = rig.transmits();
+    rig.endpoint.detach(US);
+    assert_eq!(sent.len(), 3);
+    for transmit in sent {
+        rig.hear_octets(OUR_HOST, transmit.payload);
+    }
+    assert_eq!(rig.count(Counter::OwnEcho), 3);
+}
+
+#[test]
 fn our_words_from_somebody_elses_address_are_an_id_conflict() {
     let mut rig = Rig::new();
     let datagram = broadcast(&mut rig);

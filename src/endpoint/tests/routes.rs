@@ -40,6 +40,16 @@ fn at(host: u8) -> To {
 }
 
 #[test]
+fn a_peer_is_a_stranger_until_we_have_sent_it_something() {
+    let mut rig = Rig::new();
+    assert!(rig.endpoint.peers.is_stranger(PEER));
+    rig.hear(&again(1));
+    assert!(rig.endpoint.peers.is_stranger(PEER));
+    rig.send(to_peer()).unwrap();
+    assert!(!rig.endpoint.peers.is_stranger(PEER));
+}
+
+#[test]
 fn a_connection_that_has_closed_takes_the_routes_through_it_along() {
     let mut rig = Rig::new();
     rig.meet_peer();
