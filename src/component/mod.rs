@@ -83,9 +83,10 @@ mod watch;
 pub use crate::service::{
     AccessControl, Audience, CannotSubscribe, Change, Condition, ControlLost, ControlRefused,
     Directory, EventSettings, Handlers, Identification, Kind, Level, Liveness, Loss, Management,
-    Offer, Outage, Patience, Rejection, Retake, Scope, Service, SessionLoss, SessionState,
-    Standing, State, SubscriptionEnd, Time, TimeOfDay, Timing, When,
+    Offer, Outage, Patience, QueryOptions, Rejection, Retake, Scope, Service, SessionLoss,
+    SessionState, Standing, State, SubscriptionEnd, Time, TimeOfDay, Timing, When,
 };
+pub use crate::wire::Priority;
 pub use builder::{AttachError, Builder};
 pub use control::Control;
 pub use error::{
