@@ -18,7 +18,8 @@ use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::QueryHeartbeatPulse;
 use crate::node::{self, Port, Resident};
 use crate::service::{
-    Change, Condition, Event, Inquiry, NoAnswer, Patience, Service, Stack, Standing, UnsafeService,
+    Change, Condition, Event, Inquiry, NoAnswer, Patience, QueryOptions, Service, Stack, Standing,
+    UnsafeService,
 };
 
 /// A request of the application to its component's task.
@@ -28,6 +29,7 @@ pub(super) enum Command {
         peer: JausId,
         query: Bytes,
         report: u16,
+        options: QueryOptions,
         reply: oneshot::Sender<Answer>,
     },
     /// Create a subscription or request control. Boxed, because every place in the queue has room
@@ -120,7 +122,10 @@ impl Driver {
             let wake = self.stack.poll_timeout();
             tokio::select! {
                 received = self.port.recv() => match received {
-                    Some(message) => self.stack.handle_message(Instant::now(), &message),
+                    Some(message) => {
+                        self.note_progress();
+                        self.stack.handle_message(Instant::now(), &message);
+                    }
                     None => return,
                 },
                 command = self.inbox.recv() => match command {
@@ -140,9 +145,23 @@ impl Driver {
                     }
                 }
                 () = self.membership.changed() => self.stack.handle_directory(Instant::now()),
-                () = sleep_until(wake) => self.stack.handle_timeout(Instant::now()),
+                () = sleep_until(wake) => {
+                    self.note_progress();
+                    self.stack.handle_timeout(Instant::now());
+                }
             }
             self.settle();
+        }
+    }
+
+    /// Postpones the repetition of queries to peers that are sending a large message.
+    fn note_progress(&mut self) {
+        let now = Instant::now();
+        let overdue: BTreeSet<_> = self.stack.overdue(now).collect();
+        for peer in overdue {
+            if let Some(latest) = self.port.last_fragment(peer) {
+                self.stack.handle_progress(now, peer, latest);
+            }
         }
     }
 
@@ -183,10 +202,12 @@ impl Driver {
                 peer,
                 query,
                 report,
+                mut options,
                 reply,
             } => {
                 let now = Instant::now();
-                let inquiry = self.stack.ask(now, peer, query, report, self.patience);
+                options.patience.get_or_insert(self.patience);
+                let inquiry = self.stack.ask(now, peer, query, report, options);
                 match self.transmit() {
                     Ok(()) => {
                         self.waiting.insert(inquiry, reply);

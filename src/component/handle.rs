@@ -20,8 +20,8 @@ use crate::endpoint::{Outgoing, Received};
 use crate::messages;
 use crate::node;
 use crate::service::{
-    Change, Condition, Directory, Kind, NodeDirectory, Offer, Service, Standing, Topic,
-    UnsafeService, When,
+    Change, Condition, Directory, Kind, NodeDirectory, Offer, QueryOptions, Service, Standing,
+    Topic, UnsafeService, When,
 };
 use crate::wire::Priority;
 
@@ -191,14 +191,28 @@ impl Component {
         Ok(self.shared.sender.deliver(outgoing).await?)
     }
 
-    /// Sends a query to a component, and waits for its report; repeats the query on timeout.
+    /// Sends a query to a component, and waits for its report; repeats the query on timeout, but
+    /// not while parts of a large report arrive.
     ///
     /// If `peer` has wildcards, the first answer of any matching component counts.
     ///
     /// # Errors
     /// [`QueryError`] names the peer and the query, and how long it waited.
     pub async fn query<Q: Query>(&self, peer: JausId, query: &Q) -> Result<Q::Report, QueryError> {
-        self.request(peer, query).await
+        self.query_with(QueryOptions::default(), peer, query).await
+    }
+
+    /// Like [`query`](Self::query), with a priority and with its own patience.
+    ///
+    /// # Errors
+    /// Those of [`query`](Self::query).
+    pub async fn query_with<Q: Query>(
+        &self,
+        options: QueryOptions,
+        peer: JausId,
+        query: &Q,
+    ) -> Result<Q::Report, QueryError> {
+        self.ask(options, peer, query).await
     }
 
     /// Like [`query`](Self::query), for a message whose answer does not follow from its type: a
@@ -209,6 +223,15 @@ impl Component {
     /// Those of [`query`](Self::query).
     pub async fn request<R: Message, M: Message>(
         &self,
+        peer: JausId,
+        message: &M,
+    ) -> Result<R, QueryError> {
+        self.ask(QueryOptions::default(), peer, message).await
+    }
+
+    async fn ask<R: Message, M: Message>(
+        &self,
+        options: QueryOptions,
         peer: JausId,
         message: &M,
     ) -> Result<R, QueryError> {
@@ -234,6 +257,7 @@ impl Component {
             peer,
             query: payload,
             report: R::CODE,
+            options,
             reply,
         };
         let sent = self.shared.commands.send(command).await;

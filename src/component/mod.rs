@@ -83,9 +83,11 @@ mod watch;
 pub use crate::service::{
     AccessControl, Audience, CannotSubscribe, Change, Condition, ControlLost, ControlRefused,
     Directory, EventSettings, Handlers, Identification, Kind, Level, Liveness, Loss, Management,
-    Offer, Outage, Patience, Rejection, Retake, Scope, Service, SessionLoss, SessionSettings,
-    SessionState, Standing, State, SubscriptionEnd, TargetState, Time, TimeOfDay, Timing, When,
+    Offer, Outage, Patience, QueryOptions, Rejection, Retake, Scope, Service, SessionLoss,
+    SessionSettings, SessionState, Standing, State, SubscriptionEnd, TargetState, Time, TimeOfDay,
+    Timing, When,
 };
+pub use crate::wire::Priority;
 pub use builder::{AttachError, Builder};
 pub use control::Control;
 pub use error::{

@@ -4,6 +4,7 @@
 use std::any::Any;
 use std::sync::Arc;
 use std::task::{Context, Poll};
+use std::time::Instant;
 
 use tokio::sync::oneshot;
 
@@ -112,6 +113,15 @@ impl Port {
         match &self.sender.way {
             Attachment::Here(shared) => shared.common(),
             Attachment::Host(_) => Arc::default(),
+        }
+    }
+
+    /// When the latest fragment of an unfinished message of this peer to the component arrived. A
+    /// component on the node of another process does not know.
+    pub(crate) fn last_fragment(&self, peer: JausId) -> Option<Instant> {
+        match &self.sender.way {
+            Attachment::Here(shared) => shared.lock().endpoint.last_fragment(peer, self.id()),
+            Attachment::Host(_) => None,
         }
     }
 

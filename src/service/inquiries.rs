@@ -9,6 +9,7 @@ use bytes::Bytes;
 use super::{Outbox, code_of};
 use crate::address::JausId;
 use crate::endpoint::Received;
+use crate::wire::Priority;
 
 /// Identifies one query until it ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -31,6 +32,53 @@ impl Default for Patience {
             tries: 3,
             interval: Duration::from_millis(500),
         }
+    }
+}
+
+/// How to send one query, and how long to wait for its report.
+///
+/// ```
+/// use std::time::Duration;
+/// use jaus::service::QueryOptions;
+/// use jaus::wire::Priority;
+///
+/// let options = QueryOptions::default().within(Duration::from_secs(5)).priority(Priority::High);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct QueryOptions {
+    /// How long to wait; `None` for the component's default.
+    pub patience: Option<Patience>,
+    /// The priority of the query, which the report usually takes over.
+    pub priority: Priority,
+}
+
+impl From<Patience> for QueryOptions {
+    fn from(patience: Patience) -> Self {
+        let patience = Some(patience);
+        let priority = Priority::default();
+        Self { patience, priority }
+    }
+}
+
+impl QueryOptions {
+    /// Waits for the report up to `limit`, and repeats the query about every 500 ms until then.
+    /// While parts of a large report arrive, the query is neither repeated nor given up.
+    #[must_use]
+    pub fn within(mut self, limit: Duration) -> Self {
+        let interval = Patience::default().interval.min(limit);
+        let tries = limit.as_millis().div_ceil(interval.as_millis().max(1));
+        let tries = u32::try_from(tries).unwrap_or(u32::MAX).max(1);
+        let interval = limit / tries;
+        self.patience = Some(Patience { tries, interval });
+        self
+    }
+
+    /// Sends the query with a priority.
+    #[must_use]
+    pub const fn priority(mut self, priority: Priority) -> Self {
+        self.priority = priority;
+        self
     }
 }
 
@@ -68,6 +116,7 @@ type Turn = (u16, JausId);
 struct Waiting {
     turn: Turn,
     query: Bytes,
+    priority: Priority,
     patience: Patience,
     asked: Option<Asked>,
 }
@@ -89,7 +138,7 @@ impl Inquiries {
         peer: JausId,
         query: Bytes,
         report: u16,
-        patience: Patience,
+        options: QueryOptions,
         out: &mut Outbox,
     ) -> Inquiry {
         self.last += 1;
@@ -107,7 +156,8 @@ impl Inquiries {
         let waiting = Waiting {
             turn,
             query,
-            patience,
+            priority: options.priority,
+            patience: options.patience.unwrap_or_default(),
             asked: None,
         };
         self.waiting.insert(inquiry, waiting);
@@ -143,6 +193,33 @@ impl Inquiries {
         Some(inquiry)
     }
 
+    /// The peers whose queries would be repeated now, or time out.
+    pub(super) fn overdue(&self, now: Instant) -> impl Iterator<Item = JausId> {
+        let due = self.due.iter().take_while(move |(due, _)| *due <= now);
+        due.filter_map(|(_, inquiry)| Some(self.waiting.get(inquiry)?.turn.1))
+    }
+
+    /// Postpones the next try of the queries to a peer that is sending a large message, of which a
+    /// part arrived at `latest`. It may be the report.
+    pub(super) fn handle_progress(&mut self, now: Instant, peer: JausId, latest: Instant) {
+        let due = self.due.iter().take_while(|(due, _)| *due <= now);
+        let inquiries: Vec<_> = due.map(|&(_, inquiry)| inquiry).collect();
+        for inquiry in inquiries {
+            let waiting = self.waiting.get_mut(&inquiry);
+            let Some(waiting) = waiting.filter(|waiting| waiting.turn.1 == peer) else {
+                continue;
+            };
+            let next = latest + waiting.patience.interval;
+            if let Some(asked) = &mut waiting.asked
+                && next > now
+            {
+                self.due.remove(&(asked.next, inquiry));
+                asked.next = next;
+                self.due.insert((next, inquiry));
+            }
+        }
+    }
+
     pub(super) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
         while let Some(&(due, inquiry)) = self.due.first().filter(|(due, _)| *due <= now) {
             self.due.remove(&(due, inquiry));
@@ -157,7 +234,7 @@ impl Inquiries {
                 asked.tries += 1;
                 asked.next = now + waiting.patience.interval;
                 self.due.insert((asked.next, inquiry));
-                out.send_octets(peer, waiting.query.clone());
+                out.send_octets_with(peer, waiting.priority, waiting.query.clone());
                 continue;
             }
             let failure = NoAnswer {
@@ -217,7 +294,7 @@ impl Inquiries {
             next,
         });
         self.due.insert((next, inquiry));
-        out.send_octets(turn.1, waiting.query.clone());
+        out.send_octets_with(turn.1, waiting.priority, waiting.query.clone());
     }
 }
 
@@ -237,8 +314,8 @@ mod tests {
         let (mut inquiries, now) = (Inquiries::default(), Instant::now());
         let mut out = Outbox::new(US);
         let ask = |inquiries: &mut Inquiries, out: &mut Outbox| {
-            let patience = Patience::default();
-            inquiries.ask(now, PEER, Bytes::new(), 0x4202, patience, out)
+            let options = QueryOptions::default();
+            inquiries.ask(now, PEER, Bytes::new(), 0x4202, options, out)
         };
         for _ in 0..Inquiries::MOST {
             ask(&mut inquiries, &mut out);
@@ -252,5 +329,42 @@ mod tests {
         inquiries.cancel(now, Inquiry(1), &mut out);
         assert!(out.pop().is_some() && out.pop().is_none(), "the third");
         assert_eq!(inquiries.waiting.len(), Inquiries::MOST - 2);
+    }
+
+    #[test]
+    fn a_query_is_not_repeated_while_parts_of_a_large_report_arrive() {
+        let (mut inquiries, start) = (Inquiries::default(), Instant::now());
+        let mut out = Outbox::new(US);
+        let options = QueryOptions::default()
+            .within(Duration::from_secs(1))
+            .priority(Priority::High);
+        inquiries.ask(start, PEER, Bytes::new(), 0x4202, options, &mut out);
+        assert_eq!(out.pop().map(|it| it.priority), Some(Priority::High));
+        let at = |milliseconds| start + Duration::from_millis(milliseconds);
+        // Parts arrive for 4 s.
+        for milliseconds in (100..=4000).step_by(100) {
+            let now = at(milliseconds);
+            for peer in inquiries.overdue(now).collect::<Vec<_>>() {
+                assert_eq!(peer, PEER);
+                inquiries.handle_progress(now, peer, at(milliseconds - 50));
+            }
+            inquiries.handle_timeout(now, &mut out);
+            assert!(out.pop().is_none(), "{milliseconds} ms");
+        }
+        // Then they stop.
+        for (milliseconds, is_sent, has_failed) in [
+            (4400, false, false),
+            (4500, true, false),
+            (5000, false, true),
+        ] {
+            inquiries.handle_progress(at(milliseconds), PEER, at(3950));
+            inquiries.handle_timeout(at(milliseconds), &mut out);
+            assert_eq!(out.pop().is_some(), is_sent, "{milliseconds} ms");
+            assert_eq!(
+                inquiries.poll_failure().is_some(),
+                has_failed,
+                "{milliseconds} ms"
+            );
+        }
     }
 }

@@ -69,7 +69,7 @@ pub use discovery::{Change, Discovery, Loss, NodeDirectory, Profile, Refused, Sc
 pub use events::EventSettings;
 pub use guard::{MotionGuard, MotionPolicy, StopCause, Validity};
 pub use handlers::Handlers;
-pub use inquiries::{Inquiry, NoAnswer, Patience};
+pub use inquiries::{Inquiry, NoAnswer, Patience, QueryOptions};
 pub use life::{Life, Rank};
 pub use list::{ElementList, Elements, ListManager};
 pub use liveness::Liveness;

@@ -94,10 +94,15 @@ impl Outbox {
 
     /// Sends octets that begin with a message code.
     pub fn send_octets(&mut self, destination: JausId, payload: Bytes) {
+        self.send_octets_with(destination, Priority::Standard, payload);
+    }
+
+    /// Sends octets that begin with a message code, with a priority.
+    pub fn send_octets_with(&mut self, destination: JausId, priority: Priority, payload: Bytes) {
         self.queue.push_back(Outgoing {
             source: self.source,
             destination,
-            priority: Priority::Standard,
+            priority,
             broadcast: Broadcast::None,
             acknowledge: false,
             payload,

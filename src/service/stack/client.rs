@@ -10,7 +10,7 @@ use crate::endpoint::Received;
 use crate::service::client::{Sessions, Surroundings};
 use crate::service::{
     Audience, CannotSubscribe, ControlId, ControlNews, ControlRefused, Handled, Inquiry, Patience,
-    SessionId, SessionOrder, SessionSettings, SubscriptionId, Topic,
+    QueryOptions, SessionId, SessionOrder, SessionSettings, SubscriptionId, Topic,
 };
 
 impl Stack {
@@ -22,10 +22,22 @@ impl Stack {
         peer: JausId,
         query: Bytes,
         report: u16,
-        patience: Patience,
+        options: impl Into<QueryOptions>,
     ) -> Inquiry {
         self.inquiries
-            .ask(now, peer, query, report, patience, &mut self.out)
+            .ask(now, peer, query, report, options.into(), &mut self.out)
+    }
+
+    /// The peers whose queries would be repeated now, or time out, unless the owner reports
+    /// [progress](Self::handle_progress).
+    pub fn overdue(&self, now: Instant) -> impl Iterator<Item = JausId> {
+        self.inquiries.overdue(now)
+    }
+
+    /// Postpones the next try of the queries to a peer that is sending a large message, of which a
+    /// part arrived at `latest`. It may be the report.
+    pub fn handle_progress(&mut self, now: Instant, peer: JausId, latest: Instant) {
+        self.inquiries.handle_progress(now, peer, latest);
     }
 
     /// Cancels a query.
