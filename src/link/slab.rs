@@ -4,19 +4,13 @@
 /// No UDP datagram is longer, so none is ever truncated.
 pub(super) const LONGEST: usize = 65_536;
 
-/// The receive buffer, shared by the sockets of a node.
+/// The receive buffer, shared by the sockets of a node. It allocates at the first datagram.
 #[derive(Debug, Default)]
 pub struct Slab {
     free: Vec<u8>,
 }
 
 impl Slab {
-    /// An empty slab. It allocates at the first datagram.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Room for several datagrams. Untouched memory takes no pages.
     pub(super) fn room_for(&mut self, datagrams: usize) -> &mut [u8] {
         let wanted = datagrams * LONGEST;

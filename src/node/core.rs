@@ -165,7 +165,7 @@ impl Core {
             components: Components::default(),
             awaiting: Awaiting::default(),
             events: EventSender::default(),
-            slab: Slab::new(),
+            slab: Slab::default(),
             gathered: 0,
             driver: None,
             stop_at: None,

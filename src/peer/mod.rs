@@ -22,13 +22,13 @@
 //!
 //! // Recorded from JAUS++, which reports its services and then sends a query from the same buffer.
 //! let query = b"\x02\x00\x11\x00\x01\x01\x01\x4D\x00\x07\x01\xE8\x03\x01\x2B\x02\x02\x00urn:jaus";
-//! let mut recogniser = Recogniser::new();
+//! let mut recogniser = Recogniser::default();
 //! let mut frames = judp::frames(Bytes::from_static(query))?;
 //! let frame = frames.next().expect("a first message or an error")?;
 //! recogniser.handle_frame(&frame, frames.remaining());
 //! let verdict = recogniser.verdict();
 //! assert_eq!((verdict.peer, verdict.certainty), (Peer::JausPlusPlus, Certainty::Likely));
-//! assert!(verdict.reasons[0].to_string().contains("follow its messages"));
+//! assert!(verdict.reasons[0].explanation().contains("follow its messages"));
 //! # Ok::<(), jaus::wire::Error>(())
 //! ```
 //!
@@ -54,7 +54,7 @@ pub use departure::{DEPARTURES, Departure, Recognition, Source};
 pub(crate) use habits::JAUSPP_FRAGMENT;
 pub use habits::{LargeStyle, Pacing};
 pub(crate) use recogniser::is_priority_fault;
-pub use recogniser::{Certainty, Reason, Recogniser, Verdict};
+pub use recogniser::{Certainty, Recogniser, Verdict};
 pub use sign::Sign;
 
 /// A JAUS implementation whose departures are known.

@@ -43,20 +43,6 @@ impl fmt::Display for Certainty {
     }
 }
 
-/// A reason for a recognition.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Reason {
-    /// The observed sign.
-    pub sign: Sign,
-}
-
-/// The sign and the peer that it points to, in words.
-impl fmt::Display for Reason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, as {} does", self.sign, self.sign.peer().title())
-    }
-}
-
 /// The result of a recognition.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
@@ -67,7 +53,7 @@ pub struct Verdict {
     /// guess does little harm.
     pub certainty: Certainty,
     /// All observed signs, including those that point to other peers.
-    pub reasons: Vec<Reason>,
+    pub reasons: Vec<Sign>,
 }
 
 /// Recognises one peer by the messages that it sends.
@@ -91,12 +77,6 @@ struct Large {
 }
 
 impl Recogniser {
-    /// Creates a recogniser without evidence.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Processes a frame. `trailing` is the number of octets after the last message of its
     /// datagram; 0 for frames from other kinds of link.
     ///
@@ -186,7 +166,7 @@ impl Recogniser {
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         let (peer, certainty) = self.best();
-        let reasons = self.signs.iter().map(|sign| Reason { sign }).collect();
+        let reasons = self.signs.iter().collect();
         Verdict {
             peer,
             certainty,

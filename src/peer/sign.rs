@@ -85,6 +85,14 @@ signs! {
     IopService = Iop, 4: "it offers a service of the interoperability profiles";
 }
 
+impl Sign {
+    /// It and the peer that it points to, in words.
+    #[must_use]
+    pub fn explanation(self) -> String {
+        format!("{self}, as {} does", self.peer().title())
+    }
+}
+
 /// A set of signs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Signs(u32);

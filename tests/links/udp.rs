@@ -33,7 +33,7 @@ fn settings() -> Settings {
 }
 
 async fn receive(link: &mut UdpLink) -> (SocketAddr, Bytes) {
-    let mut slab = Slab::new();
+    let mut slab = Slab::default();
     within_limit(poll_fn(|cx| link.poll_recv(cx, &mut slab))).await
 }
 

@@ -141,7 +141,7 @@ impl PeerState {
         let (path, route) = match (finding, refused) {
             (Finding::Moves { verified }, Some(rival)) => {
                 if !rival.is_near(known) {
-                    self.recogniser = Recogniser::new();
+                    self.recogniser = Recogniser::default();
                 }
                 refused = None;
                 (rival, RouteState::of(verified))

@@ -104,7 +104,7 @@ impl PeerState {
         let (frame, now, path) = (arrival.frame, arrival.now, arrival.path);
         let mut received = Traffic::default();
         received.add(frame.payload.len());
-        let mut recogniser = Recogniser::new();
+        let mut recogniser = Recogniser::default();
         recogniser.handle_frame(frame, 0);
         Self {
             peer: Peer {
@@ -167,7 +167,7 @@ impl PeerState {
         self.latest = number.or(self.latest);
         self.heard_on_route = self.peer.last_heard;
         self.also_at.clear();
-        self.recogniser = Recogniser::new();
+        self.recogniser = Recogniser::default();
         self.recogniser.handle_frame(frame, 0);
     }
 }

@@ -51,10 +51,8 @@ impl Place {
 
 impl From<SocketAddr> for Place {
     fn from(address: SocketAddr) -> Self {
-        Self {
-            address,
-            zone: None,
-        }
+        let zone = None;
+        Self { address, zone }
     }
 }
 

@@ -454,12 +454,9 @@ impl Counters {
     }
 
     /// Counts a message that a connection has taken or rejected.
-    const fn count(&mut self, taken: bool) {
-        if taken {
-            self.sent += 1;
-        } else {
-            self.other_version += 1;
-        }
+    fn count(&mut self, taken: bool) {
+        self.sent += u64::from(taken);
+        self.other_version += u64::from(!taken);
     }
 }
 

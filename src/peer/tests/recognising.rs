@@ -25,15 +25,11 @@ fn to(destination: JausId, sequence: u16) -> Frame {
 }
 
 fn after<'a>(frames: impl IntoIterator<Item = &'a Frame>) -> Verdict {
-    let mut recogniser = Recogniser::new();
+    let mut recogniser = Recogniser::default();
     for frame in frames {
         recogniser.handle_frame(frame, 0);
     }
     recogniser.verdict()
-}
-
-fn signs(verdict: &Verdict) -> Vec<Sign> {
-    verdict.reasons.iter().map(|reason| reason.sign).collect()
 }
 
 /// The fragments of a message of `octets`, each with the code and this payload.
@@ -61,7 +57,7 @@ fn with_code_in_each(octets: usize, payload: usize) -> Vec<Frame> {
 fn nothing_is_known_of_who_keeps_to_the_standard() {
     let frames: Vec<_> = (500..520).map(|number| frame(number, QUERY)).collect();
     assert_eq!(after(&frames), Verdict::default());
-    assert_eq!(Recogniser::new().certain(), Peer::Standard);
+    assert_eq!(Recogniser::default().certain(), Peer::Standard);
 }
 
 #[test]
@@ -71,7 +67,7 @@ fn jauspp_is_certain_by_its_fragments_and_nobody_by_others() {
         (verdict.peer, verdict.certainty),
         (Peer::JausPlusPlus, Certainty::Certain)
     );
-    assert_eq!(signs(&verdict), [Sign::RepeatedCode]);
+    assert_eq!(verdict.reasons, [Sign::RepeatedCode]);
     let other_length = after(&with_code_in_each(5000, 1425));
     assert_eq!(other_length.certainty, Certainty::Unknown);
     let mut without = with_code_in_each(5000, 1573);
@@ -85,7 +81,7 @@ fn jauspp_is_certain_by_its_fragments_and_nobody_by_others() {
 
 #[test]
 fn stale_octets_make_jauspp_likely_and_a_registration_from_elsewhere_makes_it_certain() {
-    let mut recogniser = Recogniser::new();
+    let mut recogniser = Recogniser::default();
     recogniser.handle_frame(&frame(3, QUERY), 206);
     let verdict = recogniser.verdict();
     assert_eq!(
@@ -109,7 +105,7 @@ fn stale_octets_make_jauspp_likely_and_a_registration_from_elsewhere_makes_it_ce
         0,
     );
     assert_eq!(recogniser.certain(), Peer::JausPlusPlus);
-    let reasons = signs(&recogniser.verdict());
+    let reasons = recogniser.verdict().reasons;
     assert_eq!(
         reasons,
         [
@@ -123,7 +119,7 @@ fn stale_octets_make_jauspp_likely_and_a_registration_from_elsewhere_makes_it_ce
 #[test]
 fn services_tell_jauspp_and_the_profiles() {
     let verdict = |services: &[(&str, u8, u8)]| {
-        let mut recogniser = Recogniser::new();
+        let mut recogniser = Recogniser::default();
         recogniser.handle_services(services.iter().copied());
         recogniser.certain()
     };
@@ -184,7 +180,7 @@ fn junior_is_likely_by_its_first_call_and_certain_by_its_fault() {
 
 #[test]
 fn what_speaks_for_junior_speaks_for_a_fork_that_gives_itself_away() {
-    let mut recogniser = Recogniser::new();
+    let mut recogniser = Recogniser::default();
     recogniser.note(Sign::AnswersForZero);
     let guessed = recogniser.verdict();
     assert_eq!(
@@ -193,7 +189,7 @@ fn what_speaks_for_junior_speaks_for_a_fork_that_gives_itself_away() {
     );
     recogniser.note(Sign::MisreadType);
     assert_eq!(recogniser.certain(), Peer::Jts);
-    let mut recogniser = Recogniser::new();
+    let mut recogniser = Recogniser::default();
     recogniser.note(Sign::MisreadType);
     assert_eq!(recogniser.certain(), Peer::Junior);
 }
@@ -231,11 +227,15 @@ fn the_judging_tool_is_told_by_how_it_counts_and_whom_it_asks() {
 
 #[test]
 fn what_speaks_for_somebody_else_is_told_too() {
-    let mut recogniser = Recogniser::new();
+    let mut recogniser = Recogniser::default();
     recogniser.handle_frame(&frame(1, QUERY), 12);
     let verdict = recogniser.verdict();
     assert_eq!(verdict.peer, Peer::JausPlusPlus);
-    let reasons: Vec<_> = verdict.reasons.iter().map(Reason::to_string).collect();
+    let reasons: Vec<_> = verdict
+        .reasons
+        .iter()
+        .map(|sign| sign.explanation())
+        .collect();
     assert!(reasons[0].ends_with("as JAUS++ does"), "{reasons:?}");
     assert!(reasons[1].ends_with("as Junior does"), "{reasons:?}");
 }
@@ -254,7 +254,7 @@ fn who_begins_with_1_and_calls_may_be_taken_for_junior_and_no_node_of_ours() {
         ..frame(sequence, b"")
     };
     let presumed = |frames: &[Frame]| {
-        let mut recogniser = Recogniser::new();
+        let mut recogniser = Recogniser::default();
         for frame in frames {
             recogniser.handle_frame(frame, 0);
         }
@@ -269,7 +269,7 @@ fn who_begins_with_1_and_calls_may_be_taken_for_junior_and_no_node_of_ours() {
     assert_eq!(presumed(&ours), (Peer::Standard, Peer::Standard));
     // JAUS++ and others may begin with 1 too.
     assert_eq!(presumed(&[frame(1, QUERY)]).0, Peer::Standard);
-    let mut recogniser = Recogniser::new();
+    let mut recogniser = Recogniser::default();
     recogniser.handle_frame(&call(1), 206);
     recogniser.note(Sign::RepeatedVersion);
     assert_eq!(recogniser.presumed(), Peer::JausPlusPlus);

@@ -87,7 +87,7 @@ impl Part for RaGateway {
         let mut running = Leaver(Some(Running {
             gateway,
             link,
-            slab: Slab::new(),
+            slab: Slab::default(),
             _resident: slot.port.reside(),
             ports: BTreeMap::from([(id, slot.port)]),
             node,

@@ -81,7 +81,7 @@ fn subsystem() -> Subsystem {
 
 impl RaVehicle {
     async fn run(mut self) {
-        let mut slab = Slab::new();
+        let mut slab = Slab::default();
         loop {
             self.settle();
             let wake = [

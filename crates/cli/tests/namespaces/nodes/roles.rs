@@ -219,7 +219,7 @@ pub(crate) async fn train() {
 pub(crate) async fn station() {
     let mut link = UdpLink::open(&cable(), &udp::Settings::default()).unwrap();
     println!("\nlistening on {}", link.local());
-    let mut slab = Slab::new();
+    let mut slab = Slab::default();
     for (count, length) in [(CARS, CAR), (3 * CARS, CAR / 3)] {
         for _ in 0..count {
             let (_, datagram) = poll_fn(|cx| link.poll_recv(cx, &mut slab)).await;

@@ -44,7 +44,7 @@ impl RaSystems {
             links: links
                 .filter_map(|interface| UdpLink::open(interface, &settings).ok())
                 .collect(),
-            slab: Slab::new(),
+            slab: Slab::default(),
             heard: BTreeMap::new(),
         }
     }

@@ -31,7 +31,7 @@ impl Listeners {
             .map_err(Failure::of)?;
         Ok(Self {
             links,
-            slab: Slab::new(),
+            slab: Slab::default(),
         })
     }
 

@@ -33,7 +33,7 @@ impl Case {
 
     /// Recognises the peer without probes, as a node does.
     fn unprovoked(&self) -> Recogniser {
-        let mut recogniser = Recogniser::new();
+        let mut recogniser = Recogniser::default();
         let all = self.seen.all().iter();
         for heard in all.filter(|heard| Some(heard.frame.source) == self.id) {
             recogniser.handle_frame(&heard.frame, heard.stale);
@@ -94,12 +94,8 @@ impl Profile {
             return vec!["none: it looks like a peer that conforms to the standard".to_owned()];
         }
         let mut lines = vec![format!("{} ({})", peer.title(), verdict.certainty)];
-        lines.extend(
-            verdict
-                .reasons
-                .iter()
-                .map(|reason| format!("because {reason}")),
-        );
+        let reasons = verdict.reasons.iter();
+        lines.extend(reasons.map(|sign| format!("because {}", sign.explanation())));
         if case.unprovoked().certain() != peer {
             let id = case.id.map_or_else(String::new, |id| id.to_string());
             let once = match verdict.certainty {
@@ -126,7 +122,7 @@ impl Profile {
                 let departures = verdict.peer.departures().map(|departure| {
                     json!({"name": departure.name, "does": departure.does, "ours": departure.ours})
                 });
-                let reasons = verdict.reasons.iter().map(ToString::to_string);
+                let reasons = verdict.reasons.iter().map(|sign| sign.explanation());
                 json!({
                     "peer": verdict.peer.name(),
                     "certainty": verdict.certainty.to_string(),
