@@ -42,6 +42,11 @@ pub use jaus_codec as codec;
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+/// Compiles the program in the guide to sessions.
+#[cfg(all(doctest, feature = "node", feature = "mobility"))]
+#[doc = include_str!("../docs/sessions.md")]
+struct Sessions;
+
 /// Compiles the programs in the guide to JSIDL.
 #[cfg(doctest)]
 #[doc = include_str!("../docs/jsidl.md")]

@@ -204,7 +204,7 @@ impl Clients {
             let _ = reply.send(Ok((self.ticket(Instruction::EndSubscription(id)), feed)));
         }
         if let Some(feed) = self.feeds.get(&id) {
-            feed.tell(news);
+            feed.tell(Instant::now(), news);
         }
     }
 

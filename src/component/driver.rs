@@ -22,18 +22,12 @@ use crate::service::{
     UnsafeService,
 };
 
-/// A request of the application to its component's task.
+/// A request of the application to its component's task. What is large is boxed, because every
+/// place in the queue has room for the largest command.
 pub(super) enum Command {
     /// Send a query and wait for the answer.
-    Ask {
-        peer: JausId,
-        query: Bytes,
-        report: u16,
-        options: QueryOptions,
-        reply: oneshot::Sender<Answer>,
-    },
-    /// Create a subscription or request control. Boxed, because every place in the queue has room
-    /// for the largest command.
+    Ask(Box<Ask>),
+    /// Create a subscription or request control.
     Hold(Box<Hold>),
     /// Add a service.
     Offer(Box<dyn Service>, oneshot::Sender<Result<(), UnsafeService>>),
@@ -45,6 +39,15 @@ pub(super) enum Command {
     Announce(u16),
     /// Report the end of the command with this code, and whether it was successful.
     End(u16, bool),
+}
+
+/// A query, and where its result goes.
+pub(super) struct Ask {
+    pub(super) peer: JausId,
+    pub(super) query: Bytes,
+    pub(super) report: u16,
+    pub(super) options: QueryOptions,
+    pub(super) reply: oneshot::Sender<Answer>,
 }
 
 /// The result of a query.
@@ -196,29 +199,32 @@ impl Driver {
         }
     }
 
+    fn ask(&mut self, ask: Ask) {
+        let Ask {
+            peer,
+            query,
+            report,
+            mut options,
+            reply,
+        } = ask;
+        let now = Instant::now();
+        options.patience.get_or_insert(self.patience);
+        let inquiry = self.stack.ask(now, peer, query, report, options);
+        match self.transmit() {
+            Ok(()) => {
+                self.waiting.insert(inquiry, reply);
+            }
+            Err(error) => {
+                self.stack.cancel(now, inquiry);
+                // The caller may have gone.
+                let _ = reply.send(Answer::NotSent(error));
+            }
+        }
+    }
+
     fn obey(&mut self, command: Command) {
         match command {
-            Command::Ask {
-                peer,
-                query,
-                report,
-                mut options,
-                reply,
-            } => {
-                let now = Instant::now();
-                options.patience.get_or_insert(self.patience);
-                let inquiry = self.stack.ask(now, peer, query, report, options);
-                match self.transmit() {
-                    Ok(()) => {
-                        self.waiting.insert(inquiry, reply);
-                    }
-                    Err(error) => {
-                        self.stack.cancel(now, inquiry);
-                        // The caller may have gone.
-                        let _ = reply.send(Answer::NotSent(error));
-                    }
-                }
-            }
+            Command::Ask(ask) => self.ask(*ask),
             Command::Hold(hold) => self.hold(*hold),
             Command::Offer(service, reply) => {
                 // The application may not wait for it.

@@ -19,14 +19,22 @@ pub(super) struct Feed {
 /// An item in the queue.
 #[derive(Debug)]
 pub(super) enum Item {
-    Report(Bytes),
+    Report { octets: Bytes, arrived: Instant },
     Down { since: Instant, why: Outage },
     Up,
+}
+
+impl Item {
+    const fn is_report(&self) -> bool {
+        matches!(self, Self::Report { .. })
+    }
 }
 
 #[derive(Debug, Default)]
 struct State {
     queue: VecDeque<Item>,
+    /// Limit of reports in the queue.
+    depth: usize,
     condition: Condition,
     end: Option<Option<SubscriptionEnd>>,
     /// The reader's waker while it waits; there is at most one reader.
@@ -52,18 +60,36 @@ impl Feed {
 
     pub(super) fn new() -> Self {
         Self {
-            state: Mutex::new(State::default()),
+            state: Mutex::new(State {
+                depth: Self::CAPACITY,
+                ..State::default()
+            }),
         }
     }
 
-    /// The component's side: queues a notification.
-    pub(super) fn tell(&self, news: SubscriptionNews) {
+    /// Sets the limit of reports in the queue, 1 to 256.
+    pub(super) fn set_depth(&self, reports: usize) {
+        let mut state = self.lock();
+        state.depth = reports.clamp(1, Self::CAPACITY);
+        state.drop_excess();
+    }
+
+    /// The number of reports in the queue.
+    pub(super) fn waiting(&self) -> usize {
+        self.lock().waiting()
+    }
+
+    /// The component's side: queues a notification that has arrived now.
+    pub(super) fn tell(&self, now: Instant, news: SubscriptionNews) {
         let mut state = self.lock();
         match news {
             SubscriptionNews::Up { hz } => state.rise(hz),
             SubscriptionNews::Report { report, lost } => {
                 state.condition.lost += u64::from(lost);
-                state.push(Item::Report(report));
+                state.push(Item::Report {
+                    octets: report,
+                    arrived: now,
+                });
             }
             SubscriptionNews::Down { since, why } => {
                 state.condition.up = false;
@@ -133,24 +159,27 @@ impl State {
     }
 
     fn push(&mut self, item: Item) {
-        if self.queue.len() >= Feed::CAPACITY {
-            self.make_room();
+        if self.queue.len() >= Feed::CAPACITY && !self.drop_oldest_report() {
+            self.queue.pop_front();
         }
         self.queue.push_back(item);
+        self.drop_excess();
     }
 
-    /// Drops the oldest report; without any report, the oldest item.
-    fn make_room(&mut self) {
-        let report = |item: &Item| matches!(item, Item::Report(_));
-        match self.queue.iter().position(report) {
-            Some(oldest) => {
-                self.queue.remove(oldest);
-                self.condition.missed += 1;
-            }
-            None => {
-                self.queue.pop_front();
-            }
-        }
+    fn drop_excess(&mut self) {
+        while self.waiting() > self.depth && self.drop_oldest_report() {}
+    }
+
+    /// Drops the oldest report; returns whether there was one.
+    fn drop_oldest_report(&mut self) -> bool {
+        let oldest = self.queue.iter().position(Item::is_report);
+        let dropped = oldest.and_then(|oldest| self.queue.remove(oldest));
+        self.condition.missed += u64::from(dropped.is_some());
+        dropped.is_some()
+    }
+
+    fn waiting(&self) -> usize {
+        self.queue.iter().filter(|item| item.is_report()).count()
     }
 }
 
@@ -164,6 +193,10 @@ mod tests {
         poll_fn(|cx| feed.poll_next(cx)).await
     }
 
+    fn tell(feed: &Feed, news: SubscriptionNews) {
+        feed.tell(Instant::now(), news);
+    }
+
     fn report(number: u8) -> SubscriptionNews {
         SubscriptionNews::Report {
             report: Bytes::copy_from_slice(&[number]),
@@ -174,24 +207,42 @@ mod tests {
     #[tokio::test]
     async fn a_slow_reader_loses_the_oldest_reports_and_is_told_how_many() {
         let feed = Feed::new();
-        feed.tell(SubscriptionNews::Up { hz: None });
+        tell(&feed, SubscriptionNews::Up { hz: None });
         for number in 0..=255 {
-            feed.tell(report(number));
+            tell(&feed, report(number));
         }
         assert_eq!(feed.condition().missed, 1);
         assert!(matches!(next(&feed).await, Some(Item::Up)));
-        let Some(Item::Report(first)) = next(&feed).await else {
+        let Some(Item::Report { octets, .. }) = next(&feed).await else {
             panic!("a report is due");
         };
-        assert_eq!(first[..], [1], "report 0 made room");
+        assert_eq!(octets[..], [1], "report 0 made room");
+    }
+
+    #[tokio::test]
+    async fn a_reader_that_wants_the_latest_report_gets_it_and_no_outage_is_lost() {
+        let feed = Feed::new();
+        tell(&feed, report(1));
+        tell(&feed, report(2));
+        feed.set_depth(1);
+        let (since, why) = (Instant::now(), Outage::Silent);
+        tell(&feed, SubscriptionNews::Down { since, why });
+        tell(&feed, SubscriptionNews::Up { hz: None });
+        tell(&feed, report(3));
+        assert_eq!((feed.waiting(), feed.condition().missed), (1, 2));
+        assert!(matches!(next(&feed).await, Some(Item::Down { .. })));
+        assert!(matches!(next(&feed).await, Some(Item::Up)));
+        let latest = next(&feed).await;
+        assert!(matches!(latest, Some(Item::Report { octets, .. }) if octets[..] == [3]));
+        assert_eq!(feed.waiting(), 0);
     }
 
     #[tokio::test]
     async fn what_waits_is_read_before_the_end() {
         let feed = Feed::new();
-        feed.tell(report(7));
+        tell(&feed, report(7));
         feed.stop();
-        assert!(matches!(next(&feed).await, Some(Item::Report(_))));
+        assert!(matches!(next(&feed).await, Some(Item::Report { .. })));
         assert!(next(&feed).await.is_none() && next(&feed).await.is_none());
     }
 
@@ -199,12 +250,12 @@ mod tests {
     async fn a_reader_that_waits_is_woken_by_news_and_by_the_end() {
         let feed = Feed::new();
         let telling = async {
-            feed.tell(report(1));
+            tell(&feed, report(1));
             tokio::task::yield_now().await;
             feed.stop();
         };
         let reading = async { (next(&feed).await, next(&feed).await) };
         let (read, ()) = tokio::join!(reading, telling);
-        assert!(matches!(read, (Some(Item::Report(_)), None)));
+        assert!(matches!(read, (Some(Item::Report { .. }), None)));
     }
 }

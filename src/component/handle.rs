@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::clients::{Hold, NotControlled, NotSubscribed};
-use super::driver::{Answer, Command};
+use super::driver::{Answer, Ask, Command};
 use super::offers::missing_for;
 use super::watch::Outlet;
 use super::{
@@ -253,13 +253,13 @@ impl Component {
         };
         let payload = message.encode().map_err(|error| not_sent(error.into()))?;
         let (reply, answer) = oneshot::channel();
-        let command = Command::Ask {
+        let command = Command::Ask(Box::new(Ask {
             peer,
             query: payload,
             report: R::CODE,
             options,
             reply,
-        };
+        }));
         let sent = self.shared.commands.send(command).await;
         sent.map_err(|_| QueryError::Stopped)?;
         match answer.await.map_err(|_| QueryError::Stopped)? {

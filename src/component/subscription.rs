@@ -2,9 +2,12 @@
 
 use std::future::poll_fn;
 use std::marker::PhantomData;
+use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+use futures_core::Stream;
 
 use super::Component;
 use super::clients::Ticket;
@@ -18,7 +21,8 @@ use crate::service::{Outage, SubscriptionEnd};
 ///
 /// It renews the event, detects when reports stop, and creates the event again until the peer is
 /// back, after a second or a day. In the meantime [`next`](Self::next) reports the outage. Up to
-/// 256 updates wait for a slow reader; then the oldest report is dropped.
+/// 256 updates wait for a slow reader, or fewer as set by [`depth`](Self::depth); then the oldest
+/// report is dropped. It is a [`Stream`] too.
 #[derive(Debug)]
 pub struct Subscription<R> {
     /// Dropped before the component.
@@ -27,6 +31,8 @@ pub struct Subscription<R> {
     _component: Component,
     peer: JausId,
     feed: Arc<Feed>,
+    /// When the report that was read last arrived.
+    arrived: Option<Instant>,
     report: PhantomData<fn() -> R>,
 }
 
@@ -58,6 +64,7 @@ impl<R: Message> Subscription<R> {
             _component: component,
             peer,
             feed,
+            arrived: None,
             report: PhantomData,
         }
     }
@@ -74,29 +81,7 @@ impl<R: Message> Subscription<R> {
     ///
     /// Cancel safe: dropping the returned future loses nothing.
     pub async fn next(&mut self) -> Option<Update<R>> {
-        poll_fn(|cx| self.poll_next(cx)).await
-    }
-
-    /// Like [`next`](Self::next), for hand-written futures.
-    pub fn poll_next(&mut self, cx: &mut Context<'_>) -> Poll<Option<Update<R>>> {
-        loop {
-            let Some(item) = ready!(self.feed.poll_next(cx)) else {
-                return Poll::Ready(None);
-            };
-            let update = match item {
-                Item::Up => Update::Up,
-                Item::Down { since, why } => Update::Down { since, why },
-                Item::Report(octets) => match R::decode(&octets) {
-                    Ok(report) => Update::Report(report),
-                    Err(error) => {
-                        self.feed.count_unreadable();
-                        tracing::debug!(peer = %self.peer, %error, "cannot decode the report");
-                        continue;
-                    }
-                },
-            };
-            return Poll::Ready(Some(update));
-        }
+        poll_fn(|cx| Pin::new(&mut *self).poll_next(cx)).await
     }
 
     /// Waits for the next report, across outages; `None` as for [`next`](Self::next).
@@ -109,7 +94,55 @@ impl<R: Message> Subscription<R> {
     }
 }
 
+impl<R: Message> Stream for Subscription<R> {
+    type Item = Update<R>;
+
+    fn poll_next(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Update<R>>> {
+        loop {
+            let Some(item) = ready!(self.feed.poll_next(cx)) else {
+                return Poll::Ready(None);
+            };
+            let update = match item {
+                Item::Up => Update::Up,
+                Item::Down { since, why } => Update::Down { since, why },
+                Item::Report { octets, arrived } => match R::decode(&octets) {
+                    Ok(report) => {
+                        self.arrived = Some(arrived);
+                        Update::Report(report)
+                    }
+                    Err(error) => {
+                        self.feed.count_unreadable();
+                        tracing::debug!(peer = %self.peer, %error, "cannot decode the report");
+                        continue;
+                    }
+                },
+            };
+            return Poll::Ready(Some(update));
+        }
+    }
+}
+
 impl<R> Subscription<R> {
+    /// Lets at most this many reports wait for a slow reader, 1 to 256, which is the default. With
+    /// 1, a reader always gets the latest report. Older ones count as [missed](Self::missed).
+    #[must_use]
+    pub fn depth(self, reports: usize) -> Self {
+        self.feed.set_depth(reports);
+        self
+    }
+
+    /// The number of reports that wait to be read.
+    #[must_use]
+    pub fn waiting(&self) -> usize {
+        self.feed.waiting()
+    }
+
+    /// How long ago the report that was read last arrived. `None` before the first.
+    #[must_use]
+    pub fn age(&self) -> Option<Duration> {
+        self.arrived.map(|arrived| arrived.elapsed())
+    }
+
     /// The component that sends the reports.
     #[must_use]
     pub const fn peer(&self) -> JausId {

@@ -9,6 +9,7 @@ use std::pin::Pin;
 use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
 
+use futures_core::Stream;
 use tokio::sync::watch;
 
 use super::member_table::MemberTable;
@@ -243,7 +244,7 @@ fn poll_subscribed<R: Message>(
     let up_to = (Bound::Unbounded, Bound::Included(last));
     for part in [behind, up_to] {
         for (&member, subscription) in subscribed.range_mut(part) {
-            match subscription.poll_next(cx) {
+            match Pin::new(&mut *subscription).poll_next(cx) {
                 Poll::Pending => {}
                 Poll::Ready(Some(update)) => {
                     news.push_back((member, update.into()));
