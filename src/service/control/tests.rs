@@ -1,5 +1,6 @@
 //! Tests of each transition of Access Control and Management on a whole component, in virtual time.
 
+mod emergencies;
 mod stopping;
 
 use std::time::Duration;
@@ -11,7 +12,7 @@ use crate::messages::core::confirm_control::ResponseCode as Confirmation;
 use crate::messages::core::reject_control::ResponseCode as Rejection;
 use crate::messages::core::*;
 use crate::service::stack_rig::{Sent, StackRig as Rig};
-use crate::service::{Stack, Standing as Now, State, Transport, code_of};
+use crate::service::{Stack, Standing as Now, State, Transport};
 
 const FIRST: JausId = JausId::new(42, 2, 1);
 const SECOND: JausId = JausId::new(42, 2, 2);
@@ -482,179 +483,6 @@ fn every_message_in_every_state_leads_where_the_clause_says_and_nowhere_else() {
                 );
             }
         }
-    }
-}
-
-#[test]
-fn anybody_can_set_an_emergency_and_only_the_same_client_clears_it() {
-    let mut rig = Rig::ready();
-    rig.hear(THIRD, &STOP);
-    assert_eq!(rig.state(), State::Emergency);
-    for client in [FIRST, SECOND] {
-        rig.hear(client, &CLEAR);
-        assert_eq!(rig.state(), State::Emergency);
-    }
-    rig.hear(THIRD, &CLEAR);
-    assert_eq!(
-        rig.state(),
-        State::Standby,
-        "it does not move off by itself"
-    );
-    assert_eq!(rig.controller(), Some((FIRST, 100)), "control is kept");
-}
-
-/// JAUS++ sends Set Emergency when it means Clear Emergency.
-#[test]
-fn an_emergency_that_is_set_again_stays_and_is_cleared_at_once() {
-    let mut rig = Rig::ready();
-    for _again in 0..3 {
-        rig.hear(FIRST, &STOP);
-        assert_eq!(rig.state(), State::Emergency);
-    }
-    assert_eq!(
-        rig.controller().map(|(id, _)| id),
-        Some(FIRST),
-        "control stays"
-    );
-    rig.hear(FIRST, &CLEAR);
-    assert_eq!(rig.state(), State::Standby);
-}
-
-#[test]
-fn an_emergency_ends_when_the_last_of_several_is_cleared() {
-    let mut rig = Rig::ready();
-    for client in [SECOND, THIRD, SECOND] {
-        rig.hear(client, &STOP);
-    }
-    rig.hear(SECOND, &CLEAR);
-    assert_eq!(rig.state(), State::Emergency);
-    rig.hear(THIRD, &CLEAR);
-    assert_eq!(rig.state(), State::Standby);
-}
-
-#[test]
-fn the_application_can_end_the_emergencies_of_clients_that_are_gone() {
-    let mut rig = Rig::ready();
-    rig.hear(SECOND, &STOP);
-    rig.hear(THIRD, &STOP);
-    rig.stack.set_condition(rig.now, Condition::Safe);
-    assert_eq!(rig.state(), State::Standby);
-    rig.hear(SECOND, &STOP);
-    rig.hear(THIRD, &CLEAR);
-    assert_eq!(rig.state(), State::Emergency, "of another emergency");
-    for state in [State::Initialize, State::Ready, State::Failure] {
-        let mut rig = Rig::brought_to(state);
-        rig.stack.set_condition(rig.now, Condition::Safe);
-        assert_eq!(rig.state(), state, "there was none");
-    }
-}
-
-#[test]
-fn in_an_emergency_control_neither_comes_nor_goes() {
-    let mut rig = Rig::ready();
-    rig.hear(THIRD, &STOP);
-    let refused = confirmed(SECOND, Confirmation::NOT_AVAILABLE);
-    assert_eq!(rig.request(SECOND, 255), [refused]);
-    let kept = rejected(FIRST, Rejection::NOT_AVAILABLE);
-    assert_eq!(rig.hear(FIRST, &ReleaseControl), [kept]);
-    rig.hear(FIRST, &Resume);
-    rig.hear(FIRST, &Reset);
-    rig.hear(FIRST, &Shutdown);
-    rig.hear(FIRST, &SetAuthority { authority_code: 5 });
-    assert_eq!(rig.controller(), Some((FIRST, 100)));
-    let status = ReportStatus {
-        status: report_status::Status(5),
-        reserved: 0,
-    };
-    assert_eq!(rig.hear(SECOND, &QueryStatus), [told(SECOND, &status)]);
-}
-
-#[test]
-fn a_flood_of_emergencies_is_bounded_and_can_be_cleared() {
-    let mut rig = Rig::managed();
-    let client = |i: u16| JausId::new(1000 + i, 1, 1);
-    for i in 0..1000 {
-        rig.hear(client(i), &STOP);
-    }
-    for i in 0..1000 {
-        assert_eq!(rig.state(), State::Emergency);
-        rig.hear(client(i), &CLEAR);
-    }
-    assert_eq!(rig.state(), State::Standby);
-}
-
-#[test]
-fn a_flood_of_forged_emergencies_hides_no_real_one_and_is_cleared_by_the_client_in_control() {
-    let mut rig = lasting();
-    for i in 0..5000 {
-        let forged = JausId::new(1000 + i, 1, 1);
-        rig.dead.push(forged);
-        rig.hear(forged, &STOP);
-    }
-    rig.run(Duration::from_secs(5));
-    rig.hear(THIRD, &STOP);
-    rig.hear(FIRST, &CLEAR);
-    assert_eq!(rig.state(), State::Emergency, "THIRD is alive");
-    rig.hear(THIRD, &CLEAR);
-    // There were more emergencies than the table holds; the client in control clears the rest.
-    rig.hear(FIRST, &CLEAR);
-    assert_eq!(rig.state(), State::Standby);
-}
-
-/// The number of setters that the table holds.
-const MOST: u16 = super::management::MOST_EMERGENCIES as u16;
-
-fn setter(i: u16) -> JausId {
-    JausId::new(1000 + i, 1, 1)
-}
-
-#[test]
-fn a_setter_that_finds_the_table_full_is_noted_until_the_client_in_control_clears_it() {
-    let mut rig = lasting();
-    for i in 0..=MOST {
-        rig.hear(setter(i), &STOP);
-    }
-    rig.hear(FIRST, &CLEAR);
-    for i in 0..MOST {
-        rig.hear(setter(i), &CLEAR);
-    }
-    assert_eq!(rig.state(), State::Emergency, "one more has set it");
-    rig.hear(FIRST, &CLEAR);
-    assert_eq!(rig.state(), State::Standby);
-}
-
-#[test]
-fn a_full_table_holds_again_a_setter_that_repeats_and_one_in_place_of_a_dead_one() {
-    let mut rig = lasting();
-    rig.dead.push(setter(0));
-    rig.hear(setter(0), &STOP);
-    rig.run(Duration::from_secs(5));
-    for i in 1..=MOST {
-        rig.hear(setter(i), &STOP);
-    }
-    rig.hear(setter(1), &STOP);
-    for i in 1..=MOST {
-        assert_eq!(rig.state(), State::Emergency);
-        rig.hear(setter(i), &CLEAR);
-    }
-    assert_eq!(rig.state(), State::Standby);
-}
-
-#[test]
-fn only_setters_of_emergencies_are_probed_among_clients_without_control() {
-    type Send = fn(&mut Rig);
-    let sends: [(Send, bool); 2] = [
-        (|rig| _ = rig.hear(THIRD, &STOP), true),
-        (|rig| _ = rig.hear(THIRD, &QueryStatus), false),
-    ];
-    for (send, probed) in sends {
-        let mut rig = Rig::managed();
-        send(&mut rig);
-        rig.now += Duration::from_secs(5);
-        rig.stack.handle_timeout(rig.now);
-        let sent: Vec<_> = std::iter::from_fn(|| rig.stack.poll_transmit()).collect();
-        let is_probe = |payload| code_of(payload) == Some(QueryHeartbeatPulse::CODE);
-        assert_eq!(sent.iter().any(|it| is_probe(&it.payload)), probed);
     }
 }
 
