@@ -125,10 +125,7 @@ impl Driver {
             let wake = self.stack.poll_timeout();
             tokio::select! {
                 received = self.port.recv() => match received {
-                    Some(message) => {
-                        self.note_progress();
-                        self.stack.handle_message(Instant::now(), &message);
-                    }
+                    Some(message) => self.stack.handle_message(Instant::now(), &message),
                     None => return,
                 },
                 command = self.inbox.recv() => match command {
