@@ -345,8 +345,8 @@ impl Stack {
         self.stop(&StopCause::Ended);
         self.control.end(&mut self.out);
         self.follow_control(now);
-        self.subscriptions.farewell(now, &mut self.out);
-        self.controls.farewell(now, &mut self.out);
+        self.subscriptions.cancel_all(now, &mut self.out);
+        self.controls.release_all(now, &mut self.out);
         self.sessions = Sessions::default();
     }
 

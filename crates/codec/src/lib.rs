@@ -64,6 +64,10 @@ pub use crate::{
     __codec_if_arbitrary as if_arbitrary, __codec_if_serde as if_serde, __codec_scaled as scaled,
 };
 
+#[cfg(feature = "serde")]
+#[doc(hidden)]
+pub use crate::__codec_view_serde as serde_by_view;
+
 /// Expands to its content if this crate has the feature `serde`, whatever the calling crate
 /// enables.
 #[cfg(feature = "serde")]

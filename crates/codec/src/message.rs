@@ -6,7 +6,9 @@ use std::fmt::Debug;
 
 use bytes::Bytes;
 
-use super::{DecodeError, EncodeError, Reader, Writer};
+use super::error::{DecodeError, EncodeError};
+use super::reader::Reader;
+use super::writer::Writer;
 
 /// A message type. Generated from its definition, never written by hand.
 ///
@@ -92,6 +94,13 @@ pub trait View: Sized {}
 
 #[cfg(not(feature = "serde"))]
 impl<T> View for T {}
+
+#[cfg(feature = "serde")]
+impl serde::Serialize for dyn AnyMessage {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serde::Serialize::serialize(&self.view(), serializer)
+    }
+}
 
 /// A message whose type is known only at run time.
 pub trait AnyMessage: Any + Debug + Send + Sync {

@@ -4,7 +4,8 @@ use std::fmt;
 
 use bytes::Bytes;
 
-use super::{AnyMessage, DecodeError, Message};
+use super::error::DecodeError;
+use super::message::{AnyMessage, Message};
 
 /// Identity of a service: URN and version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -173,7 +173,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportArrays);
+    codec::serde_by_view!(ReportArrays);
 }
 
 codec::if_arbitrary! {
@@ -280,7 +280,7 @@ codec::if_serde! {
             Ok(Self { rows: codec::view::View::from_view(value)? })
         }
     }
-    codec::view::serde_by_view!(ReportArrayList);
+    codec::serde_by_view!(ReportArrayList);
 }
 
 codec::if_arbitrary! {
@@ -336,7 +336,7 @@ pub mod report_array_list {
                 })
             }
         }
-        codec::view::serde_by_view!(RowRec);
+        codec::serde_by_view!(RowRec);
     }
 
     codec::if_arbitrary! {

@@ -98,7 +98,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(QueryNothing);
+    codec::serde_by_view!(QueryNothing);
 }
 
 codec::if_arbitrary! {
@@ -170,7 +170,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportTree);
+    codec::serde_by_view!(ReportTree);
 }
 
 codec::if_arbitrary! {
@@ -227,7 +227,7 @@ pub mod report_tree {
                 })
             }
         }
-        codec::view::serde_by_view!(RequestIdRec);
+        codec::serde_by_view!(RequestIdRec);
     }
 
     codec::if_arbitrary! {
@@ -285,7 +285,7 @@ pub mod report_tree {
                 })
             }
         }
-        codec::view::serde_by_view!(NodeRec);
+        codec::serde_by_view!(NodeRec);
     }
 
     codec::if_arbitrary! {
@@ -352,7 +352,7 @@ pub mod report_tree {
                 })
             }
         }
-        codec::view::serde_by_view!(ComponentRec);
+        codec::serde_by_view!(ComponentRec);
     }
 
     codec::if_arbitrary! {
@@ -419,7 +419,7 @@ pub mod report_tree {
                 })
             }
         }
-        codec::view::serde_by_view!(NodeSeq);
+        codec::serde_by_view!(NodeSeq);
     }
 
     codec::if_arbitrary! {
@@ -483,7 +483,7 @@ codec::if_serde! {
             Ok(Self { outer: codec::view::View::from_view(value)? })
         }
     }
-    codec::view::serde_by_view!(ReportListOfLists);
+    codec::serde_by_view!(ReportListOfLists);
 }
 
 codec::if_arbitrary! {
@@ -545,7 +545,7 @@ pub mod report_list_of_lists {
                 })
             }
         }
-        codec::view::serde_by_view!(PointRec);
+        codec::serde_by_view!(PointRec);
     }
 
     codec::if_arbitrary! {
@@ -609,7 +609,7 @@ codec::if_serde! {
             Ok(Self { choice: codec::view::View::from_view(value)? })
         }
     }
-    codec::view::serde_by_view!(SetChoice);
+    codec::serde_by_view!(SetChoice);
 }
 
 codec::if_arbitrary! {
@@ -665,7 +665,7 @@ pub mod set_choice {
                 })
             }
         }
-        codec::view::serde_by_view!(NumberRec);
+        codec::serde_by_view!(NumberRec);
     }
 
     codec::if_arbitrary! {
@@ -723,7 +723,7 @@ pub mod set_choice {
                 })
             }
         }
-        codec::view::serde_by_view!(TextRec);
+        codec::serde_by_view!(TextRec);
     }
 
     codec::if_arbitrary! {
@@ -817,7 +817,7 @@ pub mod set_choice {
                 })
             }
         }
-        codec::view::serde_by_view!(EmptyPresenceRec);
+        codec::serde_by_view!(EmptyPresenceRec);
     }
 
     codec::if_arbitrary! {
@@ -899,7 +899,7 @@ pub mod set_choice {
                 read.map_err(|error| error.within(name))
             }
         }
-        codec::view::serde_by_view!(Again);
+        codec::serde_by_view!(Again);
     }
 
     codec::if_arbitrary! {
@@ -952,7 +952,7 @@ pub mod set_choice {
                 })
             }
         }
-        codec::view::serde_by_view!(FirstRec);
+        codec::serde_by_view!(FirstRec);
     }
 
     codec::if_arbitrary! {
@@ -1004,7 +1004,7 @@ pub mod set_choice {
                 })
             }
         }
-        codec::view::serde_by_view!(SecondRec);
+        codec::serde_by_view!(SecondRec);
     }
 
     codec::if_arbitrary! {
@@ -1062,7 +1062,7 @@ pub mod set_choice {
                 })
             }
         }
-        codec::view::serde_by_view!(PairSeq);
+        codec::serde_by_view!(PairSeq);
     }
 
     codec::if_arbitrary! {
@@ -1169,7 +1169,7 @@ pub mod set_choice {
                 read.map_err(|error| error.within(name))
             }
         }
-        codec::view::serde_by_view!(Choice);
+        codec::serde_by_view!(Choice);
     }
 
     codec::if_arbitrary! {
@@ -1246,7 +1246,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportEmptyVariant);
+    codec::serde_by_view!(ReportEmptyVariant);
 }
 
 codec::if_arbitrary! {
@@ -1299,7 +1299,7 @@ pub mod report_empty_variant {
                 Ok(Self)
             }
         }
-        codec::view::serde_by_view!(Nothing);
+        codec::serde_by_view!(Nothing);
     }
 
     codec::if_arbitrary! {
@@ -1349,7 +1349,7 @@ pub mod report_empty_variant {
                 })
             }
         }
-        codec::view::serde_by_view!(AfterRec);
+        codec::serde_by_view!(AfterRec);
     }
 
     codec::if_arbitrary! {
@@ -1452,7 +1452,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportOptional);
+    codec::serde_by_view!(ReportOptional);
 }
 
 codec::if_arbitrary! {
@@ -1511,7 +1511,7 @@ pub mod report_optional {
                 })
             }
         }
-        codec::view::serde_by_view!(AlwaysRec);
+        codec::serde_by_view!(AlwaysRec);
     }
 
     codec::if_arbitrary! {
@@ -1617,7 +1617,7 @@ pub mod report_optional {
                 })
             }
         }
-        codec::view::serde_by_view!(MaybeRec);
+        codec::serde_by_view!(MaybeRec);
     }
 
     codec::if_arbitrary! {
@@ -1670,7 +1670,7 @@ pub mod report_optional {
                 })
             }
         }
-        codec::view::serde_by_view!(ItemRec);
+        codec::serde_by_view!(ItemRec);
     }
 
     codec::if_arbitrary! {
@@ -1722,7 +1722,7 @@ pub mod report_optional {
                 })
             }
         }
-        codec::view::serde_by_view!(LeftRec);
+        codec::serde_by_view!(LeftRec);
     }
 
     codec::if_arbitrary! {
@@ -1774,7 +1774,7 @@ pub mod report_optional {
                 })
             }
         }
-        codec::view::serde_by_view!(RightRec);
+        codec::serde_by_view!(RightRec);
     }
 
     codec::if_arbitrary! {
@@ -1856,7 +1856,7 @@ pub mod report_optional {
                 read.map_err(|error| error.within(name))
             }
         }
-        codec::view::serde_by_view!(MaybeVariant);
+        codec::serde_by_view!(MaybeVariant);
     }
 
     codec::if_arbitrary! {
@@ -2106,7 +2106,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportManyOptional);
+    codec::serde_by_view!(ReportManyOptional);
 }
 
 codec::if_arbitrary! {

@@ -361,7 +361,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(Open);
+    codec::serde_by_view!(Open);
 }
 
 codec::if_arbitrary! {
@@ -414,7 +414,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(Close);
+    codec::serde_by_view!(Close);
 }
 
 codec::if_arbitrary! {
@@ -467,7 +467,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(Stop);
+    codec::serde_by_view!(Stop);
 }
 
 codec::if_arbitrary! {
@@ -520,7 +520,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(ReportDoor);
+    codec::serde_by_view!(ReportDoor);
 }
 
 codec::if_arbitrary! {

@@ -106,7 +106,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SetPosition);
+    codec::serde_by_view!(SetPosition);
 }
 
 codec::if_arbitrary! {
@@ -203,7 +203,7 @@ pub mod set_position {
                 }))
             }
         }
-        codec::view::serde_by_view!(Position);
+        codec::serde_by_view!(Position);
     }
 
     codec::if_arbitrary! {
@@ -324,7 +324,7 @@ pub mod set_position {
                 }))
             }
         }
-        codec::view::serde_by_view!(Reading);
+        codec::serde_by_view!(Reading);
     }
 
     codec::if_arbitrary! {

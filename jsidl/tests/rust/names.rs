@@ -266,7 +266,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(Option_);
+    codec::serde_by_view!(Option_);
 }
 
 codec::if_arbitrary! {
@@ -471,7 +471,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(Result_);
+    codec::serde_by_view!(Result_);
 }
 
 codec::if_arbitrary! {
@@ -558,7 +558,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(Vec_);
+    codec::serde_by_view!(Vec_);
 }
 
 codec::if_arbitrary! {
@@ -638,7 +638,7 @@ pub mod vec {
                 })
             }
         }
-        codec::view::serde_by_view!(Some_);
+        codec::serde_by_view!(Some_);
     }
 
     codec::if_arbitrary! {
@@ -696,7 +696,7 @@ pub mod vec {
                 })
             }
         }
-        codec::view::serde_by_view!(Err_);
+        codec::serde_by_view!(Err_);
     }
 
     codec::if_arbitrary! {
@@ -748,7 +748,7 @@ pub mod vec {
                 })
             }
         }
-        codec::view::serde_by_view!(Self_);
+        codec::serde_by_view!(Self_);
     }
 
     codec::if_arbitrary! {
@@ -800,7 +800,7 @@ pub mod vec {
                 })
             }
         }
-        codec::view::serde_by_view!(Default_);
+        codec::serde_by_view!(Default_);
     }
 
     codec::if_arbitrary! {
@@ -882,7 +882,7 @@ pub mod vec {
                 read.map_err(|error| error.within(name))
             }
         }
-        codec::view::serde_by_view!(Box_);
+        codec::serde_by_view!(Box_);
     }
 
     codec::if_arbitrary! {
@@ -1015,7 +1015,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(Codec);
+    codec::serde_by_view!(Codec);
 }
 
 codec::if_arbitrary! {
@@ -1104,7 +1104,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(Move);
+    codec::serde_by_view!(Move);
 }
 
 codec::if_arbitrary! {
@@ -1157,7 +1157,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(Move2);
+    codec::serde_by_view!(Move2);
 }
 
 codec::if_arbitrary! {
@@ -1241,7 +1241,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportSame);
+    codec::serde_by_view!(ReportSame);
 }
 
 codec::if_arbitrary! {
@@ -1299,7 +1299,7 @@ pub mod report_same {
                 })
             }
         }
-        codec::view::serde_by_view!(SameRec);
+        codec::serde_by_view!(SameRec);
     }
 
     codec::if_arbitrary! {
@@ -1351,7 +1351,7 @@ pub mod report_same {
                 })
             }
         }
-        codec::view::serde_by_view!(FirstSeq);
+        codec::serde_by_view!(FirstSeq);
     }
 
     codec::if_arbitrary! {
@@ -1409,7 +1409,7 @@ pub mod report_same {
                 })
             }
         }
-        codec::view::serde_by_view!(SameRec2);
+        codec::serde_by_view!(SameRec2);
     }
 
     codec::if_arbitrary! {
@@ -1462,7 +1462,7 @@ pub mod report_same {
                 })
             }
         }
-        codec::view::serde_by_view!(SecondSeq);
+        codec::serde_by_view!(SecondSeq);
     }
 
     codec::if_arbitrary! {
@@ -1514,7 +1514,7 @@ pub mod report_same {
                 })
             }
         }
-        codec::view::serde_by_view!(ThirdSeq);
+        codec::serde_by_view!(ThirdSeq);
     }
 
     codec::if_arbitrary! {
@@ -1581,7 +1581,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SameRecAgain);
+    codec::serde_by_view!(SameRecAgain);
 }
 
 codec::if_arbitrary! {

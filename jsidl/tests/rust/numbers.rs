@@ -177,7 +177,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportNumbers);
+    codec::serde_by_view!(ReportNumbers);
 }
 
 codec::if_arbitrary! {
@@ -383,7 +383,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SetScaled);
+    codec::serde_by_view!(SetScaled);
 }
 
 codec::if_arbitrary! {
@@ -589,7 +589,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SetScaledOptional);
+    codec::serde_by_view!(SetScaledOptional);
 }
 
 codec::if_arbitrary! {
@@ -698,7 +698,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportNamed);
+    codec::serde_by_view!(ReportNamed);
 }
 
 codec::if_arbitrary! {

@@ -127,7 +127,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SetTexts);
+    codec::serde_by_view!(SetTexts);
 }
 
 codec::if_arbitrary! {
@@ -230,7 +230,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SetBlobs);
+    codec::serde_by_view!(SetBlobs);
 }
 
 codec::if_arbitrary! {

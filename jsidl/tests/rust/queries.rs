@@ -112,7 +112,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(QueryPlace);
+    codec::serde_by_view!(QueryPlace);
 }
 
 codec::if_arbitrary! {
@@ -244,7 +244,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(QueryDrive);
+    codec::serde_by_view!(QueryDrive);
 }
 
 codec::if_arbitrary! {
@@ -337,7 +337,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(QueryEcho);
+    codec::serde_by_view!(QueryEcho);
 }
 
 codec::if_arbitrary! {
@@ -390,7 +390,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(QueryCodes);
+    codec::serde_by_view!(QueryCodes);
 }
 
 codec::if_arbitrary! {
@@ -530,7 +530,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportPlace);
+    codec::serde_by_view!(ReportPlace);
 }
 
 codec::if_arbitrary! {
@@ -754,7 +754,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportDrive);
+    codec::serde_by_view!(ReportDrive);
 }
 
 codec::if_arbitrary! {
@@ -810,7 +810,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(ReportSound);
+    codec::serde_by_view!(ReportSound);
 }
 
 codec::if_arbitrary! {
@@ -863,7 +863,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(ReportCodes);
+    codec::serde_by_view!(ReportCodes);
 }
 
 codec::if_arbitrary! {

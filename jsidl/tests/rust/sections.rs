@@ -106,7 +106,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportSections);
+    codec::serde_by_view!(ReportSections);
 }
 
 codec::if_arbitrary! {
@@ -164,7 +164,7 @@ pub mod report_sections {
                 })
             }
         }
-        codec::view::serde_by_view!(Header);
+        codec::serde_by_view!(Header);
     }
 
     codec::if_arbitrary! {
@@ -216,7 +216,7 @@ pub mod report_sections {
                 })
             }
         }
-        codec::view::serde_by_view!(ItemRec);
+        codec::serde_by_view!(ItemRec);
     }
 
     codec::if_arbitrary! {
@@ -268,7 +268,7 @@ pub mod report_sections {
                 })
             }
         }
-        codec::view::serde_by_view!(Footer);
+        codec::serde_by_view!(Footer);
     }
 
     codec::if_arbitrary! {

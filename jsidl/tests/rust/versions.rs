@@ -122,7 +122,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(QueryState);
+    codec::serde_by_view!(QueryState);
 }
 
 codec::if_arbitrary! {
@@ -181,7 +181,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(QueryMode);
+    codec::serde_by_view!(QueryMode);
 }
 
 codec::if_arbitrary! {
@@ -276,7 +276,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportState);
+    codec::serde_by_view!(ReportState);
 }
 
 codec::if_arbitrary! {
@@ -370,7 +370,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportMode);
+    codec::serde_by_view!(ReportMode);
 }
 
 codec::if_arbitrary! {
@@ -435,7 +435,7 @@ pub mod v1_0 {
                 Ok(Self)
             }
         }
-        codec::view::serde_by_view!(QueryState);
+        codec::serde_by_view!(QueryState);
     }
 
     codec::if_arbitrary! {
@@ -530,7 +530,7 @@ pub mod v1_0 {
                 })
             }
         }
-        codec::view::serde_by_view!(ReportState);
+        codec::serde_by_view!(ReportState);
     }
 
     codec::if_arbitrary! {

@@ -18,8 +18,9 @@ use super::docs;
 use super::ident::{Names, version_module};
 use super::messages::Plan;
 use super::writer::Writer;
-use crate::behaviour::{MOST_REMEMBERED, Machine, TransitionKind};
+use crate::behaviour::TransitionKind;
 use crate::library::Library;
+use crate::machine::{MOST_REMEMBERED, Machine};
 use crate::model::{Message, Service};
 
 /// Locations of the message types.
