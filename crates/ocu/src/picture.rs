@@ -1,4 +1,4 @@
-//! The station's model of the vehicle: reports go in, snapshots for the pages come out. It uses no
+//! The station's model of a vehicle: reports go in, snapshots for the pages come out. It uses no
 //! network and no clock.
 
 use std::collections::BTreeMap;
@@ -6,19 +6,20 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::missing::{Absence, GonePart, GoneParts};
-use super::report::{Mission, Report};
+use super::report::{Mission, MissionStage, Report};
 use super::role::{self, Role};
 use super::sample_clock::{SampleClock, Stamp};
 use super::state;
 use jaus::address::JausId;
-use jaus::service::{Component, Directory, Kind, State};
+use jaus::service::{Component, Directory, State};
 
-/// The known state of the vehicle.
+/// The known state of a vehicle.
 #[derive(Debug)]
 pub(super) struct Picture {
     own: JausId,
     directory: Arc<Directory>,
-    vehicle: Option<u16>,
+    vehicle: u16,
+    depth: Depth,
     /// Name of the vehicle, kept after discovery has lost it.
     name: String,
     parts: BTreeMap<JausId, Part>,
@@ -29,6 +30,33 @@ pub(super) struct Picture {
     path: Vec<[f64; 2]>,
     maps: Vec<state::Map>,
     store: Option<JausId>,
+}
+
+/// Which reports of the vehicle's parts are expected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Depth {
+    /// What the list of vehicles shows: the state of the principal part, control, and the mission.
+    Brief,
+    /// All reports of all parts.
+    Full,
+}
+
+impl Depth {
+    /// A part with periodic reports is silent after this time without a report.
+    const fn silent(self) -> Duration {
+        match self {
+            Self::Brief => Duration::from_secs(4),
+            Self::Full => Duration::from_millis(1500),
+        }
+    }
+
+    /// An emergency that was reported earlier is checked again.
+    const fn fresh(self) -> Duration {
+        match self {
+            Self::Brief => Duration::from_secs(5),
+            Self::Full => Duration::from_secs(2),
+        }
+    }
 }
 
 /// A component of the vehicle.
@@ -63,8 +91,6 @@ struct Sample<T> {
 }
 
 impl Part {
-    /// A part with periodic reports is silent after this time without a report.
-    const SILENT: Duration = Duration::from_millis(1500);
     /// A part whose subscription is down is silent after this time without a report.
     const DOWN: Duration = Duration::from_secs(1);
 
@@ -99,12 +125,19 @@ impl Part {
         );
     }
 
+    /// Forgets its reports.
+    fn forget(&mut self) {
+        (self.status, self.controller, self.stage) = (None, None, None);
+        (self.pose_clock, self.velocity_clock) = (None, None);
+        (self.heard, self.is_down) = (None, false);
+    }
+
     /// Whether its reports have ceased.
-    fn is_silent(&self, now: Instant) -> bool {
+    fn is_silent(&self, now: Instant, limit: Duration) -> bool {
         let is_periodic = self.managed || self.reports_pose || self.reports_velocity;
         self.heard.is_some_and(|heard| {
             let silence = now.saturating_duration_since(heard);
-            (is_periodic && silence >= Self::SILENT) || (self.is_down && silence >= Self::DOWN)
+            (is_periodic && silence >= limit) || (self.is_down && silence >= Self::DOWN)
         })
     }
 
@@ -128,19 +161,18 @@ impl Part {
 }
 
 impl Picture {
-    /// Older reports are ignored for safety decisions.
-    const FRESH: Duration = Duration::from_secs(2);
     /// Manual drive requires pose, velocity and status younger than this.
     const DRIVABLE: Duration = Duration::from_secs(1);
     /// A planner that is silent for this time while other parts report is lost.
     const LOST: Duration = Duration::from_secs(2);
 
-    /// Creates an empty picture of `vehicle`, or of the first vehicle discovered.
-    pub(super) fn new(own: JausId, vehicle: Option<u16>) -> Self {
+    /// Creates an empty picture of a vehicle.
+    pub(super) fn new(own: JausId, vehicle: u16, depth: Depth) -> Self {
         Self {
             own,
             directory: Arc::default(),
             vehicle,
+            depth,
             name: String::new(),
             parts: BTreeMap::new(),
             gone: GoneParts::default(),
@@ -153,8 +185,24 @@ impl Picture {
         }
     }
 
-    pub(super) const fn vehicle(&self) -> Option<u16> {
+    pub(super) const fn vehicle(&self) -> u16 {
         self.vehicle
+    }
+
+    pub(super) const fn depth(&self) -> Depth {
+        self.depth
+    }
+
+    /// Changes which reports are expected. What was reported is forgotten, because some of it is
+    /// not reported any more.
+    pub(super) fn set_depth(&mut self, depth: Depth) {
+        if self.depth == depth {
+            return;
+        }
+        self.depth = depth;
+        self.parts.values_mut().for_each(Part::forget);
+        (self.pose, self.velocity, self.mission) = (None, None, None);
+        (self.path, self.maps, self.store) = (Vec::new(), Vec::new(), None);
     }
 
     pub(super) const fn parts(&self) -> &BTreeMap<JausId, Part> {
@@ -165,6 +213,12 @@ impl Picture {
     pub(super) fn find(&self, role: Role) -> Option<JausId> {
         let mut parts = self.parts.iter();
         parts.find(|(_, part)| part.role == role).map(|(id, _)| *id)
+    }
+
+    /// The part whose state stands for the vehicle's.
+    pub(super) fn principal(&self) -> Option<JausId> {
+        let managed = self.parts.iter().filter(|(_, part)| part.managed);
+        managed.min_by_key(|(_, part)| part.role).map(|(id, _)| *id)
     }
 
     pub(super) fn directory(&self) -> &Directory {
@@ -185,30 +239,15 @@ impl Picture {
         self.maps.iter().find(|map| map.id == id).cloned()
     }
 
-    /// Selects another vehicle.
-    ///
-    /// # Errors
-    /// If there is no vehicle with this number, with the reason as text.
-    pub(super) fn select(&mut self, now: Instant, subsystem: u16) -> Result<(), String> {
-        if !role::is_vehicle(&self.directory, subsystem) || subsystem == self.own.subsystem() {
-            return Err(format!(
-                "subsystem {subsystem} is not a known vehicle; choose one from the tree"
-            ));
-        }
-        if self.vehicle != Some(subsystem) {
-            let directory = self.directory.clone();
-            *self = Self::new(self.own, Some(subsystem));
-            self.handle_directory(now, directory);
-        }
-        Ok(())
+    /// Whether nothing of the vehicle is known any more.
+    pub(super) fn is_empty(&self) -> bool {
+        self.parts.is_empty() && self.gone.iter().next().is_none()
     }
 
     /// Handles a change of the discovered components.
-    pub(super) fn handle_directory(&mut self, now: Instant, directory: Arc<Directory>) {
-        self.directory = directory;
-        self.vehicle = self.vehicle.or_else(|| self.first_vehicle());
-        let directory = Arc::clone(&self.directory);
-        let known = self.vehicle.and_then(|it| directory.subsystem(it));
+    pub(super) fn handle_directory(&mut self, now: Instant, directory: &Arc<Directory>) {
+        self.directory = Arc::clone(directory);
+        let known = directory.subsystem(self.vehicle);
         if let Some(identification) = known.and_then(|it| it.identification()) {
             self.name.clone_from(&identification.name);
         }
@@ -244,20 +283,6 @@ impl Picture {
 
     pub(super) fn handle_time(&mut self, now: Instant) {
         self.gone.handle_time(now);
-    }
-
-    fn first_vehicle(&self) -> Option<u16> {
-        let others = || {
-            let own = self.own.subsystem();
-            let all = self.directory.subsystems();
-            all.filter(move |(id, _)| *id != own && role::is_vehicle(&self.directory, *id))
-        };
-        let is_vehicle = |it: &jaus::service::Subsystem| {
-            it.identification()
-                .is_some_and(|it| it.kind == Kind::Vehicle)
-        };
-        let named = others().find(|(_, subsystem)| is_vehicle(subsystem));
-        named.or_else(|| others().next()).map(|(id, _)| id)
     }
 
     /// Handles a report of a part of the vehicle.
@@ -337,10 +362,11 @@ impl Picture {
     pub(super) fn missing(&self, now: Instant) -> impl Iterator<Item = (JausId, &str, Absence)> {
         let gone = self.gone.iter();
         let gone = gone.map(|(id, part)| (id, &*part.name, Absence::Gone));
-        let silent = self
-            .parts
-            .iter()
-            .filter(move |(_, part)| part.is_silent(now));
+        let principal = self.principal();
+        let silent = self.parts.iter().filter(move |(id, part)| {
+            let is_expected = self.depth == Depth::Full || principal == Some(**id);
+            is_expected && part.is_silent(now, self.depth.silent())
+        });
         let silent = silent.map(|(id, part)| (*id, &*part.name, Absence::Silent));
         gone.chain(silent)
     }
@@ -380,7 +406,7 @@ impl Picture {
     /// The parts that can enter emergency and have not recently reported it.
     pub(super) fn not_in_emergency(&self, now: Instant) -> impl Iterator<Item = JausId> {
         let stands = move |part: &Part| {
-            let fresh = |it: &Sample<u8>| now.saturating_duration_since(it.at) < Self::FRESH;
+            let fresh = |it: &Sample<u8>| now.saturating_duration_since(it.at) < self.depth.fresh();
             part.is(State::Emergency) && part.status.as_ref().is_some_and(fresh)
         };
         let managed = self.parts.iter().filter(|(_, part)| part.managed);
@@ -398,11 +424,6 @@ impl Picture {
         stopped.map(|(id, _)| *id)
     }
 
-    /// The tree of all known components.
-    pub(super) fn tree(&self) -> Vec<state::Subsystem> {
-        super::tree::of(&self.directory)
-    }
-
     /// Snapshot of the vehicle. `obstacle` returns why a part is not under control.
     pub(super) fn vehicle_state(
         &self,
@@ -410,9 +431,8 @@ impl Picture {
         emergency_wanted: bool,
         obstacle: impl Fn(JausId) -> Option<String>,
     ) -> Option<state::Vehicle> {
-        let subsystem = self.vehicle?;
-        let is_known = self.directory.subsystem(subsystem).is_some();
-        if !is_known && self.gone.iter().next().is_none() {
+        let is_known = self.directory.subsystem(self.vehicle).is_some();
+        if !is_known && self.is_empty() {
             return None;
         }
         let mut parts: Vec<_> = self.parts.iter().collect();
@@ -422,7 +442,7 @@ impl Picture {
         let any = self.in_emergency().next().is_some();
         let all = any && self.not_in_emergency(now).next().is_none();
         Some(state::Vehicle {
-            subsystem,
+            subsystem: self.vehicle,
             name: self.name.clone(),
             pose: self.pose.map(|told| state::Pose {
                 age_ms: age(now, told.at),
@@ -439,6 +459,50 @@ impl Picture {
         })
     }
 
+    /// The vehicle in the list of vehicles. `selected` and `held` state whether the station has
+    /// selected it and controls it.
+    pub(super) fn fleet_state(
+        &self,
+        now: Instant,
+        selected: bool,
+        held: bool,
+    ) -> state::FleetVehicle {
+        let principal = self.principal().and_then(|id| self.parts.get(&id));
+        let status = principal.and_then(|part| part.status);
+        let presence = match principal {
+            None if self.is_empty() => "unknown",
+            None => "gone",
+            Some(part) if part.is_silent(now, self.depth.silent()) => "silent",
+            Some(_) => "present",
+        };
+        let holder = self.holder();
+        let mission = self.mission().map(|it| it.stage);
+        let heard = self.parts.values().filter_map(|part| part.heard);
+        let heard = heard.chain(self.gone.iter().filter_map(|(_, part)| part.heard));
+        let heard = heard.max();
+        state::FleetVehicle {
+            subsystem: self.vehicle,
+            name: self.name.clone(),
+            selected,
+            presence,
+            state: status.map(|told| state_name(told.what)),
+            controller: holder.map(|(id, _)| id.to_string()),
+            authority: holder.map(|(_, authority)| authority),
+            held,
+            mission: mission.filter(|it| !it.is_over()).map(MissionStage::name),
+            age_ms: heard.map(|at| age(now, at)),
+        }
+    }
+
+    /// The operator in control of the vehicle with the greatest authority. The vehicle's own parts
+    /// control each other during a mission, which does not count.
+    pub(super) fn holder(&self) -> Option<(JausId, u8)> {
+        let parts = self.parts.values().filter(|part| part.role.is_commanded());
+        let controllers = parts.filter_map(|part| part.controller?.what);
+        let operators = controllers.filter(|(id, _)| id.subsystem() != self.vehicle);
+        operators.max_by_key(|(_, authority)| *authority)
+    }
+
     fn part_state(
         &self,
         now: Instant,
@@ -451,9 +515,7 @@ impl Picture {
             id: id.to_string(),
             role: part.role.name(),
             managed: part.managed,
-            state: part
-                .status
-                .map(|told| State::from_code(told.what).map_or("unknown", State::name)),
+            state: part.status.map(|told| state_name(told.what)),
             state_age_ms: part.status.map(|told| age(now, told.at)),
             controller: controller.map(|(id, _)| id.to_string()),
             authority: controller.map(|(_, authority)| authority),
@@ -503,6 +565,10 @@ fn sampled_at(clock: &mut Option<SampleClock>, now: Instant, stamp: Option<Stamp
             now
         }
     }
+}
+
+fn state_name(code: u8) -> &'static str {
+    State::from_code(code).map_or("unknown", State::name)
 }
 
 /// Milliseconds since `then`.

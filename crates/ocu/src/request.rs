@@ -8,6 +8,10 @@ pub struct Frame {
     /// A request with an id is answered.
     #[serde(default)]
     pub id: Option<u64>,
+    /// The subsystem number of the vehicle that the page shows. A request for another vehicle than
+    /// the selected one is refused, except an emergency.
+    #[serde(default)]
+    pub vehicle: Option<u16>,
     /// The content.
     #[serde(flatten)]
     pub said: Said,
@@ -53,7 +57,7 @@ pub struct MessageFilter {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum OperatorRequest {
-    /// Select another vehicle.
+    /// Select another vehicle: the one to control and drive.
     Select {
         /// Its subsystem number.
         subsystem: u16,
@@ -69,6 +73,11 @@ pub enum OperatorRequest {
     Standby,
     /// Set or clear an emergency.
     Emergency {
+        /// Whether to set it.
+        on: bool,
+    },
+    /// Set or clear an emergency of all vehicles.
+    EmergencyAll {
         /// Whether to set it.
         on: bool,
     },
@@ -126,6 +135,10 @@ mod tests {
                 OperatorRequest::Emergency { on: false },
             ),
             (
+                r#"{"type":"emergency_all","on":true}"#,
+                OperatorRequest::EmergencyAll { on: true },
+            ),
+            (
                 r#"{"type":"drive","forward":0.5,"turn":-1}"#,
                 OperatorRequest::Drive {
                     forward: 0.5,
@@ -153,6 +166,7 @@ mod tests {
                 frame,
                 Frame {
                     id: None,
+                    vehicle: None,
                     said: Said::OperatorRequest(request)
                 },
                 "{text}"
@@ -162,7 +176,9 @@ mod tests {
         let said = Said::Token {
             token: "abc".into(),
         };
-        assert_eq!(frame, Frame { id: Some(7), said });
+        assert_eq!((frame.id, frame.said), (Some(7), said));
+        let frame = read(r#"{"type":"stop","vehicle":101}"#).unwrap();
+        assert_eq!(frame.vehicle, Some(101));
         let frame = read(r#"{"type":"messages","on":true,"filter":{"text":"x"}}"#).unwrap();
         let filter = MessageFilter {
             text: "x".into(),

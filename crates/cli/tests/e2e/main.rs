@@ -15,6 +15,7 @@
 
 mod browser;
 mod by_hand;
+mod fleet;
 mod steps;
 mod system;
 
@@ -47,6 +48,17 @@ fn a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once() {
         return not_tested(&this_test(), "not built: jaus-ocu");
     }
     by_hand::run();
+}
+
+#[test]
+fn an_operator_chooses_among_vehicles_and_stops_all_of_them() {
+    if let Some(reason) = browser::missing() {
+        return not_tested(&this_test(), &reason);
+    }
+    if !system::program("jaus-ocu").exists() {
+        return not_tested(&this_test(), "not built: jaus-ocu");
+    }
+    fleet::run();
 }
 
 fn run(system: &System) {

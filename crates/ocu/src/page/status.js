@@ -1,7 +1,7 @@
-// The top bar and the status panel: which vehicle, how good the connection is, who is in control,
-// and how the vehicle moves.
+// The top bar and the status panel: how good the connection is, who is in control, and how the
+// vehicle moves.
 
-import { duration, figure, get, list, make, mark, number, plain, say, show, toast, words } from "./dom.js";
+import { duration, figure, get, list, mark, number, plain, say, show, toast, words } from "./dom.js";
 
 const FRESH = 1_000;
 
@@ -28,22 +28,6 @@ export function showLink(link, state) {
   }[condition];
   show(banner, Boolean(text));
   if (text) say(banner, text);
-}
-
-/** Shows the vehicles that there are, and which one is operated. */
-export function showVehicles(state) {
-  const select = get("vehicle-select");
-  const vehicles = list(state.tree, 64).filter((one) => one?.kind === "vehicle" && number(one.subsystem) !== null);
-  const chosen = number(state.vehicle?.subsystem);
-  if (chosen !== null && !vehicles.some((one) => one.subsystem === chosen)) vehicles.unshift(state.vehicle);
-  const key = JSON.stringify([chosen, vehicles.map((one) => [one.subsystem, one.name])]);
-  if (select.dataset.key === key || document.activeElement === select) return;
-  select.dataset.key = key;
-  const options = vehicles.map((one) =>
-    make("option", { value: one.subsystem }, `${plain(one.name, 40) || "Vehicle"} · ${one.subsystem}`));
-  select.replaceChildren(...(options.length ? options : [make("option", {}, "No vehicle found")]));
-  if (chosen !== null) select.value = String(chosen);
-  select.disabled = !options.length;
 }
 
 /** How a part is missing, in words. */

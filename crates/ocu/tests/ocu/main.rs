@@ -12,6 +12,7 @@
 mod scene;
 
 mod drive;
+mod fleet;
 mod hostile;
 mod looking;
 mod missing;
