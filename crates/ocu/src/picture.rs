@@ -1,17 +1,21 @@
 //! The station's model of a vehicle: reports go in, snapshots for the pages come out. It uses no
 //! network and no clock.
 
+mod part;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+pub(super) use self::part::{Depth, Part};
 use super::missing::{Absence, GonePart, GoneParts};
 use super::report::{Mission, MissionStage, Report};
-use super::role::{self, Role};
+use super::role::Role;
 use super::sample_clock::{SampleClock, Stamp};
 use super::state;
 use jaus::address::JausId;
 use jaus::service::{Component, Directory, State};
+use jaus_vehicle::messages::handoff::enhanced_access_control;
 
 /// The known state of a vehicle.
 #[derive(Debug)]
@@ -32,55 +36,6 @@ pub(super) struct Picture {
     store: Option<JausId>,
 }
 
-/// Which reports of the vehicle's parts are expected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Depth {
-    /// What the list of vehicles shows: the state of the principal part, control, and the mission.
-    Brief,
-    /// All reports of all parts.
-    Full,
-}
-
-impl Depth {
-    /// A part with periodic reports is silent after this time without a report.
-    const fn silent(self) -> Duration {
-        match self {
-            Self::Brief => Duration::from_secs(4),
-            Self::Full => Duration::from_millis(1500),
-        }
-    }
-
-    /// An emergency that was reported earlier is checked again.
-    const fn fresh(self) -> Duration {
-        match self {
-            Self::Brief => Duration::from_secs(5),
-            Self::Full => Duration::from_secs(2),
-        }
-    }
-}
-
-/// A component of the vehicle.
-#[derive(Debug, Clone)]
-pub(super) struct Part {
-    pub(super) role: Role,
-    /// Whether the part offers Management.
-    pub(super) managed: bool,
-    status: Option<Sample<u8>>,
-    /// The client in control, with its authority.
-    controller: Option<Sample<Option<(JausId, u8)>>>,
-    stage: Option<state::Stage>,
-    /// Name of the part.
-    name: String,
-    reports_pose: bool,
-    reports_velocity: bool,
-    pose_clock: Option<SampleClock>,
-    velocity_clock: Option<SampleClock>,
-    /// Time of its last report.
-    heard: Option<Instant>,
-    /// Whether the last subscription event was a loss of reports.
-    is_down: bool,
-}
-
 /// A reported value with its reporter and sample time. The time comes from the report's time stamp,
 /// or is the arrival time without a stamp.
 #[derive(Debug, Clone, Copy)]
@@ -88,76 +43,6 @@ struct Sample<T> {
     what: T,
     by: JausId,
     at: Instant,
-}
-
-impl Part {
-    /// A part whose subscription is down is silent after this time without a report.
-    const DOWN: Duration = Duration::from_secs(1);
-
-    fn new(role: Role) -> Self {
-        Self {
-            role,
-            managed: false,
-            status: None,
-            controller: None,
-            stage: None,
-            name: String::new(),
-            reports_pose: false,
-            reports_velocity: false,
-            pose_clock: None,
-            velocity_clock: None,
-            heard: None,
-            is_down: false,
-        }
-    }
-
-    /// Updates the part from discovery data.
-    fn describe(&mut self, component: &Component, role: Role) {
-        self.role = role;
-        self.managed = role::is_managed(component);
-        self.reports_pose = role::reports_pose(component);
-        self.reports_velocity = role::reports_velocity(component);
-        let own_name = component.identification.as_ref().map(|it| it.name.clone());
-        let own_name = own_name.filter(|it| !it.is_empty());
-        self.name = role.title().map_or_else(
-            || own_name.unwrap_or_else(|| "Component".to_owned()),
-            str::to_owned,
-        );
-    }
-
-    /// Forgets its reports.
-    fn forget(&mut self) {
-        (self.status, self.controller, self.stage) = (None, None, None);
-        (self.pose_clock, self.velocity_clock) = (None, None);
-        (self.heard, self.is_down) = (None, false);
-    }
-
-    /// Whether its reports have ceased.
-    fn is_silent(&self, now: Instant, limit: Duration) -> bool {
-        let is_periodic = self.managed || self.reports_pose || self.reports_velocity;
-        self.heard.is_some_and(|heard| {
-            let silence = now.saturating_duration_since(heard);
-            (is_periodic && silence >= limit) || (self.is_down && silence >= Self::DOWN)
-        })
-    }
-
-    fn was_heard_within(&self, limit: Duration, now: Instant) -> bool {
-        self.heard
-            .is_some_and(|heard| now.saturating_duration_since(heard) < limit)
-    }
-
-    pub(super) fn is(&self, state: State) -> bool {
-        self.status.is_some_and(|it| it.what == state as u8)
-    }
-
-    pub(super) fn controller(&self) -> Option<JausId> {
-        self.told_controller()?
-    }
-
-    /// The reported client in control, which may be none; `None` before a report.
-    pub(super) fn told_controller(&self) -> Option<Option<JausId>> {
-        Some(self.controller?.what.map(|(id, _)| id))
-    }
 }
 
 impl Picture {
@@ -183,6 +68,10 @@ impl Picture {
             maps: Vec::new(),
             store: None,
         }
+    }
+
+    pub(super) const fn own(&self) -> JausId {
+        self.own
     }
 
     pub(super) const fn vehicle(&self) -> u16 {
@@ -459,13 +348,13 @@ impl Picture {
         })
     }
 
-    /// The vehicle in the list of vehicles. `selected` and `held` state whether the station has
-    /// selected it and controls it.
+    /// The vehicle in the list of vehicles. The flags state whether the station has selected it,
+    /// controls it, and is requested to hand it over.
     pub(super) fn fleet_state(
         &self,
         now: Instant,
         selected: bool,
-        held: bool,
+        (held, requested): (bool, bool),
     ) -> state::FleetVehicle {
         let principal = self.principal().and_then(|id| self.parts.get(&id));
         let status = principal.and_then(|part| part.status);
@@ -489,6 +378,7 @@ impl Picture {
             controller: holder.map(|(id, _)| id.to_string()),
             authority: holder.map(|(_, authority)| authority),
             held,
+            requested,
             mission: mission.filter(|it| !it.is_over()).map(MissionStage::name),
             age_ms: heard.map(|at| age(now, at)),
         }
@@ -501,6 +391,19 @@ impl Picture {
         let controllers = parts.filter_map(|part| part.controller?.what);
         let operators = controllers.filter(|(id, _)| id.subsystem() != self.vehicle);
         operators.max_by_key(|(_, authority)| *authority)
+    }
+
+    /// The part under control of this operator that passes on requests for control.
+    pub(super) fn handoff_part(&self, holder: JausId) -> Option<JausId> {
+        let held = self
+            .parts
+            .iter()
+            .filter(|(_, part)| part.controller() == Some(holder));
+        let mut ids = held.map(|(id, _)| *id);
+        ids.find(|id| {
+            let component = self.directory.component(*id);
+            component.is_some_and(|it| it.offers(enhanced_access_control::URN))
+        })
     }
 
     fn part_state(

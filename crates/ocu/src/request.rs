@@ -62,10 +62,18 @@ pub enum OperatorRequest {
         /// Its subsystem number.
         subsystem: u16,
     },
-    /// Take or release control.
+    /// Take or release control. If another operator with an equal or higher authority has it, this
+    /// requests it from that operator, or withdraws the request.
     Control {
         /// Whether to take control.
         on: bool,
+    },
+    /// Decide about another operator's request for control.
+    Handover {
+        /// Number of the request.
+        request: u8,
+        /// Whether to hand over control.
+        grant: bool,
     },
     /// Resume: make the vehicle act on commands.
     Resume,
@@ -127,6 +135,13 @@ mod tests {
             (
                 r#"{"type":"control","on":true}"#,
                 OperatorRequest::Control { on: true },
+            ),
+            (
+                r#"{"type":"handover","request":3,"grant":false}"#,
+                OperatorRequest::Handover {
+                    request: 3,
+                    grant: false,
+                },
             ),
             (r#"{"type":"resume"}"#, OperatorRequest::Resume),
             (r#"{"type":"standby"}"#, OperatorRequest::Standby),

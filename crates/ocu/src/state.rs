@@ -51,6 +51,8 @@ pub struct FleetVehicle {
     pub authority: Option<u8>,
     /// Whether this station controls it.
     pub held: bool,
+    /// Whether another operator requests the control that this station has.
+    pub requested: bool,
     /// Stage of its mission; `null` without one.
     pub mission: Option<&'static str>,
     /// Milliseconds since its last report.
@@ -218,6 +220,25 @@ pub struct Control {
     pub wanted: bool,
     /// Why control is not complete.
     pub reason: String,
+    /// JAUS id of the operator whose control this station has requested.
+    pub asking: Option<String>,
+    /// The requests of other operators for the control that this station has.
+    pub requests: Vec<HandoverRequest>,
+    /// How control last changed hands or was refused; empty otherwise.
+    pub handover: String,
+}
+
+/// Another operator's request for control.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct HandoverRequest {
+    /// Number of the request.
+    pub id: u8,
+    /// JAUS id of the operator.
+    pub operator: String,
+    /// Authority of the operator.
+    pub authority: u8,
+    /// Why, in the operator's words.
+    pub explanation: String,
 }
 
 /// Manual drive.

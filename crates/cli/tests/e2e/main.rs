@@ -16,6 +16,7 @@
 mod browser;
 mod by_hand;
 mod fleet;
+mod handover;
 mod steps;
 mod system;
 
@@ -59,6 +60,17 @@ fn an_operator_chooses_among_vehicles_and_stops_all_of_them() {
         return not_tested(&this_test(), "not built: jaus-ocu");
     }
     fleet::run();
+}
+
+#[test]
+fn control_is_handed_over_between_the_pages_of_two_operators() {
+    if let Some(reason) = browser::missing() {
+        return not_tested(&this_test(), &reason);
+    }
+    if !system::program("jaus-ocu").exists() {
+        return not_tested(&this_test(), "not built: jaus-ocu");
+    }
+    handover::run();
 }
 
 fn run(system: &System) {

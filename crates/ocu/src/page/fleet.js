@@ -101,7 +101,8 @@ function condition({ presence, state, mission }) {
   return words(state ?? "unknown");
 }
 
-function controller({ held, controller: id, authority }) {
+function controller({ held, requested, controller: id, authority }) {
+  if (requested) return "another operator requests control";
   if (held) return "you control it";
   if (!id) return "nobody controls it";
   return `${plain(id, 16)} controls it${number(authority) === null ? "" : ` (${authority})`}`;

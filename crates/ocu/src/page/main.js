@@ -5,6 +5,7 @@ import { get, mark, plain, say, show, toast, typing } from "./dom.js";
 import { Drive } from "./drive.js";
 import { Emergency } from "./emergency.js";
 import { Fleet } from "./fleet.js";
+import { Handover } from "./handover.js";
 import { Link } from "./link.js";
 import { MapView } from "./map.js";
 import { Messages } from "./messages.js";
@@ -19,6 +20,7 @@ const mission = new Mission(ask, map);
 const emergency = new Emergency(link);
 const drive = new Drive(link, () => emergency.stop());
 const fleet = new Fleet((subsystem) => selectVehicle(subsystem));
+const handover = new Handover(ask);
 new Messages(link);
 followTheme(() => map.recolour());
 
@@ -66,6 +68,7 @@ function render() {
   get("standby").disabled = !operable || !state.control?.held || mode !== "ready";
   if (!state) return;
   showControl(state, authority, operable);
+  handover.update(state, operable);
   showStatus(state, Number.isFinite(link.age) ? link.age : 0);
   showMissing(state, live);
   map.update(state, live, link.token);
@@ -106,7 +109,8 @@ function choose(place) {
 }
 
 get("control-button").addEventListener("click", () => {
-  const on = !(state?.control?.held || state?.control?.wanted);
+  const { held, wanted, asking } = state?.control ?? {};
+  const on = !(held || wanted || asking);
   ask({ type: "control", on });
 });
 get("resume").addEventListener("click", () => ask({ type: "resume" }));

@@ -57,21 +57,25 @@ export function showMissing(state, live) {
   say(notice, texts.slice(0, 2).join(" · ") + more);
 }
 
-/** Shows who controls, and offers to take or release control. */
+/** Shows who controls, and offers to take, request or release control. */
 export function showControl(state, authority, operable) {
-  const { held, wanted, reason } = state.control ?? {};
+  const { held, wanted, asking, reason } = state.control ?? {};
   const driver = part(state, "primitive_driver");
   const [word, detail] = held
     ? ["You have control", number(authority) === null ? "" : `authority ${authority}`]
-    : wanted
-      ? ["Taking control", plain(reason)]
-      : ["Not in control", plain(reason) || holder(driver)];
+    : asking
+      ? ["Control requested", `from ${plain(asking, 16)}`]
+      : wanted
+        ? ["Taking control", plain(reason)]
+        : ["Not in control", plain(reason) || holder(driver)];
   say(get("control-word"), word);
   say(get("control-detail"), detail);
-  document.body.dataset.control = held ? "held" : wanted ? "wanted" : "none";
+  document.body.dataset.control = held ? "held" : asking ? "asking" : wanted ? "wanted" : "none";
   const button = get("control-button");
-  say(button, held || wanted ? "Release" : "Take control");
-  button.classList.toggle("primary", !held && !wanted);
+  const outranks = Boolean(driver?.controller) && driver.authority >= authority;
+  const offer = outranks ? "Request control" : "Take control";
+  say(button, asking ? "Withdraw" : held || wanted ? "Release" : offer);
+  button.classList.toggle("primary", !held && !wanted && !asking);
   button.disabled = !operable;
 }
 

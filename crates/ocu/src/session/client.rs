@@ -81,6 +81,10 @@ impl Client {
         }
     }
 
+    pub(super) const fn authority(&self) -> u8 {
+        self.authority
+    }
+
     pub(super) const fn component(&self) -> &Component {
         &self.component
     }

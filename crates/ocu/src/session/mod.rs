@@ -6,6 +6,7 @@ mod alarm;
 mod client;
 mod fleet;
 mod following;
+mod handover;
 mod lease;
 mod maps;
 mod requests;
@@ -21,6 +22,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use self::client::{Client, Finished};
 use self::fleet::Fleet;
 use self::following::Sighting;
+use self::handover::Notice;
 pub(super) use self::maps::CellsReply;
 use self::vehicle::Vehicle;
 use super::PageId;
@@ -29,7 +31,7 @@ use super::picture::Depth;
 use super::request::OperatorRequest;
 use super::state::{Control, Drive, State};
 use super::stick::{Push, Stick};
-use jaus::component::Component;
+use jaus::component::{Component, Handlers};
 use jaus::service::Directory;
 use jaus_vehicle::parts::PartError;
 use jaus_view::Timestamp;
@@ -143,6 +145,9 @@ pub(super) struct Session {
     halted: Option<String>,
     orders: mpsc::Receiver<Order>,
     sightings: mpsc::Receiver<Sighting>,
+    notices: mpsc::Receiver<Notice>,
+    /// The service that receives the notices, until it is offered.
+    handoff: Option<Handlers>,
     publisher: Publisher,
     /// The directory whose tree was published.
     published: Arc<Directory>,
@@ -164,6 +169,7 @@ impl Session {
     pub(super) fn new(component: Component, vehicles: Vec<u16>, authority: u8) -> (Self, Access) {
         let (orders, inbox) = mpsc::channel(Self::QUEUE);
         let (sighted, sightings) = mpsc::channel(Self::QUEUE);
+        let (noticed, notices) = mpsc::channel(Self::QUEUE);
         let (publisher, snapshots) = Publisher::new();
         let session = Self {
             fleet: Fleet::new(component.clone(), vehicles, sighted),
@@ -174,6 +180,8 @@ impl Session {
             halted: None,
             orders: inbox,
             sightings,
+            notices,
+            handoff: Some(handover::service(noticed)),
             publisher,
             published: Arc::default(),
             seq: 0,
@@ -183,6 +191,11 @@ impl Session {
 
     /// Runs until the component stops.
     pub(super) async fn run(mut self) -> PartError {
+        if let Some(handoff) = self.handoff.take()
+            && let Err(error) = self.client.component().offer(handoff).await
+        {
+            return PartError::Broken(error.to_string());
+        }
         let mut standing = self.client.component().watch_standing();
         let mut beat = interval(Self::BEAT);
         beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -195,6 +208,11 @@ impl Session {
                 Some((by, report)) = self.sightings.recv() => {
                     if let Some(vehicle) = self.fleet.get_mut(by.subsystem()) {
                         vehicle.handle_report(Instant::now(), by, report);
+                    }
+                }
+                Some((part, content)) = self.notices.recv() => {
+                    if let Some(vehicle) = self.fleet.get_mut(part.subsystem()) {
+                        vehicle.handle_handover(Instant::now(), part, &content, &mut self.client);
                     }
                 }
                 Some(finished) = self.client.finished() => {
@@ -322,7 +340,7 @@ impl Session {
             time: time_of_day().to_string(),
             operator: self.client.component().id().to_string(),
             vehicle: vehicle.and_then(|it| it.state(now)),
-            control: vehicle.map_or_else(Control::default, |it| it.lease.state(&it.picture)),
+            control: vehicle.map_or_else(Control::default, Vehicle::control_state),
             drive: Drive {
                 active: driven.is_some(),
                 forward: push.forward(),

@@ -13,6 +13,7 @@ use crate::PageId;
 use crate::request::OperatorRequest;
 use crate::role::Role;
 use crate::stick::Push;
+use jaus::address::JausId;
 use jaus::component::Session as PartSession;
 use jaus::service::State;
 use jaus_vehicle::messages::ground::set_destination::Approved;
@@ -60,6 +61,9 @@ impl Session {
             }
             OperatorRequest::Emergency { on } => return self.emergency(now, meant, on, reply),
             OperatorRequest::EmergencyAll { on } => return self.emergency_of_all(now, on, reply),
+            OperatorRequest::Handover { request, grant } => {
+                return self.decide_handover(now, meant, (request, grant), reply);
+            }
             OperatorRequest::DriveEnd => {
                 self.stick.handle_release(now, page);
                 self.steer(now);
@@ -72,6 +76,7 @@ impl Session {
             return reply(Err(format!("vehicle {meant} is not selected any more")));
         }
         match request {
+            OperatorRequest::Control { on: true } => self.take_control(now, reply),
             OperatorRequest::Control { on: false } => self.release_control(now, reply),
             OperatorRequest::Resume => self.set_ready(now, true, reply),
             OperatorRequest::Standby => self.set_ready(now, false, reply),
@@ -100,14 +105,14 @@ impl Session {
         }
         self.stick.stop(now);
         self.steer(now);
-        if let Some(before) = self.fleet.selected_mut()
-            && before.is_wanted()
-            && !before.is_on_mission(now)
-        {
-            let vehicle = before.number();
-            let driver = before.driver();
-            self.client.leave(vehicle, driver, before.release());
-            self.leaving.insert(vehicle);
+        if let Some(before) = self.fleet.selected_mut() {
+            before.handover.withdraw(self.client.component());
+            if before.is_wanted() && !before.is_on_mission(now) {
+                let vehicle = before.number();
+                let driver = before.driver();
+                self.client.leave(vehicle, driver, before.release());
+                self.leaving.insert(vehicle);
+            }
         }
         // The vehicle that was left is stopped as above, and by itself without commands.
         self.stick.handle_stopped();
@@ -116,7 +121,55 @@ impl Session {
         Ok(())
     }
 
+    fn take_control(&mut self, now: Instant, reply: Reply) {
+        match self.fleet.selected_mut() {
+            Some(vehicle) => vehicle.take_control(now, &mut self.client, reply),
+            None => reply(Err(NO_VEHICLE.to_owned())),
+        }
+    }
+
+    /// Grants or refuses another operator's request for control of a vehicle, by default of the
+    /// selected one. A grant stops manual drive and releases the vehicle.
+    fn decide_handover(
+        &mut self,
+        now: Instant,
+        meant: Option<u16>,
+        (request, grant): (u8, bool),
+        reply: Reply,
+    ) {
+        let selected = self.fleet.selected_number();
+        let number = meant.or(selected);
+        let vehicle = number.and_then(|number| self.fleet.get_mut(number));
+        let decided = vehicle.and_then(|it| it.handover.decide(request, grant));
+        let Some((part, decision, operator)) = decided else {
+            return reply(Err("the request for control is over".to_owned()));
+        };
+        let mut sessions = Vec::new();
+        if grant {
+            if number == selected {
+                self.stick.stop(now);
+                self.steer(now);
+            }
+            if let Some(vehicle) = number.and_then(|number| self.fleet.get_mut(number)) {
+                vehicle.handover.ending = Some(format!("control was handed over to {operator}"));
+                sessions = vehicle.release();
+            }
+        }
+        let component = self.client.component().clone();
+        self.client.tell(reply, async move {
+            // The vehicle hands over control before it is released.
+            let delivered = component.deliver(part, &decision).await;
+            release_all(sessions).await;
+            delivered.map_err(|error| error.to_string())
+        });
+    }
+
     fn release_control(&mut self, now: Instant, reply: Reply) {
+        if let Some(vehicle) = self.fleet.selected_mut()
+            && vehicle.handover.withdraw(self.client.component())
+        {
+            return reply(Ok(()));
+        }
         self.stick.stop(now);
         self.steer(now);
         let sessions = self.fleet.selected_mut().map(Vehicle::release);
@@ -267,18 +320,26 @@ impl Vehicle {
     /// Handles a request that concerns nothing but the vehicle.
     fn handle_request(&mut self, request: &OperatorRequest, client: &mut Client, reply: Reply) {
         match *request {
-            OperatorRequest::Control { .. } => self.take_control(client, reply),
             OperatorRequest::Destination { x, y, speed } => self.go_to(x, y, speed, client, reply),
             _ => self.stop_mission(client, reply),
         }
     }
 
-    fn take_control(&mut self, client: &mut Client, reply: Reply) {
+    /// Takes control, or requests it from an operator of equal or higher authority who has it.
+    fn take_control(&mut self, now: Instant, client: &mut Client, reply: Reply) {
         if self.picture.parts().is_empty() {
             return reply(Err(NO_VEHICLE.to_owned()));
         }
-        // Keep a mission that this operator has in progress.
         let own = client.component().id();
+        let holder = self.picture.holder();
+        if let Some((holder, authority)) = holder.filter(|(id, _)| *id != own) {
+            if authority >= client.authority() {
+                return reply(self.ask_holder(now, holder, authority));
+            }
+            self.lease.stand_by();
+        }
+        self.handover.ending = None;
+        // Keep a mission that this operator has in progress.
         let planner = self.picture.find(Role::Planner);
         let planner = planner.and_then(|id| self.picture.parts().get(&id));
         let ours = planner.is_some_and(|it| it.controller() == Some(own));
@@ -288,6 +349,17 @@ impl Vehicle {
             Wanted::Everything
         };
         self.lease.take(wanted, reply, &self.picture, client);
+    }
+
+    fn ask_holder(&mut self, now: Instant, holder: JausId, authority: u8) -> Outcome {
+        let Some(part) = self.picture.handoff_part(holder) else {
+            return Err(format!(
+                "{holder} is in control with authority {authority}, and the vehicle does not pass \
+                 on requests for control: {holder} must release it first"
+            ));
+        };
+        self.handover.ask(now, part, holder);
+        Ok(())
     }
 
     fn has_managed(&self) -> bool {

@@ -10,6 +10,7 @@ use tokio::sync::mpsc;
 use super::alarm::Alarm;
 use super::client::Client;
 use super::following::{Following, Sighting};
+use super::handover::{Content, Handover};
 use super::lease::{Lease, Wanted};
 use super::maps::Maps;
 use crate::missing::Absence;
@@ -27,6 +28,7 @@ pub(super) struct Vehicle {
     pub(super) lease: Lease,
     pub(super) alarm: Alarm,
     pub(super) maps: Maps,
+    pub(super) handover: Handover,
     following: Following,
     /// The missing parts that have been logged.
     missing: BTreeMap<JausId, Absence>,
@@ -40,6 +42,7 @@ impl Vehicle {
             lease: Lease::default(),
             alarm: Alarm::default(),
             maps: Maps::default(),
+            handover: Handover::default(),
             missing: BTreeMap::new(),
         }
     }
@@ -79,7 +82,50 @@ impl Vehicle {
         }
         self.alarm.handle_time(now, &self.picture, client);
         self.stop_after_lost_planner(now);
+        self.yield_to_other();
+        self.handover
+            .handle_time(now, client.authority(), client.component());
         self.lease.handle_time(&self.picture, client);
+    }
+
+    /// Gives up what is left of control after another operator has taken it. The station does not
+    /// take it again by itself.
+    fn yield_to_other(&mut self) {
+        let own = self.picture.own();
+        let Some((other, authority)) = self.picture.holder().filter(|(id, _)| *id != own) else {
+            return;
+        };
+        if self.is_wanted() && self.lease.is_taken(&self.picture) {
+            let ending = format!(
+                "{other} has taken control with authority {authority}; the vehicle was stopped"
+            );
+            tracing::warn!("vehicle {}: {ending}", self.number());
+            self.handover.ending = Some(ending);
+            drop(self.release());
+        }
+    }
+
+    /// Handles a message about a handover.
+    pub(super) fn handle_handover(
+        &mut self,
+        now: Instant,
+        part: JausId,
+        content: &Content,
+        client: &mut Client,
+    ) {
+        match content {
+            Content::Requests(requests) if self.is_wanted() => {
+                self.handover.handle_requests(now, part, requests);
+            }
+            Content::Requests(_) => {}
+            Content::Answer(answer) => {
+                if self.handover.handle_answer(now, part, answer) {
+                    let nobody = Box::new(|_| {});
+                    self.lease
+                        .take(Wanted::Everything, nobody, &self.picture, client);
+                }
+            }
+        }
     }
 
     /// Logs parts that disappear, fall silent or return.
@@ -160,13 +206,23 @@ impl Vehicle {
 
     pub(super) fn fleet_state(&self, now: Instant, selected: bool) -> state::FleetVehicle {
         let held = !self.lease.all_held().is_empty();
-        self.picture.fleet_state(now, selected, held)
+        let requested = !self.handover.requests().is_empty();
+        self.picture.fleet_state(now, selected, (held, requested))
     }
 
     pub(super) fn state(&self, now: Instant) -> Option<state::Vehicle> {
         let obstacle = |part| self.lease.obstacle(part);
         self.picture
             .vehicle_state(now, self.alarm.is_wanted(), obstacle)
+    }
+
+    pub(super) fn control_state(&self) -> state::Control {
+        state::Control {
+            asking: self.handover.holder().map(|it| it.to_string()),
+            requests: self.handover.requests().to_vec(),
+            handover: self.handover.ending.clone().unwrap_or_default(),
+            ..self.lease.state(&self.picture)
+        }
     }
 
     pub(super) fn mission_state(&self, now: Instant) -> Option<state::Mission> {

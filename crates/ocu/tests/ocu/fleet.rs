@@ -1,9 +1,13 @@
 //! Several vehicles at one station: the list, selection, and stopping all of them.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+
 use jaus::component::State;
 use jaus_ocu::Station;
 use serde_json::{Value, json};
 
+use crate::missing::planner;
 use crate::scene::{Page, Scene};
 
 /// A vehicle in the list.
@@ -102,6 +106,39 @@ async fn selecting_another_vehicle_stops_and_releases_the_one_that_is_driven() {
         .fleet_until(|fleet| listed(fleet, 102)["held"] == true)
         .await;
     assert_eq!(listed(&fleet, 101)["held"], false);
+}
+
+#[tokio::test]
+async fn a_mission_goes_on_while_another_vehicle_is_selected_and_is_released_at_its_end() {
+    let scene = Scene::new().await;
+    let _second = scene.another_vehicle(102);
+    let stage = Arc::new(AtomicU8::new(3));
+    let planner = planner(&scene, Arc::clone(&stage));
+    let is_controlled = || planner.standing().controller.is_some();
+    let mut page = scene.page().await;
+    page.until(|state| state["mission"]["stage"] == "awaiting_approval")
+        .await;
+    take_and_resume(&mut page).await;
+    page.ask(json!({"type": "approve", "mission": 7}))
+        .await
+        .unwrap();
+    stage.store(7, Ordering::Relaxed);
+    page.until(|state| state["mission"]["stage"] == "driving")
+        .await;
+    page.fleet_until(|fleet| listed(fleet, 102)["state"] == "standby")
+        .await;
+    select(&mut page, 102).await;
+    let driving = |fleet: &Value| {
+        let first = listed(fleet, 101);
+        first["mission"] == "driving" && first["held"] == true && first["selected"] == false
+    };
+    page.fleet_until(driving).await;
+    assert!(is_controlled());
+
+    stage.store(8, Ordering::Relaxed);
+    scene.until(|_| !is_controlled()).await;
+    page.fleet_until(|fleet| listed(fleet, 101)["held"] == false)
+        .await;
 }
 
 #[tokio::test]

@@ -13,6 +13,7 @@ mod scene;
 
 mod drive;
 mod fleet;
+mod handover;
 mod hostile;
 mod looking;
 mod missing;

@@ -20,6 +20,7 @@ use jaus::node::{Config, Node};
 use jaus_ocu::{Listen, Station};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::{LIMIT, until, within_limit};
+use jaus_vehicle::handoff::Handoff;
 use jaus_vehicle::mobility::Vehicle;
 use jaus_vehicle::motion::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 use jaus_vehicle::parts::{Part, Slot};
@@ -81,8 +82,12 @@ impl Scene {
 
     /// Starts another operator's station on the same network. Returns its address, and handles that
     /// keep it alive.
-    pub(crate) async fn another_station(&self) -> (SocketAddr, JoinHandle<()>, Node) {
+    pub(crate) async fn another_station(
+        &self,
+        authority: u8,
+    ) -> (SocketAddr, JoinHandle<()>, Node) {
         let station = Station {
+            authority,
             listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
             ..Station::default()
         };
@@ -156,6 +161,11 @@ impl Scene {
         self.rover = Some(rover(&self.vehicle, &self.nodes[0], self.timeout, frozen));
     }
 
+    /// Ends this station without notice to its pages.
+    pub(crate) fn end_station(&self) {
+        self.station.abort();
+    }
+
     pub(crate) fn is_controlled(&self) -> bool {
         let standing = self.rover.as_ref().map(Component::standing);
         standing.is_some_and(|it| it.controller.is_some())
@@ -222,6 +232,7 @@ fn rover(
     let control = AccessControl::new().timeout(timeout);
     let rover = Component::builder(Kind::Vehicle, "Rover")
         .management(Management::new().access_control(control))
+        .offer(Handoff::new())
         .offer(vehicle.velocity_state_sensor())
         .offer(vehicle.primitive_driver());
     let rover = match frozen {
