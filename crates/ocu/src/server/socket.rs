@@ -14,10 +14,10 @@ use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 use super::Shared;
 use super::bounds::Rate;
 use super::view::{self, MessageView};
-use crate::PageId;
 use crate::answer::Said as Answer;
 use crate::request::{Frame, MessageFilter, OperatorRequest, Said};
 use crate::session::{Order, Reply};
+use crate::stick::PageId;
 use jaus_view::Filter;
 
 /// Version of the protocol between page and station.
