@@ -2,6 +2,7 @@
 
 use std::net::UdpSocket;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crate::support::{Running, own_group, run};
@@ -44,8 +45,16 @@ fn a_sound_network_is_found_sound_and_the_neighbours_are_named() {
 }
 
 /// No AS5669A program receives OpenJAUS's messages, which use another multicast group.
+/// Held by the test that plays a system of the Reference Architecture, and by tests that must not
+/// receive its messages: port and group of these systems are fixed.
+pub(super) fn reference_architecture() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 #[test]
 fn a_system_of_the_reference_architecture_is_named_with_the_way_to_it() {
+    let _alone = reference_architecture();
     // Report Heartbeat Pulse of 20.1.35.1 to all node managers, as OpenJAUS sends it every second.
     let beat = b"JAUS01.0\x06\x02\x02\x42\x01\x01\xFF\xFF\x01\x23\x01\x14\0\0\0\0";
     let heart = UdpSocket::bind("127.0.0.1:0").unwrap();

@@ -8,8 +8,8 @@ use jaus::node::{Config, Node};
 use jaus::service::Management;
 use jaus_vehicle::ground::StageBoard;
 
-use crate::judge::peer::network;
 use crate::support::run;
+use crate::tool::judge::peer::network;
 
 #[test]
 fn the_core_services_pass_every_step_that_they_are_in() {
@@ -17,7 +17,7 @@ fn the_core_services_pass_every_step_that_they_are_in() {
     judge(management, &["--only", "A1-A3,B1-B26"]);
 }
 
-#[path = "../../../../../examples/sensor.rs"]
+#[path = "../../../../../../examples/sensor.rs"]
 #[expect(dead_code, reason = "the example's own component")]
 mod sensor;
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::browser::{Browser, SCREENS};
+use super::browser::{Browser, SCREENS};
 
 /// Takes control unless it is already held or requested, and makes the vehicle Ready.
 pub(crate) fn take_control(page: &mut Browser) {

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use jaus::messages::core::{access_control, liveness};
 
-use crate::judge::peer::{Peer, free_port, network};
 use crate::support::run;
+use crate::tool::judge::peer::{Peer, free_port, network};
 
 /// A test's own file, removed when dropped.
 struct Paper(PathBuf);

@@ -1,8 +1,8 @@
 //! Two operators with a page each: one asks the other for control, who refuses and then grants it.
 
-use crate::browser::{Browser, SCREENS};
-use crate::by_hand::Running;
-use crate::steps::{look_from_all_screens, take_control};
+use super::browser::{Browser, SCREENS};
+use super::by_hand::Running;
+use super::steps::{look_from_all_screens, take_control};
 
 /// The number of this test's multicast group.
 const TEST: u8 = 4;

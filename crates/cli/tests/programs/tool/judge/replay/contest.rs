@@ -11,9 +11,9 @@ use jaus_test_kit::evidence;
 use jaus_view::Dictionary;
 use serde_json::{Value as Json, json};
 
-use crate::judge::replay::capture::said_by;
-use crate::judge::replay::client::{Client, Exchange, Pauses, is_answered};
-use crate::judge::replay::vehicle::{VEHICLE, Vehicle};
+use crate::tool::judge::replay::capture::said_by;
+use crate::tool::judge::replay::client::{Client, Exchange, Pauses, is_answered};
+use crate::tool::judge::replay::vehicle::{VEHICLE, Vehicle};
 
 /// Subsystem of the judged vehicle.
 const JUDGED: u16 = 105;
@@ -76,7 +76,7 @@ fn check(exchanges: &[Exchange], snapshot: &str) {
 }
 
 fn kept(snapshot: &str) -> PathBuf {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/tool/judge/replay");
+    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/tool/judge/replay");
     here.join(snapshot)
 }
 

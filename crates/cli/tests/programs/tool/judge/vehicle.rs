@@ -1,7 +1,7 @@
 //! The reference vehicle passes every step.
 
-use crate::judge::peer::network;
 use crate::support::{jaus, run};
+use crate::tool::judge::peer::network;
 use jaus_test_kit::vehicle_process::VehicleProcess;
 
 /// A vehicle in the network that the flags name.

@@ -10,9 +10,9 @@ use jaus::messages::core::{CancelEvent, ConfirmEventRequest, CreateEvent};
 use jaus_test_kit::evidence;
 use jaus_view::Dictionary;
 
-use crate::judge::replay::capture::{Said, said_by};
-use crate::judge::replay::client::{Client, Exchange, Pauses, is_answered};
-use crate::judge::replay::vehicle::{VEHICLE, Vehicle};
+use crate::tool::judge::replay::capture::{Said, said_by};
+use crate::tool::judge::replay::client::{Client, Exchange, Pauses, is_answered};
+use crate::tool::judge::replay::vehicle::{VEHICLE, Vehicle};
 
 /// The clients paused for seconds at times.
 const SHORT: Pauses = Pauses(Duration::from_millis(50));

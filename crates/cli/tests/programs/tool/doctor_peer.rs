@@ -3,6 +3,7 @@
 use std::net::UdpSocket;
 use std::time::Duration;
 
+use super::doctor::reference_architecture;
 use crate::support::{Running, own_group, run};
 use serde_json::Value as Json;
 
@@ -49,11 +50,20 @@ fn our_own_vehicle_has_nothing_wrong_by_id_and_by_address() {
 
 #[test]
 fn a_port_at_which_nobody_listens_is_told_at_once() {
+    let _alone = reference_architecture();
     let free = UdpSocket::bind("127.0.0.1:0")
         .unwrap()
         .local_addr()
         .unwrap();
-    let flags = ["doctor", "--loopback", "--group", "off", "--peer"];
+    let flags = [
+        "doctor",
+        "--loopback",
+        "--port",
+        "0",
+        "--group",
+        "off",
+        "--peer",
+    ];
     let run = run(&[&flags[..], &[&free.to_string()]].concat(), b"");
     assert_eq!(run.status, 2, "{run:?}");
     let words = run.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -73,12 +83,13 @@ fn a_port_at_which_nobody_listens_is_told_at_once() {
 
 #[test]
 fn who_says_nothing_is_waited_for_as_long_as_is_said() {
+    let _alone = reference_architecture();
     let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
     silent
         .set_read_timeout(Some(Duration::from_secs(5)))
         .unwrap();
     let address = silent.local_addr().unwrap().to_string();
-    let network = ["--loopback", "--group", "off"].map(str::to_owned);
+    let network = ["--loopback", "--port", "0", "--group", "off"].map(str::to_owned);
     let (status, report) = examine(&address, &network, &["--seconds", "0.3"]);
     assert_eq!(
         (status, &report["first_failure"]),

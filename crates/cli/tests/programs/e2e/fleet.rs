@@ -1,8 +1,8 @@
 //! Several vehicles on one page: the list, by keyboard and by touch, on a tablet and on a phone.
 
-use crate::browser::{Browser, SCREENS, Screen};
-use crate::by_hand::Running;
-use crate::steps::{look_from_all_screens, take_control};
+use super::browser::{Browser, SCREENS, Screen};
+use super::by_hand::Running;
+use super::steps::{look_from_all_screens, take_control};
 
 /// The number of this test's multicast group.
 const TEST: u8 = 3;

@@ -17,8 +17,8 @@ use jaus::messages::mobility::{
     velocity_state_sensor,
 };
 
-use crate::judge::peer::{Peer, network};
 use crate::support::run;
+use crate::tool::judge::peer::{Peer, network};
 
 /// The rule that a vehicle violates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,9 +4,9 @@
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
-use crate::browser::{Browser, SCREENS};
-use crate::steps::{emergency, look_from_all_screens, take_control};
-use crate::system::program;
+use super::browser::{Browser, SCREENS};
+use super::steps::{emergency, look_from_all_screens, take_control};
+use super::system::program;
 
 /// The number of this test's multicast group.
 const TEST: u8 = 2;

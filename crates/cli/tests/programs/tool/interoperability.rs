@@ -5,7 +5,7 @@ use crate::support::run;
 use jaus::peer::Peer;
 use jaus_cli::settings;
 
-const PAGE: &str = include_str!("../../../../docs/interoperability.md");
+const PAGE: &str = include_str!("../../../../../docs/interoperability.md");
 
 /// The code blocks of a language, without their fences.
 fn blocks(language: &str) -> Vec<&'static str> {

@@ -17,8 +17,8 @@ use jaus::messages::mobility::{
     ReportWrenchEffort, local_pose_sensor, primitive_driver, velocity_state_sensor,
 };
 
-use crate::judge::peer::{Peer, network};
 use crate::support::run;
+use crate::tool::judge::peer::{Peer, network};
 
 /// The judge's second component.
 const FIRST: JausId = JausId::new(42, 2, 1);

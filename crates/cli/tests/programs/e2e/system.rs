@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use jaus_test_kit::hosts::ip;
 
@@ -68,7 +69,9 @@ impl System {
     /// # Errors
     /// If this machine does not permit it.
     pub(crate) fn new() -> Result<Self, String> {
-        let number = std::process::id();
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let number = format!("{}-{number}", std::process::id());
         let system = Self {
             names: HOSTS.map(|host| format!("jaus-{number}-{host}")),
             directory: Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("system-{number}")),

@@ -3,15 +3,7 @@
 //! `target/e2e-screenshots`.
 //!
 //! They need Chromium and network namespaces. Without these, the tests report this prominently and
-//! pass, but fail if the environment variable `CI` is set.
-#![cfg(target_os = "linux")]
-#![allow(
-    clippy::disallowed_methods,
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "a test with processes"
-)]
+//! pass, but fail if `JAUS_EVIDENCE=required` is set.
 
 mod browser;
 mod by_hand;
@@ -22,14 +14,81 @@ mod system;
 
 use std::time::Duration;
 
-use browser::{Browser, SCREENS};
 use jaus_test_kit::evidence::{not_tested, this_test};
 use jaus_test_kit::hosts::on_hosts;
-use steps::{emergency, look_from_all_screens, take_control};
-use system::{PAGE, System};
+
+use self::browser::{Browser, SCREENS};
+use self::steps::{emergency, look_from_all_screens, take_control};
+use self::system::{PAGE, System};
+
+#[test]
+fn a_mission_through_the_page_ends_by_the_death_of_the_planner_and_by_a_key() {
+    on_system(|system, page| {
+        look_from_all_screens(page, "1-start");
+
+        take_control(page);
+        plan(page, 4.5, 1.5);
+        look_from_all_screens(page, "2-approval");
+        approve(page);
+        page.wait("+document.querySelector('#progress').ariaValueNow > 5");
+        look_from_all_screens(page, "3-driving");
+
+        says_that_the_planner_is_gone(system, page);
+        take_control(page);
+        plan(page, 4.5, 1.5);
+        approve(page);
+
+        take_over_by_keyboard(page);
+        emergency(page);
+    });
+}
 
 #[test]
 fn a_mission_through_the_page_survives_the_death_of_every_part() {
+    on_system(|system, page| {
+        take_control(page);
+        for program in system.programs() {
+            system.kill(program);
+            if program != "jaus-ocu" {
+                page.wait("!document.querySelector('#missing').hidden");
+            }
+            page.screenshot(&format!("5-without-{program}"));
+            system.start(program);
+            comes_alive(page);
+        }
+        arrive(page);
+        look_from_all_screens(page, "6-arrived");
+    });
+}
+
+#[test]
+fn a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once() {
+    on_a_station(by_hand::run);
+}
+
+#[test]
+fn an_operator_chooses_among_vehicles_and_stops_all_of_them() {
+    on_a_station(fleet::run);
+}
+
+#[test]
+fn control_is_handed_over_between_the_pages_of_two_operators() {
+    on_a_station(handover::run);
+}
+
+/// Runs a test that starts its own vehicles and stations.
+fn on_a_station(body: impl FnOnce()) {
+    if let Some(reason) = browser::missing() {
+        return not_tested(&this_test(), &reason);
+    }
+    if !system::program("jaus-ocu").exists() {
+        return not_tested(&this_test(), "not built: jaus-ocu");
+    }
+    body();
+}
+
+/// Runs the body of a test with a complete system and its operator's page.
+fn on_system(body: impl FnOnce(&System, &mut Browser)) {
     if let Some(reason) = browser::missing() {
         return not_tested(&this_test(), &reason);
     }
@@ -37,77 +96,15 @@ fn a_mission_through_the_page_survives_the_death_of_every_part() {
     if !missing.is_empty() {
         return not_tested(&this_test(), &format!("not built: {}", missing.join(", ")));
     }
-    on_hosts(System::new, run);
-}
-
-#[test]
-fn a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once() {
-    if let Some(reason) = browser::missing() {
-        return not_tested(&this_test(), &reason);
-    }
-    if !system::program("jaus-ocu").exists() {
-        return not_tested(&this_test(), "not built: jaus-ocu");
-    }
-    by_hand::run();
-}
-
-#[test]
-fn an_operator_chooses_among_vehicles_and_stops_all_of_them() {
-    if let Some(reason) = browser::missing() {
-        return not_tested(&this_test(), &reason);
-    }
-    if !system::program("jaus-ocu").exists() {
-        return not_tested(&this_test(), "not built: jaus-ocu");
-    }
-    fleet::run();
-}
-
-#[test]
-fn control_is_handed_over_between_the_pages_of_two_operators() {
-    if let Some(reason) = browser::missing() {
-        return not_tested(&this_test(), &reason);
-    }
-    if !system::program("jaus-ocu").exists() {
-        return not_tested(&this_test(), "not built: jaus-ocu");
-    }
-    handover::run();
-}
-
-fn run(system: &System) {
-    system.start_all();
-    let mut page = Browser::start(Some(system.operator()));
-    page.look_on(SCREENS[0]);
-    page.open(PAGE);
-    comes_alive(&mut page);
-    look_from_all_screens(&mut page, "1-start");
-
-    take_control(&mut page);
-    plan(&mut page, 4.5, 1.5);
-    look_from_all_screens(&mut page, "2-approval");
-    approve(&mut page);
-    page.wait("+document.querySelector('#progress').ariaValueNow > 5");
-    look_from_all_screens(&mut page, "3-driving");
-
-    says_that_the_planner_is_gone(system, &mut page);
-    take_control(&mut page);
-    plan(&mut page, 4.5, 1.5);
-    approve(&mut page);
-
-    take_over_by_keyboard(&mut page);
-    emergency(&mut page);
-
-    for program in system.programs() {
-        system.kill(program);
-        if program != "jaus-ocu" {
-            page.wait("!document.querySelector('#missing').hidden");
-        }
-        page.screenshot(&format!("5-without-{program}"));
-        system.start(program);
+    on_hosts(System::new, |system| {
+        system.start_all();
+        let mut page = Browser::start(Some(system.operator()));
+        page.look_on(SCREENS[0]);
+        page.open(PAGE);
         comes_alive(&mut page);
-    }
-    arrive(&mut page);
-    look_from_all_screens(&mut page, "6-arrived");
-    assert!(page.complaints().is_empty(), "{:?}", page.complaints());
+        body(system, &mut page);
+        assert!(page.complaints().is_empty(), "{:?}", page.complaints());
+    });
 }
 
 /// Waits until the page has connected by itself and shows a complete vehicle.

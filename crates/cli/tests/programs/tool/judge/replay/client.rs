@@ -15,8 +15,8 @@ use jaus::messages::core::{
 use jaus::wire::{Acknowledgement, Flags, Frame, judp};
 use jaus_test_kit::waiting::LIMIT;
 
-use crate::judge::replay::capture::Said;
-use crate::judge::replay::vehicle::{VEHICLE, Vehicle};
+use crate::tool::judge::replay::capture::Said;
+use crate::tool::judge::replay::vehicle::{VEHICLE, Vehicle};
 
 /// Offset of the message in a datagram: version and header.
 const MESSAGE: usize = 13;
