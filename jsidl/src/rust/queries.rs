@@ -124,7 +124,7 @@ impl<'m> Request<'m> {
             element,
             keys: fields.first().and_then(|key| keys(key, report)),
         };
-        (!selections.is_empty()).then(|| Self {
+        (!selections.is_empty()).then_some(Self {
             has_more: fields.len() > selections.len(),
             selections,
             list: Some(list),
