@@ -234,7 +234,7 @@ impl Component {
         peer: JausId,
         query: &Q,
     ) -> Result<Q::Report, QueryError> {
-        self.ask(options, peer, query).await
+        self.request_with(options, peer, query).await
     }
 
     /// Like [`query`](Self::query), for a message whose answer does not follow from its type: a
@@ -248,10 +248,15 @@ impl Component {
         peer: JausId,
         message: &M,
     ) -> Result<R, QueryError> {
-        self.ask(QueryOptions::default(), peer, message).await
+        self.request_with(QueryOptions::default(), peer, message)
+            .await
     }
 
-    async fn ask<R: Message, M: Message>(
+    /// Like [`request`](Self::request), with a priority and with its own patience.
+    ///
+    /// # Errors
+    /// Those of [`query`](Self::query).
+    pub async fn request_with<R: Message, M: Message>(
         &self,
         options: QueryOptions,
         peer: JausId,
