@@ -91,8 +91,8 @@ pub use crate::wire::Priority;
 pub use builder::{AttachError, Builder};
 pub use control::Control;
 pub use error::{
-    ControlError, DeliverError, FindError, ManageError, QueryError, SendError, SessionError,
-    SubscribeError,
+    ControlError, DeliverError, FindError, ManageError, PublishError, QueryError, SendError,
+    SessionError, SubscribeError,
 };
 pub use group::{GroupSubscription, GroupUpdate, Results};
 pub use handle::Component;

@@ -5,17 +5,58 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::time::Instant;
 
+use super::publication::Latest;
 use super::{
-    Context, Handled, Hazards, MotionGuard, MotionPolicy, Service, Standing, StopCause, Validity,
-    code_of,
+    Context, Handled, Hazards, MotionGuard, MotionPolicy, Publication, Service, Standing,
+    StopCause, Validity, code_of,
 };
 use crate::address::JausId;
 use crate::codec::{DecodeError, Message, Query, ServiceId};
 use crate::endpoint::Received;
 
 type Stop = Box<dyn FnMut(&mut Context<'_>) + Send>;
-/// Handles a message, or fails if its octets are no message of its type.
-type Handler = Box<dyn FnMut(&Received, &mut Context<'_>) -> Result<Taken, DecodeError> + Send>;
+
+/// A handler of one layout of a message.
+trait Handler: Send {
+    /// Handles a message, or fails if its octets are no message of its type.
+    fn handle(
+        &mut self,
+        message: &Received,
+        context: &mut Context<'_>,
+    ) -> Result<Taken, DecodeError>;
+
+    /// Takes a published report; returns whether it answers queries with it from now on.
+    fn publish(&mut self, _publication: &Publication) -> bool {
+        false
+    }
+}
+
+impl<F> Handler for F
+where
+    F: FnMut(&Received, &mut Context<'_>) -> Result<Taken, DecodeError> + Send,
+{
+    fn handle(
+        &mut self,
+        message: &Received,
+        context: &mut Context<'_>,
+    ) -> Result<Taken, DecodeError> {
+        self(message, context)
+    }
+}
+
+impl<Q: Query> Handler for Latest<Q> {
+    fn handle(
+        &mut self,
+        message: &Received,
+        context: &mut Context<'_>,
+    ) -> Result<Taken, DecodeError> {
+        self.answer(message, context).map(|()| Taken::Message)
+    }
+
+    fn publish(&mut self, publication: &Publication) -> bool {
+        self.publish(publication)
+    }
+}
 
 /// Result of a handler.
 #[derive(Clone, Copy)]
@@ -76,7 +117,7 @@ enum Taken {
 /// ```
 pub struct Handlers {
     offers: Vec<ServiceId>,
-    by_code: BTreeMap<u16, Vec<(TypeId, Handler)>>,
+    by_code: BTreeMap<u16, Vec<(TypeId, Box<dyn Handler>)>>,
     told: BTreeSet<u16>,
     stops: Vec<Stop>,
     guard: MotionGuard,
@@ -104,7 +145,27 @@ impl Handlers {
         self
     }
 
-    /// Answers every query of type `Q`. The report goes to the sender of the query, and to
+    /// Answers every query of type `Q` with the latest report that the application
+    /// [publishes](super::Stack::publish), and notifies subscribers of each. The report is encoded once for
+    /// all clients that request the same fields.
+    ///
+    /// Until the first report is published, the answer is a report without values. If the
+    /// definition requires values, the query has no answer until then, and events are rejected.
+    ///
+    /// ```
+    /// use jaus::messages::mobility::{QueryVelocityState, velocity_state_sensor};
+    /// use jaus::service::Handlers;
+    ///
+    /// let speedometer =
+    ///     Handlers::new(velocity_state_sensor::LATEST).publishes::<QueryVelocityState>();
+    /// ```
+    #[must_use]
+    pub fn publishes<Q: Query>(mut self) -> Self {
+        self.handle::<Q>(Latest::<Q>::new());
+        self
+    }
+
+    /// Answers every query of type `Q` with a report that is made for it. The report goes to the sender of the query, and to
     /// subscribers, without the optional fields that they did not
     /// [request](Query::drop_unrequested). To report in the layout of an older version,
     /// [`receive`](Self::receive) the query and [reply](Context::reply).
@@ -113,7 +174,7 @@ impl Handlers {
         mut self,
         mut function: impl FnMut(Q) -> Q::Report + Send + 'static,
     ) -> Self {
-        self.handle::<Q>(move |received, context| {
+        self.handle::<Q>(move |received: &Received, context: &mut Context<'_>| {
             let query = Q::decode(&received.payload)?;
             let mut report = function(query.clone());
             query.drop_unrequested(&mut report);
@@ -221,7 +282,7 @@ impl Handlers {
         taken: Taken,
         mut function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
     ) -> Self {
-        self.handle::<M>(move |received, context| {
+        self.handle::<M>(move |received: &Received, context: &mut Context<'_>| {
             if may(context.standing(), received.source) {
                 function(M::decode(&received.payload)?, received, context);
                 return Ok(taken);
@@ -240,11 +301,8 @@ impl Handlers {
     }
 
     /// Sets the handler of a layout, after those of other layouts with the same code.
-    fn handle<M: Message>(
-        &mut self,
-        handler: impl FnMut(&Received, &mut Context<'_>) -> Result<Taken, DecodeError> + Send + 'static,
-    ) {
-        let (layout, handler) = (TypeId::of::<M>(), Box::new(handler));
+    fn handle<M: Message>(&mut self, handler: impl Handler + 'static) {
+        let (layout, handler): (_, Box<dyn Handler>) = (TypeId::of::<M>(), Box::new(handler));
         let layouts = self.by_code.entry(M::CODE).or_default();
         match layouts.iter_mut().find(|(known, _)| *known == layout) {
             Some(place) => place.1 = handler,
@@ -278,7 +336,7 @@ impl Service for Handlers {
             return Handled::No;
         };
         for (_, handler) in layouts {
-            match handler(message, context) {
+            match handler.handle(message, context) {
                 Ok(Taken::Message) => break,
                 Ok(Taken::Command(validity)) => {
                     self.guard.accept(now, message.source, validity);
@@ -290,6 +348,23 @@ impl Service for Handlers {
             }
         }
         Handled::Yes
+    }
+
+    fn handle_publication(
+        &mut self,
+        publication: &Publication,
+        context: &mut Context<'_>,
+    ) -> Handled {
+        let mut handled = Handled::No;
+        for (&code, layouts) in &mut self.by_code {
+            for (_, handler) in layouts {
+                if handler.publish(publication) {
+                    context.answer_changed(code);
+                    handled = Handled::Yes;
+                }
+            }
+        }
+        handled
     }
 
     fn handle_timeout(&mut self, now: Instant, context: &mut Context<'_>) {

@@ -14,6 +14,7 @@
 //! | [`ledger`] | sent messages, and checks of their delivery |
 //! | [`judges`] | invariants of endpoints: bounds, and silence when all is quiet |
 //! | [`totals`] | events over all seeds |
+//! | [`answers`] | a large answer over a slow wire |
 //! | [`large`], [`streams`], [`control`], [`directories`] | separate scenarios: a large message, subscriptions, operators, discovery |
 //!
 //! `JAUS_SEEDS=n` runs n seeds, `JAUS_SEED=n` only seed n, and `JAUS_TRACE=1` prints its events. A
@@ -25,6 +26,7 @@
 
 #![expect(clippy::expect_used, clippy::panic, reason = "tests")]
 
+mod answers;
 mod control;
 mod directories;
 mod faults;

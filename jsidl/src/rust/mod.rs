@@ -13,12 +13,15 @@ mod docs;
 mod encode;
 mod fingerprint;
 mod ident;
+mod layout;
 mod machine;
 mod messages;
 mod newtypes;
 mod queries;
 mod random;
 mod registry;
+mod reports;
+mod selections;
 mod structs;
 mod types;
 mod view;
@@ -171,7 +174,8 @@ fn write(out: &mut Writer, plans: &[Plan<'_>]) {
     let mut shared = HashMap::new();
     for (plan, sections) in all().filter(|(plan, _)| plan.version.is_none()) {
         messages::message(out, plan, sections, &mut shared);
-        queries::implement(out, plan, plans);
+        queries::implement(out, plan, plans, &shared);
+        reports::implement(out, plan, plans);
     }
     let mut versions: Vec<_> = plans
         .iter()
@@ -188,7 +192,8 @@ fn write(out: &mut Writer, plans: &[Plan<'_>]) {
         out.push(format!("pub mod {version} {{\nuse super::codec;"));
         for (plan, sections) in all().filter(|(plan, _)| plan.version.as_ref() == Some(version)) {
             messages::message(out, plan, sections, &mut shared);
-            queries::implement(out, plan, plans);
+            queries::implement(out, plan, plans, &shared);
+            reports::implement(out, plan, plans);
         }
         out.push("}");
     }

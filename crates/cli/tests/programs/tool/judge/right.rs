@@ -24,7 +24,8 @@ mod sensor;
 #[test]
 fn the_example_of_a_sensor_answers_with_the_fields_that_were_asked_for() {
     let sensor = |component: Builder| component.offer(sensor::speedometer());
-    let judged = judge(sensor, &["--only", "A4,B33"]);
+    let measure = async |rover: Component| sensor::measure(&rover).await.unwrap();
+    let judged = judge_running(sensor, measure, &["--only", "A4,B33"]);
     assert!(judged.contains("4 passed"), "{judged}");
 }
 
@@ -37,21 +38,28 @@ fn a_service_of_the_ground_vehicle_passes_its_steps() {
 
 /// Judges a component with these services, and returns the report. No step may fail.
 fn judge(services: fn(Builder) -> Builder, arguments: &[&str]) -> String {
+    let idle = async |_component| std::future::pending().await;
+    judge_running(services, idle, arguments)
+}
+
+/// The same with a component that does something.
+fn judge_running(
+    services: fn(Builder) -> Builder,
+    run_component: impl AsyncFnOnce(Component) + Send + 'static,
+    arguments: &[&str],
+) -> String {
     let flags = network();
     let group: Group = flags.last().unwrap().parse().unwrap();
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()
-        .unwrap();
     let (ready, is_ready) = mpsc::channel();
-    runtime.spawn(async move {
-        let node = Node::start(Config::loopback(105, 1).group(group)).unwrap();
-        let component = services(Component::builder(Kind::Vehicle, "Rover"));
-        let component = component.attach(&node, 1).unwrap();
-        ready.send(()).unwrap();
-        std::future::pending::<()>().await;
-        drop(component);
+    std::thread::spawn(move || {
+        let mut runtime = tokio::runtime::Builder::new_current_thread();
+        runtime.enable_all().build().unwrap().block_on(async move {
+            let node = Node::start(Config::loopback(105, 1).group(group)).unwrap();
+            let component = services(Component::builder(Kind::Vehicle, "Rover"));
+            let component = component.attach(&node, 1).unwrap();
+            ready.send(()).unwrap();
+            run_component(component).await;
+        });
     });
     is_ready.recv().unwrap();
     let network: Vec<&str> = flags.iter().map(String::as_str).collect();
