@@ -1,4 +1,4 @@
-//! `jaus-primitive-driver`: the wheels of a vehicle, simulated or on stepper motors.
+//! `jaus-primitive-driver`: the wheels and the steering of a vehicle, simulated or on stepper motors.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -10,8 +10,8 @@ use jaus_cli::failure::Failure;
 use jaus_cli::runtime::{between, seconds};
 use jaus_cli::{Ready, launch};
 use jaus_vehicle::actuator::{MotorConfig, WheelsConfig};
-use jaus_vehicle::motion::Limits;
-use jaus_vehicle::parts::{Motors, Part, PrimitiveDriver, Stop};
+use jaus_vehicle::motion::{Ackermann, Limits};
+use jaus_vehicle::parts::{Motors, Part, PrimitiveDriver, Servo, SteeringGear, Stop};
 
 #[derive(Args)]
 struct Flags {
@@ -26,6 +26,15 @@ struct Flags {
     /// The effective track width between left and right wheels in metres, from 0.05 to 10
     #[arg(long, value_name = "M", default_value = "0.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
     track: f64,
+
+    /// The distance between the axles of a vehicle with steered front wheels, in metres, from 0.05 to
+    /// 20. The left motor then drives the rear axle [default: no steering, a motor on each side]
+    #[arg(long, value_name = "METRES", value_parser = |text: &str| between(text, 0.05, 20.0))]
+    wheelbase: Option<f64>,
+
+    /// The largest steering angle to either side in degrees, from 1 to 80
+    #[arg(long, value_name = "DEGREES", default_value = "25", value_parser = |text: &str| between(text, 1.0, 80.0), requires = "wheelbase")]
+    steering_angle: f64,
 
     /// Command timeout in seconds: stop the motors when no effort arrives for this long
     #[arg(long, value_name = "SECONDS", default_value = "0.5", value_parser = seconds)]
@@ -59,6 +68,10 @@ struct Simulation {
     #[arg(long, value_name = "SECONDS", default_value = "0.25", value_parser = |text: &str| between(text, 0.01, 10.0))]
     response: f64,
 
+    /// How fast the steering servo turns, in degrees per second from 1 to 1000
+    #[arg(long, value_name = "DEGREES/S", default_value = "115", value_parser = |text: &str| between(text, 1.0, 1000.0))]
+    servo_rate: f64,
+
     /// How unequal the motors are, as a fraction of their strength from 0 to 0.5
     #[arg(long, value_name = "SHARE", default_value = "0", value_parser = |text: &str| between(text, 0.0, 0.5))]
     noise: f64,
@@ -75,12 +88,14 @@ impl Ready for Flags {
     const EXAMPLES: &'static str = "Examples:\n  \
         jaus-primitive-driver --loopback            simulated wheels, for trying it\n  \
         jaus-primitive-driver --attach              on the node of this host\n  \
-        jaus-primitive-driver --noise 0.1 --seed 7  with unequal motors";
+        jaus-primitive-driver --noise 0.1 --seed 7  with unequal motors\n  \
+        jaus-primitive-driver --wheelbase 0.5       with steered front wheels";
     const ID: JausId = JausId::new(101, 33, 33);
 
     fn part(self) -> Result<impl Part, Failure> {
         Ok(PrimitiveDriver {
             motors: self.motors(),
+            steering: self.steering(),
             stop: self.stop(),
             wheels: WheelsConfig {
                 track: self.track,
@@ -99,6 +114,16 @@ impl Ready for Flags {
 }
 
 impl Flags {
+    fn steering(&self) -> Option<SteeringGear> {
+        Some(SteeringGear {
+            geometry: Ackermann {
+                wheelbase: self.wheelbase?,
+                max_angle: self.steering_angle.to_radians(),
+            },
+            servo: Servo::Simulated(self.simulation.servo_rate.to_radians()),
+        })
+    }
+
     fn stop(&self) -> Option<Stop> {
         #[cfg(all(feature = "gpio", target_os = "linux"))]
         if let Some((chip, line)) = self.gpio.stop_line.clone() {

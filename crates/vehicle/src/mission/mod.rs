@@ -4,6 +4,7 @@
 //! fetched, and the path planned, approved, handed to the path segment driver and driven. When a
 //! stage is blocked it starts over. Neither does I/O, reads a clock or depends on messages.
 
+mod bends;
 mod blocks;
 mod ground;
 mod lost_link;

@@ -34,7 +34,7 @@ pub use planner::Planner;
 pub use pose_sensor::PoseSensor;
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 pub use primitive_driver::GpioMotors;
-pub use primitive_driver::{Hardware, Motors, PrimitiveDriver, Stop};
+pub use primitive_driver::{Drives, Hardware, Motors, PrimitiveDriver, Servo, SteeringGear, Stop};
 pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
 

@@ -47,6 +47,13 @@ impl Default for VectorDriver {
 impl VectorDriver {
     /// Report rate requested from the sensors, in hertz.
     const HZ: f64 = 25.0;
+
+    /// Sets the vehicle's least turning radius in metres; 0 if it turns on the spot.
+    #[must_use]
+    pub const fn turning_radius(mut self, radius: f64) -> Self {
+        self.limits.turning_radius = radius;
+        self
+    }
 }
 
 impl Part for VectorDriver {

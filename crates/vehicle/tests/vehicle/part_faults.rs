@@ -25,11 +25,15 @@ use jaus::messages::mobility::{
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::{LIMIT, within_limit};
-use jaus_vehicle::actuator::{Actuator, MotorConfig, SimulatedMotor, SimulatedStop};
+use jaus_vehicle::actuator::{
+    Actuator, MotorConfig, SimulatedMotor, SimulatedServo, SimulatedStop,
+};
 use jaus_vehicle::ground::{StageReport, StageState};
 use jaus_vehicle::messages::ground::{QueryStage, QueryWheelOdometry};
+use jaus_vehicle::motion::Ackermann;
 use jaus_vehicle::parts::{
-    Hardware, Part, PartError, PoseSensor, PrimitiveDriver, Slot, VectorDriver, VelocitySensor,
+    Drives, Hardware, Part, PartError, PoseSensor, PrimitiveDriver, Slot, VectorDriver,
+    VelocitySensor,
 };
 use tokio::task::JoinHandle;
 
@@ -176,8 +180,10 @@ async fn a_motor_fault_stops_both_sides_and_is_a_failure_until_it_is_gone() {
     let [left, right] = [(); 2].map(|()| SimulatedMotor::new(MotorConfig::default()));
     let switch = right.fault_switch();
     let hardware = Hardware {
-        left: Box::new(left),
-        right: Box::new(right),
+        drives: Drives::Sides {
+            left: Box::new(left),
+            right: Box::new(right),
+        },
         stop: None,
     };
     let running = scene.start(PRIMITIVE, |slot| {
@@ -262,6 +268,41 @@ async fn a_sensor_that_stays_away_is_a_failure_of_the_driver_until_it_is_back() 
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_fault_of_the_steering_stops_the_drive_and_is_a_failure() {
+    let scene = Scene::new();
+    let servo = SimulatedServo::new(SimulatedServo::RATE);
+    let switch = servo.fault_switch();
+    let hardware = Hardware {
+        drives: Drives::Steered {
+            drive: Box::new(SimulatedMotor::new(MotorConfig::default())),
+            steering: Box::new(servo),
+            geometry: Ackermann::default(),
+        },
+        stop: None,
+    };
+    let running = scene.start(PRIMITIVE, |slot| {
+        PrimitiveDriver::default().run_on(hardware, slot)
+    });
+    let control = scene.control(PRIMITIVE, primitive_driver::URN).await;
+    let mut effort = ahead();
+    effort
+        .set_propulsive_rotational_effort_z_percent(100.0)
+        .unwrap();
+    scene
+        .until("a right turn", || async {
+            control.send(&effort).unwrap();
+            let (left, right) = scene.wheels().await;
+            (left > right + 0.1).then_some(())
+        })
+        .await;
+    switch.fail("no answer from the servo");
+    scene
+        .until_state(PRIMITIVE, State::Failure, &control, &effort)
+        .await;
+    running.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
     let scene = Scene::new();
     let [left, right] = [(); 2].map(|()| {
@@ -270,7 +311,8 @@ async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
     });
     let button = SimulatedStop::default();
     let stop = Some(Box::new(button.clone()) as _);
-    let hardware = Hardware { left, right, stop };
+    let drives = Drives::Sides { left, right };
+    let hardware = Hardware { drives, stop };
     let running = scene.start(PRIMITIVE, |slot| {
         PrimitiveDriver::default().run_on(hardware, slot)
     });
@@ -323,8 +365,10 @@ async fn motors_are_commanded_to_stop_when_the_part_is_stopped() {
     let scene = Scene::new();
     let last = std::sync::Arc::<std::sync::Mutex<jaus_vehicle::actuator::Command>>::default();
     let hardware = Hardware {
-        left: Box::new(Shown(last.clone())),
-        right: Box::new(SimulatedMotor::new(MotorConfig::default())),
+        drives: Drives::Sides {
+            left: Box::new(Shown(last.clone())),
+            right: Box::new(SimulatedMotor::new(MotorConfig::default())),
+        },
         stop: None,
     };
     let running = scene.start(PRIMITIVE, |slot| {
