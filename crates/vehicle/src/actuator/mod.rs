@@ -2,7 +2,8 @@
 //! platforms of them.
 //!
 //! A driver for real hardware implements [`Actuator`] or [`Steering`]. [`SimulatedMotor`] and
-//! [`SimulatedServo`] simulate them, and [`Stepper`] generates the pulses for a stepper motor.
+//! [`SimulatedServo`] simulate them; [`PulseMotor`] drives a stepper motor, [`SabertoothMotor`] a
+//! motor controller on a serial line, [`PwmServo`] a steering servo.
 //! [`Wheels`] is the [`Platform`](crate::motion::Platform): [a left and a right drive](SideDrives),
 //! or [one drive and steered front wheels](SteeredDrive). An [`Odometer`] reports the distance that
 //! the wheels of each side have travelled.
@@ -23,6 +24,8 @@
 mod gpio;
 mod motor;
 mod pulses;
+mod pwm_servo;
+mod sabertooth;
 mod side_drives;
 mod steered_drive;
 mod steering;
@@ -36,6 +39,8 @@ use std::time::Instant;
 pub use gpio::{GpioError, GpioLines, GpioStop};
 pub use motor::{FaultSwitch, MotorConfig, SimulatedMotor};
 pub use pulses::{Lines, PulseMotor};
+pub use pwm_servo::{PwmError, PwmServo, ServoConfig};
+pub use sabertooth::SabertoothMotor;
 pub use side_drives::SideDrives;
 pub use steered_drive::SteeredDrive;
 pub use steering::{SimulatedServo, Steering};

@@ -277,6 +277,12 @@ impl Pilot {
     /// Sets the platform's global pose by moving the local frame. Its local pose is unchanged.
     pub fn set_global_pose(&mut self, pose: GlobalPose) {
         self.frame = Frame::joining(&self.motion().pose, &pose);
+        self.platform.set_global_pose(pose);
+    }
+
+    /// Moves the local frame. The platform's local pose is unchanged.
+    pub const fn set_frame(&mut self, frame: Frame) {
+        self.frame = frame;
     }
 
     /// The limits in force: those of the platform, or narrower ones.

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::{Motion, Pose, Velocity};
+use super::{GlobalPose, Motion, Pose, Velocity};
 
 /// A vehicle, real or simulated.
 ///
@@ -26,6 +26,10 @@ pub trait Platform: Send {
 
     /// Sets the current pose in the local frame.
     fn set_pose(&mut self, pose: Pose);
+
+    /// A client has set the current pose on the globe. The [`Pilot`](super::Pilot) moves the local
+    /// frame accordingly; only a platform with sensors of its own for it needs to know.
+    fn set_global_pose(&mut self, _pose: GlobalPose) {}
 
     /// Sets the command until the next one, or until the deadline above. A command that is [not
     /// finite](Drive::is_finite) must stop the platform.

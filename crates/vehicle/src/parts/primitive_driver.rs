@@ -14,9 +14,11 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::drivers::{FaultMonitor, Watchman, guard, shut_down};
 use super::stop_line::StopLine;
 use super::{Part, PartError, Slot};
+#[cfg(feature = "serial")]
+use crate::actuator::SabertoothMotor;
 use crate::actuator::{
-    Actuator, Interlock, MotorConfig, Odometer, SimulatedMotor, SimulatedServo, Steering, StopFile,
-    StopInput, Wheels, WheelsConfig,
+    Actuator, Interlock, MotorConfig, Odometer, PwmServo, ServoConfig, SimulatedMotor,
+    SimulatedServo, Steering, StopFile, StopInput, Wheels, WheelsConfig,
 };
 use crate::ground::{StageBoard, StageReport, StageState, WheelOdometry};
 use crate::messages::ground::QueryStage;
@@ -56,13 +58,16 @@ pub struct PrimitiveDriver {
 pub enum Motors {
     /// Simulated motors. The right one uses the seed after the left one's.
     Simulated(MotorConfig),
+    /// The two motors of a Sabertooth motor controller on a serial line.
+    #[cfg(feature = "serial")]
+    Sabertooth(Sabertooth),
     /// Stepper motors on lines of a GPIO chip.
     #[cfg(all(feature = "gpio", target_os = "linux"))]
     Gpio(GpioMotors),
 }
 
 /// Steered front wheels.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SteeringGear {
     /// Wheelbase and largest steering angle.
     pub geometry: Ackermann,
@@ -71,11 +76,50 @@ pub struct SteeringGear {
 }
 
 /// A steering servo.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Servo {
     /// A simulated servo with this rate in radians per second.
     Simulated(f64),
+    /// A servo on a PWM output.
+    Pwm {
+        /// The chip, such as `/sys/class/pwm/pwmchip0`.
+        chip: std::path::PathBuf,
+        /// The output of the chip.
+        channel: u32,
+        /// Pulse lengths and rate.
+        config: ServoConfig,
+    },
+}
+
+/// A motor controller on a serial line.
+#[cfg(feature = "serial")]
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sabertooth {
+    /// The serial line, such as `/dev/ttyUSB0`.
+    pub device: String,
+    /// Bits per second of the line.
+    pub baud: u32,
+    /// The controller's address, 128 to 135.
+    pub address: u8,
+    /// Top speed and lag of the motors, from which the travel is estimated, and their deadline.
+    pub motor: MotorConfig,
+}
+
+#[cfg(feature = "serial")]
+impl Sabertooth {
+    fn start(&self) -> Result<[Box<dyn Actuator>; 2], PartError> {
+        let started = serial2::SerialPort::open(&self.device, self.baud)
+            .and_then(|line| SabertoothMotor::start(line, self.address, self.motor));
+        let motors = started.map_err(|error| {
+            PartError::Broken(format!(
+                "cannot use the motor controller on {}: {error}; check the device and the group of \
+                 its file, usually dialout",
+                self.device
+            ))
+        })?;
+        Ok(motors.map(|motor| Box::new(motor) as _))
+    }
 }
 
 impl SteeringGear {
@@ -90,9 +134,17 @@ impl SteeringGear {
 }
 
 impl Servo {
-    fn start(self) -> Box<dyn Steering> {
+    fn start(&self) -> Result<Box<dyn Steering>, PartError> {
         match self {
-            Self::Simulated(rate) => Box::new(SimulatedServo::new(rate)),
+            Self::Simulated(rate) => Ok(Box::new(SimulatedServo::new(*rate))),
+            Self::Pwm {
+                chip,
+                channel,
+                config,
+            } => match PwmServo::open(chip, *channel, *config) {
+                Ok(servo) => Ok(Box::new(servo)),
+                Err(error) => Err(PartError::Broken(error.to_string())),
+            },
         }
     }
 }
@@ -211,7 +263,16 @@ impl Default for PrimitiveDriver {
 }
 
 impl Motors {
-    /// Starts the motor of a side.
+    /// Starts the motors of both sides.
+    fn start_both(&self) -> Result<[Box<dyn Actuator>; 2], PartError> {
+        match self {
+            #[cfg(feature = "serial")]
+            Self::Sabertooth(controller) => controller.start(),
+            _ => Ok([self.start(Side::Left)?, self.start(Side::Right)?]),
+        }
+    }
+
+    /// Starts the motor of a side. The left one is the first of a controller.
     fn start(&self, side: Side) -> Result<Box<dyn Actuator>, PartError> {
         match self {
             Self::Simulated(config) => {
@@ -220,6 +281,11 @@ impl Motors {
                     seed,
                     ..*config
                 })))
+            }
+            #[cfg(feature = "serial")]
+            Self::Sabertooth(controller) => {
+                let [left, right] = controller.start()?;
+                Ok(if side == Side::Left { left } else { right })
             }
             #[cfg(all(feature = "gpio", target_os = "linux"))]
             Self::Gpio(motors) => motors.start(side),
@@ -250,16 +316,15 @@ impl GpioMotors {
 
 impl Part for PrimitiveDriver {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
-        let left = self.motors.start(Side::Left)?;
-        let drives = match self.steering {
-            None => Drives::Sides {
-                left,
-                right: self.motors.start(Side::Right)?,
-            },
+        let drives = match &self.steering {
+            None => {
+                let [left, right] = self.motors.start_both()?;
+                Drives::Sides { left, right }
+            }
             Some(SteeringGear { geometry, servo }) => Drives::Steered {
-                drive: left,
-                steering: servo.start(),
-                geometry,
+                drive: self.motors.start(Side::Left)?,
+                steering: servo.start()?,
+                geometry: *geometry,
             },
         };
         let stop = self.stop.as_ref().map(Stop::open).transpose()?;
@@ -270,7 +335,7 @@ impl Part for PrimitiveDriver {
 impl PrimitiveDriver {
     /// Sets the steering of the front wheels.
     #[must_use]
-    pub const fn steering(mut self, gear: Option<SteeringGear>) -> Self {
+    pub fn steering(mut self, gear: Option<SteeringGear>) -> Self {
         self.steering = gear;
         self
     }

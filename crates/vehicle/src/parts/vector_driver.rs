@@ -80,7 +80,7 @@ impl Part for VectorDriver {
             vehicle,
             remote_platform: remote_platform.clone(),
             board,
-            language: Efforts(Throttle::new(self.limits)),
+            language: Efforts::new(self.limits),
             authority: self.authority,
             settling: self.silence,
             sensors: FaultMonitor::default(),
@@ -95,7 +95,14 @@ impl Part for VectorDriver {
 }
 
 /// Command interface of the primitive driver.
-struct Efforts(Throttle);
+pub(super) struct Efforts(Throttle);
+
+impl Efforts {
+    /// Creates the commands to a vehicle whose full effort reaches these limits.
+    pub(super) const fn new(limits: Limits) -> Self {
+        Self(Throttle::new(limits))
+    }
+}
 
 impl Language for Efforts {
     type Command = SetWrenchEffort;
