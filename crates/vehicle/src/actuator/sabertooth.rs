@@ -143,7 +143,7 @@ impl Actuator for SabertoothMotor {
 
     fn fault(&self) -> Option<String> {
         let state = self.controller.shared.lock();
-        let is_stuck = state.written_at.elapsed() > SabertoothMotor::STUCK;
+        let is_stuck = state.written_at.elapsed() > Self::STUCK;
         let stuck = || is_stuck.then(|| "the motor controller's line takes no data".to_owned());
         state.fault.clone().or_else(stuck)
     }

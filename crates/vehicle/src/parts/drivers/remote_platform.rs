@@ -46,6 +46,7 @@ pub(in crate::parts) enum Order {
 
 /// The action possible now.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "one at a time, used up at once")]
 pub(in crate::parts) enum Plan {
     /// There is no order.
     Rest,
