@@ -80,6 +80,7 @@ fn row(side: usize, name: &str, ground: Ground) {
     let thin = Vehicle {
         width: 0.1,
         margin: 0.0,
+        ..Vehicle::default()
     };
     let mut times = Vec::new();
     let mut memory = 0;

@@ -4,6 +4,7 @@
 //! | module | contents |
 //! |---|---|
 //! | [`motion`] | a platform, real or simulated, and the motion control over it |
+//! | [`navigation`] | the pose on the globe from GNSS, gyroscope and wheel travel |
 //! | [`actuator`] | wheels and what turns them: a simulated motor, stepper motors on GPIO lines |
 //! | [`zones`] | areas to stay in or keep out of |
 //! | [`world`] | vector objects and raster maps, their index and their file |
@@ -23,6 +24,7 @@ pub mod messages;
 pub mod mission;
 pub mod mobility;
 pub mod motion;
+pub mod navigation;
 pub mod parts;
 pub mod world;
 pub mod zones;

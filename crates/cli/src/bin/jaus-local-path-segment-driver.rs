@@ -21,6 +21,10 @@ struct Flags {
     #[arg(long, value_name = "RAD/S", default_value = "1.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
     yaw_rate: f64,
 
+    /// The vehicle's least turning radius in metres, up to 100; 0 if it turns on the spot
+    #[arg(long, value_name = "METRES", default_value = "0", value_parser = |text: &str| between(text, 0.0, 100.0))]
+    turning_radius: f64,
+
     /// Deceleration before the end of the path in m/s², from 0.05 to 20
     #[arg(long, value_name = "M/S²", default_value = "1", value_parser = |text: &str| between(text, 0.05, 20.0))]
     deceleration: f64,
@@ -58,6 +62,7 @@ impl Ready for Flags {
                 speed: self.speed,
                 yaw_rate: self.yaw_rate,
                 deceleration: self.deceleration,
+                turning_radius: self.turning_radius,
                 ..Limits::default()
             },
             stale: self.stale,

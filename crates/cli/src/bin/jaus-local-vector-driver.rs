@@ -21,6 +21,10 @@ struct Flags {
     #[arg(long, value_name = "RAD/S", default_value = "1.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
     yaw_rate: f64,
 
+    /// The vehicle's least turning radius in metres, up to 100; 0 if it turns on the spot
+    #[arg(long, value_name = "METRES", default_value = "0", value_parser = |text: &str| between(text, 0.0, 100.0))]
+    turning_radius: f64,
+
     /// The maximum acceleration in m/s², from 0.05 to 20; it brakes twice as hard
     #[arg(long, value_name = "M/S²", default_value = "1", value_parser = |text: &str| between(text, 0.05, 20.0))]
     acceleration: f64,
@@ -66,6 +70,7 @@ impl Ready for Flags {
                 yaw_rate: self.yaw_rate,
                 acceleration: self.acceleration,
                 deceleration: 2.0 * self.acceleration,
+                turning_radius: self.turning_radius,
                 ..usual
             },
             silence: self.silence,

@@ -20,6 +20,10 @@ struct Flags {
     #[arg(long, value_name = "METRES", default_value = "0.1", value_parser = |text: &str| between(text, 0.0, 100.0))]
     margin: f64,
 
+    /// The vehicle's least turning radius in metres, up to 100; 0 if it turns on the spot
+    #[arg(long, value_name = "METRES", default_value = "0", value_parser = |text: &str| between(text, 0.0, 100.0))]
+    turning_radius: f64,
+
     /// The maximum speed in m/s, from 0.01 to 100, for missions that set none
     #[arg(long, value_name = "M/S", default_value = "1", value_parser = |text: &str| between(text, 0.01, 100.0))]
     speed: f64,
@@ -87,6 +91,7 @@ impl Ready for Flags {
             vehicle: Vehicle {
                 width: self.width,
                 margin: self.margin,
+                turning_radius: self.turning_radius,
             },
             mission: Settings {
                 attempts: self.attempts,

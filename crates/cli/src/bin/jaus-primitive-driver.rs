@@ -1,4 +1,4 @@
-//! `jaus-primitive-driver`: the wheels of a vehicle, simulated or on stepper motors.
+//! `jaus-primitive-driver`: the wheels and the steering of a vehicle, simulated or real.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -9,9 +9,9 @@ use jaus::address::JausId;
 use jaus_cli::failure::Failure;
 use jaus_cli::runtime::{between, seconds};
 use jaus_cli::{FenceFlags, Ready, launch};
-use jaus_vehicle::actuator::{MotorConfig, WheelsConfig};
-use jaus_vehicle::motion::Limits;
-use jaus_vehicle::parts::{Motors, Part, PrimitiveDriver, Stop};
+use jaus_vehicle::actuator::{MotorConfig, ServoConfig, WheelsConfig};
+use jaus_vehicle::motion::{Ackermann, Limits};
+use jaus_vehicle::parts::{self, Motors, Part, PrimitiveDriver, Sabertooth, SteeringGear, Stop};
 
 #[derive(Args)]
 struct Flags {
@@ -26,6 +26,15 @@ struct Flags {
     /// The effective track width between left and right wheels in metres, from 0.05 to 10
     #[arg(long, value_name = "M", default_value = "0.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
     track: f64,
+
+    /// The distance between the axles of a vehicle with steered front wheels, in metres, from 0.05 to
+    /// 20. The left motor then drives the rear axle [default: no steering, a motor on each side]
+    #[arg(long, value_name = "METRES", value_parser = |text: &str| between(text, 0.05, 20.0))]
+    wheelbase: Option<f64>,
+
+    /// The largest steering angle to either side in degrees, from 1 to 80
+    #[arg(long, value_name = "DEGREES", default_value = "25", value_parser = |text: &str| between(text, 1.0, 80.0), requires = "wheelbase")]
+    steering_angle: f64,
 
     /// Command timeout in seconds: stop the motors when no effort arrives for this long
     #[arg(long, value_name = "SECONDS", default_value = "0.5", value_parser = seconds)]
@@ -50,9 +59,54 @@ struct Flags {
     #[command(flatten)]
     simulation: Simulation,
 
+    #[command(flatten)]
+    servo: Servo,
+
+    #[command(flatten)]
+    controller: Controller,
+
     #[cfg(all(feature = "gpio", target_os = "linux"))]
     #[command(flatten)]
     gpio: gpio::Gpio,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Steering servo")]
+struct Servo {
+    /// The PWM output of the servo, such as /sys/class/pwm/pwmchip0:0 [default: a simulated servo]
+    #[arg(long, value_name = "CHIP:OUTPUT", value_parser = chip_and_number, requires = "wheelbase")]
+    servo: Option<(PathBuf, u32)>,
+
+    /// The pulse length straight ahead in microseconds, from 500 to 2500
+    #[arg(long, value_name = "MICROSECONDS", default_value = "1500", value_parser = clap::value_parser!(u16).range(500..=2500))]
+    servo_centre: u16,
+
+    /// How much longer the pulse is at the largest angle to the right, in microseconds, from -1000 to
+    /// 1000; negative for a servo that turns the other way
+    #[arg(long, value_name = "MICROSECONDS", default_value = "400", value_parser = clap::value_parser!(i32).range(-1000..=1000), allow_hyphen_values = true)]
+    servo_swing: i32,
+
+    /// How fast the servo turns, in degrees per second from 1 to 1000
+    #[arg(long, value_name = "DEGREES/S", default_value = "115", value_parser = |text: &str| between(text, 1.0, 1000.0))]
+    servo_rate: f64,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Sabertooth motor controller")]
+struct Controller {
+    /// The serial line of a motor controller with the left motor on output 1 and the right one on
+    /// output 2, such as /dev/ttyUSB0. Without encoders, wheel travel is estimated from --speed and
+    /// --response [default: simulated motors]
+    #[arg(long, value_name = "DEVICE")]
+    sabertooth: Option<String>,
+
+    /// Bits per second of the controller's line
+    #[arg(long, value_name = "BAUD", default_value = "9600", value_parser = clap::value_parser!(u32).range(2400..=115_200))]
+    sabertooth_baud: u32,
+
+    /// The controller's address, from 128 to 135
+    #[arg(long, value_name = "ADDRESS", default_value = "128", value_parser = clap::value_parser!(u8).range(128..=135))]
+    sabertooth_address: u8,
 }
 
 #[derive(Args)]
@@ -78,12 +132,14 @@ impl Ready for Flags {
     const EXAMPLES: &'static str = "Examples:\n  \
         jaus-primitive-driver --loopback            simulated wheels, for trying it\n  \
         jaus-primitive-driver --attach              on the node of this host\n  \
-        jaus-primitive-driver --noise 0.1 --seed 7  with unequal motors";
+        jaus-primitive-driver --noise 0.1 --seed 7  with unequal motors\n  \
+        jaus-primitive-driver --wheelbase 0.5       with steered front wheels";
     const ID: JausId = JausId::new(101, 33, 33);
 
     fn part(self) -> Result<impl Part, Failure> {
         Ok(PrimitiveDriver {
             motors: self.motors(),
+            steering: self.steering(),
             stop: self.stop(),
             wheels: WheelsConfig {
                 track: self.track,
@@ -103,6 +159,16 @@ impl Ready for Flags {
 }
 
 impl Flags {
+    fn steering(&self) -> Option<SteeringGear> {
+        Some(SteeringGear {
+            geometry: Ackermann {
+                wheelbase: self.wheelbase?,
+                max_angle: self.steering_angle.to_radians(),
+            },
+            servo: self.servo.settings(self.steering_angle),
+        })
+    }
+
     fn stop(&self) -> Option<Stop> {
         #[cfg(all(feature = "gpio", target_os = "linux"))]
         if let Some((chip, line)) = self.gpio.stop_line.clone() {
@@ -116,15 +182,57 @@ impl Flags {
         if let Some(motors) = self.gpio.motors(self.speed, self.deadline) {
             return Motors::Gpio(motors);
         }
-        Motors::Simulated(MotorConfig {
+        let motor = MotorConfig {
             top: self.speed,
             response: self.simulation.response,
             noise: self.simulation.noise,
             seed: self.simulation.seed,
             deadline: self.deadline,
             ..MotorConfig::default()
-        })
+        };
+        match &self.controller.sabertooth {
+            Some(device) => Motors::Sabertooth(Sabertooth {
+                device: device.clone(),
+                baud: self.controller.sabertooth_baud,
+                address: self.controller.sabertooth_address,
+                motor: MotorConfig {
+                    noise: 0.0,
+                    ..motor
+                },
+            }),
+            None => Motors::Simulated(motor),
+        }
     }
+}
+
+impl Servo {
+    /// The servo of a steering with this largest angle in degrees.
+    fn settings(&self, max_angle: f64) -> parts::Servo {
+        let rate = self.servo_rate.to_radians();
+        match self.servo.clone() {
+            None => parts::Servo::Simulated(rate),
+            Some((chip, channel)) => parts::Servo::Pwm {
+                chip,
+                channel,
+                config: ServoConfig {
+                    centre: Duration::from_micros(self.servo_centre.into()),
+                    swing: self.servo_swing,
+                    max_angle: max_angle.to_radians(),
+                    rate,
+                },
+            },
+        }
+    }
+}
+
+/// Parses a chip and a number: `/dev/gpiochip0:5`.
+fn chip_and_number(text: &str) -> Result<(PathBuf, u32), String> {
+    let pair = text.rsplit_once(':').filter(|(chip, _)| !chip.is_empty());
+    pair.and_then(|(chip, line)| Some((PathBuf::from(chip), line.parse().ok()?)))
+        .ok_or_else(|| {
+            "write a path and a number such as /dev/gpiochip0:5 or /sys/class/pwm/pwmchip0:0"
+                .to_owned()
+        })
 }
 
 #[cfg(all(feature = "gpio", target_os = "linux"))]
@@ -155,7 +263,7 @@ mod gpio {
         /// A stop input: a normally closed contact between this line and ground, such as
         /// /dev/gpiochip0:5. An open contact or a broken wire stops the motors; closing it again
         /// clears all emergencies
-        #[arg(long, value_name = "CHIP:LINE", value_parser = chip_and_line, conflicts_with = "stop_file")]
+        #[arg(long, value_name = "CHIP:LINE", value_parser = super::chip_and_number, conflicts_with = "stop_file")]
         pub(super) stop_line: Option<(PathBuf, u32)>,
 
         /// Step pulses per metre of travel, from 1 to 1000000
@@ -183,12 +291,6 @@ mod gpio {
                 right: self.right?,
             })
         }
-    }
-
-    fn chip_and_line(text: &str) -> Result<(PathBuf, u32), String> {
-        let pair = text.rsplit_once(':').filter(|(chip, _)| !chip.is_empty());
-        pair.and_then(|(chip, line)| Some((PathBuf::from(chip), line.parse().ok()?)))
-            .ok_or_else(|| "write a chip and a line number such as /dev/gpiochip0:5".to_owned())
     }
 
     fn lines(text: &str) -> Result<(u32, u32), String> {

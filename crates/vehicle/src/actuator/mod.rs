@@ -1,10 +1,12 @@
-//! Wheel drives: the trait [`Actuator`], a simulated motor, a stepper motor, and a platform of two
-//! drives.
+//! Wheel drives and steering: the traits [`Actuator`] and [`Steering`], simulated and real ones, and
+//! platforms of them.
 //!
-//! A driver for real hardware implements [`Actuator`]. [`SimulatedMotor`] simulates one, and
-//! [`Stepper`] generates the pulses for a stepper motor. [`Wheels`] combines a left and a right
-//! drive into a [`Platform`](crate::motion::Platform), and an [`Odometer`] reports the distance
-//! that each has travelled.
+//! A driver for real hardware implements [`Actuator`] or [`Steering`]. [`SimulatedMotor`] and
+//! [`SimulatedServo`] simulate them; [`PulseMotor`] drives a stepper motor, [`SabertoothMotor`] a
+//! motor controller on a serial line, [`PwmServo`] a steering servo.
+//! [`Wheels`] is the [`Platform`](crate::motion::Platform): [a left and a right drive](SideDrives),
+//! or [one drive and steered front wheels](SteeredDrive). An [`Odometer`] reports the distance that
+//! the wheels of each side have travelled.
 //!
 //! ```
 //! use jaus_vehicle::actuator::{MotorConfig, Odometer, SimulatedMotor, Wheels, WheelsConfig};
@@ -22,6 +24,11 @@
 mod gpio;
 mod motor;
 mod pulses;
+mod pwm_servo;
+mod sabertooth;
+mod side_drives;
+mod steered_drive;
+mod steering;
 mod stepper;
 mod stop;
 mod wheels;
@@ -32,9 +39,14 @@ use std::time::Instant;
 pub use gpio::{GpioError, GpioLines, GpioStop};
 pub use motor::{FaultSwitch, MotorConfig, SimulatedMotor};
 pub use pulses::{Lines, PulseMotor};
+pub use pwm_servo::{PwmError, PwmServo, ServoConfig};
+pub use sabertooth::SabertoothMotor;
+pub use side_drives::SideDrives;
+pub use steered_drive::SteeredDrive;
+pub use steering::{SimulatedServo, Steering};
 pub use stepper::{Stepper, StepperConfig, StepperPoll};
 pub use stop::{Interlock, SimulatedStop, StopFile, StopInput};
-pub use wheels::{Odometer, Wheels, WheelsConfig};
+pub use wheels::{Drivetrain, Odometer, Wheels, WheelsConfig};
 
 /// One drive: a wheel, or the wheels of one side, with motor and distance counter.
 ///
@@ -43,7 +55,6 @@ pub use wheels::{Odometer, Wheels, WheelsConfig};
 /// it brakes to [`Command::STOP`] on its own. Commands are repeated every 20 ms while the vehicle
 /// moves, so silence means that the controlling program hangs. The deadline must not depend on that
 /// program: implement it in the motor controller, or on a thread that only writes to the motor, as
-/// `PulseMotor` does.
 /// `PulseMotor` does.
 pub trait Actuator: Send {
     /// Advances to time `now`: a simulation integrates, real hardware is read back.

@@ -38,12 +38,14 @@ impl Default for MotorConfig {
     }
 }
 
-/// Injects and clears a fault of a [`SimulatedMotor`]. Cheap to clone; all clones share one state.
+/// Injects and clears a fault of a [`SimulatedMotor`] or a
+/// [`SimulatedServo`](super::SimulatedServo). Cheap to clone; all clones share one state.
 #[derive(Debug, Clone, Default)]
 pub struct FaultSwitch(Arc<Mutex<Option<String>>>);
 
 impl FaultSwitch {
-    /// Sets a fault: the motor no longer turns the wheel but can still brake.
+    /// Sets a fault: the motor no longer turns the wheel but can still brake, and the servo no longer
+    /// moves.
     pub fn fail(&self, reason: impl Into<String>) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(reason.into());
     }
@@ -53,7 +55,7 @@ impl FaultSwitch {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
-    fn fault(&self) -> Option<String> {
+    pub(super) fn fault(&self) -> Option<String> {
         let fault = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         fault.clone()
     }

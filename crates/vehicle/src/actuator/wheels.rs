@@ -1,18 +1,20 @@
-//! The differential-drive platform of two drives, and its odometer.
+//! The platform on wheels, whatever drives and steers them, and its odometer.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use super::{Actuator, Command, Interlock};
-use crate::motion::{Acceleration, Drive, Effort, Limits, Motion, Platform, Pose, Velocity};
-use crate::motion::{DeadReckoning, WheelCount};
+use super::{Actuator, Interlock, SideDrives, SteeredDrive, Steering};
+use crate::motion::{
+    Acceleration, Ackermann, DeadReckoning, Drive, Effort, Limits, Motion, Platform, Pose,
+    Velocity, WheelCount,
+};
 
-/// Parameters of a platform with two drives.
+/// Parameters of a platform on wheels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WheelsConfig {
     /// Effective distance between left and right wheels in turns, in metres.
     pub track: f64,
-    /// Speed of each side at full propulsion, in metres per second.
+    /// Speed of a drive at full propulsion, in metres per second.
     pub top: f64,
     /// Limits of the platform. Full forward effort commands the maximum speed, full backward effort
     /// the reverse speed, full turning effort the yaw rate.
@@ -68,12 +70,33 @@ impl Odometer {
     }
 }
 
-/// A platform with one drive on each side, steered by the speed difference.
+/// The drives of a platform, and its steering if it has one.
+pub trait Drivetrain: Send {
+    /// Advances to time `now`: a simulation integrates, real hardware is read back.
+    fn handle_time(&mut self, now: Instant);
+
+    /// Moves with a velocity along and about the platform's axes.
+    fn drive(&mut self, velocity: Velocity);
+
+    /// Moves with an effort. Full effort commands the speeds of the limits.
+    fn push(&mut self, effort: Effort, limits: &Limits);
+
+    /// Stops as fast as the brakes allow.
+    fn stop(&mut self);
+
+    /// Distance travelled by the left and the right wheels since creation, in metres.
+    fn travel(&self) -> (f64, f64);
+
+    /// The fault of any drive or of the steering, as text for the operator.
+    fn fault(&self) -> Option<String>;
+}
+
+/// A platform on wheels. A fault of any part of its drivetrain stops all of it, since a single drive
+/// would turn the vehicle.
 ///
 /// Its only sensor is the wheel odometry, so its pose is dead reckoning.
-pub struct Wheels<A> {
-    left: A,
-    right: A,
+pub struct Wheels<T> {
+    drivetrain: T,
     config: WheelsConfig,
     limits: Limits,
     odometer: Odometer,
@@ -84,14 +107,37 @@ pub struct Wheels<A> {
     interlock: Interlock,
 }
 
-impl<A: Actuator> Wheels<A> {
-    /// Creates a platform at rest.
+impl<A: Actuator> Wheels<SideDrives<A>> {
+    /// Creates a platform at rest with one drive on each side, steered by the speed difference.
     #[must_use]
     pub fn new(left: A, right: A, config: WheelsConfig, odometer: Odometer) -> Self {
+        Self::with(SideDrives::new(left, right, &config), config, odometer)
+    }
+}
+
+impl<A: Actuator, S: Steering> Wheels<SteeredDrive<A, S>> {
+    /// Creates a platform at rest with one drive and steered front wheels. The geometry determines
+    /// the turning radius of its limits.
+    #[must_use]
+    pub fn steered(
+        drive: A,
+        steering: S,
+        mut config: WheelsConfig,
+        geometry: Ackermann,
+        odometer: Odometer,
+    ) -> Self {
+        let least = geometry.turning_radius();
+        config.limits.turning_radius = config.limits.turning_radius.max(least);
+        let drivetrain = SteeredDrive::new(drive, steering, &config, geometry);
+        Self::with(drivetrain, config, odometer)
+    }
+}
+
+impl<T: Drivetrain> Wheels<T> {
+    fn with(drivetrain: T, config: WheelsConfig, odometer: Odometer) -> Self {
         odometer.lock().count.track = config.track;
         Self {
-            left,
-            right,
+            drivetrain,
             config,
             limits: config.limits,
             odometer,
@@ -109,46 +155,9 @@ impl<A: Actuator> Wheels<A> {
         self
     }
 
-    /// Whether both sides must stand still, whatever the command.
+    /// Whether the platform must stand still, whatever the command.
     fn is_locked(&self) -> bool {
         self.interlock.is_open() || self.fault().is_some()
-    }
-
-    /// Drives both sides at speeds in metres per second. If one side exceeds its top speed, both
-    /// slow down so that the curvature is preserved.
-    fn drive_at(&mut self, velocity: Velocity, brake: f64) {
-        let lead = velocity.yaw * self.config.track / 2.0;
-        let sides = [velocity.x + lead, velocity.x - lead].map(|speed| speed / self.config.top);
-        let most = sides.iter().fold(1.0_f64, |most, it| most.max(it.abs()));
-        let [left, right] = sides.map(|share| Command {
-            drive: share / most,
-            brake,
-        });
-        self.command(left, right);
-    }
-
-    /// Commands both sides. A fault on one side stops both, since a single drive would turn the
-    /// vehicle.
-    fn command(&mut self, left: Command, right: Command) {
-        let locked = self.is_locked();
-        let [left, right] = [left, right].map(|it| if locked { Command::STOP } else { it });
-        self.left.command(left);
-        self.right.command(right);
-    }
-
-    fn push(&mut self, effort: Effort) {
-        let Limits {
-            speed,
-            reverse,
-            yaw_rate,
-            ..
-        } = self.limits;
-        let along = if effort.forward < 0.0 { reverse } else { speed };
-        let velocity = Velocity::forward(
-            effort.forward.clamp(-1.0, 1.0) * along,
-            effort.turn.clamp(-1.0, 1.0) * yaw_rate,
-        );
-        self.drive_at(velocity, effort.brake.max(effort.turn_brake));
     }
 
     fn read(&mut self, now: Instant) {
@@ -159,8 +168,7 @@ impl<A: Actuator> Wheels<A> {
         let count = {
             let mut reading = self.odometer.lock();
             reading.fault = fault;
-            reading.count.left = self.left.travel();
-            reading.count.right = self.right.travel();
+            (reading.count.left, reading.count.right) = self.drivetrain.travel();
             // Wraps to 0 after 49 days, as specified for the report.
             reading.count.time_ms = milliseconds as u32;
             reading.count
@@ -183,12 +191,11 @@ impl<A: Actuator> Wheels<A> {
     }
 }
 
-impl<A: Actuator> Platform for Wheels<A> {
+impl<T: Drivetrain> Platform for Wheels<T> {
     fn handle_time(&mut self, now: Instant) {
-        self.left.handle_time(now);
-        self.right.handle_time(now);
+        self.drivetrain.handle_time(now);
         if self.is_locked() {
-            self.command(Command::STOP, Command::STOP);
+            self.drivetrain.stop();
         }
         self.read(now);
     }
@@ -204,9 +211,10 @@ impl<A: Actuator> Platform for Wheels<A> {
 
     fn drive(&mut self, command: Drive) {
         match command.or_stop() {
-            Drive::Stop => self.command(Command::STOP, Command::STOP),
-            Drive::Velocity(velocity) => self.drive_at(self.limits.clamp(velocity), 0.0),
-            Drive::Effort(effort) => self.push(effort),
+            _ if self.is_locked() => self.drivetrain.stop(),
+            Drive::Stop => self.drivetrain.stop(),
+            Drive::Velocity(velocity) => self.drivetrain.drive(self.limits.clamp(velocity)),
+            Drive::Effort(effort) => self.drivetrain.push(effort, &self.limits),
         }
     }
 
@@ -219,7 +227,7 @@ impl<A: Actuator> Platform for Wheels<A> {
     }
 
     fn fault(&self) -> Option<String> {
-        self.left.fault().or_else(|| self.right.fault())
+        self.drivetrain.fault()
     }
 }
 
@@ -314,7 +322,7 @@ mod tests {
             let mut wheels = Wheels::new(left, right, WheelsConfig::default(), odometer.clone());
             let forward = Drive::Velocity(Velocity::forward(1.0, 0.0));
             let mut now = Instant::now();
-            let mut drive = |wheels: &mut Wheels<SimulatedMotor>, seconds: f64| {
+            let mut drive = |wheels: &mut Wheels<SideDrives<SimulatedMotor>>, seconds: f64| {
                 let end = now + Duration::from_secs_f64(seconds);
                 while now < end {
                     now += Pilot::STEP;

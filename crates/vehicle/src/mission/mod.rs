@@ -5,6 +5,7 @@
 //! stage is blocked it starts over. Neither does I/O, reads a clock or depends on messages.
 
 mod barred;
+mod bends;
 mod blocks;
 mod ground;
 mod lost_link;

@@ -1,7 +1,7 @@
 //! Path planning from the vehicle's position to its destination over a map.
 
 use super::ground::Ground;
-use super::{Terrain, search, sight};
+use super::{Terrain, bends, search, sight};
 use crate::zones::ZoneId;
 
 /// A point of the local frame: X (north) and Y (east) in metres.
@@ -14,6 +14,8 @@ pub struct Vehicle {
     pub width: f64,
     /// Clearance on each side in metres.
     pub margin: f64,
+    /// Least turning radius in metres; 0 for a vehicle that turns on the spot.
+    pub turning_radius: f64,
 }
 
 impl Default for Vehicle {
@@ -21,6 +23,7 @@ impl Default for Vehicle {
         Self {
             width: 0.6,
             margin: 0.1,
+            turning_radius: 0.0,
         }
     }
 }
@@ -30,6 +33,12 @@ impl Vehicle {
     #[must_use]
     pub fn clearance(&self) -> f64 {
         self.width / 2.0 + self.margin
+    }
+
+    /// Radius of the arcs in the corners of a path: wider than the least, to leave the driver room
+    /// for corrections.
+    fn bend(&self) -> f64 {
+        1.25 * self.turning_radius
     }
 }
 
@@ -156,6 +165,19 @@ pub enum NoPath {
         /// Required distance of the vehicle's centre from obstacles, in metres.
         clearance: f64,
     },
+    /// A corner of the path leaves no room for the vehicle's turning radius.
+    #[error(
+        "the path to {} turns at {} without room for an arc of {radius:.2} m: clear obstacles \
+         there, correct the map, or choose another destination", At(*.destination), At(*.corner)
+    )]
+    TooTight {
+        /// The destination.
+        destination: Point,
+        /// The corner.
+        corner: Point,
+        /// Radius of the arc in metres.
+        radius: f64,
+    },
     /// The path has more segments than a driver's list holds.
     #[error(
         "the path to {} has {segments} segments, and a driver accepts at most {}: choose a closer \
@@ -173,7 +195,7 @@ impl NoPath {
     /// Whether the same request may succeed later, because the obstacle may move.
     #[must_use]
     pub const fn may_pass(&self) -> bool {
-        matches!(self, Self::Unreachable { .. })
+        matches!(self, Self::Unreachable { .. } | Self::TooTight { .. })
     }
 }
 
@@ -242,6 +264,10 @@ fn last_clear(is_clear: impl Fn(f64) -> bool) -> f64 {
 /// traversability. On maps with more than 512 x 512 cells the path may cost slightly more than the
 /// optimum.
 ///
+/// For a vehicle with a turning radius, the corners are rounded. An arc cuts its corner, so the path
+/// keeps more clearance before. The direction in which the vehicle starts is not considered: its
+/// first turn needs about one turning radius of room on each side.
+///
 /// On the largest map, 4096 x 4096 cells, planning takes some 60 MB and up to one or two seconds;
 /// `docs/performance.md` has the figures. Async callers should run it on a separate thread.
 ///
@@ -263,7 +289,7 @@ pub fn plan(
             destination,
             corners,
         })?;
-    let clearance = vehicle.clearance();
+    let clearance = vehicle.clearance() + CUT * vehicle.bend();
     let ground = Ground::new(terrain, clearance, from);
     let is_open = |cell| {
         let (row, column) = ground.place(cell);
@@ -294,7 +320,16 @@ pub fn plan(
         destination,
         clearance,
     })?;
-    let corners = sight::straighten(&ground, &way, from, to);
+    let mut corners = sight::straighten(&ground, &way, from, to);
+    if vehicle.turning_radius > 0.0 {
+        let room = Ground::new(terrain, vehicle.clearance(), from);
+        let rounded = bends::round(&room, &corners, vehicle.bend() / terrain.cell());
+        corners = rounded.map_err(|corner| NoPath::TooTight {
+            destination,
+            corner: terrain.to_local(corner),
+            radius: vehicle.bend(),
+        })?;
+    }
     let mut points: Vec<Point> = corners.iter().map(|&it| terrain.to_local(it)).collect();
     // Restores the exact ends, without rounding from the grid conversion.
     if let [first, .., last] = points.as_mut_slice() {
@@ -310,3 +345,6 @@ pub fn plan(
     }
     Ok(path)
 }
+
+/// How far an arc cuts a corner of 60 degrees, as a fraction of its radius.
+const CUT: f64 = 0.155;

@@ -110,22 +110,26 @@ fn told_ext(message: &SetGlobalPoseExt, pose: &GlobalPose) -> GlobalPose {
 }
 
 fn report(_: &QueryGlobalPose, exchange: &mut Exchange<'_, '_>) -> ReportGlobalPose {
-    let pose = pose(exchange);
+    let (pose, motion) = (pose(exchange), exchange.controls.pilot.motion());
     ReportGlobalPose {
         latitude: fields::Latitude::new(pose.latitude).ok(),
         longitude: fields::Longitude::new(pose.longitude).ok(),
         altitude: fields::Altitude::new(pose.altitude).ok(),
-        position_rms: None,
+        position_rms: motion
+            .position_rms
+            .and_then(|it| fields::PositionRms::new(it).ok()),
         roll: fields::Roll::new(pose.roll).ok(),
         pitch: fields::Pitch::new(pose.pitch).ok(),
         yaw: fields::Yaw::new(pose.yaw).ok(),
-        attitude_rms: None,
+        attitude_rms: motion
+            .attitude_rms
+            .and_then(|it| fields::AttitudeRms::new(it).ok()),
         time_stamp: None,
     }
 }
 
 fn report_ext(_: &QueryGlobalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportGlobalPoseExt {
-    let pose = pose(exchange);
+    let (pose, motion) = (pose(exchange), exchange.controls.pilot.motion());
     ReportGlobalPoseExt {
         latitude: ext::Latitude::new(pose.latitude).ok(),
         longitude: ext::Longitude::new(pose.longitude).ok(),
@@ -133,6 +137,12 @@ fn report_ext(_: &QueryGlobalPoseExt, exchange: &mut Exchange<'_, '_>) -> Report
         roll: ext::Roll::new(pose.roll).ok(),
         pitch: ext::Pitch::new(pose.pitch).ok(),
         heading: ext::Heading::new(pose.yaw).ok(),
+        xy_position_rms: motion
+            .position_rms
+            .and_then(|it| ext::XyPositionRms::new(it).ok()),
+        attitude_rms: motion
+            .attitude_rms
+            .and_then(|it| ext::AttitudeRms::new(it).ok()),
         ..ReportGlobalPoseExt::default()
     }
 }

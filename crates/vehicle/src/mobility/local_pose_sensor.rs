@@ -96,22 +96,26 @@ fn told_ext(message: &SetLocalPoseExt, pose: &Pose) -> Pose {
 }
 
 fn report(_: &QueryLocalPose, exchange: &mut Exchange<'_, '_>) -> ReportLocalPose {
-    let pose = pose(exchange);
+    let (pose, motion) = (pose(exchange), exchange.controls.pilot.motion());
     ReportLocalPose {
         x: fields::X::new(pose.x).ok(),
         y: fields::Y::new(pose.y).ok(),
         z: fields::Z::new(pose.z).ok(),
-        position_rms: None,
+        position_rms: motion
+            .position_rms
+            .and_then(|it| fields::PositionRms::new(it).ok()),
         roll: fields::Roll::new(pose.roll).ok(),
         pitch: fields::Pitch::new(pose.pitch).ok(),
         yaw: fields::Yaw::new(pose.yaw).ok(),
-        attitude_rms: None,
+        attitude_rms: motion
+            .attitude_rms
+            .and_then(|it| fields::AttitudeRms::new(it).ok()),
         time_stamp: None,
     }
 }
 
 fn report_ext(_: &QueryLocalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportLocalPoseExt {
-    let pose = pose(exchange);
+    let (pose, motion) = (pose(exchange), exchange.controls.pilot.motion());
     ReportLocalPoseExt {
         x: ext::X::new(pose.x).ok(),
         y: ext::Y::new(pose.y).ok(),
@@ -119,6 +123,12 @@ fn report_ext(_: &QueryLocalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportL
         roll: ext::Roll::new(pose.roll).ok(),
         pitch: ext::Pitch::new(pose.pitch).ok(),
         heading: ext::Heading::new(pose.yaw).ok(),
+        xy_position_rms: motion
+            .position_rms
+            .and_then(|it| ext::XyPositionRms::new(it).ok()),
+        attitude_rms: motion
+            .attitude_rms
+            .and_then(|it| ext::AttitudeRms::new(it).ok()),
         ..ReportLocalPoseExt::default()
     }
 }

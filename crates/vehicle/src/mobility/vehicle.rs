@@ -19,7 +19,7 @@ use super::velocity_state_driver::VelocityStateDriver;
 use super::velocity_state_sensor::VelocityStateSensor;
 use super::waypoint_driver::WaypointDriver;
 use super::waypoint_kinds::{Global, Local};
-use crate::motion::{GlobalPose, Motion, Pilot};
+use crate::motion::{Frame, GlobalPose, Motion, Pilot};
 use jaus::address::JausId;
 use jaus::codec::ServiceId;
 use jaus::endpoint::Received;
@@ -104,6 +104,19 @@ impl Vehicle {
     #[must_use]
     pub fn global_pose(&self) -> GlobalPose {
         self.lock().pilot.global_pose()
+    }
+
+    /// The local frame.
+    #[must_use]
+    pub fn frame(&self) -> Frame {
+        *self.lock().pilot.frame()
+    }
+
+    /// Moves the local frame, and with it the destination on the globe.
+    pub fn set_frame(&self, frame: Frame) {
+        let mut controls = self.lock();
+        controls.pilot.set_frame(frame);
+        controls.handle_new_frame();
     }
 
     /// Velocity State Sensor: reports the velocity.

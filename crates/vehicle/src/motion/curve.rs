@@ -40,7 +40,17 @@ impl Curve {
             .collect()
     }
 
-    const POINTS: u32 = 256;
+    /// Heading at the end in radians.
+    pub(super) fn final_heading(&self) -> f64 {
+        let from = match self.weight > 0.0 && self.control != self.end {
+            true => self.control,
+            false => self.start,
+        };
+        (self.end.1 - from.1).atan2(self.end.0 - from.0)
+    }
+
+    /// Number of sections between points.
+    pub(super) const POINTS: u16 = 256;
 }
 
 #[cfg(test)]

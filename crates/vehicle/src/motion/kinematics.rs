@@ -63,11 +63,25 @@ pub struct Motion {
     pub velocity: Velocity,
     /// The acceleration.
     pub acceleration: Acceleration,
+    /// Standard error of the horizontal position in metres; `None` if unknown.
+    pub position_rms: Option<f64>,
+    /// Standard error of the attitude in radians; `None` if unknown.
+    pub attitude_rms: Option<f64>,
     /// Time of the measurement; `None` if unknown.
     pub sampled_at: Option<Instant>,
 }
 
 impl Pose {
+    /// No component is known (NaN). Unknown components are omitted from reports.
+    pub const UNKNOWN: Self = Self {
+        x: f64::NAN,
+        y: f64::NAN,
+        z: f64::NAN,
+        roll: f64::NAN,
+        pitch: f64::NAN,
+        yaw: f64::NAN,
+    };
+
     /// A pose on the ground, facing along the local X axis.
     #[must_use]
     pub fn at(x: f64, y: f64) -> Self {

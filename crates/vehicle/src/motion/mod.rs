@@ -48,6 +48,8 @@
 //! Axes follow AS6009: X forward or north, Y right or east, Z down. Angles are in radians. Yaw and
 //! heading are clockwise from X, seen from above.
 
+mod ackermann;
+mod course;
 mod curve;
 mod deadline;
 mod fence;
@@ -65,6 +67,7 @@ mod throttle;
 #[cfg(test)]
 mod tests;
 
+pub use ackermann::Ackermann;
 pub use curve::Curve;
 pub use deadline::CommandDeadline;
 pub use fence::{Fence, FenceConfig};
@@ -77,5 +80,4 @@ pub(crate) use random::Random;
 pub use reckoning::{DeadReckoning, Gone, Speedometer, WheelCount};
 pub use skid_steer::{SkidSteer, SkidSteerConfig};
 pub use steering::Waypoint;
-pub(crate) use steering::along;
 pub use throttle::Throttle;

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use super::{Drive, Limits, Motion, Platform, Pose};
+use super::{Drive, GlobalPose, Limits, Motion, Platform, Pose};
 
 /// Externally measured motion of a vehicle. Cheap to clone; all clones share one state.
 ///
@@ -17,6 +17,8 @@ struct Observation {
     motion: Motion,
     /// The pose set by a client.
     told: Option<Pose>,
+    /// The pose on the globe set by a client.
+    told_global: Option<GlobalPose>,
 }
 
 impl Observed {
@@ -39,6 +41,12 @@ impl Observed {
         self.lock().told.take()
     }
 
+    /// Takes the pose on the globe set by a client, if there is a new one.
+    #[must_use]
+    pub fn take_told_global(&self) -> Option<GlobalPose> {
+        self.lock().told_global.take()
+    }
+
     fn lock(&self) -> MutexGuard<'_, Observation> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -55,6 +63,10 @@ impl Platform for Observed {
         let mut observation = self.lock();
         observation.motion.pose = pose;
         observation.told = Some(pose);
+    }
+
+    fn set_global_pose(&mut self, pose: GlobalPose) {
+        self.lock().told_global = Some(pose);
     }
 
     fn drive(&mut self, _: Drive) {}

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use super::course::{Course, Setpoint};
 use super::fence::Bounds;
-use super::steering::{along, towards, turn_rate};
 use super::{
     Curve, Drive, Effort, Fence, Frame, GlobalPose, Limits, Motion, Platform, Pose, Velocity,
     Waypoint, wrap,
@@ -90,26 +90,6 @@ pub struct Pilot {
     trouble: Option<Trouble>,
 }
 
-/// Setpoint that a course requests from the platform.
-enum Setpoint {
-    Drive(Drive),
-    Head { heading: f64, speed: f64 },
-}
-
-/// A goal in progress.
-#[derive(Debug)]
-struct Course {
-    goal: Goal,
-    ticket: Ticket,
-    has_arrived: bool,
-    /// Whether the vehicle has reached its waypoint and only turns.
-    is_turning: bool,
-    /// The remaining points of a curve.
-    ahead: Vec<(f64, f64)>,
-    /// The heading for driving straight ahead.
-    straight: f64,
-}
-
 impl Pilot {
     /// Period of the control loop.
     pub const STEP: Duration = Duration::from_millis(20);
@@ -184,32 +164,9 @@ impl Pilot {
     pub fn pursue(&mut self, goal: Goal) -> Ticket {
         self.tickets += 1;
         let ticket = Ticket(self.tickets);
-        let ahead = match &goal {
-            Goal::Path { curve, .. } => self.ahead_on(curve),
-            _ => Vec::new(),
-        };
-        self.course = Some(Course {
-            goal,
-            ticket,
-            has_arrived: false,
-            is_turning: false,
-            ahead,
-            straight: self.motion().pose.yaw,
-        });
+        let course = Course::new(goal, ticket, &self.motion().pose, &self.limits);
+        self.course = Some(course);
         ticket
-    }
-
-    /// The points of a curve from the one nearest to the vehicle.
-    fn ahead_on(&self, curve: &Curve) -> Vec<(f64, f64)> {
-        let pose = self.motion().pose;
-        let distance = |&(x, y): &(f64, f64)| pose.distance(x, y);
-        let mut points = curve.points();
-        let nearest = points.iter().enumerate();
-        let nearest = nearest.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)));
-        if let Some((index, _)) = nearest {
-            points.drain(..index);
-        }
-        points
     }
 
     /// Whether there is a goal that has not been reached.
@@ -330,6 +287,12 @@ impl Pilot {
     /// Sets the platform's global pose by moving the local frame. Its local pose is unchanged.
     pub fn set_global_pose(&mut self, pose: GlobalPose) {
         self.frame = Frame::joining(&self.motion().pose, &pose);
+        self.platform.set_global_pose(pose);
+    }
+
+    /// Moves the local frame. The platform's local pose is unchanged.
+    pub const fn set_frame(&mut self, frame: Frame) {
+        self.frame = frame;
     }
 
     /// The limits in force: those of the platform, or narrower ones.
@@ -397,13 +360,25 @@ impl Pilot {
                 let bounds = self.fence.bounds(time, &motion, &limits, wanted);
                 self.drive(bounds.apply(command, motion.velocity.x));
             }
-            Setpoint::Head { heading, speed } => {
-                // Before it drives, the vehicle turns.
-                let wanted = along(pose.yaw, heading, speed, &limits).x;
-                let bounds = self.fence.bounds(time, &motion, &limits, wanted);
+            Setpoint::Head {
+                heading,
+                speed,
+                distance,
+            } => {
+                let Some(course) = &mut self.course else {
+                    return;
+                };
+                let steering = &mut course.steering;
+                let velocity = steering.along(pose.yaw, heading, speed, distance, &limits);
+                // Before it drives, the vehicle may turn, or back up.
+                let bounds = self.fence.bounds(time, &motion, &limits, velocity.x);
                 let speed = bounds.clamp(speed);
                 self.command = Drive::Velocity(Velocity::forward(speed, 0.0));
-                self.platform.head(heading, speed, &limits);
+                if !self.platform.head(heading, speed) {
+                    let x = bounds.clamp(velocity.x);
+                    let velocity = limits.clamp(Velocity { x, ..velocity });
+                    self.platform.drive(Drive::Velocity(velocity));
+                }
             }
         }
     }
@@ -417,126 +392,9 @@ impl Pilot {
     }
 }
 
-fn head_for(pose: &Pose, to: (f64, f64), speed: f64, way: f64, limits: &Limits) -> Setpoint {
-    let (heading, speed) = towards(pose, to, speed, way, limits);
-    Setpoint::Head { heading, speed }
-}
-
 impl Drop for Pilot {
     /// Stops the platform.
     fn drop(&mut self) {
         self.platform.drive(Drive::Stop);
-    }
-}
-
-impl Goal {
-    /// Whether pursuing the goal requires a pose.
-    const fn needs_pose(&self) -> bool {
-        match self {
-            Self::Effort(_) | Self::Velocity(_) => false,
-            Self::Vector { .. } | Self::Waypoint { .. } | Self::Path { .. } => true,
-        }
-    }
-}
-
-impl Course {
-    /// The current setpoint. Records the arrival.
-    fn command(&mut self, pose: &Pose, north: f64, limits: &Limits) -> Setpoint {
-        match self.goal {
-            Goal::Effort(effort) => Setpoint::Drive(Drive::Effort(effort)),
-            Goal::Velocity(velocity) => Setpoint::Drive(Drive::Velocity(velocity)),
-            Goal::Vector { speed, heading } => Setpoint::Head {
-                heading: match heading {
-                    Some(Heading::Local(heading)) => heading,
-                    Some(Heading::North(heading)) => heading + north,
-                    None => self.straight,
-                },
-                speed,
-            },
-            Goal::Waypoint { to, speed, goes_on } => self.reach(pose, to, speed, goes_on, limits),
-            Goal::Path {
-                curve,
-                speed,
-                tolerance,
-                goes_on,
-            } => {
-                let end = Waypoint {
-                    tolerance,
-                    ..Waypoint::at(curve.end.0, curve.end.1)
-                };
-                self.follow(pose, end, speed, goes_on, limits)
-            }
-        }
-    }
-
-    fn reach(
-        &mut self,
-        pose: &Pose,
-        to: Waypoint,
-        speed: f64,
-        goes_on: bool,
-        limits: &Limits,
-    ) -> Setpoint {
-        self.has_arrived |= to.is_reached(pose) && (goes_on || to.heading.is_none());
-        match to.heading {
-            Some(heading) if !goes_on && (self.is_turning || to.is_reached(pose)) => {
-                self.turn(pose, heading, limits)
-            }
-            _ if self.has_arrived && !goes_on => Setpoint::Drive(Drive::Stop),
-            _ => {
-                let distance = pose.distance(to.x, to.y);
-                let way = if goes_on { f64::INFINITY } else { distance };
-                head_for(pose, (to.x, to.y), speed, way, limits)
-            }
-        }
-    }
-
-    /// Turns to the requested heading at the waypoint.
-    fn turn(&mut self, pose: &Pose, heading: f64, limits: &Limits) -> Setpoint {
-        // Keeps turning from here on, even if the vehicle slips out of the tolerance.
-        self.is_turning = true;
-        let error = wrap(heading - pose.yaw).abs();
-        self.has_arrived |= error <= Waypoint::HEADING_TOLERANCE;
-        if self.has_arrived {
-            return Setpoint::Drive(Drive::Stop);
-        }
-        let turn = Velocity::forward(0.0, turn_rate(pose.yaw, heading, limits));
-        Setpoint::Drive(Drive::Velocity(turn))
-    }
-
-    fn follow(
-        &mut self,
-        pose: &Pose,
-        end: Waypoint,
-        speed: f64,
-        goes_on: bool,
-        limits: &Limits,
-    ) -> Setpoint {
-        self.has_arrived |= self.ahead.len() <= 2 && end.is_reached(pose);
-        if self.has_arrived && !goes_on {
-            return Setpoint::Drive(Drive::Stop);
-        }
-        let look = Self::LOOK_AHEAD.max(speed * Self::LOOK_AHEAD_TIME);
-        self.pass(pose, look);
-        let target = self.ahead.first().copied().unwrap_or((end.x, end.y));
-        let way = if goes_on {
-            f64::INFINITY
-        } else {
-            pose.distance(end.x, end.y)
-        };
-        head_for(pose, target, speed, way, limits)
-    }
-
-    /// Look-ahead distance on a curve in metres.
-    const LOOK_AHEAD: f64 = 0.4;
-    /// Look-ahead distance in seconds of driving.
-    const LOOK_AHEAD_TIME: f64 = 0.5;
-
-    /// Drops the points of the curve within the look-ahead distance.
-    fn pass(&mut self, pose: &Pose, look: f64) {
-        let ahead = |&(x, y): &(f64, f64)| pose.distance(x, y) > look;
-        let passed = self.ahead.iter().position(ahead);
-        let passed = passed.unwrap_or(self.ahead.len().saturating_sub(1));
-        self.ahead.drain(..passed);
     }
 }

@@ -2,8 +2,7 @@
 
 use std::time::Instant;
 
-use super::steering::along;
-use super::{Motion, Pose, Velocity};
+use super::{GlobalPose, Motion, Pose, Velocity};
 
 /// A vehicle, real or simulated.
 ///
@@ -28,17 +27,20 @@ pub trait Platform: Send {
     /// Sets the current pose in the local frame.
     fn set_pose(&mut self, pose: Pose);
 
+    /// A client has set the current pose on the globe. The [`Pilot`](super::Pilot) moves the local
+    /// frame accordingly; only a platform with sensors of its own for it needs to know.
+    fn set_global_pose(&mut self, _pose: GlobalPose) {}
+
     /// Sets the command until the next one, or until the deadline above. A command that is [not
     /// finite](Drive::is_finite) must stop the platform.
     fn drive(&mut self, command: Drive);
 
     /// Holds a heading in radians clockwise from the local X axis, at a speed in metres per second,
-    /// until the next command. The default, sufficient for most platforms, commands the velocity
-    /// within `limits` that turns to the heading. It is called every
-    /// [`Pilot::STEP`](super::Pilot::STEP).
-    fn head(&mut self, heading: f64, speed: f64, limits: &Limits) {
-        let velocity = along(self.motion().pose.yaw, heading, speed, limits);
-        self.drive(Drive::Velocity(limits.clamp(velocity)));
+    /// until the next command, if the platform can do so on its own; returns whether it does. It is
+    /// called every [`Pilot::STEP`](super::Pilot::STEP). By default the pilot steers instead, with
+    /// velocities.
+    fn head(&mut self, _heading: f64, _speed: f64) -> bool {
+        false
     }
 
     /// The platform's own limits.
@@ -101,7 +103,9 @@ impl Drive {
 pub struct Effort {
     /// Propulsion forward, -1 to 1.
     pub forward: f64,
-    /// Propulsion that turns to the right, -1 to 1.
+    /// Turning effort to the right, -1 to 1: propulsion of a vehicle that turns on the spot, and the
+    /// curvature of a vehicle with steered wheels. 1 is then its least turning radius, in either
+    /// direction of travel.
     pub turn: f64,
     /// Braking of the forward motion, 0 to 1.
     pub brake: f64,
@@ -124,20 +128,41 @@ pub struct Limits {
     pub yaw_rate: f64,
     /// Yaw acceleration in radians per second squared.
     pub yaw_acceleration: f64,
+    /// Least turning radius in metres; 0 for a vehicle that turns on the spot.
+    pub turning_radius: f64,
 }
 
 impl Limits {
     /// The nearest velocity within these limits for a ground vehicle; 0 if the velocity is not
-    /// finite.
+    /// finite. The speed has priority over the turn.
     #[must_use]
     pub fn clamp(&self, velocity: Velocity) -> Velocity {
         if !velocity.is_finite() {
             return Velocity::default();
         }
-        Velocity::forward(
-            velocity.x.clamp(-self.reverse, self.speed),
-            velocity.yaw.clamp(-self.yaw_rate, self.yaw_rate),
-        )
+        let speed = velocity.x.clamp(-self.reverse, self.speed);
+        let fastest = match self.turns_on_the_spot() {
+            true => self.yaw_rate,
+            false => self.yaw_rate.min(speed.abs() / self.turning_radius),
+        };
+        Velocity::forward(speed, velocity.yaw.clamp(-fastest, fastest))
+    }
+
+    /// The speed that a fraction of full effort commands, -1 to 1.
+    #[must_use]
+    pub fn speed_at(&self, effort: f64) -> f64 {
+        let full = if effort < 0.0 {
+            self.reverse
+        } else {
+            self.speed
+        };
+        effort.clamp(-1.0, 1.0) * full
+    }
+
+    /// Whether the vehicle can turn without driving.
+    #[must_use]
+    pub fn turns_on_the_spot(&self) -> bool {
+        self.turning_radius <= 0.0
     }
 
     /// The intersection of two sets of limits.
@@ -150,12 +175,14 @@ impl Limits {
             deceleration: self.deceleration.min(other.deceleration),
             yaw_rate: self.yaw_rate.min(other.yaw_rate),
             yaw_acceleration: self.yaw_acceleration.min(other.yaw_acceleration),
+            turning_radius: self.turning_radius.max(other.turning_radius),
         }
     }
 }
 
 impl Default for Limits {
-    /// A small rover: 2 m/s forward, 1 m/s backward, 1 m/s², brakes of 2 m/s², 1.5 rad/s.
+    /// A small rover: 2 m/s forward, 1 m/s backward, 1 m/s², brakes of 2 m/s², 1.5 rad/s. It turns on
+    /// the spot.
     fn default() -> Self {
         Self {
             speed: 2.0,
@@ -164,6 +191,7 @@ impl Default for Limits {
             deceleration: 2.0,
             yaw_rate: 1.5,
             yaw_acceleration: 3.0,
+            turning_radius: 0.0,
         }
     }
 }

@@ -1,4 +1,10 @@
 //! Steering: the heading, speed and turn rate that lead a vehicle to its target.
+//!
+//! A vehicle that turns on the spot does so for large heading errors. A vehicle with a least
+//! turning radius turns in two arcs instead: it backs up at full lock until the rest of the turn is
+//! short enough, and then drives ahead. It also backs up when its target is within the circle that
+//! it cannot drive. The two arcs need about one turning radius of room on each side; a turn in one
+//! wide circle would need two on one side.
 
 use std::f64::consts::FRAC_PI_3;
 
@@ -59,19 +65,64 @@ pub(super) fn turn_rate(yaw: f64, heading: f64, limits: &Limits) -> f64 {
     (TURN_GAIN * error).clamp(-most, most)
 }
 
-/// The velocity for a heading and a speed, reduced while the heading error is large. Zero if any
-/// input is unknown (NaN).
-pub(crate) fn along(yaw: f64, heading: f64, speed: f64, limits: &Limits) -> Velocity {
-    let error = wrap(heading - yaw);
-    if !error.is_finite() || !speed.is_finite() {
-        return Velocity::default();
+/// Turns a vehicle to its heading. It remembers which of the two arcs of a turn it is on.
+#[derive(Debug, Default)]
+pub(super) struct Steering {
+    is_reversing: bool,
+}
+
+impl Steering {
+    /// With a larger heading error, a vehicle with a turning radius backs up first.
+    const REVERSE_FROM: f64 = 1.8;
+    /// With a smaller heading error, it drives ahead again.
+    const REVERSE_UNTIL: f64 = 1.4;
+    /// While it backs up for a near target, it leaves this much more room than necessary.
+    const ROOM: f64 = 1.2;
+    /// It drives at least at this fraction of the speed in a turn.
+    const LEAST_SHARE: f64 = 0.5;
+
+    /// The velocity for a heading and a speed, within the limits. The speed is reduced while the
+    /// heading error is large. `distance` is that to the target in metres, if it is a point. Zero if
+    /// any input is unknown (NaN).
+    pub(super) fn along(
+        &mut self,
+        yaw: f64,
+        heading: f64,
+        speed: f64,
+        distance: f64,
+        limits: &Limits,
+    ) -> Velocity {
+        let error = wrap(heading - yaw);
+        if !error.is_finite() || !speed.is_finite() {
+            return Velocity::default();
+        }
+        let turn = turn_rate(yaw, heading, limits);
+        let share = if limits.turns_on_the_spot() {
+            if error.abs() > TURN_FIRST {
+                0.0
+            } else {
+                error.cos()
+            }
+        } else if self.reverses(error, distance, limits) {
+            -1.0
+        } else {
+            error.cos().max(Self::LEAST_SHARE)
+        };
+        limits.clamp(Velocity::forward(speed * share, turn))
     }
-    let share = if error.abs() > TURN_FIRST {
-        0.0
-    } else {
-        error.cos()
-    };
-    Velocity::forward(speed * share, turn_rate(yaw, heading, limits))
+
+    /// Decides between backing up and driving ahead.
+    fn reverses(&mut self, error: f64, distance: f64, limits: &Limits) -> bool {
+        // The diameter of the circle through a target at this angle is its distance by the sine.
+        let least = 2.0 * limits.turning_radius * error.sin().abs();
+        let (most, room) = match self.is_reversing {
+            true => (Self::REVERSE_UNTIL, Self::ROOM),
+            false => (Self::REVERSE_FROM, 1.0),
+        };
+        let must = error.abs() > most || distance < room * least;
+        self.is_reversing = must && limits.reverse > 0.0;
+        self.is_reversing
+    }
 }
 
 /// The heading and speed towards a point. The speed is at most `speed`, and low enough to stop
@@ -120,7 +171,7 @@ mod tests {
             let (_, speed) = towards(&pose, (5.0, 0.0), 2.0, 5.0, &limits);
             assert_eq!(speed, 0.0, "{pose:?}");
         }
-        let velocity = along(f64::NAN, 0.0, 2.0, &limits);
+        let velocity = Steering::default().along(f64::NAN, 0.0, 2.0, 1.0, &limits);
         assert_eq!(velocity, Velocity::default());
         let (_, speed) = towards(&Pose::default(), (5.0, 0.0), 2.0, f64::INFINITY, &limits);
         assert_eq!(speed, 2.0);

@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 
 use super::*;
 
+mod steered;
+
 /// A vehicle and its time, checked at every step.
 struct Track {
     pilot: Pilot,

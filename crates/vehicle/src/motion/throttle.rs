@@ -1,4 +1,5 @@
-//! Velocity control by effort: feed-forward plus proportional feedback.
+//! Velocity control by effort: feed-forward plus proportional feedback. Wheels that are steered need
+//! no feedback: their angle sets the curvature.
 
 use std::time::{Duration, Instant};
 
@@ -52,9 +53,21 @@ impl Throttle {
         self.ramp = Some((now, ramped));
         Effort {
             forward: share(ramped.x, measured.x, limits.speed, limits.reverse),
-            turn: share(ramped.yaw, measured.yaw, limits.yaw_rate, limits.yaw_rate),
+            turn: match limits.turns_on_the_spot() {
+                true => share(ramped.yaw, measured.yaw, limits.yaw_rate, limits.yaw_rate),
+                false => curvature(&wanted) * limits.turning_radius,
+            },
             ..Effort::default()
         }
+    }
+}
+
+/// Curvature of a velocity in radians per metre, right positive; 0 without speed.
+fn curvature(velocity: &Velocity) -> f64 {
+    if velocity.x == 0.0 {
+        0.0
+    } else {
+        velocity.yaw / velocity.x
     }
 }
 

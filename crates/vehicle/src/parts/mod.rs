@@ -7,8 +7,11 @@
 
 mod communicator;
 mod drivers;
+mod global_driver;
+mod global_pose_sensor;
 mod keeper;
 mod knowledge_store;
+mod navigation_inputs;
 mod path_driver;
 mod planner;
 mod pose_file;
@@ -28,13 +31,18 @@ use jaus::node::{Node, Port};
 use jaus::service::TimeOfDay;
 
 pub use communicator::{Communicator, DEBUG_ADDRESS};
+pub use global_driver::GlobalDriver;
+pub use global_pose_sensor::{GlobalPoseSensor, NavigationInputs};
 pub use knowledge_store::{Broken, KnowledgeStore};
+pub use navigation_inputs::Gyro;
 pub use path_driver::PathDriver;
 pub use planner::Planner;
 pub use pose_sensor::PoseSensor;
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 pub use primitive_driver::GpioMotors;
-pub use primitive_driver::{Hardware, Motors, PrimitiveDriver, Stop};
+#[cfg(feature = "serial")]
+pub use primitive_driver::Sabertooth;
+pub use primitive_driver::{Drives, Hardware, Motors, PrimitiveDriver, Servo, SteeringGear, Stop};
 pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
 

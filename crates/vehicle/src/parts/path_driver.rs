@@ -51,6 +51,13 @@ impl Default for PathDriver {
 impl PathDriver {
     /// Report rate requested from the sensor, in hertz.
     const HZ: f64 = 25.0;
+
+    /// Sets the vehicle's least turning radius in metres; 0 if it turns on the spot.
+    #[must_use]
+    pub const fn turning_radius(mut self, radius: f64) -> Self {
+        self.limits.turning_radius = radius;
+        self
+    }
 }
 
 impl Part for PathDriver {

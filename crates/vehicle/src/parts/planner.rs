@@ -57,6 +57,15 @@ impl Default for Planner {
     }
 }
 
+impl Planner {
+    /// Sets the vehicle's least turning radius in metres; 0 if it turns on the spot.
+    #[must_use]
+    pub const fn turning_radius(mut self, radius: f64) -> Self {
+        self.vehicle.turning_radius = radius;
+        self
+    }
+}
+
 impl Part for Planner {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let wake = Arc::new(Notify::new());

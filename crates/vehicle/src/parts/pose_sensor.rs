@@ -51,7 +51,7 @@ impl Default for PoseSensor {
 impl Part for PoseSensor {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let reckoning = self.begin().await?;
-        let observed = Observed::new(standing(unknown(), None));
+        let observed = Observed::new(standing(Pose::UNKNOWN, None));
         let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
             .with_clock(super::host_clock());
         let component = slot
@@ -143,7 +143,7 @@ impl Running {
                 }
                 Err(_) => {
                     sampled_at = Some(now);
-                    unknown()
+                    Pose::UNKNOWN
                 }
             };
             self.observed.set(standing(pose, sampled_at));
@@ -183,17 +183,5 @@ fn standing(pose: Pose, sampled_at: Option<Instant>) -> Motion {
         pose,
         sampled_at,
         ..Motion::default()
-    }
-}
-
-/// NaN components are omitted from reports.
-fn unknown() -> Pose {
-    Pose {
-        x: f64::NAN,
-        y: f64::NAN,
-        z: f64::NAN,
-        roll: f64::NAN,
-        pitch: f64::NAN,
-        yaw: f64::NAN,
     }
 }

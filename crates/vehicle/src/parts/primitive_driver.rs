@@ -1,4 +1,5 @@
-//! The primitive driver: wrench efforts for two wheel drives, and wheel odometry.
+//! The primitive driver: wrench efforts for the drives of a vehicle and its steering, and wheel
+//! odometry.
 #![expect(
     clippy::disallowed_methods,
     reason = "supervises the motors in real time"
@@ -13,20 +14,22 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::drivers::{FaultMonitor, Sense, Watchman, guard, shut_down};
 use super::stop_line::StopLine;
 use super::{Part, PartError, Slot};
+#[cfg(feature = "serial")]
+use crate::actuator::SabertoothMotor;
 use crate::actuator::{
-    Actuator, Interlock, MotorConfig, Odometer, SimulatedMotor, StopFile, StopInput, Wheels,
-    WheelsConfig,
+    Actuator, Interlock, MotorConfig, Odometer, PwmServo, ServoConfig, SimulatedMotor,
+    SimulatedServo, Steering, StopFile, StopInput, Wheels, WheelsConfig,
 };
 use crate::ground::{StageBoard, StageReport, StageState, WheelOdometry};
 use crate::handoff::Handoff;
 use crate::messages::ground::QueryStage;
 use crate::mobility::Vehicle;
-use crate::motion::{Fence, FenceConfig, Frame, Pilot};
+use crate::motion::{Ackermann, Fence, FenceConfig, Frame, Pilot};
 use jaus::component::{Component, Condition, State};
 use jaus::service::{MotionPolicy, StopCause};
 
 /// Drives the wheels of a vehicle as commanded, and stops them when commands cease. While a motor
-/// has a fault, both sides stand still and the component is in Failure.
+/// or the steering has a fault, all wheels stand still and the component is in Failure.
 ///
 /// With a stop input, an open line stops the motors immediately and sets the component's emergency.
 /// Closing the line clears all emergencies, on the assumption that the operator on site has dealt
@@ -40,6 +43,9 @@ use jaus::service::{MotionPolicy, StopCause};
 pub struct PrimitiveDriver {
     /// The motors.
     pub motors: Motors,
+    /// The steering of the front wheels. Without it, the vehicle has a motor on each side; with it,
+    /// only the left motor is used, and drives the rear axle.
+    pub steering: Option<SteeringGear>,
     /// The stop input, if there is one.
     pub stop: Option<Stop>,
     /// Parameters of the platform.
@@ -58,9 +64,95 @@ pub struct PrimitiveDriver {
 pub enum Motors {
     /// Simulated motors. The right one uses the seed after the left one's.
     Simulated(MotorConfig),
+    /// The two motors of a Sabertooth motor controller on a serial line.
+    #[cfg(feature = "serial")]
+    Sabertooth(Sabertooth),
     /// Stepper motors on lines of a GPIO chip.
     #[cfg(all(feature = "gpio", target_os = "linux"))]
     Gpio(GpioMotors),
+}
+
+/// Steered front wheels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SteeringGear {
+    /// Wheelbase and largest steering angle.
+    pub geometry: Ackermann,
+    /// What turns the wheels.
+    pub servo: Servo,
+}
+
+/// A steering servo.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Servo {
+    /// A simulated servo with this rate in radians per second.
+    Simulated(f64),
+    /// A servo on a PWM output.
+    Pwm {
+        /// The chip, such as `/sys/class/pwm/pwmchip0`.
+        chip: std::path::PathBuf,
+        /// The output of the chip.
+        channel: u32,
+        /// Pulse lengths and rate.
+        config: ServoConfig,
+    },
+}
+
+/// A motor controller on a serial line.
+#[cfg(feature = "serial")]
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sabertooth {
+    /// The serial line, such as `/dev/ttyUSB0`.
+    pub device: String,
+    /// Bits per second of the line.
+    pub baud: u32,
+    /// The controller's address, 128 to 135.
+    pub address: u8,
+    /// Top speed and lag of the motors, from which the travel is estimated, and their deadline.
+    pub motor: MotorConfig,
+}
+
+#[cfg(feature = "serial")]
+impl Sabertooth {
+    fn start(&self) -> Result<[Box<dyn Actuator>; 2], PartError> {
+        let started = serial2::SerialPort::open(&self.device, self.baud)
+            .and_then(|line| SabertoothMotor::start(line, self.address, self.motor));
+        let motors = started.map_err(|error| {
+            PartError::Broken(format!(
+                "cannot use the motor controller on {}: {error}; check the device and the group of \
+                 its file, usually dialout",
+                self.device
+            ))
+        })?;
+        Ok(motors.map(|motor| Box::new(motor) as _))
+    }
+}
+
+impl SteeringGear {
+    /// Simulated steering.
+    #[must_use]
+    pub const fn simulated(geometry: Ackermann) -> Self {
+        Self {
+            geometry,
+            servo: Servo::Simulated(SimulatedServo::RATE),
+        }
+    }
+}
+
+impl Servo {
+    fn start(&self) -> Result<Box<dyn Steering>, PartError> {
+        match self {
+            Self::Simulated(rate) => Ok(Box::new(SimulatedServo::new(*rate))),
+            Self::Pwm {
+                chip,
+                channel,
+                config,
+            } => match PwmServo::open(chip, *channel, *config) {
+                Ok(servo) => Ok(Box::new(servo)),
+                Err(error) => Err(PartError::Broken(error.to_string())),
+            },
+        }
+    }
 }
 
 /// The stop input on the vehicle.
@@ -94,12 +186,51 @@ impl Stop {
 
 /// The hardware of a primitive driver.
 pub struct Hardware {
-    /// The drive of the left side.
-    pub left: Box<dyn Actuator>,
-    /// The drive of the right side.
-    pub right: Box<dyn Actuator>,
+    /// The drives, and the steering if the vehicle has one.
+    pub drives: Drives,
     /// The stop input, if there is one.
     pub stop: Option<Box<dyn StopInput>>,
+}
+
+/// The drives of a vehicle.
+pub enum Drives {
+    /// A drive on each side.
+    Sides {
+        /// The drive of the left side.
+        left: Box<dyn Actuator>,
+        /// The drive of the right side.
+        right: Box<dyn Actuator>,
+    },
+    /// One drive and steered front wheels.
+    Steered {
+        /// The drive of the rear axle.
+        drive: Box<dyn Actuator>,
+        /// The steering of the front axle.
+        steering: Box<dyn Steering>,
+        /// Wheelbase and largest steering angle.
+        geometry: Ackermann,
+    },
+}
+
+impl Drives {
+    /// A pilot for these drives.
+    fn pilot(self, config: WheelsConfig, odometer: Odometer, interlock: Interlock) -> Pilot {
+        let frame = Frame::default();
+        match self {
+            Self::Sides { left, right } => {
+                let wheels = Wheels::new(left, right, config, odometer);
+                Pilot::new(wheels.with_interlock(interlock), frame)
+            }
+            Self::Steered {
+                drive,
+                steering,
+                geometry,
+            } => {
+                let wheels = Wheels::steered(drive, steering, config, geometry, odometer);
+                Pilot::new(wheels.with_interlock(interlock), frame)
+            }
+        }
+    }
 }
 
 impl std::fmt::Debug for Hardware {
@@ -128,6 +259,7 @@ impl Default for PrimitiveDriver {
     fn default() -> Self {
         Self {
             motors: Motors::Simulated(MotorConfig::default()),
+            steering: None,
             stop: None,
             wheels: WheelsConfig::default(),
             fence: FenceConfig::default(),
@@ -138,42 +270,72 @@ impl Default for PrimitiveDriver {
 }
 
 impl Motors {
-    fn start(&self) -> Result<[Box<dyn Actuator>; 2], PartError> {
+    /// Starts the motors of both sides.
+    fn start_both(&self) -> Result<[Box<dyn Actuator>; 2], PartError> {
+        match self {
+            #[cfg(feature = "serial")]
+            Self::Sabertooth(controller) => controller.start(),
+            _ => Ok([self.start(Side::Left)?, self.start(Side::Right)?]),
+        }
+    }
+
+    /// Starts the motor of a side. The left one is the first of a controller.
+    fn start(&self, side: Side) -> Result<Box<dyn Actuator>, PartError> {
         match self {
             Self::Simulated(config) => {
-                let right = MotorConfig {
-                    seed: config.seed.wrapping_add(1),
+                let seed = config.seed.wrapping_add(u64::from(side == Side::Right));
+                Ok(Box::new(SimulatedMotor::new(MotorConfig {
+                    seed,
                     ..*config
-                };
-                Ok([*config, right].map(|config| Box::new(SimulatedMotor::new(config)) as _))
+                })))
+            }
+            #[cfg(feature = "serial")]
+            Self::Sabertooth(controller) => {
+                let [left, right] = controller.start()?;
+                Ok(if side == Side::Left { left } else { right })
             }
             #[cfg(all(feature = "gpio", target_os = "linux"))]
-            Self::Gpio(motors) => motors.start(),
+            Self::Gpio(motors) => motors.start(side),
         }
     }
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Left,
+    Right,
+}
+
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 impl GpioMotors {
-    fn start(&self) -> Result<[Box<dyn Actuator>; 2], PartError> {
-        let start = |(step, direction), reversed| -> Result<Box<dyn Actuator>, PartError> {
-            let broken = |why: String| PartError::Broken(why);
-            let lines = crate::actuator::GpioLines::open(&self.chip, step, direction, reversed);
-            let lines = lines.map_err(|error| broken(error.to_string()))?;
-            let motor = crate::actuator::PulseMotor::start(self.stepper, lines);
-            let motor =
-                motor.map_err(|error| broken(format!("cannot start the pulse thread: {error}")))?;
-            Ok(Box::new(motor))
-        };
-        Ok([start(self.left, false)?, start(self.right, true)?])
+    fn start(&self, side: Side) -> Result<Box<dyn Actuator>, PartError> {
+        let broken = |why: String| PartError::Broken(why);
+        let is_right = side == Side::Right;
+        let (step, direction) = if is_right { self.right } else { self.left };
+        let lines = crate::actuator::GpioLines::open(&self.chip, step, direction, is_right);
+        let lines = lines.map_err(|error| broken(error.to_string()))?;
+        let motor = crate::actuator::PulseMotor::start(self.stepper, lines);
+        let motor =
+            motor.map_err(|error| broken(format!("cannot start the pulse thread: {error}")))?;
+        Ok(Box::new(motor))
     }
 }
 
 impl Part for PrimitiveDriver {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
-        let [left, right] = self.motors.start()?;
+        let drives = match &self.steering {
+            None => {
+                let [left, right] = self.motors.start_both()?;
+                Drives::Sides { left, right }
+            }
+            Some(SteeringGear { geometry, servo }) => Drives::Steered {
+                drive: self.motors.start(Side::Left)?,
+                steering: servo.start()?,
+                geometry: *geometry,
+            },
+        };
         let stop = self.stop.as_ref().map(Stop::open).transpose()?;
-        self.run_on(Hardware { left, right, stop }, slot).await
+        self.run_on(Hardware { drives, stop }, slot).await
     }
 }
 
@@ -181,22 +343,29 @@ impl PrimitiveDriver {
     /// Report rate requested from the pose sensor, in hertz.
     const HZ: f64 = 10.0;
 
-    /// Runs on custom hardware in place of [`motors`](Self::motors) and [`stop`](Self::stop).
+    /// Sets the steering of the front wheels.
+    #[must_use]
+    pub fn steering(mut self, gear: Option<SteeringGear>) -> Self {
+        self.steering = gear;
+        self
+    }
+
+    /// Runs on custom hardware in place of [`motors`](Self::motors), [`steering`](Self::steering)
+    /// and [`stop`](Self::stop).
     ///
     /// # Errors
     /// Why the component cannot continue.
     pub async fn run_on(self, hardware: Hardware, slot: Slot) -> Result<Infallible, PartError> {
-        let Hardware { left, right, stop } = hardware;
+        let Hardware { drives, stop } = hardware;
         let interlock = Interlock::default();
         let stop = stop.map(|input| StopLine::start(input, interlock.clone()));
         let stop = stop.transpose().map_err(|error| {
             PartError::Broken(format!("cannot start the stop input thread: {error}"))
         })?;
         let odometer = Odometer::new(random());
-        let wheels = Wheels::new(left, right, self.wheels, odometer.clone());
-        let wheels = wheels.with_interlock(interlock.clone());
         let fence = Fence::located_elsewhere(self.fence);
-        let pilot = Pilot::new(wheels, Frame::default()).with_fence(fence.clone());
+        let pilot = drives.pilot(self.wheels, odometer.clone(), interlock.clone());
+        let pilot = pilot.with_fence(fence.clone());
         let policy = MotionPolicy::Expire(self.silence);
         let vehicle = Vehicle::new(pilot).motion_policy(policy);
         let board = StageBoard::default();

@@ -50,6 +50,13 @@ impl Default for VectorDriver {
 impl VectorDriver {
     /// Report rate requested from the sensors, in hertz.
     const HZ: f64 = 25.0;
+
+    /// Sets the vehicle's least turning radius in metres; 0 if it turns on the spot.
+    #[must_use]
+    pub const fn turning_radius(mut self, radius: f64) -> Self {
+        self.limits.turning_radius = radius;
+        self
+    }
 }
 
 impl Part for VectorDriver {
@@ -79,7 +86,7 @@ impl Part for VectorDriver {
             remote_platform: remote_platform.clone(),
             fence: fence.clone(),
             board,
-            language: Efforts(Throttle::new(self.limits)),
+            language: Efforts::new(self.limits),
             authority: self.authority,
             settling: self.silence,
             sensors: FaultMonitor::default(),
@@ -95,7 +102,14 @@ impl Part for VectorDriver {
 }
 
 /// Command interface of the primitive driver.
-struct Efforts(Throttle);
+pub(super) struct Efforts(Throttle);
+
+impl Efforts {
+    /// Creates the commands to a vehicle whose full effort reaches these limits.
+    pub(super) const fn new(limits: Limits) -> Self {
+        Self(Throttle::new(limits))
+    }
+}
 
 impl Language for Efforts {
     type Command = SetWrenchEffort;

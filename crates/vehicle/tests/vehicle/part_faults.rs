@@ -9,160 +9,27 @@
     reason = "a test with sockets"
 )]
 
-use std::future::Future;
 use std::path::PathBuf;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use jaus::address::JausId;
-use jaus::component::{Component, Control, Kind, State};
-use jaus::link::Group;
-use jaus::messages::core::{QueryStatus, Shutdown};
+use jaus::component::State;
+use jaus::messages::core::Shutdown;
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::messages::mobility::{
     QueryLocalPose, SetLocalVector, SetWrenchEffort, local_vector_driver, primitive_driver,
 };
-use jaus::node::{Config, Node};
-use jaus_test_kit::group::own_group;
-use jaus_test_kit::waiting::{LIMIT, within_limit};
-use jaus_vehicle::actuator::{Actuator, MotorConfig, SimulatedMotor, SimulatedStop};
-use jaus_vehicle::ground::{StageReport, StageState};
-use jaus_vehicle::messages::ground::{QueryStage, QueryWheelOdometry};
-use jaus_vehicle::parts::{
-    Hardware, Part, PartError, PoseSensor, PrimitiveDriver, Slot, VectorDriver, VelocitySensor,
+use jaus_test_kit::waiting::LIMIT;
+use jaus_vehicle::actuator::{
+    Actuator, MotorConfig, SimulatedMotor, SimulatedServo, SimulatedStop,
 };
-use tokio::task::JoinHandle;
+use jaus_vehicle::ground::StageState;
+use jaus_vehicle::messages::ground::QueryWheelOdometry;
+use jaus_vehicle::motion::Ackermann;
+use jaus_vehicle::parts::VelocitySensor;
+use jaus_vehicle::parts::{Drives, Hardware, Part, PoseSensor, PrimitiveDriver, VectorDriver};
 
-const PRIMITIVE: JausId = JausId::new(101, 33, 33);
-const POSE: JausId = JausId::new(101, 41, 41);
-const VELOCITY: JausId = JausId::new(101, 42, 42);
-const VECTOR: JausId = JausId::new(101, 44, 44);
-/// A client and the multicast group that it shares with the parts.
-struct Scene {
-    group: Group,
-    client: Component,
-    _node: Node,
-}
-
-/// A part that runs until it is stopped.
-struct Running(Node, JoinHandle<()>);
-
-impl Running {
-    async fn stop(self) {
-        self.1.abort();
-        let _ = self.1.await;
-        self.0.shutdown().await;
-    }
-}
-
-impl Scene {
-    fn new() -> Self {
-        let group = own_group();
-        let node = Node::start(Config::loopback(42, 1).group(group)).unwrap();
-        let client = Component::builder(Kind::OperatorControlUnit, "Operator");
-        Self {
-            group,
-            client: client.attach(&node, 1).unwrap(),
-            _node: node,
-        }
-    }
-
-    fn start<F>(&self, id: JausId, run: impl FnOnce(Slot) -> F) -> Running
-    where
-        F: Future<Output = Result<std::convert::Infallible, PartError>> + Send + 'static,
-    {
-        let config = Config::loopback(id.subsystem(), id.node()).group(self.group);
-        let node = Node::start(config).unwrap();
-        let part = run(Slot {
-            port: node.attach(id.component()).unwrap(),
-            node: Some(node.clone()),
-            kind: Kind::Vehicle,
-            name: "Rover".to_owned(),
-        });
-        let task = tokio::spawn(async move {
-            match part.await {
-                Err(PartError::ShutDown) => {}
-                Err(error) => panic!("{id} cannot go on: {error}"),
-            }
-        });
-        Running(node, task)
-    }
-
-    /// Takes control and makes the component Ready.
-    async fn control(&self, id: JausId, urn: &str) -> Control {
-        self.until("control", || async {
-            if self.client.find(urn).await.is_err() {
-                return None;
-            }
-            let control = self.client.control(id, 200).await.ok()?;
-            control.resume().await.ok()?;
-            Some(control)
-        })
-        .await
-    }
-
-    async fn state(&self, id: JausId) -> Option<u8> {
-        let report = self.client.query(id, &QueryStatus {}).await.ok()?;
-        Some(report.status.0)
-    }
-
-    async fn stage(&self, id: JausId) -> Option<StageReport> {
-        let report = self.client.query(id, &QueryStage {}).await.ok()?;
-        Some(StageReport::from(&report))
-    }
-
-    async fn wheels(&self) -> (f64, f64) {
-        let query = QueryWheelOdometry {};
-        let report = self.client.query(PRIMITIVE, &query).await.unwrap();
-        (report.left, report.right)
-    }
-
-    /// Waits until both wheels stand still. Returns their travel.
-    async fn comes_to_rest(&self) -> (f64, f64) {
-        let mut before = self.wheels().await;
-        within_limit(async {
-            loop {
-                tokio::time::sleep(Duration::from_millis(300)).await;
-                let now = self.wheels().await;
-                if std::mem::replace(&mut before, now) == now {
-                    return now;
-                }
-            }
-        })
-        .await
-    }
-
-    /// Repeats an attempt until it returns a value.
-    async fn until<T, F: Future<Output = Option<T>>>(
-        &self,
-        what: &str,
-        mut attempt: impl FnMut() -> F,
-    ) -> T {
-        let start = Instant::now();
-        loop {
-            if let Some(answer) = attempt().await {
-                return answer;
-            }
-            assert!(start.elapsed() < LIMIT, "{what}: in vain");
-            tokio::time::sleep(Duration::from_millis(50)).await;
-        }
-    }
-
-    /// Repeats a command until a component is in a given state.
-    async fn until_state(
-        &self,
-        id: JausId,
-        state: State,
-        control: &Control,
-        command: &impl jaus::codec::Message,
-    ) {
-        self.until(&format!("{id} in {state}"), || async {
-            let _ = control.send(command);
-            (self.state(id).await == Some(state as u8)).then_some(())
-        })
-        .await;
-    }
-}
+use crate::scene::{POSE, PRIMITIVE, Running, Scene, VECTOR, VELOCITY};
 
 fn ahead() -> SetWrenchEffort {
     let mut effort = SetWrenchEffort::default();
@@ -176,8 +43,10 @@ async fn a_motor_fault_stops_both_sides_and_is_a_failure_until_it_is_gone() {
     let [left, right] = [(); 2].map(|()| SimulatedMotor::new(MotorConfig::default()));
     let switch = right.fault_switch();
     let hardware = Hardware {
-        left: Box::new(left),
-        right: Box::new(right),
+        drives: Drives::Sides {
+            left: Box::new(left),
+            right: Box::new(right),
+        },
         stop: None,
     };
     let running = scene.start(PRIMITIVE, |slot| {
@@ -262,6 +131,41 @@ async fn a_sensor_that_stays_away_is_a_failure_of_the_driver_until_it_is_back() 
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_fault_of_the_steering_stops_the_drive_and_is_a_failure() {
+    let scene = Scene::new();
+    let servo = SimulatedServo::new(SimulatedServo::RATE);
+    let switch = servo.fault_switch();
+    let hardware = Hardware {
+        drives: Drives::Steered {
+            drive: Box::new(SimulatedMotor::new(MotorConfig::default())),
+            steering: Box::new(servo),
+            geometry: Ackermann::default(),
+        },
+        stop: None,
+    };
+    let running = scene.start(PRIMITIVE, |slot| {
+        PrimitiveDriver::default().run_on(hardware, slot)
+    });
+    let control = scene.control(PRIMITIVE, primitive_driver::URN).await;
+    let mut effort = ahead();
+    effort
+        .set_propulsive_rotational_effort_z_percent(100.0)
+        .unwrap();
+    scene
+        .until("a right turn", || async {
+            control.send(&effort).unwrap();
+            let (left, right) = scene.wheels().await;
+            (left > right + 0.1).then_some(())
+        })
+        .await;
+    switch.fail("no answer from the servo");
+    scene
+        .until_state(PRIMITIVE, State::Failure, &control, &effort)
+        .await;
+    running.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
     let scene = Scene::new();
     let [left, right] = [(); 2].map(|()| {
@@ -270,7 +174,8 @@ async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
     });
     let button = SimulatedStop::default();
     let stop = Some(Box::new(button.clone()) as _);
-    let hardware = Hardware { left, right, stop };
+    let drives = Drives::Sides { left, right };
+    let hardware = Hardware { drives, stop };
     let running = scene.start(PRIMITIVE, |slot| {
         PrimitiveDriver::default().run_on(hardware, slot)
     });
@@ -323,8 +228,10 @@ async fn motors_are_commanded_to_stop_when_the_part_is_stopped() {
     let scene = Scene::new();
     let last = std::sync::Arc::<std::sync::Mutex<jaus_vehicle::actuator::Command>>::default();
     let hardware = Hardware {
-        left: Box::new(Shown(last.clone())),
-        right: Box::new(SimulatedMotor::new(MotorConfig::default())),
+        drives: Drives::Sides {
+            left: Box::new(Shown(last.clone())),
+            right: Box::new(SimulatedMotor::new(MotorConfig::default())),
+        },
         stop: None,
     };
     let running = scene.start(PRIMITIVE, |slot| {

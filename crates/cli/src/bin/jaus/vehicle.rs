@@ -243,6 +243,7 @@ impl Simulation {
             deceleration: 2.0 * self.acceleration,
             yaw_rate: self.yaw_rate,
             yaw_acceleration: 2.0 * self.yaw_rate,
+            turning_radius: 0.0,
         };
         let platform = SkidSteer::new(SkidSteerConfig {
             limits,

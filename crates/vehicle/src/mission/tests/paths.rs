@@ -22,10 +22,11 @@ fn map(picture: &[&str]) -> Terrain {
 const THIN: Vehicle = Vehicle {
     width: 0.0,
     margin: 0.0,
+    turning_radius: 0.0,
 };
 
 fn wide(width: f64) -> Vehicle {
-    Vehicle { width, margin: 0.0 }
+    Vehicle { width, ..THIN }
 }
 
 /// Distance of the path from the nearest centre of a closed cell.

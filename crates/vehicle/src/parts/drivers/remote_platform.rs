@@ -46,6 +46,7 @@ pub(in crate::parts) enum Order {
 
 /// The action possible now.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "one at a time, used up at once")]
 pub(in crate::parts) enum Plan {
     /// There is no order.
     Rest,
@@ -177,19 +178,17 @@ impl Platform for RemotePlatform {
         };
     }
 
-    fn head(&mut self, heading: f64, speed: f64, limits: &Limits) {
-        if !heading.is_finite() || !speed.is_finite() {
-            return self.drive(Drive::Stop);
+    fn head(&mut self, heading: f64, speed: f64) -> bool {
+        let mut state = self.lock();
+        if !state.settings.by_heading {
+            return false;
         }
-        if !self.lock().settings.by_heading {
-            let yaw = self.motion().pose.yaw;
-            let velocity = crate::motion::along(yaw, heading, speed, limits);
-            return self.drive(Drive::Velocity(limits.clamp(velocity)));
-        }
-        self.lock().order = Some(Order::Heading {
+        let is_known = heading.is_finite() && speed.is_finite();
+        state.order = is_known.then(|| Order::Heading {
             heading: crate::motion::wrap(heading),
-            speed: speed.clamp(0.0, limits.speed),
+            speed: speed.clamp(0.0, state.limits.speed),
         });
+        true
     }
 
     fn limits(&self) -> Limits {
@@ -257,7 +256,7 @@ mod tests {
         let mut remote_platform = remote_platform(true);
         let now = Instant::now();
         remote_platform.handle_pose(now, None, Some((0.0, 0.0, 0.0)));
-        remote_platform.head(4.0, 9.0, &Limits::default());
+        assert!(remote_platform.head(4.0, 9.0));
         let Plan::Go(Order::Heading { heading, speed }, _) = remote_platform.plan(now) else {
             panic!("it can go");
         };
@@ -273,7 +272,7 @@ mod tests {
         let mut plan = |count: u32, stamp: u32| {
             let now = start + period * count;
             remote_platform.handle_time(now);
-            remote_platform.head(0.0, 1.0, &Limits::default());
+            remote_platform.head(0.0, 1.0);
             let stamp = Duration::from_secs(3600) + period * stamp;
             remote_platform.handle_pose(now, Some(stamp), Some((1.0, 2.0, 0.5)));
             remote_platform.plan(now)
@@ -293,7 +292,7 @@ mod tests {
         let mut remote_platform = remote_platform(true);
         let start = Instant::now();
         remote_platform.handle_time(start);
-        remote_platform.head(0.0, 1.0, &Limits::default());
+        remote_platform.head(0.0, 1.0);
         let later = start + CommandDeadline::DEFAULT;
         remote_platform.handle_pose(later, None, Some((0.0, 0.0, 0.0)));
         assert!(matches!(remote_platform.plan(later), Plan::Go(..)));
@@ -305,7 +304,7 @@ mod tests {
     fn a_heading_that_is_no_number_is_no_order() {
         for by_heading in [true, false] {
             let mut remote_platform = remote_platform(by_heading);
-            remote_platform.head(f64::NAN, 1.0, &Limits::default());
+            assert_eq!(remote_platform.head(f64::NAN, 1.0), by_heading);
             assert_eq!(remote_platform.plan(Instant::now()), Plan::Rest);
         }
     }

@@ -8,16 +8,17 @@ use std::time::Instant;
 use super::RemotePlatform;
 use super::freshness::{Freshness, time_in_month};
 use crate::ground::reported_zones;
-use crate::motion::{Fence, Pose};
+use crate::mobility::Vehicle;
+use crate::motion::{Fence, Frame, GlobalPose, Pose};
 use crate::parts::PartError;
 use crate::zones::Zones;
 use jaus::address::JausId;
 use jaus::codec::{Message, Query};
 use jaus::component::{Audience, Component, GroupSubscription, GroupUpdate, When};
 use jaus::messages::mobility::{
-    QueryLocalOperatingZone, QueryLocalPose, QueryVelocityState, ReportLocalOperatingZone,
-    ReportLocalPose, ReportVelocityState, local_operating_zone, local_pose_sensor,
-    velocity_state_sensor,
+    QueryGlobalPose, QueryLocalOperatingZone, QueryLocalPose, QueryVelocityState, ReportGlobalPose,
+    ReportLocalOperatingZone, ReportLocalPose, ReportVelocityState, global_pose_sensor,
+    local_operating_zone, local_pose_sensor, velocity_state_sensor,
 };
 
 /// The reports of one sensor of the own subsystem, whichever provides them at the time.
@@ -171,6 +172,65 @@ impl Sense<ReportLocalOperatingZone> {
     ) -> Result<Infallible, PartError> {
         loop {
             fence.set_zones(self.next_zones().await?);
+        }
+    }
+}
+
+impl Sense<ReportGlobalPose> {
+    /// Distance from the origin in metres up to which a local frame is accurate enough.
+    const REACH: f64 = 5000.0;
+
+    /// The pose on the globe, with its standard error.
+    pub(in crate::parts) fn global_pose(component: &Component, hz: f64) -> Result<Self, PartError> {
+        let query = QueryGlobalPose::none()
+            .with_latitude()
+            .with_longitude()
+            .with_yaw()
+            .with_position_rms()
+            .with_time_stamp();
+        Self::of(
+            component,
+            global_pose_sensor::URN,
+            &query,
+            hz,
+            "global pose",
+        )
+    }
+
+    /// Passes all reports to a remote platform, in the vehicle's local frame. The frame is moved to
+    /// the vehicle when it is far away and at rest. A position with a greater standard error than
+    /// `max_rms` metres is unknown.
+    pub(in crate::parts) async fn steer(
+        mut self,
+        remote_platform: &RemotePlatform,
+        vehicle: &Vehicle,
+        max_rms: f64,
+    ) -> Result<Infallible, PartError> {
+        loop {
+            let report = self.next().await?;
+            let now = Instant::now();
+            if self.take_loss() {
+                remote_platform.handle_pose(now, None, None);
+            }
+            let is_certain = report.position_rms_m().is_none_or(|rms| rms <= max_rms);
+            let place = report.latitude_deg().zip(report.longitude_deg());
+            let place = place.zip(report.yaw_rad()).filter(|_| is_certain);
+            let pose = place.map(|((latitude, longitude), yaw)| {
+                let global = GlobalPose {
+                    latitude,
+                    longitude,
+                    yaw,
+                    ..GlobalPose::default()
+                };
+                let mut local = vehicle.frame().to_local(&global);
+                if local.distance(0.0, 0.0) > Self::REACH && !vehicle.is_under_way() {
+                    vehicle.set_frame(Frame::at(latitude, longitude));
+                    local = vehicle.frame().to_local(&global);
+                }
+                (local.x, local.y, local.yaw)
+            });
+            let stamp = report.time_stamp.and_then(time_in_month);
+            remote_platform.handle_pose(now, stamp, pose);
         }
     }
 }

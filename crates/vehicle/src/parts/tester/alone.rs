@@ -6,9 +6,10 @@ use std::path::PathBuf;
 
 use tokio::task::{AbortHandle, JoinSet};
 
+use crate::motion::Ackermann;
 use crate::parts::{
     KnowledgeStore, Part, PartError, PathDriver, Planner, PoseSensor, PrimitiveDriver, Slot,
-    VectorDriver, VelocitySensor,
+    SteeringGear, VectorDriver, VelocitySensor,
 };
 use jaus::component::Kind;
 use jaus::node::{Config, Node, StartError};
@@ -19,6 +20,8 @@ pub struct Alone {
     subsystem: u16,
     /// Directory for the store's file and the pose sensor's pose.
     directory: PathBuf,
+    /// The geometry of a vehicle with steered wheels.
+    steering: Option<Ackermann>,
     running: BTreeMap<u8, (Node, AbortHandle)>,
     tasks: JoinSet<PartError>,
 }
@@ -41,17 +44,23 @@ impl Alone {
     pub const PARTS: [u8; 7] = [33, 36, 41, 42, 44, 48, 61];
 
     /// Starts all parts, each as component C on node C of a subsystem. They store their files in
-    /// `directory`.
+    /// `directory`. With `steering` the front wheels are steered; without, the vehicle turns on the
+    /// spot.
     ///
     /// # Errors
     /// If a node cannot start.
     ///
     /// # Panics
     /// Outside a tokio runtime.
-    pub fn start(subsystem: u16, directory: impl Into<PathBuf>) -> Result<Self, AloneError> {
+    pub fn start(
+        subsystem: u16,
+        directory: impl Into<PathBuf>,
+        steering: Option<Ackermann>,
+    ) -> Result<Self, AloneError> {
         let mut alone = Self {
             subsystem,
             directory: directory.into(),
+            steering,
             running: BTreeMap::new(),
             tasks: JoinSet::new(),
         };
@@ -73,13 +82,17 @@ impl Alone {
             kind: Kind::Vehicle,
             name: "Tested".to_owned(),
         };
+        let radius = self.steering.map_or(0.0, |it| it.turning_radius());
         let task = match number {
-            33 => self.spawn(PrimitiveDriver::default(), slot),
-            36 => self.spawn(Planner::default(), slot),
+            33 => {
+                let gear = self.steering.map(SteeringGear::simulated);
+                self.spawn(PrimitiveDriver::default().steering(gear), slot)
+            }
+            36 => self.spawn(Planner::default().turning_radius(radius), slot),
             41 => self.spawn(PoseSensor::default(), slot),
             42 => self.spawn(VelocitySensor::default(), slot),
-            44 => self.spawn(VectorDriver::default(), slot),
-            48 => self.spawn(PathDriver::default(), slot),
+            44 => self.spawn(VectorDriver::default().turning_radius(radius), slot),
+            48 => self.spawn(PathDriver::default().turning_radius(radius), slot),
             _ => {
                 let store = KnowledgeStore {
                     file: self.directory.join(KnowledgeStore::FILE),

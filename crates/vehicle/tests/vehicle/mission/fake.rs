@@ -244,6 +244,7 @@ fn settings() -> Planner {
         vehicle: Size {
             width: 0.6,
             margin: 0.1,
+            ..Size::default()
         },
         mission: Settings {
             pause: Duration::from_millis(200),
@@ -263,6 +264,7 @@ fn vehicle() -> Vehicle {
         deceleration: 10.0,
         yaw_rate: 6.0,
         yaw_acceleration: 30.0,
+        turning_radius: 0.0,
     };
     let mut pilot = Pilot::new(
         SkidSteer::new(SkidSteerConfig {

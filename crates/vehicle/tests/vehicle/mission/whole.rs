@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use jaus::component::{Component, Kind};
 use jaus::node::{Config, Node};
+use jaus_vehicle::motion::Ackermann;
 use jaus_vehicle::parts::tester::steps::{Step, all_pass};
 use jaus_vehicle::parts::tester::{Alone, MissionTest};
 
@@ -43,7 +44,7 @@ fn told(steps: &[Step]) -> String {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_mission_goes_through_the_whole_chain_though_the_path_driver_dies_on_the_way() {
     let directory = Directory::new("restart");
-    let mut alone = Alone::start(1111, &directory.0).unwrap();
+    let mut alone = Alone::start(1111, &directory.0, None).unwrap();
     let (node, tester) = tester(1112).await;
     let test = MissionTest {
         subsystem: 1111,
@@ -63,6 +64,25 @@ async fn a_mission_goes_through_the_whole_chain_though_the_path_driver_dies_on_t
         }
     };
     let (steps, ()) = tokio::join!(running, killing);
+    assert!(all_pass(&steps), "{}", told(&steps));
+    drop(tester);
+    node.shutdown().await;
+    alone.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_vehicle_with_steered_wheels_drives_the_same_mission() {
+    let directory = Directory::new("steered");
+    let steering = Some(Ackermann::default());
+    let alone = Alone::start(1113, &directory.0, steering).unwrap();
+    let (node, tester) = tester(1114).await;
+    let test = MissionTest {
+        subsystem: 1113,
+        patience: Duration::from_secs(60),
+        speed: 0.5,
+        ..MissionTest::default()
+    };
+    let steps = test.run(&tester, |_| {}).await;
     assert!(all_pass(&steps), "{}", told(&steps));
     drop(tester);
     node.shutdown().await;

@@ -13,9 +13,10 @@ use jaus::node::Node;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::runtime;
 use jaus_ocu::Station;
+use jaus_vehicle::motion::Ackermann;
 use jaus_vehicle::parts::{
-    Communicator, DEBUG_ADDRESS, PathDriver, Planner, PoseSensor, PrimitiveDriver, VectorDriver,
-    VelocitySensor,
+    Communicator, DEBUG_ADDRESS, PathDriver, Planner, PoseSensor, PrimitiveDriver, SteeringGear,
+    VectorDriver, VelocitySensor,
 };
 
 use operator::{Ending, Operator};
@@ -31,6 +32,7 @@ use system::{OPERATOR, System, VEHICLE};
 #[command(after_help = "Examples:\n  \
     jaus demo                         with the page; runs until Ctrl-C\n  \
     jaus demo --stay                  starts no mission: drive on the page\n  \
+    jaus demo --ackermann             a vehicle that steers like a car\n  \
     jaus demo --headless              without the page; ends when the vehicle arrives\n  \
     jaus demo --to 3,-5 --headless --seconds 60")]
 pub(crate) struct Demo {
@@ -46,6 +48,10 @@ pub(crate) struct Demo {
     /// The destination: NORTH,EAST of the start in metres
     #[arg(long, value_name = "X,Y", default_value = "6,5", value_parser = place, allow_hyphen_values = true)]
     to: (f64, f64),
+
+    /// Steer the front wheels, as in a car, instead of turning on the spot
+    #[arg(long)]
+    ackermann: bool,
 
     /// Start no mission
     #[arg(long, conflicts_with = "headless")]
@@ -90,6 +96,8 @@ impl Demo {
 
     /// Starts everything; returns the operator's component.
     async fn start(&self, system: &mut System, story: &mut Story) -> Result<Component, Failure> {
+        let geometry = self.ackermann.then(Ackermann::default);
+        let radius = geometry.map_or(0.0, |it| it.turning_radius());
         let vehicle = system.node(VEHICLE, 1)?;
         start_part(
             system,
@@ -106,7 +114,7 @@ impl Demo {
             &wheels,
             33,
             "primitive driver",
-            PrimitiveDriver::default(),
+            PrimitiveDriver::default().steering(geometry.map(SteeringGear::simulated)),
         )?;
         start_part(
             system,
@@ -131,7 +139,7 @@ impl Demo {
             &mind,
             44,
             "local vector driver",
-            VectorDriver::default(),
+            VectorDriver::default().turning_radius(radius),
         )?;
         start_part(
             system,
@@ -139,7 +147,7 @@ impl Demo {
             &mind,
             48,
             "local path segment driver",
-            PathDriver::default(),
+            PathDriver::default().turning_radius(radius),
         )?;
         start_part(
             system,
@@ -149,7 +157,8 @@ impl Demo {
             "vector knowledge store",
             system.store(),
         )?;
-        start_part(system, story, &mind, 36, "planner", Planner::default())?;
+        let planner = Planner::default().turning_radius(radius);
+        start_part(system, story, &mind, 36, "planner", planner)?;
         let desk = system.node(OPERATOR, 1)?;
         if !self.headless {
             let station = Station::default().open().await.map_err(Failure::of)?;

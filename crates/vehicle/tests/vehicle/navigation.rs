@@ -1,0 +1,232 @@
+//! Navigation with satellites: a receiver on a serial line, and a vehicle that drives to a waypoint
+//! on the globe by a fused pose.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test with sockets"
+)]
+
+use std::fs::File;
+use std::io::Write;
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::component::State;
+use jaus::messages::mobility::{
+    QueryGlobalPose, ReportGlobalPose, SetGlobalVector, SetGlobalWaypoint, SetTravelSpeed,
+    global_waypoint_driver,
+};
+use jaus_vehicle::messages::ground::QueryWheelOdometry;
+use jaus_vehicle::motion::{Ackermann, DeadReckoning, Frame, GlobalPose, Pose, WheelCount};
+use jaus_vehicle::parts::{
+    GlobalDriver, GlobalPoseSensor, NavigationInputs, Part, PrimitiveDriver, SteeringGear,
+    VelocitySensor,
+};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use tokio::sync::{mpsc, watch};
+
+use crate::scene::{PRIMITIVE, Scene, VELOCITY};
+
+const POSE: JausId = JausId::new(101, 43, 43);
+const DRIVER: JausId = JausId::new(101, 46, 46);
+
+fn here() -> Frame {
+    Frame::at(52.5, 13.4)
+}
+
+fn sentence(body: &str) -> String {
+    let sum = body.bytes().fold(0, |sum, octet| sum ^ octet);
+    format!("${body}*{sum:02X}\r\n")
+}
+
+/// Degrees and minutes.
+fn minutes(degrees: f64) -> String {
+    let whole = degrees.trunc();
+    format!("{:.6}", whole * 100.0 + (degrees - whole) * 60.0)
+}
+
+/// A position north and east of the equator, by a clock that shows midnight at `start`.
+fn gga(start: Instant, pose: &GlobalPose, hdop: f64) -> String {
+    let millis = start.elapsed().as_millis();
+    let (seconds, rest) = (millis / 1000, millis % 1000);
+    sentence(&format!(
+        "GNGGA,{:02}{:02}{:02}.{rest:03},{},N,{:0>12},E,4,12,{hdop},30.0,M,40.0,M,,",
+        seconds / 3600,
+        seconds / 60 % 60,
+        seconds % 60,
+        minutes(pose.latitude),
+        minutes(pose.longitude),
+    ))
+}
+
+async fn pose(scene: &Scene) -> Option<ReportGlobalPose> {
+    scene.client.query(POSE, &QueryGlobalPose::all()).await.ok()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_receiver_on_a_serial_line_gives_a_position_that_does_not_outlive_its_fix() {
+    let scene = Scene::new();
+    let end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
+    grantpt(&end).unwrap();
+    unlockpt(&end).unwrap();
+    let device = ptsname(&end, Vec::new()).unwrap();
+    let mut line = File::from(end);
+    let sensor = GlobalPoseSensor {
+        receiver: device.into_string().unwrap(),
+        ..GlobalPoseSensor::default()
+    };
+    let running = scene.start(POSE, |slot| sensor.run(slot));
+    let place = here().to_global(&Pose::default());
+    let start = Instant::now();
+    // Between good sentences: noise, half a sentence, a wrong checksum, no fix.
+    let good = move || {
+        let good = gga(start, &place, 0.8);
+        let wrong = good.replace("5230", "5231");
+        format!(
+            "\u{fffd}{}{wrong}{}{good}",
+            &good[..25],
+            sentence("GNRMC,,V,,,,,,,,,")
+        )
+    };
+    let report = scene.until("a position", || {
+        line.write_all(good().as_bytes()).unwrap();
+        async { pose(&scene).await.filter(|it| it.latitude.is_some()) }
+    });
+    let report = report.await;
+    assert!((report.latitude_deg().unwrap() - 52.5).abs() < 1e-6);
+    assert!((report.longitude_deg().unwrap() - 13.4).abs() < 1e-6);
+    assert!((report.altitude_m().unwrap() - 70.0).abs() < 0.1);
+    assert!((0.001..0.1).contains(&report.position_rms_m().unwrap()));
+    assert!(report.yaw.is_none(), "unknown before it has moved");
+    // The receiver repeats its last fix: it has stopped measuring.
+    let frozen = good();
+    scene
+        .until("no position", || {
+            line.write_all(frozen.as_bytes()).unwrap();
+            async { pose(&scene).await.filter(|it| it.latitude.is_none()) }
+        })
+        .await;
+    scene
+        .until("a position again", || {
+            line.write_all(good().as_bytes()).unwrap();
+            async { pose(&scene).await.filter(|it| it.latitude.is_some()) }
+        })
+        .await;
+    running.stop().await;
+}
+
+/// The satellites over a simulated vehicle: its true pose follows from its wheels.
+struct Sky {
+    octets: mpsc::Sender<Vec<u8>>,
+    reckoning: DeadReckoning,
+    /// Error to the east in metres.
+    offset: watch::Receiver<f64>,
+    truth: watch::Sender<Pose>,
+}
+
+impl Sky {
+    async fn shine(mut self, scene: &Scene) {
+        let start = Instant::now();
+        loop {
+            tokio::time::sleep(Duration::from_millis(100)).await;
+            let Ok(report) = scene.client.query(PRIMITIVE, &QueryWheelOdometry {}).await else {
+                continue;
+            };
+            self.reckoning.handle_count(WheelCount::from(&report));
+            let truth = self.reckoning.pose();
+            self.truth.send_replace(truth);
+            let seen = Pose::at(truth.x, truth.y + *self.offset.borrow());
+            let gga = gga(start, &here().to_global(&seen), 0.8);
+            if self.octets.send(gga.into_bytes()).await.is_err() {
+                return;
+            }
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_vehicle_drives_to_a_waypoint_on_the_globe_and_stops_when_its_position_jumps() {
+    for geometry in [None, Some(Ackermann::default())] {
+        let scene = Scene::new();
+        let gear = geometry.map(SteeringGear::simulated);
+        let driver = PrimitiveDriver::default().steering(gear);
+        let running = [
+            scene.start(PRIMITIVE, |slot| driver.run(slot)),
+            scene.start(VELOCITY, |slot| VelocitySensor::default().run(slot)),
+        ];
+        let (octets, receiver) = mpsc::channel(16);
+        let start = Pose {
+            yaw: 1.0,
+            ..Pose::default()
+        };
+        let (offset, offset_receiver) = watch::channel(0.0);
+        let (truth, place) = watch::channel(start);
+        let sky = Sky {
+            octets,
+            reckoning: DeadReckoning::at(start),
+            offset: offset_receiver,
+            truth,
+        };
+        let sensor = GlobalPoseSensor {
+            heading: Some(start.yaw),
+            ..GlobalPoseSensor::default()
+        };
+        let inputs = NavigationInputs {
+            receiver,
+            gyro: None,
+        };
+        let sensor = scene.start(POSE, |slot| sensor.run_on(inputs, slot));
+        let radius = geometry.map_or(0.0, |it| it.turning_radius());
+        let driver = GlobalDriver::default().turning_radius(radius);
+        let driver = scene.start(DRIVER, |slot| driver.run(slot));
+        let drive = async {
+            let control = scene.control(DRIVER, global_waypoint_driver::URN).await;
+            let to = here().to_global(&Pose::at(-4.0, 3.0));
+            let mut waypoint = SetGlobalWaypoint::default();
+            waypoint.set_latitude_deg(to.latitude).unwrap();
+            waypoint.set_longitude_deg(to.longitude).unwrap();
+            let mut speed = SetTravelSpeed::default();
+            speed.set_speed_m_per_s(1.0).unwrap();
+            scene
+                .until("the waypoint", || async {
+                    let is_there = place.borrow().distance(-4.0, 3.0) < 0.8;
+                    // Before the first position, the waypoint is out of reach.
+                    if !is_there && place.borrow().distance(0.0, 0.0) < 0.1 {
+                        let _ = control.deliver(&waypoint).await;
+                        let _ = control.deliver(&speed).await;
+                        tokio::time::sleep(Duration::from_millis(500)).await;
+                    }
+                    is_there.then_some(())
+                })
+                .await;
+            let mut vector = SetGlobalVector::default();
+            vector.set_speed_m_per_s(1.0).unwrap();
+            vector.set_heading_rad(0.0).unwrap();
+            let north = place.borrow().x;
+            scene
+                .until("driving north", || async {
+                    let _ = control.send(&vector);
+                    (place.borrow().x > north + 2.0).then_some(())
+                })
+                .await;
+            // The receiver is deceived, or sees reflections: nobody knows which position is right.
+            offset.send_replace(40.0);
+            scene
+                .until_state(DRIVER, State::Failure, &control, &vector)
+                .await;
+            scene.comes_to_rest().await;
+        };
+        tokio::select! {
+            () = drive => {}
+            () = sky.shine(&scene) => panic!("the sensor has ended"),
+        }
+        driver.stop().await;
+        sensor.stop().await;
+        for part in running {
+            part.stop().await;
+        }
+    }
+}
