@@ -1,5 +1,9 @@
 //! A camera that publishes images of 1 MiB at 10 Hz, and a slow viewer that gets the latest one each
 //! time. Run it with `--features every-set`.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "an application has clocks and tasks"
+)]
 
 use std::time::{Duration, SystemTime};
 

@@ -1,5 +1,9 @@
 //! A vehicle that reports its speed to queries and subscriptions, until Ctrl-C.
 //! `cargo run --example client` subscribes to it.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "an application has clocks and tasks"
+)]
 
 use std::time::{Duration, SystemTime};
 

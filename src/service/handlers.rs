@@ -16,6 +16,9 @@ use crate::endpoint::Received;
 
 type Stop = Box<dyn FnMut(&mut Context<'_>) + Send>;
 
+/// The handlers of one message code, each for the layout that is a type.
+type Layouts = Vec<(TypeId, Box<dyn Handler>)>;
+
 /// A handler of one layout of a message.
 trait Handler: Send {
     /// Handles a message, or fails if its octets are no message of its type.
@@ -117,7 +120,7 @@ enum Taken {
 /// ```
 pub struct Handlers {
     offers: Vec<ServiceId>,
-    by_code: BTreeMap<u16, Vec<(TypeId, Box<dyn Handler>)>>,
+    by_code: BTreeMap<u16, Layouts>,
     told: BTreeSet<u16>,
     stops: Vec<Stop>,
     guard: MotionGuard,

@@ -22,7 +22,9 @@ pub(super) fn implement(out: &mut Writer, plan: &Plan<'_>, plans: &[Plan<'_>]) {
     let times = layout
         .as_ref()
         .map_or_else(Vec::new, |it| times(it, "self", &it.fields));
-    let needs_values = layout.is_none_or(|it| requires_any(&it, &it.fields));
+    let needs_values = layout
+        .as_ref()
+        .is_none_or(|it| requires_any(it, &it.fields));
     out.gap();
     if times.is_empty() && needs_values {
         out.push(format!("impl codec::Report for {} {{}}", plan.ident));
@@ -38,7 +40,11 @@ pub(super) fn implement(out: &mut Writer, plan: &Plan<'_>, plans: &[Plan<'_>]) {
     }
     if !needs_values {
         out.gap();
-        out.push("fn without_values() -> Option<Self> {\nSome(Self::default())\n}");
+        let is_unit = layout.is_some_and(|it| it.fields.is_empty());
+        let report = if is_unit { "Self" } else { "Self::default()" };
+        out.push(format!(
+            "fn without_values() -> Option<Self> {{\nSome({report})\n}}"
+        ));
     }
     out.push("}");
 }
