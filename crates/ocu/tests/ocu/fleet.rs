@@ -17,14 +17,6 @@ fn listed(fleet: &Value, subsystem: u16) -> &Value {
     found.unwrap_or(&Value::Null)
 }
 
-async fn select(page: &mut Page, subsystem: u16) {
-    page.ask(json!({"type": "select", "subsystem": subsystem}))
-        .await
-        .unwrap();
-    page.until(|state| state["vehicle"]["subsystem"] == subsystem)
-        .await;
-}
-
 async fn take_and_resume(page: &mut Page) {
     page.until(|state| !state["vehicle"]["pose"].is_null())
         .await;
@@ -92,7 +84,7 @@ async fn selecting_another_vehicle_stops_and_releases_the_one_that_is_driven() {
     page.fleet_until(|fleet| listed(fleet, 102)["state"] == "standby")
         .await;
     page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
-    select(&mut page, 102).await;
+    page.select(102).await;
     scene
         .until(|scene| !scene.is_controlled() && scene.speed() == 0.0)
         .await;
@@ -116,6 +108,7 @@ async fn a_mission_goes_on_while_another_vehicle_is_selected_and_is_released_at_
     let planner = planner(&scene, Arc::clone(&stage));
     let is_controlled = || planner.standing().controller.is_some();
     let mut page = scene.page().await;
+    page.select(101).await;
     page.until(|state| state["mission"]["stage"] == "awaiting_approval")
         .await;
     take_and_resume(&mut page).await;
@@ -127,7 +120,7 @@ async fn a_mission_goes_on_while_another_vehicle_is_selected_and_is_released_at_
         .await;
     page.fleet_until(|fleet| listed(fleet, 102)["state"] == "standby")
         .await;
-    select(&mut page, 102).await;
+    page.select(102).await;
     let driving = |fleet: &Value| {
         let first = listed(fleet, 101);
         first["mission"] == "driving" && first["held"] == true && first["selected"] == false
@@ -158,7 +151,7 @@ async fn a_page_does_not_select_another_vehicle_while_another_page_drives() {
         if let Err(refused) = selected {
             break refused;
         }
-        select(&mut other, 101).await;
+        other.select(101).await;
         take_and_resume(&mut driver).await;
     };
     assert!(refused.contains("another page is driving"), "{refused}");
@@ -173,7 +166,7 @@ async fn a_request_for_a_vehicle_that_is_not_selected_any_more_is_refused() {
     other
         .fleet_until(|fleet| listed(fleet, 102)["state"] == "standby")
         .await;
-    select(&mut other, 102).await;
+    other.select(102).await;
     let late = json!({"type": "control", "on": true, "vehicle": 101});
     let refused = page.ask(late).await.unwrap_err();
     assert_eq!(refused, "vehicle 101 is not selected any more");

@@ -131,6 +131,7 @@ impl Scene {
     /// The page of an operator who controls a vehicle that is Ready.
     pub(crate) async fn driver(&self) -> Page {
         let mut page = self.page().await;
+        page.select(101).await;
         page.until(|state| !state["vehicle"]["pose"].is_null())
             .await;
         page.ask(json!({"type": "control", "on": true}))
@@ -377,6 +378,20 @@ impl Page {
             Ok(frame) => frame,
             Err(_) => panic!("it never came to that: {last:#}"),
         }
+    }
+
+    /// Selects a vehicle as soon as it is listed.
+    pub(crate) async fn select(&mut self, subsystem: u16) {
+        self.fleet_until(|fleet| {
+            let mut listed = fleet.as_array().unwrap().iter();
+            listed.any(|it| it["subsystem"] == subsystem)
+        })
+        .await;
+        self.ask(json!({"type": "select", "subsystem": subsystem}))
+            .await
+            .unwrap();
+        self.until(|state| state["vehicle"]["subsystem"] == subsystem)
+            .await;
     }
 
     /// Sends a request without waiting for its result.
