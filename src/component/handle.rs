@@ -20,8 +20,8 @@ use crate::endpoint::{Outgoing, Received};
 use crate::messages;
 use crate::node;
 use crate::service::{
-    Change, Condition, Directory, Kind, NodeDirectory, Offer, QueryOptions, Service, Standing,
-    Topic, UnsafeService, When,
+    Change, Condition, Directory, Kind, LaterAnswer, NodeDirectory, Offer, QueryOptions, Service,
+    Standing, Topic, UnsafeService, When,
 };
 use crate::wire::Priority;
 
@@ -189,6 +189,19 @@ impl Component {
             ..Outgoing::new(self.id(), destination, payload)
         };
         Ok(self.shared.sender.deliver(outgoing).await?)
+    }
+
+    /// Answers a query that a service of this component has [put off](crate::service::Call::later).
+    ///
+    /// # Errors
+    /// Those of [`send`](Self::send).
+    pub fn answer<Q: Query>(
+        &self,
+        later: LaterAnswer<Q>,
+        report: Q::Report,
+    ) -> Result<(), SendError> {
+        self.shared.sender.send(later.into_outgoing(report)?)?;
+        Ok(())
     }
 
     /// Sends a query to a component, and waits for its report; repeats the query on timeout, but

@@ -81,18 +81,18 @@ mod subscription;
 mod watch;
 
 pub use crate::service::{
-    AccessControl, Audience, CannotSubscribe, Change, Condition, ControlLost, ControlRefused,
-    Directory, EventSettings, Handlers, Identification, Kind, Level, Liveness, Loss, Management,
-    Offer, Outage, Patience, QueryOptions, Rejection, Retake, Scope, Service, SessionLoss,
-    SessionSettings, SessionState, Standing, State, SubscriptionEnd, TargetState, Time, TimeOfDay,
-    Timing, When,
+    AccessControl, Audience, Call, CannotSubscribe, Change, Condition, ControlLost, ControlRefused,
+    Directory, EventSettings, Handlers, Identification, Kind, LaterAnswer, Level, Liveness, Loss,
+    Management, Offer, Outage, Patience, QueryOptions, Rejection, Retake, Scope, Service,
+    SessionLoss, SessionSettings, SessionState, Standing, State, SubscriptionEnd, TargetState,
+    Time, TimeOfDay, Timing, When,
 };
 pub use crate::wire::Priority;
 pub use builder::{AttachError, Builder};
 pub use control::Control;
 pub use error::{
-    ControlError, DeliverError, FindError, ManageError, QueryError, SendError, SessionError,
-    SubscribeError,
+    ControlError, DeliverError, FindError, ManageError, QueryError, SendError,
+    SessionError, SubscribeError,
 };
 pub use group::{GroupSubscription, GroupUpdate, Results};
 pub use handle::Component;

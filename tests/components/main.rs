@@ -15,5 +15,6 @@ mod examples;
 mod groups;
 mod offering;
 mod peers;
+mod servers;
 #[path = "../support/streams.rs"]
 mod streams;

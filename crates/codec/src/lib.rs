@@ -29,6 +29,7 @@ mod query;
 mod reader;
 mod registry;
 mod scale;
+mod service;
 mod text;
 #[cfg(feature = "serde")]
 pub mod view;
@@ -54,6 +55,7 @@ pub use reader::Reader;
 pub use registry::RandomMessage;
 pub use registry::{MessageInfo, Registry, ServiceId, ServiceInfo, ServiceSet};
 pub use scale::{OutOfRange, Rounding, Scale, Scaled};
+pub use service::{Call, Hazards, InternalEvent, Provider};
 pub use text::Text;
 pub use writer::Writer;
 

@@ -6,7 +6,7 @@ use std::fmt::Debug;
 
 use bytes::Bytes;
 
-use super::{DecodeError, EncodeError, Reader, Writer};
+use super::{DecodeError, EncodeError, Reader, ServiceId, Writer};
 
 /// A message type. Generated from its definition, never written by hand.
 ///
@@ -23,6 +23,11 @@ pub trait Message: Sized + View + Clone + Debug + PartialEq + Send + Sync + 'sta
     /// client in control may send. Exceptions are Set Emergency and Clear Emergency: Management
     /// accepts them from any client.
     const NEEDS_CONTROL: bool;
+    /// Whether the message is a command of a service that inherits Management: the component obeys
+    /// it only while it is ready, and stops what it has started.
+    const NEEDS_READINESS: bool = false;
+    /// The services and versions that declare the message with another layout.
+    const OTHER_LAYOUTS: &'static [ServiceId] = &[];
 
     /// Size in octets, including the message code.
     fn encoded_len(&self) -> usize;

@@ -33,7 +33,7 @@ pub(super) fn implement(out: &mut Writer, query: &Plan<'_>, plans: &[Plan<'_>]) 
 
 /// The report of a query: `ReportX` of `QueryX`, declared by a service that declares the query.
 /// Of several layouts the newest, which comes first.
-fn report<'p, 'm>(query: &Plan<'m>, plans: &'p [Plan<'m>]) -> Option<&'p Plan<'m>> {
+pub(super) fn report<'p, 'm>(query: &Plan<'m>, plans: &'p [Plan<'m>]) -> Option<&'p Plan<'m>> {
     let stem = query.message.name.strip_prefix("Query")?;
     let code = report_code(query.message.code);
     plans.iter().find(|plan| {
@@ -43,6 +43,13 @@ fn report<'p, 'm>(query: &Plan<'m>, plans: &'p [Plan<'m>]) -> Option<&'p Plan<'m
             && code.is_none_or(|code| plan.message.code == code)
             && services.any(|service| query.services.contains(service))
     })
+}
+
+/// The query that a report answers.
+pub(super) fn query_of<'p, 'm>(report: &Plan<'m>, plans: &'p [Plan<'m>]) -> Option<&'p Plan<'m>> {
+    let answers =
+        |query: &&Plan<'m>| self::report(query, plans).is_some_and(|it| it.path() == report.path());
+    plans.iter().find(answers)
 }
 
 /// As `jaus_codec::report_code`. Services outside of the standard use other codes, too.

@@ -18,6 +18,51 @@ pub mod queries {
 
     /// The newest version.
     pub const LATEST: codec::ServiceId = V1_0;
+
+    /// The service, as an application implements it. `C` is the type of a call.
+    pub trait Service<C> {
+        /// Answers `QueryPlace`; `None` is for no answer, or a later one.
+        fn query_place(&mut self, query: super::QueryPlace, call: &mut C) -> Option<super::ReportPlace>;
+
+        /// Answers `QueryDrive`; `None` is for no answer, or a later one.
+        fn query_drive(&mut self, query: super::QueryDrive, call: &mut C) -> Option<super::ReportDrive>;
+
+        /// Handles `QueryEcho`.
+        fn query_echo(&mut self, message: super::QueryEcho, call: &mut C);
+
+        /// Handles `QueryCodes`.
+        fn query_codes(&mut self, message: super::QueryCodes, call: &mut C);
+    }
+
+    /// Passes messages to a [`Service`].
+    #[derive(Debug)]
+    pub struct Server<T> {
+        service: T,
+    }
+
+    impl<T> Server<T> {
+        /// A server of this service.
+        #[must_use]
+        pub const fn new(service: T) -> Self {
+            Self { service }
+        }
+    }
+
+    impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
+        fn offers(&self) -> Vec<codec::ServiceId> {
+            vec![V1_0]
+        }
+
+        fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
+            Some(match code {
+                0xE0A1 => call.answer(|query: super::QueryPlace, call| self.service.query_place(query, call)),
+                0xE0A2 => call.answer(|query: super::QueryDrive, call| self.service.query_drive(query, call)),
+                0xE0A3 => call.receive(|message: super::QueryEcho, call| self.service.query_echo(message, call)),
+                0xE0A4 => call.receive(|message: super::QueryCodes, call| self.service.query_codes(message, call)),
+                _ => return None,
+            })
+        }
+    }
 }
 
 /// The services of the set, by URN and version.
