@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::AtomicU8;
 use std::time::{Duration, Instant};
 
 use tokio::sync::{mpsc, oneshot, watch};
@@ -40,6 +41,8 @@ pub(super) struct Shared {
     pub(super) standings: watch::Receiver<Standing>,
     pub(super) changes: Arc<Outlet<Change>>,
     pub(super) messages: Arc<Outlet<Received>>,
+    /// The number of the next request.
+    pub(super) requests: AtomicU8,
 }
 
 impl Shared {

@@ -68,6 +68,7 @@
 
 mod builder;
 mod clients;
+mod command;
 mod control;
 mod directories;
 mod driver;
@@ -75,7 +76,9 @@ mod error;
 mod feed;
 mod group;
 mod handle;
+mod list;
 mod offers;
+mod request;
 mod session;
 mod subscription;
 mod watch;
@@ -89,13 +92,15 @@ pub use crate::service::{
 };
 pub use crate::wire::Priority;
 pub use builder::{AttachError, Builder};
+pub use command::RunningCommand;
 pub use control::Control;
 pub use error::{
-    ControlError, DeliverError, FindError, ManageError, QueryError, SendError,
+    ControlError, DeliverError, FindError, ManageError, QueryError, RequestError, SendError,
     SessionError, SubscribeError,
 };
 pub use group::{GroupSubscription, GroupUpdate, Results};
 pub use handle::Component;
+pub use list::List;
 pub use session::Session;
 pub use subscription::{Subscription, Update};
 pub use watch::{Messages, Watch};
