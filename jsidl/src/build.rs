@@ -23,8 +23,10 @@ use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::loader::Loader;
 use crate::model::Service;
-use crate::{Diagnostic, Loader, Severity, rust};
+use crate::rust;
 
 /// What to generate, and from which definitions.
 #[derive(Debug)]

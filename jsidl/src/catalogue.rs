@@ -93,7 +93,7 @@ pub(crate) fn name(entry: &Entry) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Loader;
+    use crate::loader::Loader;
 
     #[test]
     fn every_embedded_definition_is_sound() {

@@ -1,6 +1,7 @@
 //! Diagnostics of a load: every finding with its location and a sentence that says what to do.
 
 use std::collections::BTreeMap;
+use std::collections::HashMap;
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
@@ -158,6 +159,25 @@ impl Report {
     pub(crate) fn error(&mut self, span: Span, message: impl Into<String>) -> &mut Finding {
         self.errors += 1;
         self.add(Severity::Error, span, message.into())
+    }
+
+    /// Reports names that occur twice among `what`, a plural; empty ones are reported elsewhere.
+    /// Returns whether there are none.
+    pub(crate) fn unique<'n>(
+        &mut self,
+        what: &str,
+        names: impl Iterator<Item = (&'n str, Span)>,
+    ) -> bool {
+        let mut seen = HashMap::new();
+        let mut sound = true;
+        for (name, span) in names.filter(|(name, _)| !name.is_empty()) {
+            if let Some(first) = seen.insert(name, span) {
+                let twice = format!("there are two {what} named `{name}`: rename one");
+                self.error(span, twice).note(first, "the other one");
+                sound = false;
+            }
+        }
+        sound
     }
 
     /// Reports a questionable but permitted construct.

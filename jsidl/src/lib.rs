@@ -35,6 +35,7 @@ mod library;
 mod listing;
 mod loader;
 pub mod lua;
+pub mod machine;
 pub mod model;
 mod resolve;
 pub mod rust;

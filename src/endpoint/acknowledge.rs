@@ -66,3 +66,47 @@ impl Endpoint {
         }
     }
 }
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
+mod tests {
+    use bytes::Bytes;
+
+    use super::*;
+
+    const US: JausId = JausId::new(101, 1, 1);
+    const PEER: JausId = JausId::new(42, 1, 1);
+
+    fn call(sequence: u16) -> Frame {
+        Frame {
+            sequence,
+            ..Frame::new(US, PEER, Bytes::from_static(b"\x02\x22"))
+        }
+    }
+
+    #[test]
+    fn the_latest_256_calls_are_remembered_until_each_is_answered() {
+        let (mut calls, now) = (Calls::default(), Instant::now());
+        for sequence in 1..=257 {
+            calls.insert(now, &call(sequence));
+        }
+        for (sequence, expected) in [(1, false), (2, true), (2, false), (257, true)] {
+            assert_eq!(calls.take(now, PEER, US, sequence), expected, "{sequence}");
+        }
+        assert!(!calls.take(now, US, PEER, 3), "of another peer");
+        assert!(!calls.take(now, PEER, PEER, 3), "to another component");
+    }
+
+    #[test]
+    fn a_call_can_be_answered_for_five_seconds() {
+        for (after, expected) in [(4999, true), (5000, false)] {
+            let (mut calls, now) = (Calls::default(), Instant::now());
+            calls.insert(now, &call(7));
+            let then = now + Duration::from_millis(after);
+            assert_eq!(calls.take(then, PEER, US, 7), expected, "after {after} ms");
+        }
+    }
+}

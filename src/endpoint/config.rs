@@ -188,3 +188,14 @@ pub struct StaticPeer {
     /// broadcast.
     pub gets_broadcasts: bool,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn first_numbers_advance_by_five_in_a_millisecond() {
+        let numbers = [0, 1, 1500, 13_108].map(Duration::from_millis);
+        assert_eq!(numbers.map(first_sequence_at), [0, 5, 7500, 4]);
+    }
+}

@@ -151,3 +151,50 @@ fn with_header(frame: &Frame, version: Version) -> Option<Frame> {
         ..frame.clone()
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::{Acknowledgement, Flags};
+
+    const CODE: &[u8] = b"\x00\x2B";
+    const WHOLE: &[u8] = b"\x00\x2B\x02";
+    const REST: &[u8] = b"\x02";
+
+    #[test]
+    fn another_header_gets_the_code_where_it_has_one() {
+        use DataControl::{First, Last, Middle, Single};
+        use Version::{As5669, As5669a, Ra};
+        let message = |data| Flags::default().with_data(data);
+        let answer = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+        for (from, flags, payload, to, expected) in [
+            (As5669, message(Single), WHOLE, As5669a, Some(WHOLE)),
+            (As5669, message(First), WHOLE, As5669a, Some(WHOLE)),
+            (As5669, message(Middle), WHOLE, As5669a, Some(REST)),
+            (Ra, message(Last), WHOLE, As5669a, Some(REST)),
+            (Ra, answer, CODE, As5669a, Some(&[][..])),
+            (As5669a, message(Single), WHOLE, Ra, Some(WHOLE)),
+            (As5669a, message(First), WHOLE, As5669, Some(WHOLE)),
+            (As5669a, message(Middle), REST, Ra, None),
+            (As5669a, message(Last), REST, As5669, None),
+            (As5669a, answer, &[], Ra, Some(&[0, 0][..])),
+            (As5669a, message(Last), REST, As5669a, Some(REST)),
+            (As5669, message(Last), WHOLE, Ra, Some(WHOLE)),
+            (As5669, answer, CODE, Ra, Some(CODE)),
+        ] {
+            let (source, destination) = (JausId::new(1, 1, 1), JausId::new(2, 1, 1));
+            let frame = Frame {
+                version: from,
+                flags,
+                sequence: 7,
+                ..Frame::new(source, destination, Bytes::from_static(payload))
+            };
+            let translated = expected.map(|payload| Frame {
+                version: to,
+                payload: Bytes::from_static(payload),
+                ..frame.clone()
+            });
+            assert_eq!(with_header(&frame, to), translated, "{flags:?} {from} {to}");
+        }
+    }
+}

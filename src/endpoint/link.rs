@@ -130,3 +130,53 @@ pub struct Transmit {
     /// shorter. Only on links that take batches; see [`LinkProfile::max_segments`].
     pub segment: Option<usize>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn path(link: u16, peer: Option<&str>) -> Path {
+        let peer = peer.map(|text| Remote::Socket(text.parse().unwrap()));
+        Path {
+            link: LinkId(link),
+            peer: peer.unwrap_or(Remote::Line),
+        }
+    }
+
+    #[test]
+    fn one_host_is_near_itself_by_any_link_and_port_and_a_line_by_its_link() {
+        let host = path(0, Some("10.0.0.2:3794"));
+        assert!(host.is_near(path(1, Some("10.0.0.2:40000"))));
+        assert!(host.is_near(path(0, Some("[::ffff:10.0.0.2]:3794"))));
+        assert!(!host.is_near(path(0, Some("10.0.0.3:3794"))));
+        assert!(!host.is_near(path(0, None)) && !path(0, None).is_near(host));
+        assert!(path(0, None).is_near(path(0, None)) && !path(0, None).is_near(path(1, None)));
+    }
+
+    #[test]
+    fn only_links_of_datagrams_take_several_messages_or_datagrams_at_once() {
+        for (framing, reads_one, packs, segments) in [
+            (Framing::Judp, false, true, 64),
+            (Framing::Judp, true, false, 64),
+            (Framing::Jtcp, false, false, 1),
+            (Framing::Jserial, false, false, 1),
+        ] {
+            let link = LinkProfile {
+                framing,
+                reads_one,
+                max_segments: 64,
+                ..LinkProfile::default()
+            };
+            assert_eq!((link.packs(), link.segments()), (packs, segments));
+        }
+        assert_eq!(LinkProfile::default().segments(), 1, "0 means one");
+    }
+
+    #[test]
+    fn a_remote_end_is_shown_by_its_address_if_it_has_one() {
+        let shown = |peer| path(0, peer).peer.to_string();
+        assert_eq!(shown(Some("10.0.0.2:3794")), "10.0.0.2:3794");
+        assert_eq!(shown(None), "the line");
+        assert_eq!(path(0, None).peer.socket(), None);
+    }
+}

@@ -289,4 +289,65 @@ mod tests {
         assert_eq!(taken(&mut buckets, now, 1), 1);
         assert_eq!(taken(&mut buckets, now + Duration::from_secs(1), 1), 1);
     }
+
+    #[test]
+    fn who_has_no_place_gets_one_when_a_bucket_is_full_but_not_each_time_it_asks() {
+        let (now, mut buckets) = (start(), Buckets::new(Rate::new(1, 1), 1));
+        assert!(buckets.take(now, 1) && buckets.take(now, 2));
+        let ms = Duration::from_millis;
+        // The bucket of 1 is full again after a second, and the last sweep was at the beginning.
+        assert!(!buckets.take(now + ms(999), 2), "the shared one");
+        assert!(buckets.take(now + ms(1000), 2) && buckets.own.contains_key(&2));
+        assert!(buckets.take(now + ms(1500), 3), "the shared one");
+        assert!(buckets.own.contains_key(&2));
+        assert!(!buckets.take(now + ms(1999), 3) && buckets.own.contains_key(&2));
+        assert!(buckets.take(now + ms(2000), 3) && buckets.own.contains_key(&3));
+    }
+
+    #[test]
+    fn a_source_owes_what_it_has_spent_and_not_regained() {
+        let (now, mut buckets) = (start(), Buckets::new(Rate::new(10, 100), 1));
+        assert!(!buckets.owes(now, &1, 1));
+        assert!(buckets.take_many(now, 1, 40));
+        assert!(buckets.owes(now, &1, 40) && !buckets.owes(now, &1, 41));
+        assert!(!buckets.owes(now, &2, 1), "the shared one is full");
+        let later = now + Duration::from_secs(1);
+        assert!(buckets.owes(later, &1, 30) && !buckets.owes(later, &1, 31));
+        assert!(!Buckets::new(None, 1).owes(now, &1, 0), "without a limit");
+    }
+
+    #[test]
+    fn each_limit_counts_on_its_own() {
+        let path = Path {
+            link: LinkId(0),
+            peer: super::super::Remote::Line,
+        };
+        let (all, new) = (Err(Counter::MessageRate), Err(Counter::NewIdRate));
+        let two = Rate::new(1, 2);
+        let rates = |new_ids_per_address, messages_per_address, messages_per_id| Limits {
+            new_ids_per_address,
+            messages_per_address,
+            messages_per_id,
+            ..Limits::default()
+        };
+        for (limits, expected) in [
+            (rates(two, None, None), [Ok(()), Ok(()), Ok(()), new]),
+            (
+                rates(Rate::new(1, 9), Some(two), None),
+                [Ok(()), Ok(()), all, all],
+            ),
+            (
+                rates(Rate::new(1, 9), None, Some(two)),
+                [Ok(()), Ok(()), all, Ok(())],
+            ),
+        ] {
+            let (mut gate, now) = (Gate::new(&limits), start());
+            let said = [(1, true), (1, true), (1, false), (2, true)];
+            let admitted = said.map(|(component, is_new)| {
+                let source = JausId::new(42, 1, component);
+                gate.admit(now, path, source, is_new)
+            });
+            assert_eq!(admitted, expected);
+        }
+    }
 }

@@ -297,4 +297,24 @@ mod tests {
             it.flags = flags.with_acknowledgement(Acknowledgement::Request);
         }));
     }
+
+    #[test]
+    fn each_class_has_a_bound_of_its_own() {
+        let classes = [(false, false), (true, false), (false, true), (true, true)]
+            .map(|(stranger, repeats)| Class { stranger, repeats });
+        assert_eq!(classes.map(Class::index), [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn paths_are_told_apart_where_they_matter() {
+        let recent = memory(8, Duration::from_secs(1));
+        let path = |link| Path {
+            link: crate::endpoint::LinkId(link),
+            peer: crate::endpoint::Remote::Line,
+        };
+        assert_ne!(recent.way(Some(path(1))), recent.way(Some(path(2))));
+        assert_eq!(recent.way(Some(path(1))), recent.way(Some(path(1))));
+        assert_eq!(recent.way(None), recent.way(None));
+        assert_ne!(recent.way(Some(path(1))), recent.way(None));
+    }
 }

@@ -255,3 +255,22 @@ impl Endpoint {
         !self.egress.is_datagram(to) || self.peers.is_proven(to)
     }
 }
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warning_of_a_kind_is_due_every_ten_seconds() {
+        let (mut warnings, begin) = (Warnings::default(), Instant::now());
+        for (after, expected) in [(0, true), (9_999, false), (10_000, true), (19_999, false)] {
+            let now = begin + Duration::from_millis(after);
+            assert_eq!(warnings.is_due(now, Warning::PeerMoved), expected);
+        }
+        assert!(warnings.is_due(begin, Warning::Unverified));
+    }
+}

@@ -199,7 +199,7 @@ departures! {
         does "its Python node manager does the same without the broadcast flag",
         ours "a multicast message for one id that requests acknowledgement is treated the same way",
         in "src/endpoint/receive.rs",
-        tested by "a_call_without_its_flag_is_known_by_the_way_that_it_came";
+        tested by "a_broadcast_without_its_flag_is_recognised_by_its_multicast_address";
     "priority 0 sets all flags": [Junior, Jts], Recorded, By(&[PriorityFault]) =>
         does "writes flags FFh for priority 0, which decodes as an acknowledgement of a last \
             fragment",
@@ -213,14 +213,14 @@ departures! {
             s for a known Junior, because it stops retransmitting earlier; a fragment missing from \
             a reassembly is always accepted",
         in "src/endpoint/receive.rs",
-        tested by "a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_come_again";
+        tested by "a_large_message_of_a_restarted_junior_arrives_despite_repeated_numbers_and_octets";
     "remembers numbers": [Junior, Jts], Recorded, NeedNotBe =>
         does "acknowledges and drops any message whose number it received from the same id within \
             3 s, even if that node was restarted since: if it drops a fragment, the large message \
             never arrives",
         ours "a node derives its first number from the clock, ahead of those it used before",
         in "src/endpoint/config.rs",
-        tested by "a_node_that_is_started_again_and_again_uses_no_number_that_junior_remembers";
+        tested by "a_restarted_node_uses_no_sequence_number_that_junior_remembers";
     "one id for each connection": [Junior, Jts, Fkie], Recorded, NeedNotBe =>
         does "assigns a TCP connection to the first id received on it, and opens one per id",
         ours "an id is answered on the connection of its last message, however many there are. \

@@ -7,7 +7,7 @@ use std::time::Instant;
 use bytes::Bytes;
 
 use super::life::Life;
-use super::{Outbox, Standing, StopCause};
+use super::{Controller, Outbox, Standing, StopCause};
 use crate::address::JausId;
 use crate::codec::{Message, Query};
 use crate::endpoint::Received;
@@ -21,6 +21,8 @@ pub(crate) struct News {
     pub(crate) ended: Vec<(u16, bool)>,
     /// Faults (`Err`) and recoveries (`Ok`), in the order of their reports.
     pub(crate) faults: Vec<Result<(), StopCause>>,
+    /// The client that is to have control.
+    pub(crate) handover: Option<Controller>,
 }
 
 /// A service's view of its component during one call.
@@ -87,6 +89,13 @@ impl<'a> Context<'a> {
     /// component goes to standby.
     pub fn recover(&mut self) {
         self.news.faults.push(Ok(()));
+    }
+
+    /// Gives control to a client, because the client in control has agreed or there is none. What
+    /// moves stops, and a component with Management goes to standby. Has no effect in an emergency,
+    /// failure or shutdown, and if the authority does not suffice for the component.
+    pub const fn hand_over(&mut self, to: Controller) {
+        self.news.handover = Some(to);
     }
 
     /// Sends a message to one component.

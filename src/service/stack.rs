@@ -345,8 +345,8 @@ impl Stack {
         self.stop(&StopCause::Ended);
         self.control.end(&mut self.out);
         self.follow_control(now);
-        self.subscriptions.farewell(now, &mut self.out);
-        self.controls.farewell(now, &mut self.out);
+        self.subscriptions.cancel_all(now, &mut self.out);
+        self.controls.release_all(now, &mut self.out);
         self.sessions = Sessions::default();
     }
 
@@ -460,14 +460,21 @@ impl Stack {
             self.news.changed.extend(Discovery::QUERIES);
             self.events.push_back(Event::Change(change));
         }
-        self.follow_faults();
-        self.follow_control(now);
-        // A stop may itself report a fault.
-        self.follow_faults();
-        self.follow_control(now);
+        self.follow_services(now);
+        // A stop may itself report a fault, and a change of control a handover.
+        self.follow_services(now);
         self.watch_clients(now);
         self.tell_subscribers(now);
         self.collect_client_news(now);
+    }
+
+    /// Passes what the services have reported on to control.
+    fn follow_services(&mut self, now: Instant) {
+        self.follow_faults();
+        if let Some(to) = self.news.handover.take() {
+            self.control.hand_over(now, to, &mut self.out);
+        }
+        self.follow_control(now);
     }
 
     /// Passes the decisions of control on to the services.

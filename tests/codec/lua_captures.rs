@@ -131,7 +131,7 @@ fn tshark_finds_the_messages_and_faults_that_our_own_reading_finds() {
     fs::write(&script, jsidl::lua::dissector(&loader.load().library)).unwrap();
 
     let dictionary = Dictionary::new()
-        .with_reference_architecture(jaus_ra::messages::registry(), jaus_ra::messages::decode)
+        .with_reference_architecture(jaus_ra::messages::registry(), jaus_ra::forgiving::decode)
         .with_catalogue();
     let (mut files, mut total) = (Vec::new(), 0);
     captures(evidence::captures(), &mut files);

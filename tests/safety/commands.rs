@@ -41,7 +41,7 @@ pub(crate) fn motion(driver: Driver) -> Vec<Bytes> {
 pub(crate) fn places_and_speed(driver: Driver) -> Vec<Bytes> {
     let [first, second] = match driver {
         Driver::List => [FAR / 2.0, FAR].map(|x| encode(&waypoint(x))),
-        Driver::Path => [0.0, FAR / 2.0].map(|x| encode(&report(segment(x)))),
+        Driver::Path => [0.0, FAR / 2.0].map(|x| encode(&report(&segment(x)))),
         _ => return motion(driver),
     };
     vec![first, second, encode(&travel_speed())]
@@ -122,7 +122,7 @@ fn segment(x: f64) -> SetLocalPathSegment {
 }
 
 /// The report with the same layout.
-fn report(segment: SetLocalPathSegment) -> ReportLocalPathSegment {
+fn report(segment: &SetLocalPathSegment) -> ReportLocalPathSegment {
     ReportLocalPathSegment {
         p1_x: segment.p1_x,
         p1_y: segment.p1_y,

@@ -5,7 +5,7 @@ use tracing_subscriber::filter::Targets;
 use tracing_subscriber::layer::SubscriberExt as _;
 use tracing_subscriber::util::SubscriberInitExt as _;
 
-use super::Failure;
+use super::failure::Failure;
 use super::output::colours_wanted;
 
 /// The verbosity flag of every program.

@@ -6,7 +6,8 @@
 pub use arbitrary::{Arbitrary, Result, Unstructured};
 use bytes::Bytes;
 
-use super::{FormattedBlob, Text};
+use super::blob::FormattedBlob;
+use super::text::Text;
 
 /// Random lists, blobs and strings exceed the minimum length by at most this much.
 const USUAL_LENGTH: u64 = 12;

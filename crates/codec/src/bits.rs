@@ -1,6 +1,6 @@
 //! Bit fields: several small numbers packed into one integer (JSIDL `bit_field`).
 
-use super::OutOfRange;
+use super::scale::OutOfRange;
 
 /// An unsigned integer divided into sub-fields. Bits outside the sub-fields are preserved.
 pub trait Bits: Copy {

@@ -1,6 +1,8 @@
 //! Values of variable size: records, sequences, variants and message bodies.
 
-use super::{DecodeError, EncodeError, Reader, Writer};
+use super::error::{DecodeError, EncodeError};
+use super::reader::Reader;
+use super::writer::Writer;
 
 /// A value whose size on the wire depends on its content.
 pub trait Composite: Sized {

@@ -48,12 +48,12 @@ pub use fixed::{Count, Fixed};
 #[cfg(not(feature = "serde"))]
 #[doc(hidden)]
 pub use message::View;
-pub use message::{AnyMessage, Message};
+pub use message::{AnyMessage, Message, ServiceId};
 pub use query::{Query, report_code};
 pub use reader::Reader;
 #[doc(hidden)]
 pub use registry::RandomMessage;
-pub use registry::{MessageInfo, Registry, ServiceId, ServiceInfo, ServiceSet};
+pub use registry::{MessageInfo, Registry, ServiceInfo, ServiceSet};
 pub use scale::{OutOfRange, Rounding, Scale, Scaled};
 pub use service::{Call, Hazards, InternalEvent, Provider};
 pub use text::Text;
@@ -65,6 +65,10 @@ pub use crate::{
     __codec_enumeration as enumeration, __codec_fixed_newtype as fixed_newtype,
     __codec_if_arbitrary as if_arbitrary, __codec_if_serde as if_serde, __codec_scaled as scaled,
 };
+
+#[cfg(feature = "serde")]
+#[doc(hidden)]
+pub use crate::__codec_view_serde as serde_by_view;
 
 /// Expands to its content if this crate has the feature `serde`, whatever the calling crate
 /// enables.

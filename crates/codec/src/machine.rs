@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_remembered_last_comes_back_first_and_no_more_than_there_is_room_for() {
+    fn states_return_in_reverse_order_up_to_the_capacity() {
         let mut memory = Memory::<u8, 2>::new();
         assert!(memory.has_room() && !memory.is_used());
         for state in [1, 2, 3] {

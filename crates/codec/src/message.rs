@@ -2,11 +2,30 @@
 //! for types known only by message code.
 
 use std::any::Any;
-use std::fmt::Debug;
+use std::fmt::{self, Debug};
 
 use bytes::Bytes;
 
-use super::{DecodeError, EncodeError, Reader, ServiceId, Writer};
+use super::error::{DecodeError, EncodeError};
+use super::reader::Reader;
+use super::writer::Writer;
+
+/// Identity of a service: URN and version.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ServiceId {
+    /// For example `urn:jaus:jss:core:Discovery`.
+    pub urn: &'static str,
+    /// Major version, raised by incompatible changes.
+    pub major: u8,
+    /// Minor version, raised by additions.
+    pub minor: u8,
+}
+
+impl fmt::Display for ServiceId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}.{}", self.urn, self.major, self.minor)
+    }
+}
 
 /// A message type. Generated from its definition, never written by hand.
 ///
@@ -97,6 +116,13 @@ pub trait View: Sized {}
 
 #[cfg(not(feature = "serde"))]
 impl<T> View for T {}
+
+#[cfg(feature = "serde")]
+impl serde::Serialize for dyn AnyMessage {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serde::Serialize::serialize(&self.view(), serializer)
+    }
+}
 
 /// A message whose type is known only at run time.
 pub trait AnyMessage: Any + Debug + Send + Sync {

@@ -1,6 +1,6 @@
 //! Queries and the reports that answer them: by type and by message code.
 
-use super::Message;
+use super::message::Message;
 
 /// A query, which its report answers. Generated for each message `QueryX` whose service declares a
 /// `ReportX` with the code of [`report_code`].

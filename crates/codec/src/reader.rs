@@ -2,8 +2,10 @@
 
 use bytes::Bytes;
 
+use super::blob::FormattedBlob;
 use super::error::{DecodeError, DecodeErrorKind};
-use super::{Count, Fixed, FormattedBlob, Text};
+use super::fixed::{Count, Fixed};
+use super::text::Text;
 
 /// A cursor over a received message. It keeps a slice for reading fields, and the shared octets so
 /// that strings and blobs need no copy.

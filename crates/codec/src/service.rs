@@ -4,8 +4,10 @@
 //! struct `Server`, which passes messages to it. The stack knows a `Server` as a [`Provider`], and
 //! the `Server` knows the stack as a [`Call`]. Neither does I/O.
 
+use super::error::DecodeError;
 use super::machine::Outcome;
-use super::{DecodeError, Message, Query, ServiceId};
+use super::message::{Message, ServiceId};
+use super::query::Query;
 
 /// A service that a component can offer: generated `Server`s, and others over the same calls.
 pub trait Provider<C> {

@@ -1,7 +1,9 @@
 //! Appends a message to a buffer.
 
+use super::blob::FormattedBlob;
 use super::error::{EncodeError, EncodeErrorKind};
-use super::{Count, Fixed, FormattedBlob, Text};
+use super::fixed::{Count, Fixed};
+use super::text::Text;
 
 /// Appends a message to a buffer. The buffer keeps its capacity between messages.
 #[derive(Debug)]

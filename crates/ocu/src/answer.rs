@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::state::State;
+use super::state::{Fleet, State, Tree};
 
 /// One frame to a page.
 #[derive(Debug, Serialize)]
@@ -17,6 +17,8 @@ pub(super) enum Said<'a> {
         authority: u8,
     },
     State(&'a State),
+    Fleet(&'a Fleet),
+    Tree(&'a Tree),
     /// A request succeeded.
     Done {
         id: u64,

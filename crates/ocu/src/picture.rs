@@ -1,24 +1,29 @@
-//! The station's model of the vehicle: reports go in, snapshots for the pages come out. It uses no
+//! The station's model of a vehicle: reports go in, snapshots for the pages come out. It uses no
 //! network and no clock.
+
+mod part;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+pub(super) use self::part::{Depth, Part};
 use super::missing::{Absence, GonePart, GoneParts};
-use super::report::{Mission, Report};
-use super::role::{self, Role};
+use super::report::{Mission, MissionStage, Report};
+use super::role::Role;
 use super::sample_clock::{SampleClock, Stamp};
 use super::state;
 use jaus::address::JausId;
-use jaus::service::{Component, Directory, Kind, State};
+use jaus::service::{Component, Directory, State};
+use jaus_vehicle::messages::handoff::enhanced_access_control;
 
-/// The known state of the vehicle.
+/// The known state of a vehicle.
 #[derive(Debug)]
 pub(super) struct Picture {
     own: JausId,
     directory: Arc<Directory>,
-    vehicle: Option<u16>,
+    vehicle: u16,
+    depth: Depth,
     /// Name of the vehicle, kept after discovery has lost it.
     name: String,
     parts: BTreeMap<JausId, Part>,
@@ -31,28 +36,6 @@ pub(super) struct Picture {
     store: Option<JausId>,
 }
 
-/// A component of the vehicle.
-#[derive(Debug, Clone)]
-pub(super) struct Part {
-    pub(super) role: Role,
-    /// Whether the part offers Management.
-    pub(super) managed: bool,
-    status: Option<Sample<u8>>,
-    /// The client in control, with its authority.
-    controller: Option<Sample<Option<(JausId, u8)>>>,
-    stage: Option<state::Stage>,
-    /// Name of the part.
-    name: String,
-    reports_pose: bool,
-    reports_velocity: bool,
-    pose_clock: Option<SampleClock>,
-    velocity_clock: Option<SampleClock>,
-    /// Time of its last report.
-    heard: Option<Instant>,
-    /// Whether the last subscription event was a loss of reports.
-    is_down: bool,
-}
-
 /// A reported value with its reporter and sample time. The time comes from the report's time stamp,
 /// or is the arrival time without a stamp.
 #[derive(Debug, Clone, Copy)]
@@ -62,85 +45,19 @@ struct Sample<T> {
     at: Instant,
 }
 
-impl Part {
-    /// A part with periodic reports is silent after this time without a report.
-    const SILENT: Duration = Duration::from_millis(1500);
-    /// A part whose subscription is down is silent after this time without a report.
-    const DOWN: Duration = Duration::from_secs(1);
-
-    fn new(role: Role) -> Self {
-        Self {
-            role,
-            managed: false,
-            status: None,
-            controller: None,
-            stage: None,
-            name: String::new(),
-            reports_pose: false,
-            reports_velocity: false,
-            pose_clock: None,
-            velocity_clock: None,
-            heard: None,
-            is_down: false,
-        }
-    }
-
-    /// Updates the part from discovery data.
-    fn describe(&mut self, component: &Component, role: Role) {
-        self.role = role;
-        self.managed = role::is_managed(component);
-        self.reports_pose = role::reports_pose(component);
-        self.reports_velocity = role::reports_velocity(component);
-        let own_name = component.identification.as_ref().map(|it| it.name.clone());
-        let own_name = own_name.filter(|it| !it.is_empty());
-        self.name = role.title().map_or_else(
-            || own_name.unwrap_or_else(|| "Component".to_owned()),
-            str::to_owned,
-        );
-    }
-
-    /// Whether its reports have ceased.
-    fn is_silent(&self, now: Instant) -> bool {
-        let is_periodic = self.managed || self.reports_pose || self.reports_velocity;
-        self.heard.is_some_and(|heard| {
-            let silence = now.saturating_duration_since(heard);
-            (is_periodic && silence >= Self::SILENT) || (self.is_down && silence >= Self::DOWN)
-        })
-    }
-
-    fn was_heard_within(&self, limit: Duration, now: Instant) -> bool {
-        self.heard
-            .is_some_and(|heard| now.saturating_duration_since(heard) < limit)
-    }
-
-    pub(super) fn is(&self, state: State) -> bool {
-        self.status.is_some_and(|it| it.what == state as u8)
-    }
-
-    pub(super) fn controller(&self) -> Option<JausId> {
-        self.told_controller()?
-    }
-
-    /// The reported client in control, which may be none; `None` before a report.
-    pub(super) fn told_controller(&self) -> Option<Option<JausId>> {
-        Some(self.controller?.what.map(|(id, _)| id))
-    }
-}
-
 impl Picture {
-    /// Older reports are ignored for safety decisions.
-    const FRESH: Duration = Duration::from_secs(2);
     /// Manual drive requires pose, velocity and status younger than this.
     const DRIVABLE: Duration = Duration::from_secs(1);
     /// A planner that is silent for this time while other parts report is lost.
     const LOST: Duration = Duration::from_secs(2);
 
-    /// Creates an empty picture of `vehicle`, or of the first vehicle discovered.
-    pub(super) fn new(own: JausId, vehicle: Option<u16>) -> Self {
+    /// Creates an empty picture of a vehicle.
+    pub(super) fn new(own: JausId, vehicle: u16, depth: Depth) -> Self {
         Self {
             own,
             directory: Arc::default(),
             vehicle,
+            depth,
             name: String::new(),
             parts: BTreeMap::new(),
             gone: GoneParts::default(),
@@ -153,8 +70,28 @@ impl Picture {
         }
     }
 
-    pub(super) const fn vehicle(&self) -> Option<u16> {
+    pub(super) const fn own(&self) -> JausId {
+        self.own
+    }
+
+    pub(super) const fn vehicle(&self) -> u16 {
         self.vehicle
+    }
+
+    pub(super) const fn depth(&self) -> Depth {
+        self.depth
+    }
+
+    /// Changes which reports are expected. What was reported is forgotten, because some of it is
+    /// not reported any more.
+    pub(super) fn set_depth(&mut self, depth: Depth) {
+        if self.depth == depth {
+            return;
+        }
+        self.depth = depth;
+        self.parts.values_mut().for_each(Part::forget);
+        (self.pose, self.velocity, self.mission) = (None, None, None);
+        (self.path, self.maps, self.store) = (Vec::new(), Vec::new(), None);
     }
 
     pub(super) const fn parts(&self) -> &BTreeMap<JausId, Part> {
@@ -165,6 +102,12 @@ impl Picture {
     pub(super) fn find(&self, role: Role) -> Option<JausId> {
         let mut parts = self.parts.iter();
         parts.find(|(_, part)| part.role == role).map(|(id, _)| *id)
+    }
+
+    /// The part whose state stands for the vehicle's.
+    pub(super) fn principal(&self) -> Option<JausId> {
+        let managed = self.parts.iter().filter(|(_, part)| part.managed);
+        managed.min_by_key(|(_, part)| part.role).map(|(id, _)| *id)
     }
 
     pub(super) fn directory(&self) -> &Directory {
@@ -185,30 +128,15 @@ impl Picture {
         self.maps.iter().find(|map| map.id == id).cloned()
     }
 
-    /// Selects another vehicle.
-    ///
-    /// # Errors
-    /// If there is no vehicle with this number, with the reason as text.
-    pub(super) fn select(&mut self, now: Instant, subsystem: u16) -> Result<(), String> {
-        if !role::is_vehicle(&self.directory, subsystem) || subsystem == self.own.subsystem() {
-            return Err(format!(
-                "subsystem {subsystem} is not a known vehicle; choose one from the tree"
-            ));
-        }
-        if self.vehicle != Some(subsystem) {
-            let directory = self.directory.clone();
-            *self = Self::new(self.own, Some(subsystem));
-            self.handle_directory(now, directory);
-        }
-        Ok(())
+    /// Whether nothing of the vehicle is known any more.
+    pub(super) fn is_empty(&self) -> bool {
+        self.parts.is_empty() && self.gone.iter().next().is_none()
     }
 
     /// Handles a change of the discovered components.
-    pub(super) fn handle_directory(&mut self, now: Instant, directory: Arc<Directory>) {
-        self.directory = directory;
-        self.vehicle = self.vehicle.or_else(|| self.first_vehicle());
-        let directory = Arc::clone(&self.directory);
-        let known = self.vehicle.and_then(|it| directory.subsystem(it));
+    pub(super) fn handle_directory(&mut self, now: Instant, directory: &Arc<Directory>) {
+        self.directory = Arc::clone(directory);
+        let known = directory.subsystem(self.vehicle);
         if let Some(identification) = known.and_then(|it| it.identification()) {
             self.name.clone_from(&identification.name);
         }
@@ -244,20 +172,6 @@ impl Picture {
 
     pub(super) fn handle_time(&mut self, now: Instant) {
         self.gone.handle_time(now);
-    }
-
-    fn first_vehicle(&self) -> Option<u16> {
-        let others = || {
-            let own = self.own.subsystem();
-            let all = self.directory.subsystems();
-            all.filter(move |(id, _)| *id != own && role::is_vehicle(&self.directory, *id))
-        };
-        let is_vehicle = |it: &jaus::service::Subsystem| {
-            it.identification()
-                .is_some_and(|it| it.kind == Kind::Vehicle)
-        };
-        let named = others().find(|(_, subsystem)| is_vehicle(subsystem));
-        named.or_else(|| others().next()).map(|(id, _)| id)
     }
 
     /// Handles a report of a part of the vehicle.
@@ -337,10 +251,11 @@ impl Picture {
     pub(super) fn missing(&self, now: Instant) -> impl Iterator<Item = (JausId, &str, Absence)> {
         let gone = self.gone.iter();
         let gone = gone.map(|(id, part)| (id, &*part.name, Absence::Gone));
-        let silent = self
-            .parts
-            .iter()
-            .filter(move |(_, part)| part.is_silent(now));
+        let principal = self.principal();
+        let silent = self.parts.iter().filter(move |(id, part)| {
+            let is_expected = self.depth == Depth::Full || principal == Some(**id);
+            is_expected && part.is_silent(now, self.depth.silent())
+        });
         let silent = silent.map(|(id, part)| (*id, &*part.name, Absence::Silent));
         gone.chain(silent)
     }
@@ -380,7 +295,7 @@ impl Picture {
     /// The parts that can enter emergency and have not recently reported it.
     pub(super) fn not_in_emergency(&self, now: Instant) -> impl Iterator<Item = JausId> {
         let stands = move |part: &Part| {
-            let fresh = |it: &Sample<u8>| now.saturating_duration_since(it.at) < Self::FRESH;
+            let fresh = |it: &Sample<u8>| now.saturating_duration_since(it.at) < self.depth.fresh();
             part.is(State::Emergency) && part.status.as_ref().is_some_and(fresh)
         };
         let managed = self.parts.iter().filter(|(_, part)| part.managed);
@@ -398,11 +313,6 @@ impl Picture {
         stopped.map(|(id, _)| *id)
     }
 
-    /// The tree of all known components.
-    pub(super) fn tree(&self) -> Vec<state::Subsystem> {
-        super::tree::of(&self.directory)
-    }
-
     /// Snapshot of the vehicle. `obstacle` returns why a part is not under control.
     pub(super) fn vehicle_state(
         &self,
@@ -410,9 +320,8 @@ impl Picture {
         emergency_wanted: bool,
         obstacle: impl Fn(JausId) -> Option<String>,
     ) -> Option<state::Vehicle> {
-        let subsystem = self.vehicle?;
-        let is_known = self.directory.subsystem(subsystem).is_some();
-        if !is_known && self.gone.iter().next().is_none() {
+        let is_known = self.directory.subsystem(self.vehicle).is_some();
+        if !is_known && self.is_empty() {
             return None;
         }
         let mut parts: Vec<_> = self.parts.iter().collect();
@@ -422,7 +331,7 @@ impl Picture {
         let any = self.in_emergency().next().is_some();
         let all = any && self.not_in_emergency(now).next().is_none();
         Some(state::Vehicle {
-            subsystem,
+            subsystem: self.vehicle,
             name: self.name.clone(),
             pose: self.pose.map(|told| state::Pose {
                 age_ms: age(now, told.at),
@@ -439,6 +348,64 @@ impl Picture {
         })
     }
 
+    /// The vehicle in the list of vehicles. The flags state whether the station has selected it,
+    /// controls it, and is requested to hand it over.
+    pub(super) fn fleet_state(
+        &self,
+        now: Instant,
+        selected: bool,
+        (held, requested): (bool, bool),
+    ) -> state::FleetVehicle {
+        let principal = self.principal().and_then(|id| self.parts.get(&id));
+        let status = principal.and_then(|part| part.status);
+        let presence = match principal {
+            None if self.is_empty() => "unknown",
+            None => "gone",
+            Some(part) if part.is_silent(now, self.depth.silent()) => "silent",
+            Some(_) => "present",
+        };
+        let holder = self.holder();
+        let mission = self.mission().map(|it| it.stage);
+        let heard = self.parts.values().filter_map(|part| part.heard);
+        let heard = heard.chain(self.gone.iter().filter_map(|(_, part)| part.heard));
+        let heard = heard.max();
+        state::FleetVehicle {
+            subsystem: self.vehicle,
+            name: self.name.clone(),
+            selected,
+            presence,
+            state: status.map(|told| state_name(told.what)),
+            controller: holder.map(|(id, _)| id.to_string()),
+            authority: holder.map(|(_, authority)| authority),
+            held,
+            requested,
+            mission: mission.filter(|it| !it.is_over()).map(MissionStage::name),
+            age_ms: heard.map(|at| age(now, at)),
+        }
+    }
+
+    /// The operator in control of the vehicle with the greatest authority. The vehicle's own parts
+    /// control each other during a mission, which does not count.
+    pub(super) fn holder(&self) -> Option<(JausId, u8)> {
+        let parts = self.parts.values().filter(|part| part.role.is_commanded());
+        let controllers = parts.filter_map(|part| part.controller?.what);
+        let operators = controllers.filter(|(id, _)| id.subsystem() != self.vehicle);
+        operators.max_by_key(|(_, authority)| *authority)
+    }
+
+    /// The part under control of this operator that passes on requests for control.
+    pub(super) fn handoff_part(&self, holder: JausId) -> Option<JausId> {
+        let held = self
+            .parts
+            .iter()
+            .filter(|(_, part)| part.controller() == Some(holder));
+        let mut ids = held.map(|(id, _)| *id);
+        ids.find(|id| {
+            let component = self.directory.component(*id);
+            component.is_some_and(|it| it.offers(enhanced_access_control::URN))
+        })
+    }
+
     fn part_state(
         &self,
         now: Instant,
@@ -451,9 +418,7 @@ impl Picture {
             id: id.to_string(),
             role: part.role.name(),
             managed: part.managed,
-            state: part
-                .status
-                .map(|told| State::from_code(told.what).map_or("unknown", State::name)),
+            state: part.status.map(|told| state_name(told.what)),
             state_age_ms: part.status.map(|told| age(now, told.at)),
             controller: controller.map(|(id, _)| id.to_string()),
             authority: controller.map(|(_, authority)| authority),
@@ -503,6 +468,10 @@ fn sampled_at(clock: &mut Option<SampleClock>, now: Instant, stamp: Option<Stamp
             now
         }
     }
+}
+
+fn state_name(code: u8) -> &'static str {
+    State::from_code(code).map_or("unknown", State::name)
 }
 
 /// Milliseconds since `then`.

@@ -72,6 +72,11 @@ impl MissionStage {
         self.0 == 3
     }
 
+    /// Whether there is no mission: none was given, or it has ended.
+    pub(super) const fn is_over(self) -> bool {
+        matches!(self.0, 0 | 8..=10)
+    }
+
     /// Whether the planner drives the vehicle or is about to.
     pub(super) const fn is_driven(self) -> bool {
         matches!(self.0, 4..=7)

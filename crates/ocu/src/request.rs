@@ -8,6 +8,10 @@ pub struct Frame {
     /// A request with an id is answered.
     #[serde(default)]
     pub id: Option<u64>,
+    /// The subsystem number of the vehicle that the page shows. A request for another vehicle than
+    /// the selected one is refused, except an emergency.
+    #[serde(default)]
+    pub vehicle: Option<u16>,
     /// The content.
     #[serde(flatten)]
     pub said: Said,
@@ -53,15 +57,23 @@ pub struct MessageFilter {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum OperatorRequest {
-    /// Select another vehicle.
+    /// Select another vehicle: the one to control and drive.
     Select {
         /// Its subsystem number.
         subsystem: u16,
     },
-    /// Take or release control.
+    /// Take or release control. If another operator with an equal or higher authority has it, this
+    /// requests it from that operator, or withdraws the request.
     Control {
         /// Whether to take control.
         on: bool,
+    },
+    /// Decide about another operator's request for control.
+    Handover {
+        /// Number of the request.
+        request: u8,
+        /// Whether to hand over control.
+        grant: bool,
     },
     /// Resume: make the vehicle act on commands.
     Resume,
@@ -69,6 +81,11 @@ pub enum OperatorRequest {
     Standby,
     /// Set or clear an emergency.
     Emergency {
+        /// Whether to set it.
+        on: bool,
+    },
+    /// Set or clear an emergency of all vehicles.
+    EmergencyAll {
         /// Whether to set it.
         on: bool,
     },
@@ -119,11 +136,22 @@ mod tests {
                 r#"{"type":"control","on":true}"#,
                 OperatorRequest::Control { on: true },
             ),
+            (
+                r#"{"type":"handover","request":3,"grant":false}"#,
+                OperatorRequest::Handover {
+                    request: 3,
+                    grant: false,
+                },
+            ),
             (r#"{"type":"resume"}"#, OperatorRequest::Resume),
             (r#"{"type":"standby"}"#, OperatorRequest::Standby),
             (
                 r#"{"type":"emergency","on":false}"#,
                 OperatorRequest::Emergency { on: false },
+            ),
+            (
+                r#"{"type":"emergency_all","on":true}"#,
+                OperatorRequest::EmergencyAll { on: true },
             ),
             (
                 r#"{"type":"drive","forward":0.5,"turn":-1}"#,
@@ -153,6 +181,7 @@ mod tests {
                 frame,
                 Frame {
                     id: None,
+                    vehicle: None,
                     said: Said::OperatorRequest(request)
                 },
                 "{text}"
@@ -162,7 +191,9 @@ mod tests {
         let said = Said::Token {
             token: "abc".into(),
         };
-        assert_eq!(frame, Frame { id: Some(7), said });
+        assert_eq!((frame.id, frame.said), (Some(7), said));
+        let frame = read(r#"{"type":"stop","vehicle":101}"#).unwrap();
+        assert_eq!(frame.vehicle, Some(101));
         let frame = read(r#"{"type":"messages","on":true,"filter":{"text":"x"}}"#).unwrap();
         let filter = MessageFilter {
             text: "x".into(),

@@ -5,7 +5,7 @@ use jaus::messages::mobility::{
     local_path_segment_driver, local_pose_sensor, local_vector_driver, primitive_driver,
     velocity_state_sensor,
 };
-use jaus::service::{Component, Directory};
+use jaus::service::{Component, Kind, Subsystem};
 use jaus_vehicle::messages::ground::{mission_planner, raster_maps, stage};
 
 /// Role of a component. A component with several roles has the first of them.
@@ -111,8 +111,9 @@ pub(super) fn reports_velocity(component: &Component) -> bool {
     component.offers(velocity_state_sensor::URN)
 }
 
-/// Whether a subsystem has components that an operator can use.
-pub(super) fn is_vehicle(directory: &Directory, subsystem: u16) -> bool {
-    let known = directory.subsystem(subsystem);
-    known.is_some_and(|it| it.components().any(|it| Role::of(it).is_some()))
+/// Whether a subsystem has components that an operator can use, and is not another operator's.
+pub(super) fn is_vehicle(subsystem: &Subsystem) -> bool {
+    let kind = subsystem.identification().map(|it| it.kind);
+    kind != Some(Kind::OperatorControlUnit)
+        && subsystem.components().any(|it| Role::of(it).is_some())
 }

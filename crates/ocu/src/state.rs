@@ -1,9 +1,9 @@
-//! Snapshots for pages. Each one is complete, so that a reconnecting page needs nothing else.
-//! Unknown values are `null`.
+//! Snapshots for pages: the selected vehicle, the list of vehicles, and the tree of components. Each
+//! one is complete, so that a reconnecting page needs nothing else. Unknown values are `null`.
 
 use serde::Serialize;
 
-/// A complete snapshot.
+/// Snapshot of the selected vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct State {
     /// Snapshot counter.
@@ -12,8 +12,6 @@ pub struct State {
     pub time: String,
     /// The operator's own JAUS id.
     pub operator: String,
-    /// All known subsystems.
-    pub tree: Vec<Subsystem>,
     /// The selected vehicle.
     pub vehicle: Option<Vehicle>,
     /// Control of the vehicle.
@@ -24,6 +22,48 @@ pub struct State {
     pub mission: Option<Mission>,
     /// The map to show.
     pub map: Option<Map>,
+}
+
+/// The list of vehicles.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Fleet {
+    /// The vehicles, by subsystem number.
+    pub vehicles: Vec<FleetVehicle>,
+}
+
+/// A vehicle in the list.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct FleetVehicle {
+    /// Subsystem number.
+    pub subsystem: u16,
+    /// Name.
+    pub name: String,
+    /// Whether it is the selected vehicle.
+    pub selected: bool,
+    /// `present`, `silent` if its reports have ceased, `gone` if discovery has lost it, or
+    /// `unknown` if it was never discovered.
+    pub presence: &'static str,
+    /// Management state of its primitive driver, or of the part that stands in for it.
+    pub state: Option<&'static str>,
+    /// JAUS id of the operator in control.
+    pub controller: Option<String>,
+    /// Authority of that operator.
+    pub authority: Option<u8>,
+    /// Whether this station controls it.
+    pub held: bool,
+    /// Whether another operator requests the control that this station has.
+    pub requested: bool,
+    /// Stage of its mission; `null` without one.
+    pub mission: Option<&'static str>,
+    /// Milliseconds since its last report.
+    pub age_ms: Option<u64>,
+}
+
+/// The tree of all known components.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Tree {
+    /// All known subsystems.
+    pub subsystems: Vec<Subsystem>,
 }
 
 /// A subsystem of the tree.
@@ -180,6 +220,25 @@ pub struct Control {
     pub wanted: bool,
     /// Why control is not complete.
     pub reason: String,
+    /// JAUS id of the operator whose control this station has requested.
+    pub asking: Option<String>,
+    /// The requests of other operators for the control that this station has.
+    pub requests: Vec<HandoverRequest>,
+    /// How control last changed hands or was refused; empty otherwise.
+    pub handover: String,
+}
+
+/// Another operator's request for control.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct HandoverRequest {
+    /// Number of the request.
+    pub id: u8,
+    /// JAUS id of the operator.
+    pub operator: String,
+    /// Authority of the operator.
+    pub authority: u8,
+    /// Why, in the operator's words.
+    pub explanation: String,
 }
 
 /// Manual drive.

@@ -14,8 +14,9 @@ use jaus_vehicle::parts::{Part, PartError, Slot};
 /// An operator station with its page.
 #[derive(Debug, Clone)]
 pub struct Station {
-    /// The vehicle to monitor. `None` selects the first one discovered.
-    pub vehicle: Option<u16>,
+    /// The vehicles to show, by subsystem number; the first is selected at the start. Empty for all
+    /// that are discovered.
+    pub vehicles: Vec<u16>,
     /// Authority for control requests, 0 to 255.
     pub authority: u8,
     /// Address of the page.
@@ -46,10 +47,10 @@ impl Listen {
 }
 
 impl Default for Station {
-    /// The first vehicle discovered, authority 200, on the loopback interface only.
+    /// All vehicles that are discovered, authority 200, on the loopback interface only.
     fn default() -> Self {
         Self {
-            vehicle: None,
+            vehicles: Vec::new(),
             authority: 200,
             listen: Listen::Loopback,
             token: None,
@@ -137,7 +138,7 @@ impl Part for OpenStation {
             hosts: station.hosts,
             node,
         };
-        let (session, access) = Session::new(component, station.vehicle, station.authority);
+        let (session, access) = Session::new(component, station.vehicles, station.authority);
         let server = Server::new(admission, access);
         tokio::select! {
             error = session.run() => Err(error),

@@ -143,6 +143,15 @@ impl Stick {
         self.fell_silent
     }
 
+    /// The page that drives.
+    #[must_use]
+    pub const fn driver(&self) -> Option<PageId> {
+        match self.phase {
+            Phase::Driven { page, .. } => Some(page),
+            Phase::Rest | Phase::Stopping { .. } => None,
+        }
+    }
+
     /// The current push, if a page drives.
     #[must_use]
     pub const fn driven(&self) -> Option<Push> {

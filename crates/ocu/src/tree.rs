@@ -1,16 +1,18 @@
 //! The tree of subsystems, nodes, components and services for pages.
 
-use super::state::{Component, Node, Service, Subsystem};
+use super::state::{Component, Node, Service, Subsystem, Tree};
 use jaus::service::{self, Directory, Identification, Offer};
 
 /// Maximum number of components in a snapshot.
 const MOST: usize = 1000;
 
-pub(super) fn of(directory: &Directory) -> Vec<Subsystem> {
+pub(super) fn of(directory: &Directory) -> Tree {
     let mut left = MOST;
     let all = directory.subsystems();
-    all.map(|(id, known)| subsystem(id, known, &mut left))
-        .collect()
+    let subsystems = all.map(|(id, known)| subsystem(id, known, &mut left));
+    Tree {
+        subsystems: subsystems.collect(),
+    }
 }
 
 fn subsystem(id: u16, known: &service::Subsystem, left: &mut usize) -> Subsystem {

@@ -12,7 +12,7 @@ use bytes::{Bytes, BytesMut};
 use crate::messages::ra33::{
     CreateVksObjects, RejectEventRequest, ReportIdentification, ReportVksObjects,
 };
-use jaus::codec::{DecodeError, DecodeErrorKind, Message};
+use jaus::codec::{AnyMessage, DecodeError, DecodeErrorKind, Message, MessageInfo};
 
 /// Presence vectors that one message may have mended: as many as the longest list of events holds.
 const MOST_MENDED: usize = 256;
@@ -22,6 +22,14 @@ const CODE_LEN: usize = 2;
 
 /// Octets of the text that ends [`ReportIdentification`] and [`RejectEventRequest`].
 const TEXT_LEN: usize = 80;
+
+/// Decodes a message of the type, code and data, with the habits of peers forgiven.
+///
+/// # Errors
+/// What is wrong beyond those habits, and at which octet.
+pub fn decode(info: &MessageInfo, octets: &Bytes) -> Result<Box<dyn AnyMessage>, DecodeError> {
+    forgiving(octets, info.decode)
+}
 
 /// Reads a message, code and data, with the habits of peers forgiven.
 ///
@@ -116,7 +124,7 @@ mod tests {
     #[test]
     fn all_bits_mean_a_buffer_where_there_is_but_one_bit() {
         let none = read::<CreateVksObjects>(&[0x20, 0x0A, 0xFF, 0x01, 0x07, 0x00, 0x00]).unwrap();
-        assert_eq!(none.encode().unwrap()[2], 1);
+        assert_eq!(Message::encode(&none).unwrap()[2], 1);
         assert!(read::<CreateVksObjects>(&[0x20, 0x0A, 0xFF, 0x01]).is_err());
     }
 

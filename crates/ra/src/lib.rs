@@ -19,7 +19,7 @@ pub mod carrier;
 pub mod connection;
 pub mod convert;
 mod counters;
-mod forgiving;
+pub mod forgiving;
 pub mod gateway;
 pub mod ids;
 mod message;

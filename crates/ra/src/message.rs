@@ -4,9 +4,8 @@ use std::fmt;
 
 use bytes::Bytes;
 
-use super::RaId;
 use jaus::codec;
-use jaus::wire::ra::CODE_LEN;
+use jaus::wire::ra::{CODE_LEN, RaId};
 
 /// A complete message, reassembled if it arrived in parts.
 #[derive(Clone, PartialEq, Eq)]

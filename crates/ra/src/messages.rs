@@ -4,10 +4,7 @@
 //! [`Frame`](jaus::wire::Frame). Some codes are those of other layouts in the SAE sets, so these
 //! messages have their own registry.
 
-use bytes::Bytes;
-use jaus::codec::{AnyMessage, DecodeError, MessageInfo, Registry, ServiceSet};
-
-pub use crate::forgiving::forgiving;
+use jaus::codec::{Registry, ServiceSet};
 
 /// Version 3.3, which OpenJAUS 3.3 speaks.
 #[allow(missing_docs, reason = "the definitions lack descriptions")]
@@ -23,12 +20,4 @@ pub const fn registry() -> Registry {
         messages: ra33::MESSAGES,
     }];
     Registry::new(RA33)
-}
-
-/// Decodes a message of the type, code and data, with the habits of peers forgiven.
-///
-/// # Errors
-/// What is wrong beyond those habits, and at which octet.
-pub fn decode(info: &MessageInfo, octets: &Bytes) -> Result<Box<dyn AnyMessage>, DecodeError> {
-    forgiving(octets, info.decode)
 }

@@ -9,13 +9,15 @@
 //! | [`mission`] | path planning over a map, and the stages of a mission |
 //! | [`mobility`] | the services of the mobility set (AS6009), which command a [`motion::Pilot`] |
 //! | [`ground`] | this project's own services: world model, missions, stages, odometry |
+//! | [`handoff`] | handing over control to another operator on request |
 //! | [`parts`] | complete components, one per program |
 //!
-//! `mobility`, `ground` and the modules below them open no sockets and read no clocks.
+//! `mobility`, `ground`, `handoff` and the modules below them open no sockets and read no clocks.
 #![forbid(unsafe_code)]
 
 pub mod actuator;
 pub mod ground;
+pub mod handoff;
 pub mod messages;
 pub mod mission;
 pub mod mobility;

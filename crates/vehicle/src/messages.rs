@@ -1,4 +1,5 @@
-//! The messages of the ground vehicle's own services, generated from their definitions.
+//! The messages of the ground vehicle's own services and of handing over control, generated from
+//! their definitions.
 
 use jaus::codec::{Registry, ServiceSet};
 
@@ -8,13 +9,25 @@ pub mod ground {
     include!(concat!(env!("OUT_DIR"), "/ground.rs"));
 }
 
+/// Handing over control between operators: Enhanced Access Control and Handoff Controller of the
+/// interoperability profiles.
+pub mod handoff {
+    include!(concat!(env!("OUT_DIR"), "/handoff.rs"));
+}
+
 /// All services and messages that the vehicle speaks: these, and those of the stack.
 #[must_use]
 pub const fn registry() -> Registry {
     static STACK: Registry = jaus::messages::registry();
-    static GROUND: &[ServiceSet] = &[ServiceSet {
-        services: ground::SERVICES,
-        messages: ground::MESSAGES,
-    }];
-    Registry::extending(&STACK, GROUND)
+    static OWN: &[ServiceSet] = &[
+        ServiceSet {
+            services: ground::SERVICES,
+            messages: ground::MESSAGES,
+        },
+        ServiceSet {
+            services: handoff::SERVICES,
+            messages: handoff::MESSAGES,
+        },
+    ];
+    Registry::extending(&STACK, OWN)
 }

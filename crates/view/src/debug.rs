@@ -25,7 +25,9 @@ use futures_util::{SinkExt, StreamExt};
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 
-use super::{Dictionary, Filter, Links, MessageStream, tree};
+use super::dictionary::Dictionary;
+use super::stream::{Filter, Links, MessageStream};
+use super::tree;
 use jaus::component::Component;
 use jaus::node::{Node, Tap, Tapped};
 

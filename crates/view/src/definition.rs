@@ -11,9 +11,34 @@ use jsidl::model::{Id, Message, Version};
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
-use super::Unreadable;
 use jaus::codec::view::Value;
 use jaus::codec::{AnyMessage, DecodeError, MessageInfo, ServiceId};
+
+/// Why octets cannot be read, or JSON cannot be written, as a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unreadable {
+    /// A sentence.
+    pub problem: String,
+    /// Where: the octet, counted from the first of the message code, or the column of a line.
+    pub offset: usize,
+}
+
+impl Unreadable {
+    pub(super) fn new(problem: impl Into<String>, offset: usize) -> Self {
+        Self {
+            problem: problem.into(),
+            offset,
+        }
+    }
+}
+
+impl fmt::Display for Unreadable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.problem)
+    }
+}
+
+impl std::error::Error for Unreadable {}
 
 /// Decodes a message of a generated type.
 pub type Decode = fn(&MessageInfo, &Bytes) -> Result<Box<dyn AnyMessage>, DecodeError>;

@@ -3,15 +3,14 @@
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::Path;
 
 use bytes::Bytes;
 use jsidl::model::{Id, Service, Version};
 use jsidl::{Diagnostics, Loaded, Loader};
 
-use super::definition::{Body, Decode, Definition, ServiceName};
-use super::{Line, Request};
+use super::definition::{Body, Decode, Definition, ServiceName, Unreadable};
+use super::request::Request;
 use jaus::codec::Registry;
 use jaus::messages;
 
@@ -64,32 +63,6 @@ pub struct Reading<'d> {
     /// The fields.
     pub body: Result<Body, Unreadable>,
 }
-
-/// Why octets cannot be read, or JSON cannot be written, as a message.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unreadable {
-    /// A sentence.
-    pub problem: String,
-    /// Where: the octet, counted from the first of the message code, or the column of a line.
-    pub offset: usize,
-}
-
-impl Unreadable {
-    pub(super) fn new(problem: impl Into<String>, offset: usize) -> Self {
-        Self {
-            problem: problem.into(),
-            offset,
-        }
-    }
-}
-
-impl fmt::Display for Unreadable {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.problem)
-    }
-}
-
-impl std::error::Error for Unreadable {}
 
 impl Default for Dictionary {
     fn default() -> Self {
@@ -292,11 +265,6 @@ impl Dictionary {
     /// The name of the Reference Architecture's message with this code.
     pub(super) fn ra_name_of(&self, code: u16) -> Option<&str> {
         self.ra.get(&code).map(Definition::name)
-    }
-
-    /// The message as a line without transport keys.
-    pub fn line(&self, octets: &Bytes) -> Line<'_> {
-        Line::of_reading(None, self.read(octets), octets)
     }
 
     fn reading<'d>(

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::dictionary::Unreadable;
+use super::definition::Unreadable;
 
 /// Formats octets as lower-case hexadecimal digits, two per octet.
 pub fn to_hex(octets: &[u8]) -> String {

@@ -23,8 +23,8 @@ mod time;
 pub mod tree;
 
 pub use capture::{Capture, CaptureError, CaptureWriter, Frame, InterfaceNumber, LinkType};
-pub use definition::{Body, Decode, ServiceName};
-pub use dictionary::{Added, Dictionary, Reading, Unreadable};
+pub use definition::{Body, Decode, ServiceName, Unreadable};
+pub use dictionary::{Added, Dictionary, Reading};
 pub use hex::{from_hex, to_hex};
 pub use journal::{
     Journal, JournalCounters, JournalError, JournalFormat, JournalSettings, LEAST_FILE,
@@ -36,5 +36,3 @@ pub use request::Request;
 pub use stream::Links;
 pub use stream::{Entry, Filter, FilterError, MessageStream};
 pub use time::{InvalidTime, Timestamp};
-
-use stream::timestamp;

@@ -4,10 +4,11 @@ use bytes::Bytes;
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use super::definition::Body;
-use super::dictionary::{Reading, Unreadable};
+use super::capture::CaptureError;
+use super::definition::{Body, Unreadable};
+use super::dictionary::{Dictionary, Reading};
 use super::hex::to_hex;
-use super::{CaptureError, Timestamp};
+use super::time::Timestamp;
 use jaus::address::JausId;
 use jaus::wire::ra::RaId;
 use jaus::wire::{self, Frame, Version};
@@ -92,6 +93,13 @@ impl Line<'_> {
     pub fn to_json(&self) -> String {
         // Serialising to memory fails only for non-text map keys, which do not occur.
         serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
+impl Dictionary {
+    /// The message as a line without transport keys.
+    pub fn line(&self, octets: &Bytes) -> Line<'_> {
+        Line::of_reading(None, self.read(octets), octets)
     }
 }
 

@@ -5,7 +5,8 @@ use bytes::Bytes;
 use super::dictionary::Dictionary;
 use super::large::LargeMessages;
 use super::line::{Content, Envelope, Header, Line};
-use super::{Datagram, Timestamp};
+use super::network::Datagram;
+use super::time::Timestamp;
 use jaus::wire::{self, DataControl, Frame, Version, judp};
 
 /// Decodes datagrams one by one and yields a [`Line`] for every message.

@@ -4,8 +4,7 @@ use std::fmt;
 
 use serde_json::{Map, Value as Json};
 
-use super::definition::{ServiceName, parse_version};
-use super::dictionary::Unreadable;
+use super::definition::{ServiceName, Unreadable, parse_version};
 
 /// Ignored keys, which `jaus decode` and `jaus watch` add to a line.
 const PASSED_OVER: [&str; 12] = [

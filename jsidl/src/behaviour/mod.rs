@@ -1,23 +1,16 @@
 //! Protocol behaviour of a service: the `protocol_behavior` of its definition.
 //!
 //! [`Service::behaviour`](crate::model::Service::behaviour) holds the [`StateMachine`]s as written.
-//! A derived service declares only its additions to the machines of its base; [`Machine`] merges
-//! the parts and finds a state's transitions for a message. [`Run`] executes it, [`dot`] and
-//! [`mermaid`] draw it.
+//! A derived service declares only its additions to the machines of its base;
+//! [`machine`](crate::machine) merges the parts.
 
-mod draw;
 mod guard;
-mod machine;
-mod run;
 
 use std::fmt;
 
 use crate::source::{Location, Span};
 
-pub use draw::{dot, mermaid};
 pub use guard::{Argument, Call, Comparison, Guard};
-pub use machine::{Declared, Machine, MachineState, StateIndex, Stimulus};
-pub use run::{MOST_REMEMBERED, Outcome, Run};
 
 /// Maximum length of a name: findings repeat names.
 const LONGEST: usize = 500;

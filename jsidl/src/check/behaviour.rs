@@ -6,11 +6,10 @@
 //! begins in its first state), it is a warning.
 
 use super::triggers::{Events, Triggers};
-use crate::behaviour::{
-    Argument, Guard, Machine, MachineState, Name, State, StateMachine, Transition, TransitionKind,
-};
+use crate::behaviour::{Argument, Guard, Name, State, StateMachine, Transition, TransitionKind};
 use crate::diagnostic::Report;
 use crate::library::Library;
+use crate::machine::{Machine, MachineState};
 use crate::model::Service;
 use crate::source::Span;
 

@@ -27,35 +27,9 @@ pub(crate) use layout::same_shape;
 pub(crate) use service::{ambiguous_codes, ambiguous_names, left_out, same_service};
 pub(crate) use triggers::Events;
 
-/// Names must differ, because users identify items by name. `what` is a plural.
-pub(crate) fn unique<'n>(
-    report: &mut Report,
-    what: &str,
-    names: impl Iterator<Item = (&'n str, Span)>,
-) -> bool {
-    let mut seen = HashMap::new();
-    let mut sound = true;
-    for (name, span) in names.filter(|(name, _)| !name.is_empty()) {
-        if let Some(first) = seen.insert(name, span) {
-            report
-                .error(
-                    span,
-                    format!("there are two {what} named `{name}`: rename one"),
-                )
-                .note(first, "the other one");
-            sound = false;
-        }
-    }
-    sound
-}
-
-/// As [`unique`], for fields and composites.
+/// As [`Report::unique`], for fields and composites.
 pub(crate) fn unique_names(report: &mut Report, what: &str, nodes: &[Node]) -> bool {
-    unique(
-        report,
-        what,
-        nodes.iter().map(|n| (n.name.as_str(), n.span)),
-    )
+    report.unique(what, nodes.iter().map(|n| (n.name.as_str(), n.span)))
 }
 
 /// Indices must differ, because only they are on the wire. `what` is a plural.

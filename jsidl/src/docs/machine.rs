@@ -1,10 +1,9 @@
 //! State machines as nested boxes: each state with its transitions and actions.
 
 use super::block::{Block, Inline, Line, StateBox, code, heading, muted, text};
-use crate::behaviour::{
-    Action, Declared, Machine, StateIndex, Transition, TransitionKind, dot, mermaid,
-};
+use crate::behaviour::{Action, Transition, TransitionKind};
 use crate::library::Library;
+use crate::machine::{Declared, Machine, StateIndex, dot, mermaid};
 use crate::model::{Id, Service};
 
 /// The machines of a service, merged with the inherited ones; empty if there are none.

@@ -1,7 +1,6 @@
 //! Computes constant expressions.
 
 use super::{Memo, Resolver};
-use crate::check;
 use crate::expr::Value;
 use crate::model::Number;
 use crate::source::Span;
@@ -42,7 +41,7 @@ impl Resolver<'_> {
     pub(super) fn const_set(&mut self, set: usize) {
         let definitions = &self.program.const_sets[set].definitions;
         let names = definitions.iter().map(|d| (d.name.as_str(), d.value.span));
-        check::unique(self.report, "constants", names);
+        self.report.unique("constants", names);
         for position in 0..definitions.len() {
             // The faulty constant is already reported.
             let _ = self.constant(set, position);

@@ -121,7 +121,7 @@ impl Resolver<'_> {
         fields: &[syntax::SubField],
     ) -> Option<BitField> {
         let names = fields.iter().map(|f| (f.name.as_str(), f.span));
-        let unique = check::unique(self.report, "sub-fields", names);
+        let unique = self.report.unique("sub-fields", names);
         let resolved: Vec<_> = fields
             .iter()
             .map(|field| self.sub_field(scope, base, field))

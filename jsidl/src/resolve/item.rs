@@ -193,7 +193,7 @@ impl Resolver<'_> {
         element: &Node,
     ) -> Option<Array> {
         let names = dimensions.iter().map(|d| (d.name.as_str(), d.span));
-        let unique = check::unique(self.report, "dimensions", names);
+        let unique = self.report.unique("dimensions", names);
         let sizes: Vec<_> = dimensions
             .iter()
             .map(|dimension| {

@@ -16,7 +16,6 @@ use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use std::sync::Arc;
 
-use crate::check;
 use crate::diagnostic::Report;
 use crate::expr::Value;
 use crate::library::Library;
@@ -130,7 +129,7 @@ impl Resolver<'_> {
     fn type_set(&mut self, index: TypeSetIndex) {
         let set = &self.program.type_sets[index];
         let names = set.declarations.iter().map(|d| (d.name.as_str(), d.span));
-        check::unique(self.report, "declarations", names);
+        self.report.unique("declarations", names);
         for declaration in 0..set.declarations.len() {
             // A faulty declaration is already reported.
             let _ = self.declaration(index, declaration);

@@ -89,7 +89,7 @@ impl Resolver<'_> {
         declarations: &[Declaration],
     ) -> Vocabulary {
         let names = declarations.iter().map(|d| (d.name.as_str(), d.span));
-        check::unique(self.report, "messages", names);
+        self.report.unique("messages", names);
         let mut names = HashSet::new();
         let mut messages = Vec::new();
         for declaration in declarations {
@@ -128,8 +128,7 @@ impl Resolver<'_> {
     }
 
     fn events(&mut self, scope: TypeSetIndex, declarations: &[Declaration]) {
-        check::unique(
-            self.report,
+        self.report.unique(
             "events",
             declarations.iter().map(|d| (d.name.as_str(), d.span)),
         );
@@ -146,7 +145,7 @@ impl Resolver<'_> {
     fn clients(&mut self, definition: &ServiceDef) {
         let references = definition.client_of.iter().chain(&definition.inherits_from);
         let names = references.map(|r| (r.name.as_str(), r.span));
-        check::unique(self.report, "references", names);
+        self.report.unique("references", names);
         for client in &definition.client_of {
             if !self.lost.contains(&client.id) && self.index.services.first(&client.id).is_none() {
                 let id = &client.id;

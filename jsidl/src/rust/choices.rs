@@ -158,7 +158,7 @@ fn variant_view(out: &mut Writer, ident: &str, alternatives: &[Field<'_>]) {
         "_ => return Err(codec::view::Error::unknown_key(name, &{names:?})),"
     ));
     out.push("};\nread.map_err(|error| error.within(name))\n}\n}");
-    out.push(format!("codec::view::serde_by_view!({ident});\n}}"));
+    out.push(format!("codec::serde_by_view!({ident});\n}}"));
 }
 
 /// A variant without alternatives consists of its tag, 0.
@@ -281,5 +281,5 @@ fn measure_view(out: &mut Writer, ident: &str, choices: &[(&Choice, String, Type
         ));
     }
     out.push("_ => return None,\n}))\n}\n}");
-    out.push(format!("codec::view::serde_by_view!({ident});\n}}"));
+    out.push(format!("codec::serde_by_view!({ident});\n}}"));
 }

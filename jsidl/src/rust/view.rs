@@ -64,5 +64,5 @@ fn middle(out: &mut Writer) {
 }
 
 fn end(out: &mut Writer, ident: &str) {
-    out.push(format!("}}\n}}\ncodec::view::serde_by_view!({ident});\n}}"));
+    out.push(format!("}}\n}}\ncodec::serde_by_view!({ident});\n}}"));
 }

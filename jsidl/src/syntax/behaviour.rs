@@ -9,7 +9,6 @@ use crate::behaviour::{
     Action, Argument, Guard, Name, Parameter, State, StateMachine, Transition, TransitionKind,
     Trigger,
 };
-use crate::check::unique;
 use crate::source::{Span, Spanned};
 
 /// Maximum number of states of a service; published ones have up to 17.
@@ -64,7 +63,7 @@ impl Reader<'_> {
             let name = xml.attribute("name").unwrap_or_default();
             (name, self.source.span(xml.range().start))
         });
-        unique(self.report, "state machines", names);
+        self.report.unique("state machines", names);
         let machines = definitions.into_iter();
         let machines: Vec<_> = machines
             .filter_map(|child| self.state_machine(child, &starts))
@@ -304,7 +303,7 @@ impl Reader<'_> {
             }
         }
         let named = parameters.iter().map(|(at, p)| (p.name.as_str(), *at));
-        unique(self.report, "parameters", named);
+        self.report.unique("parameters", named);
         let guard = match guard {
             Some(guard) => self.guard(guard).map(Some).ok_or(Faulty),
             None => Ok(None),

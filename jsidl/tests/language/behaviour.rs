@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use jaus_test_kit::evidence;
-use jsidl::behaviour::{Guard, Machine, Name, State, Stimulus, Transition, TransitionKind};
+use jsidl::behaviour::{Guard, Name, State, Transition, TransitionKind};
+use jsidl::machine::{Machine, Stimulus};
 use jsidl::{Library, Loaded, Loader, Severity};
 use proptest::prelude::*;
 

@@ -1,9 +1,8 @@
 //! Merged state machines: their diagrams, how they run, and the soundness of the published ones.
 
 use jaus_test_kit::evidence;
-use jsidl::behaviour::{
-    Machine, Name, Outcome, Run, Stimulus, Transition, TransitionKind, dot, mermaid,
-};
+use jsidl::behaviour::{Name, Transition, TransitionKind};
+use jsidl::machine::{Machine, Outcome, Run, Stimulus, dot, mermaid};
 use jsidl::model::Service;
 use jsidl::{Library, Loaded, Loader, rust};
 

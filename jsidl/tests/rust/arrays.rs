@@ -210,7 +210,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportArrays);
+    codec::serde_by_view!(ReportArrays);
 }
 
 codec::if_arbitrary! {
@@ -317,7 +317,7 @@ codec::if_serde! {
             Ok(Self { rows: codec::view::View::from_view(value)? })
         }
     }
-    codec::view::serde_by_view!(ReportArrayList);
+    codec::serde_by_view!(ReportArrayList);
 }
 
 codec::if_arbitrary! {
@@ -373,7 +373,7 @@ pub mod report_array_list {
                 })
             }
         }
-        codec::view::serde_by_view!(RowRec);
+        codec::serde_by_view!(RowRec);
     }
 
     codec::if_arbitrary! {

@@ -200,7 +200,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportTime);
+    codec::serde_by_view!(ReportTime);
 }
 
 codec::if_arbitrary! {

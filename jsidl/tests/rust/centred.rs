@@ -266,7 +266,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SetLean);
+    codec::serde_by_view!(SetLean);
 }
 
 codec::if_arbitrary! {

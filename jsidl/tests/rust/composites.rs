@@ -155,7 +155,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(QueryNothing);
+    codec::serde_by_view!(QueryNothing);
 }
 
 codec::if_arbitrary! {
@@ -227,7 +227,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportTree);
+    codec::serde_by_view!(ReportTree);
 }
 
 codec::if_arbitrary! {
@@ -284,7 +284,7 @@ pub mod report_tree {
                 })
             }
         }
-        codec::view::serde_by_view!(RequestIdRec);
+        codec::serde_by_view!(RequestIdRec);
     }
 
     codec::if_arbitrary! {
@@ -342,7 +342,7 @@ pub mod report_tree {
                 })
             }
         }
-        codec::view::serde_by_view!(NodeRec);
+        codec::serde_by_view!(NodeRec);
     }
 
     codec::if_arbitrary! {
@@ -409,7 +409,7 @@ pub mod report_tree {
                 })
             }
         }
-        codec::view::serde_by_view!(ComponentRec);
+        codec::serde_by_view!(ComponentRec);
     }
 
     codec::if_arbitrary! {
@@ -476,7 +476,7 @@ pub mod report_tree {
                 })
             }
         }
-        codec::view::serde_by_view!(NodeSeq);
+        codec::serde_by_view!(NodeSeq);
     }
 
     codec::if_arbitrary! {
@@ -540,7 +540,7 @@ codec::if_serde! {
             Ok(Self { outer: codec::view::View::from_view(value)? })
         }
     }
-    codec::view::serde_by_view!(ReportListOfLists);
+    codec::serde_by_view!(ReportListOfLists);
 }
 
 codec::if_arbitrary! {
@@ -602,7 +602,7 @@ pub mod report_list_of_lists {
                 })
             }
         }
-        codec::view::serde_by_view!(PointRec);
+        codec::serde_by_view!(PointRec);
     }
 
     codec::if_arbitrary! {
@@ -666,7 +666,7 @@ codec::if_serde! {
             Ok(Self { choice: codec::view::View::from_view(value)? })
         }
     }
-    codec::view::serde_by_view!(SetChoice);
+    codec::serde_by_view!(SetChoice);
 }
 
 codec::if_arbitrary! {
@@ -722,7 +722,7 @@ pub mod set_choice {
                 })
             }
         }
-        codec::view::serde_by_view!(NumberRec);
+        codec::serde_by_view!(NumberRec);
     }
 
     codec::if_arbitrary! {
@@ -780,7 +780,7 @@ pub mod set_choice {
                 })
             }
         }
-        codec::view::serde_by_view!(TextRec);
+        codec::serde_by_view!(TextRec);
     }
 
     codec::if_arbitrary! {
@@ -874,7 +874,7 @@ pub mod set_choice {
                 })
             }
         }
-        codec::view::serde_by_view!(EmptyPresenceRec);
+        codec::serde_by_view!(EmptyPresenceRec);
     }
 
     codec::if_arbitrary! {
@@ -956,7 +956,7 @@ pub mod set_choice {
                 read.map_err(|error| error.within(name))
             }
         }
-        codec::view::serde_by_view!(Again);
+        codec::serde_by_view!(Again);
     }
 
     codec::if_arbitrary! {
@@ -1009,7 +1009,7 @@ pub mod set_choice {
                 })
             }
         }
-        codec::view::serde_by_view!(FirstRec);
+        codec::serde_by_view!(FirstRec);
     }
 
     codec::if_arbitrary! {
@@ -1061,7 +1061,7 @@ pub mod set_choice {
                 })
             }
         }
-        codec::view::serde_by_view!(SecondRec);
+        codec::serde_by_view!(SecondRec);
     }
 
     codec::if_arbitrary! {
@@ -1119,7 +1119,7 @@ pub mod set_choice {
                 })
             }
         }
-        codec::view::serde_by_view!(PairSeq);
+        codec::serde_by_view!(PairSeq);
     }
 
     codec::if_arbitrary! {
@@ -1226,7 +1226,7 @@ pub mod set_choice {
                 read.map_err(|error| error.within(name))
             }
         }
-        codec::view::serde_by_view!(Choice);
+        codec::serde_by_view!(Choice);
     }
 
     codec::if_arbitrary! {
@@ -1303,7 +1303,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportEmptyVariant);
+    codec::serde_by_view!(ReportEmptyVariant);
 }
 
 codec::if_arbitrary! {
@@ -1356,7 +1356,7 @@ pub mod report_empty_variant {
                 Ok(Self)
             }
         }
-        codec::view::serde_by_view!(Nothing);
+        codec::serde_by_view!(Nothing);
     }
 
     codec::if_arbitrary! {
@@ -1406,7 +1406,7 @@ pub mod report_empty_variant {
                 })
             }
         }
-        codec::view::serde_by_view!(AfterRec);
+        codec::serde_by_view!(AfterRec);
     }
 
     codec::if_arbitrary! {
@@ -1509,7 +1509,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportOptional);
+    codec::serde_by_view!(ReportOptional);
 }
 
 codec::if_arbitrary! {
@@ -1568,7 +1568,7 @@ pub mod report_optional {
                 })
             }
         }
-        codec::view::serde_by_view!(AlwaysRec);
+        codec::serde_by_view!(AlwaysRec);
     }
 
     codec::if_arbitrary! {
@@ -1674,7 +1674,7 @@ pub mod report_optional {
                 })
             }
         }
-        codec::view::serde_by_view!(MaybeRec);
+        codec::serde_by_view!(MaybeRec);
     }
 
     codec::if_arbitrary! {
@@ -1727,7 +1727,7 @@ pub mod report_optional {
                 })
             }
         }
-        codec::view::serde_by_view!(ItemRec);
+        codec::serde_by_view!(ItemRec);
     }
 
     codec::if_arbitrary! {
@@ -1779,7 +1779,7 @@ pub mod report_optional {
                 })
             }
         }
-        codec::view::serde_by_view!(LeftRec);
+        codec::serde_by_view!(LeftRec);
     }
 
     codec::if_arbitrary! {
@@ -1831,7 +1831,7 @@ pub mod report_optional {
                 })
             }
         }
-        codec::view::serde_by_view!(RightRec);
+        codec::serde_by_view!(RightRec);
     }
 
     codec::if_arbitrary! {
@@ -1913,7 +1913,7 @@ pub mod report_optional {
                 read.map_err(|error| error.within(name))
             }
         }
-        codec::view::serde_by_view!(MaybeVariant);
+        codec::serde_by_view!(MaybeVariant);
     }
 
     codec::if_arbitrary! {
@@ -2163,7 +2163,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportManyOptional);
+    codec::serde_by_view!(ReportManyOptional);
 }
 
 codec::if_arbitrary! {

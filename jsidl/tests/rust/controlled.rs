@@ -382,7 +382,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(SoundSiren);
+    codec::serde_by_view!(SoundSiren);
 }
 
 codec::if_arbitrary! {
@@ -435,7 +435,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(QuerySiren);
+    codec::serde_by_view!(QuerySiren);
 }
 
 codec::if_arbitrary! {
@@ -503,7 +503,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportSiren);
+    codec::serde_by_view!(ReportSiren);
 }
 
 codec::if_arbitrary! {

@@ -549,7 +549,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(Open);
+    codec::serde_by_view!(Open);
 }
 
 codec::if_arbitrary! {
@@ -602,7 +602,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(Close);
+    codec::serde_by_view!(Close);
 }
 
 codec::if_arbitrary! {
@@ -655,7 +655,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(Stop);
+    codec::serde_by_view!(Stop);
 }
 
 codec::if_arbitrary! {
@@ -708,7 +708,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(ReportDoor);
+    codec::serde_by_view!(ReportDoor);
 }
 
 codec::if_arbitrary! {

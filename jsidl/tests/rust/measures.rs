@@ -139,7 +139,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SetPosition);
+    codec::serde_by_view!(SetPosition);
 }
 
 codec::if_arbitrary! {
@@ -236,7 +236,7 @@ pub mod set_position {
                 }))
             }
         }
-        codec::view::serde_by_view!(Position);
+        codec::serde_by_view!(Position);
     }
 
     codec::if_arbitrary! {
@@ -357,7 +357,7 @@ pub mod set_position {
                 }))
             }
         }
-        codec::view::serde_by_view!(Reading);
+        codec::serde_by_view!(Reading);
     }
 
     codec::if_arbitrary! {

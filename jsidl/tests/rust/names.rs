@@ -327,7 +327,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(Option_);
+    codec::serde_by_view!(Option_);
 }
 
 codec::if_arbitrary! {
@@ -532,7 +532,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(Result_);
+    codec::serde_by_view!(Result_);
 }
 
 codec::if_arbitrary! {
@@ -619,7 +619,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(Vec_);
+    codec::serde_by_view!(Vec_);
 }
 
 codec::if_arbitrary! {
@@ -699,7 +699,7 @@ pub mod vec {
                 })
             }
         }
-        codec::view::serde_by_view!(Some_);
+        codec::serde_by_view!(Some_);
     }
 
     codec::if_arbitrary! {
@@ -757,7 +757,7 @@ pub mod vec {
                 })
             }
         }
-        codec::view::serde_by_view!(Err_);
+        codec::serde_by_view!(Err_);
     }
 
     codec::if_arbitrary! {
@@ -809,7 +809,7 @@ pub mod vec {
                 })
             }
         }
-        codec::view::serde_by_view!(Self_);
+        codec::serde_by_view!(Self_);
     }
 
     codec::if_arbitrary! {
@@ -861,7 +861,7 @@ pub mod vec {
                 })
             }
         }
-        codec::view::serde_by_view!(Default_);
+        codec::serde_by_view!(Default_);
     }
 
     codec::if_arbitrary! {
@@ -943,7 +943,7 @@ pub mod vec {
                 read.map_err(|error| error.within(name))
             }
         }
-        codec::view::serde_by_view!(Box_);
+        codec::serde_by_view!(Box_);
     }
 
     codec::if_arbitrary! {
@@ -1076,7 +1076,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(Codec);
+    codec::serde_by_view!(Codec);
 }
 
 codec::if_arbitrary! {
@@ -1165,7 +1165,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(Move);
+    codec::serde_by_view!(Move);
 }
 
 codec::if_arbitrary! {
@@ -1218,7 +1218,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(Move2);
+    codec::serde_by_view!(Move2);
 }
 
 codec::if_arbitrary! {
@@ -1302,7 +1302,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportSame);
+    codec::serde_by_view!(ReportSame);
 }
 
 codec::if_arbitrary! {
@@ -1360,7 +1360,7 @@ pub mod report_same {
                 })
             }
         }
-        codec::view::serde_by_view!(SameRec);
+        codec::serde_by_view!(SameRec);
     }
 
     codec::if_arbitrary! {
@@ -1412,7 +1412,7 @@ pub mod report_same {
                 })
             }
         }
-        codec::view::serde_by_view!(FirstSeq);
+        codec::serde_by_view!(FirstSeq);
     }
 
     codec::if_arbitrary! {
@@ -1470,7 +1470,7 @@ pub mod report_same {
                 })
             }
         }
-        codec::view::serde_by_view!(SameRec2);
+        codec::serde_by_view!(SameRec2);
     }
 
     codec::if_arbitrary! {
@@ -1523,7 +1523,7 @@ pub mod report_same {
                 })
             }
         }
-        codec::view::serde_by_view!(SecondSeq);
+        codec::serde_by_view!(SecondSeq);
     }
 
     codec::if_arbitrary! {
@@ -1575,7 +1575,7 @@ pub mod report_same {
                 })
             }
         }
-        codec::view::serde_by_view!(ThirdSeq);
+        codec::serde_by_view!(ThirdSeq);
     }
 
     codec::if_arbitrary! {
@@ -1642,7 +1642,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SameRecAgain);
+    codec::serde_by_view!(SameRecAgain);
 }
 
 codec::if_arbitrary! {

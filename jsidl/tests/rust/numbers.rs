@@ -230,7 +230,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportNumbers);
+    codec::serde_by_view!(ReportNumbers);
 }
 
 codec::if_arbitrary! {
@@ -436,7 +436,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SetScaled);
+    codec::serde_by_view!(SetScaled);
 }
 
 codec::if_arbitrary! {
@@ -642,7 +642,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SetScaledOptional);
+    codec::serde_by_view!(SetScaledOptional);
 }
 
 codec::if_arbitrary! {
@@ -751,7 +751,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportNamed);
+    codec::serde_by_view!(ReportNamed);
 }
 
 codec::if_arbitrary! {

@@ -164,7 +164,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SetTexts);
+    codec::serde_by_view!(SetTexts);
 }
 
 codec::if_arbitrary! {
@@ -267,7 +267,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(SetBlobs);
+    codec::serde_by_view!(SetBlobs);
 }
 
 codec::if_arbitrary! {

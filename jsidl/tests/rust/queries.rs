@@ -157,7 +157,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(QueryPlace);
+    codec::serde_by_view!(QueryPlace);
 }
 
 codec::if_arbitrary! {
@@ -289,7 +289,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(QueryDrive);
+    codec::serde_by_view!(QueryDrive);
 }
 
 codec::if_arbitrary! {
@@ -382,7 +382,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(QueryEcho);
+    codec::serde_by_view!(QueryEcho);
 }
 
 codec::if_arbitrary! {
@@ -435,7 +435,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(QueryCodes);
+    codec::serde_by_view!(QueryCodes);
 }
 
 codec::if_arbitrary! {
@@ -575,7 +575,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportPlace);
+    codec::serde_by_view!(ReportPlace);
 }
 
 codec::if_arbitrary! {
@@ -799,7 +799,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportDrive);
+    codec::serde_by_view!(ReportDrive);
 }
 
 codec::if_arbitrary! {
@@ -855,7 +855,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(ReportSound);
+    codec::serde_by_view!(ReportSound);
 }
 
 codec::if_arbitrary! {
@@ -908,7 +908,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(ReportCodes);
+    codec::serde_by_view!(ReportCodes);
 }
 
 codec::if_arbitrary! {

@@ -139,7 +139,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportSections);
+    codec::serde_by_view!(ReportSections);
 }
 
 codec::if_arbitrary! {
@@ -197,7 +197,7 @@ pub mod report_sections {
                 })
             }
         }
-        codec::view::serde_by_view!(Header);
+        codec::serde_by_view!(Header);
     }
 
     codec::if_arbitrary! {
@@ -249,7 +249,7 @@ pub mod report_sections {
                 })
             }
         }
-        codec::view::serde_by_view!(ItemRec);
+        codec::serde_by_view!(ItemRec);
     }
 
     codec::if_arbitrary! {
@@ -301,7 +301,7 @@ pub mod report_sections {
                 })
             }
         }
-        codec::view::serde_by_view!(Footer);
+        codec::serde_by_view!(Footer);
     }
 
     codec::if_arbitrary! {

@@ -168,7 +168,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(QueryState);
+    codec::serde_by_view!(QueryState);
 }
 
 codec::if_arbitrary! {
@@ -227,7 +227,7 @@ codec::if_serde! {
             Ok(Self)
         }
     }
-    codec::view::serde_by_view!(QueryMode);
+    codec::serde_by_view!(QueryMode);
 }
 
 codec::if_arbitrary! {
@@ -323,7 +323,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportState);
+    codec::serde_by_view!(ReportState);
 }
 
 codec::if_arbitrary! {
@@ -417,7 +417,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportMode);
+    codec::serde_by_view!(ReportMode);
 }
 
 codec::if_arbitrary! {
@@ -483,7 +483,7 @@ pub mod v1_0 {
                 Ok(Self)
             }
         }
-        codec::view::serde_by_view!(QueryState);
+        codec::serde_by_view!(QueryState);
     }
 
     codec::if_arbitrary! {
@@ -579,7 +579,7 @@ pub mod v1_0 {
                 })
             }
         }
-        codec::view::serde_by_view!(ReportState);
+        codec::serde_by_view!(ReportState);
     }
 
     codec::if_arbitrary! {

@@ -5,6 +5,9 @@
 //! packet counts as lost when one sent sufficiently later is acknowledged (the distance adapts to
 //! needless retransmissions), or when nothing was acknowledged for the retransmission timeout.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::time::{Duration, Instant};
 
@@ -93,7 +96,8 @@ pub(super) struct Flow {
     /// Packets to retransmit, by priority.
     lost: [VecDeque<u16>; Priority::ALL.len()],
     flight: HashMap<u16, Packet>,
-    /// Sent packets, oldest first; entries of acknowledged packets are skipped.
+    /// Sent packets that do not count as lost, oldest first; entries of acknowledged packets are
+    /// skipped.
     order: VecDeque<(u64, u16)>,
     sends: u64,
     /// The `order` of the latest acknowledged packet.
@@ -375,7 +379,7 @@ impl Flow {
     /// Marks packets as lost if one sent `tolerance` packets later was acknowledged.
     fn find_lost(&mut self, now: Instant) {
         while let Some(&(order, sequence)) = self.order.front() {
-            let is_current = |packet: &Packet| packet.order == order && !packet.lost;
+            let is_current = |packet: &Packet| packet.order == order;
             if self.flight.get(&sequence).is_some_and(is_current) {
                 if order + self.tolerance > self.newest {
                     return;
@@ -441,7 +445,7 @@ impl Flow {
             let has_proven = self.round_trip.smoothed().is_some();
             self.window.collapse(self.sends, has_proven);
             while let Some((order, sequence)) = self.order.pop_front() {
-                let is_current = |packet: &Packet| packet.order == order && !packet.lost;
+                let is_current = |packet: &Packet| packet.order == order;
                 if self.flight.get(&sequence).is_some_and(is_current) {
                     self.lose(now, sequence);
                 }

@@ -213,4 +213,29 @@ mod tests {
         queue.handle_timeout(until);
         assert!(queue.is_ready(level, 13));
     }
+
+    #[test]
+    fn a_queue_is_listed_once_for_each_level_with_something_to_send() {
+        let mut queue = queue();
+        queue.push(Priority::High, Bytes::from_static(b"12345"), None);
+        let listed = |queue: &mut HopQueue| queue.list(0).collect::<Vec<_>>();
+        let high = Level::whole(Priority::High);
+        assert_eq!(listed(&mut queue), [LEVEL, high]);
+        assert_eq!(listed(&mut queue), []);
+        queue.listed[high.index()] = false;
+        assert_eq!(listed(&mut queue), [high]);
+    }
+
+    #[test]
+    fn a_queue_is_idle_without_messages_fragments_and_use_of_the_receive_buffer() {
+        let now = Instant::now();
+        assert!(HopQueue::default().is_idle(now) && !queue().is_idle(now));
+        let mut busy = HopQueue::default();
+        busy.push(Priority::Low, Bytes::from_static(b"12345"), None);
+        assert!(!busy.is_idle(now));
+        let mut paced = HopQueue::default();
+        let time = std::time::Duration::from_millis(1);
+        paced.bucket.spend(now, time);
+        assert!(!paced.is_idle(now) && paced.is_idle(now + time));
+    }
 }

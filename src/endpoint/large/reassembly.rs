@@ -8,6 +8,9 @@
 //! Unfinished messages are bounded in octets (including an overhead per piece and run), per sender
 //! and in total, and in time. The oldest runs are dropped first.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::Arc;
@@ -483,28 +486,5 @@ impl Reassembly {
     /// The octets buffered, overhead included.
     pub(in crate::endpoint) const fn cost(&self) -> usize {
         self.cost
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_small_piece_does_not_keep_a_large_datagram_alive() {
-        let datagram = Bytes::from(vec![7; 60_000]);
-        let frame = |length| {
-            let (source, destination) = (JausId::new(1, 1, 1), JausId::new(2, 1, 1));
-            Frame::new(source, destination, datagram.slice(..length))
-        };
-        let is_shared = |length: usize, held| {
-            let piece = part_of_message(&frame(length), held);
-            assert_eq!(piece.len(), length);
-            datagram.as_ptr_range().contains(&piece.as_ptr())
-        };
-        assert!(!is_shared(100, datagram.len()));
-        assert!(is_shared(15_000, datagram.len()));
-        assert!(is_shared(1425, 1440));
-        assert!(!is_shared(1425, usize::MAX), "of a stream nothing is known");
     }
 }

@@ -45,3 +45,59 @@ pub(super) fn may_lack_the_mark(version: Version, pieces: &VecDeque<Bytes>) -> b
         && are_of_jauspp(pieces.iter())
         && large::repeats_code(pieces)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fragments of these lengths, each of which begins with the same code.
+    fn pieces(lengths: &[usize]) -> VecDeque<Bytes> {
+        let piece = |&length: &usize| [&[0x01, 0x4B][..], &vec![7; length - 2]].concat().into();
+        lengths.iter().map(piece).collect()
+    }
+
+    #[test]
+    fn a_repeated_code_is_removed_from_peers_that_are_known_or_seen_to_repeat_it() {
+        const FULL: usize = JAUSPP_FRAGMENT;
+        let repeated = Some(LargeStyle::RepeatedCode);
+        for (version, lengths, known, expected) in [
+            (Version::As5669a, [FULL, FULL, 100], None, true),
+            (Version::As5669a, [FULL, 100, 100], None, false),
+            (Version::As5669a, [FULL, 100, 100], repeated, true),
+            (
+                Version::As5669a,
+                [FULL, FULL, 100],
+                Some(LargeStyle::Standard),
+                false,
+            ),
+            (Version::As5669, [FULL, FULL, 100], repeated, false),
+        ] {
+            let (joined, style) = join(version, &pieces(&lengths), known);
+            assert_eq!(style == LargeStyle::RepeatedCode, expected, "{lengths:?}");
+            let removed = if expected { 4 } else { 0 };
+            assert_eq!(joined.len(), lengths.iter().sum::<usize>() - removed);
+        }
+        let mut others = pieces(&[FULL, FULL]);
+        others[1] = vec![9; FULL].into();
+        let (_, style) = join(Version::As5669a, &others, repeated);
+        assert_eq!(style, LargeStyle::Standard, "another code");
+    }
+
+    #[test]
+    fn several_full_fragments_with_one_code_may_lack_the_mark() {
+        const FULL: usize = JAUSPP_FRAGMENT;
+        let (current, older) = (Version::As5669a, Version::As5669);
+        for (version, lengths, expected) in [
+            (current, &[FULL, FULL][..], true),
+            (older, &[FULL, FULL], false),
+            (current, &[FULL], false),
+            (current, &[FULL, FULL - 1], false),
+        ] {
+            let lacks = may_lack_the_mark(version, &pieces(lengths));
+            assert_eq!(lacks, expected, "{lengths:?}");
+        }
+        let mut others = pieces(&[FULL, FULL]);
+        others[1] = vec![9; FULL].into();
+        assert!(!may_lack_the_mark(current, &others), "another code");
+    }
+}

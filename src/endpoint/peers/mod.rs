@@ -8,6 +8,8 @@ mod evidence;
 mod places;
 mod route;
 mod state;
+#[cfg(test)]
+mod tests;
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;

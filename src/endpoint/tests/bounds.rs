@@ -228,3 +228,154 @@ fn without_pacing_destinations_are_forgotten_too() {
     }
     assert!(rig.endpoint.egress.queues.known.len() <= 128);
 }
+
+#[test]
+fn each_priority_has_room_of_its_own_and_what_was_sent_takes_none() {
+    let mut rig = Rig::with(small());
+    rig.meet_peer();
+    for _time in 0..2 {
+        for priority in [Priority::Standard, Priority::High] {
+            let message = Outgoing {
+                priority,
+                ..to_peer()
+            };
+            for _message in 0..4 {
+                rig.send(message.clone()).unwrap();
+            }
+            let full = Err(SendError::QueueFull { limit: 4 });
+            assert_eq!(rig.send(message), full);
+        }
+        assert_eq!(rig.transmits().len(), 8);
+    }
+}
+
+#[test]
+fn fragments_that_wait_have_room_for_the_longest_message_or_up_to_their_limit() {
+    let mut rig = Rig::with(Config {
+        payload_limit: 100,
+        max_paced: 3000,
+        ..Config::default()
+    });
+    rig.meet_peer();
+    let message = |length| Outgoing {
+        payload: vec![7; length].into(),
+        ..to_peer()
+    };
+    let full = Err(SendError::TooMuchQueued { limit: 3000 });
+    for lengths in [[2000, 1000], [1500, 1500]] {
+        for length in lengths {
+            rig.send(message(length)).unwrap();
+        }
+        assert_eq!(rig.send(message(101)), full);
+        assert_eq!(rig.transmits().len(), 30);
+    }
+    rig.send(message(5000)).unwrap();
+    assert_eq!(rig.send(message(101)), full);
+}
+
+#[test]
+fn fragments_for_several_links_count_for_each() {
+    let mut rig = Rig::with(Config {
+        payload_limit: 100,
+        max_paced: 6500,
+        ..Config::default()
+    });
+    let second = LinkProfile::judp(path(OUR_HOST).peer.socket());
+    rig.endpoint.add_link(LinkId(1), second);
+    let message = Outgoing::new(US, JausId::EVERYONE, vec![7; 2000].into());
+    rig.send(message.clone()).unwrap();
+    assert_eq!(
+        rig.send(message.clone()),
+        Err(SendError::TooMuchQueued { limit: 6500 })
+    );
+    rig.endpoint.remove_link(LinkId(1));
+    assert_eq!(rig.count(Counter::LinkGone), 20);
+    rig.send(message).unwrap();
+    assert_eq!(rig.transmits().len(), 2 * 20);
+}
+
+#[test]
+fn the_longest_message_is_as_long_as_configured() {
+    let mut rig = Rig::with(Config {
+        max_message: 3000,
+        ..Config::default()
+    });
+    rig.meet_peer();
+    let message = |length| Outgoing::new(US, PEER, vec![7; length].into());
+    assert!(rig.send(message(3000)).is_ok());
+    let (length, limit) = (3001, 3000);
+    assert_eq!(
+        rig.send(message(3001)),
+        Err(SendError::TooLong { length, limit })
+    );
+}
+
+#[test]
+fn a_new_destination_takes_the_place_of_the_one_idle_for_longest() {
+    let mut rig = Rig::with(Config {
+        max_flows: 2,
+        ..Config::default()
+    });
+    let peers = [1, 2, 3].map(|component| JausId::new(42, 1, component));
+    for (host, source) in (20..).zip(peers) {
+        let heard = from_peer(QUERY_HEARTBEAT);
+        rig.hear_from(host, &Frame { source, ..heard });
+        rig.vouch_for(source);
+    }
+    let message = |destination| Outgoing {
+        acknowledge: true,
+        destination,
+        ..to_peer()
+    };
+    let full = Err(SendError::TooManyDestinations { limit: 2 });
+    let flows = |rig: &Rig| peers.map(|id| rig.endpoint.flow(id).map(|it| it.messages));
+    rig.send(message(peers[0])).unwrap();
+    rig.now += Duration::from_millis(1);
+    rig.send(message(peers[1])).unwrap();
+    assert_eq!(rig.send(message(peers[2])), full);
+    assert!(rig.send(message(peers[0])).is_ok(), "it has a place");
+    for (_, frame) in rig.sent().into_iter().rev() {
+        rig.now += Duration::from_millis(1);
+        let flags = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+        let host = 19 + frame.destination.component();
+        let answer = Frame {
+            flags,
+            sequence: frame.sequence,
+            ..Frame::new(frame.destination, US, Bytes::new())
+        };
+        rig.hear_from(host, &answer);
+    }
+    assert_eq!(flows(&rig), [Some(0), Some(0), None]);
+    rig.send(message(peers[2])).unwrap();
+    assert_eq!(flows(&rig), [Some(0), None, Some(1)]);
+    rig.send(message(peers[1])).unwrap();
+    assert_eq!(flows(&rig), [None, Some(1), Some(1)]);
+}
+
+#[test]
+fn of_a_detached_component_all_messages_end_and_those_of_others_stay() {
+    let mut rig = Rig::with(small());
+    rig.endpoint.attach(SIBLING).unwrap();
+    rig.meet_peer();
+    for source in [US, SIBLING] {
+        let message = Outgoing {
+            acknowledge: true,
+            source,
+            ..to_peer()
+        };
+        rig.send(message).unwrap();
+    }
+    rig.endpoint.detach(SIBLING);
+    assert_eq!(rig.count(Counter::MessagesGivenUp), 1);
+    assert_eq!(rig.endpoint.flow(PEER).unwrap().messages, 1);
+    let message = Outgoing {
+        acknowledge: true,
+        ..to_peer()
+    };
+    assert!(rig.send(message.clone()).is_ok());
+    let limit = 2;
+    assert_eq!(
+        rig.send(message),
+        Err(SendError::TooManyUnacknowledged { limit })
+    );
+}

@@ -312,3 +312,49 @@ fn on_a_connection_nothing_is_sent_again_for_want_of_a_quick_answer() {
     rig.pass(Duration::from_millis(100));
     assert_eq!(rig.transmits().len(), 2);
 }
+
+#[test]
+fn a_message_sent_again_has_the_header_of_its_receiver_by_then_but_not_its_fragments() {
+    for (length, expected) in [(100, Version::As5669), (2000, Version::As5669a)] {
+        let mut rig = Rig::new();
+        rig.meet_peer();
+        rig.send(reliable(large(length))).unwrap();
+        rig.transmits();
+        rig.hear(&Frame {
+            version: Version::As5669,
+            ..from_peer(QUERY_HEARTBEAT)
+        });
+        rig.pass(Duration::from_millis(100));
+        let again = rig.transmits();
+        let frames = again
+            .into_iter()
+            .map(|it| judp::frames(it.payload).unwrap());
+        let versions: Vec<_> = frames.flatten().map(|it| it.unwrap().version).collect();
+        assert!(!versions.is_empty());
+        assert!(versions.iter().all(|it| *it == expected), "{versions:?}");
+    }
+}
+
+#[test]
+fn each_message_that_is_given_up_is_counted_and_only_awaited_ones_are_reported() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    for _message in 0..3 {
+        rig.send(reliable(Bytes::from_static(QUERY_HEARTBEAT)))
+            .unwrap();
+    }
+    // Nobody waits for it: it is reliable only because the address is unknown.
+    let unawaited = Outgoing {
+        destination: id("7.1.1"),
+        payload: large(5000),
+        ..to_peer()
+    };
+    rig.send(unawaited).unwrap();
+    while let Some(timeout) = rig.endpoint.poll_timeout() {
+        rig.pass(timeout - rig.now);
+        rig.transmits();
+    }
+    assert_eq!(rig.endpoint.peers().next().unwrap().lost, 3);
+    assert_eq!(rig.count(Counter::MessagesGivenUp), 4);
+    assert_eq!(rig.events().len(), 3);
+}

@@ -43,7 +43,7 @@ impl Memory {
 }
 
 #[test]
-fn a_node_that_is_started_again_and_again_uses_no_number_that_junior_remembers() {
+fn a_restarted_node_uses_no_sequence_number_that_junior_remembers() {
     let started = Duration::from_millis(1_795_294_742_000);
     for time in REMEMBERED {
         let mut junior = Memory {
@@ -124,7 +124,7 @@ fn lengths_of(rig: &mut Rig, frames: &[Frame]) -> Vec<usize> {
 }
 
 #[test]
-fn a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_come_again() {
+fn a_large_message_of_a_restarted_junior_arrives_despite_repeated_numbers_and_octets() {
     // The peer may be recognised by its fragments, or count as standard.
     let anybody = Assignment {
         id: PEER,
@@ -151,7 +151,7 @@ fn a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_c
 }
 
 #[test]
-fn what_junior_sends_again_is_delivered_once_also_while_the_message_is_put_together() {
+fn fragments_retransmitted_by_junior_are_delivered_once_even_during_reassembly() {
     let mut rig = Rig::new();
     let frames = of_junior(1, &message(102_400));
     // Each fragment four times, as if no acknowledgement arrived.
@@ -172,7 +172,7 @@ fn what_junior_sends_again_is_delivered_once_also_while_the_message_is_put_toget
 }
 
 #[test]
-fn a_program_of_junior_that_is_started_again_beside_its_engine_is_heard() {
+fn a_junior_program_restarted_beside_its_engine_is_heard() {
     for (profile, heard) in [(Known::Junior, 2), (Known::Fkie, 2), (Known::Standard, 1)] {
         let mut rig = Rig::with(Config {
             profiles: vec![Assignment { id: PEER, profile }],
@@ -212,7 +212,7 @@ fn hear_as_sent(rig: &mut Rig, frame: &Frame, to_all: bool) {
 }
 
 #[test]
-fn a_call_without_its_flag_is_known_by_the_way_that_it_came() {
+fn a_broadcast_without_its_flag_is_recognised_by_its_multicast_address() {
     // As recorded from fkie's node manager in Python.
     let call = Frame {
         flags: WANTED,
@@ -230,7 +230,7 @@ fn a_call_without_its_flag_is_known_by_the_way_that_it_came() {
 }
 
 #[test]
-fn who_calls_without_the_flag_and_begins_with_1_gets_fragments_as_junior_does() {
+fn a_peer_that_broadcasts_without_the_flag_from_number_1_gets_junior_sized_fragments() {
     let fragments = |to_all: bool, first: u16| {
         let mut rig = Rig::new();
         let call = Frame {

@@ -4,7 +4,9 @@
 mod acknowledgements;
 mod anything;
 mod bounds;
+mod budget;
 mod delivery;
+mod duplicates;
 mod flood;
 mod fragments;
 mod hosts;

@@ -446,3 +446,38 @@ fn what_goes_to_a_link_that_is_gone_is_counted_and_holds_no_place() {
     }
     assert_eq!(rig.count(Counter::LinkGone), 10);
 }
+
+#[test]
+fn urgent_messages_leave_several_at_once_and_do_not_wait_for_longer_ones() {
+    let mut rig = with_packing(Packing::Within(Duration::ZERO));
+    rig.endpoint.add_link(WIRE, segmenting());
+    for length in [600, 1400, 1400] {
+        rig.send(unreliable(large(length), Priority::SafetyCritical))
+            .unwrap();
+    }
+    let transmits = rig.transmits();
+    let shapes = transmits.iter().map(|it| (it.payload.len(), it.segment));
+    assert!(shapes.eq([(615, None), (2 * 1415, Some(1415))]));
+}
+
+#[test]
+fn removing_a_link_leaves_what_waits_on_others() {
+    let mut rig = with_packing(Packing::Within(Duration::from_millis(5)));
+    let second = LinkProfile::judp(path(OUR_HOST).peer.socket());
+    rig.endpoint.add_link(LinkId(1), second);
+    rig.send(Outgoing {
+        destination: JausId::EVERYONE,
+        ..to_peer()
+    })
+    .unwrap();
+    rig.endpoint.remove_link(LinkId(1));
+    assert_eq!(rig.count(Counter::LinkGone), 1);
+    let due = rig.now + Duration::from_millis(5);
+    assert_eq!(rig.endpoint.poll_timeout(), Some(due));
+    rig.pass(Duration::from_millis(5));
+    let links: Vec<_> = rig.transmits().iter().map(|it| it.link).collect();
+    assert_eq!(links, [WIRE]);
+    rig.send(to_peer()).unwrap();
+    rig.endpoint.remove_link(WIRE);
+    assert_eq!(rig.endpoint.poll_timeout(), None);
+}

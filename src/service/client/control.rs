@@ -195,7 +195,7 @@ impl Controls {
             // Otherwise the peer may keep its side of the control until it receives a release.
             State::Asking | State::Held | State::Lost(_) => {
                 control.state = State::Releasing(now);
-                control.give_back(now, peer, out);
+                control.send_release(now, peer, out);
             }
         }
     }
@@ -207,7 +207,7 @@ impl Controls {
     }
 
     /// Releases everything.
-    pub(in crate::service) fn farewell(&mut self, now: Instant, out: &mut Outbox) {
+    pub(in crate::service) fn release_all(&mut self, now: Instant, out: &mut Outbox) {
         let held: Vec<_> = self.all.values().map(|it| it.id).collect();
         for id in held {
             self.release(now, id, out);
@@ -245,7 +245,7 @@ impl Controls {
             }
             _ => return Handled::No,
         };
-        if news.is_some_and(ControlNews::is_the_end) {
+        if news.is_some_and(ControlNews::is_final) {
             control.state = State::Over;
         }
         self.news.extend(news.map(|news| (id, news)));
@@ -257,7 +257,7 @@ impl Controls {
         self.all.retain(|&peer, control| {
             let told = control.handle_timeout(now, peer, out);
             news.extend(told.map(|told| (control.id, told)));
-            if told.is_some_and(ControlNews::is_the_end) {
+            if told.is_some_and(ControlNews::is_final) {
                 control.state = State::Over;
             }
             control.state != State::Over || control.awaits_answer_to_release(now)
@@ -274,7 +274,7 @@ impl Controls {
 }
 
 impl ControlNews {
-    const fn is_the_end(self) -> bool {
+    const fn is_final(self) -> bool {
         matches!(self, Self::Refused(_) | Self::Released)
     }
 }
@@ -312,7 +312,7 @@ impl Control {
 
     /// The interval between renewals. Several may be lost before control is.
     fn renewal(&self) -> Duration {
-        let most = match self.wonders() {
+        let most = match self.awaits_lifetime() {
             true => Self::HASTE,
             false => Self::RENEWAL,
         };
@@ -320,12 +320,12 @@ impl Control {
     }
 
     /// Whether the lifetime of control is still being queried.
-    const fn wonders(&self) -> bool {
+    const fn awaits_lifetime(&self) -> bool {
         self.lifetime.is_none() && self.lifetime_asked < Self::LIFETIME_TRIES
     }
 
     fn ask(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
-        if self.wonders() {
+        if self.awaits_lifetime() {
             self.lifetime_asked += 1;
             out.send(peer, &QueryTimeout {});
         }
@@ -353,7 +353,7 @@ impl Control {
             };
     }
 
-    fn give_back(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
+    fn send_release(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
         out.send(peer, &ReleaseControl {});
         self.released = Some(now);
         self.next = now + self.patience.interval;
@@ -402,7 +402,7 @@ impl Control {
             // A renewal that was in flight when control was lost has regained it without the
             // application's knowledge.
             (State::Lost(_), 0) => {
-                self.give_back(now, peer, out);
+                self.send_release(now, peer, out);
                 None
             }
             (State::Lost(_) | State::Releasing(_) | State::Over, _) => None,
@@ -511,7 +511,7 @@ impl Control {
                     waited: now.saturating_duration_since(self.first_asked),
                 };
                 // Perhaps only the answers were lost, and the peer has granted control.
-                self.give_back(now, peer, out);
+                self.send_release(now, peer, out);
                 Some(ControlNews::Refused(ControlRefused::NoAnswer(no_answer)))
             }
             State::Held if now >= self.confirmed + self.lifetime() => {
@@ -534,7 +534,7 @@ impl Control {
                 Some(ControlNews::Released)
             }
             State::Releasing(_) => {
-                self.give_back(now, peer, out);
+                self.send_release(now, peer, out);
                 None
             }
             State::Lost(_) | State::Over => None,

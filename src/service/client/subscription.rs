@@ -1,6 +1,9 @@
 //! One subscription: the event of a peer that repeats a report. It is created, renewed, and created
 //! again after an outage, until the application ends it.
 
+#[cfg(test)]
+mod tests;
+
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;

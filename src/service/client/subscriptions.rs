@@ -125,7 +125,7 @@ impl Subscriptions {
     }
 
     /// Ends all subscriptions. There will be no time to repeat the cancellations.
-    pub(in crate::service) fn farewell(&mut self, now: Instant, out: &mut Outbox) {
+    pub(in crate::service) fn cancel_all(&mut self, now: Instant, out: &mut Outbox) {
         while let Some((&id, _)) = self.alive.first_key_value() {
             self.unsubscribe(now, id, out);
         }

@@ -97,6 +97,19 @@ impl Control {
         confirm(message, Confirmation::CONTROL_ACCEPTED, out);
     }
 
+    /// Gives control to another client, in standby.
+    pub(in crate::service) fn hand_over(&mut self, now: Instant, to: Controller, out: &mut Outbox) {
+        let is_possible = matches!(self.standing.state, State::Ready | State::Standby)
+            && self.access.is_some_and(|it| to.authority >= it.authority);
+        if !is_possible || self.is_controller(to.id) {
+            return;
+        }
+        self.drop_controller(out);
+        tracing::info!(id = %out.source(), client = %to.id, "control handed over");
+        self.standing.controller = Some(to);
+        self.renew(now);
+    }
+
     fn release(&mut self, message: &Received, out: &mut Outbox) {
         let client = message.source;
         let answer = |code| RejectControl {

@@ -49,10 +49,8 @@ pub(super) struct Known {
     pub(super) again: Budget,
     pub(super) calls: u32,
     pub(super) next_call: Option<Instant>,
-    /// The components of this node that are to register with servers.
-    pub(super) registrations: BTreeMap<JausId, Registrations>,
-    /// The number of registrations so far.
-    pub(super) registered: u64,
+    /// Registrations with servers that do not list a component of this node.
+    pub(super) registrations: Registrations,
     /// The components of this node, with the number of the next change for each to read.
     members: BTreeMap<JausId, u64>,
     log: VecDeque<Change>,
@@ -82,7 +80,7 @@ impl NodeDirectory {
     #[must_use]
     pub fn change_count(&self) -> u64 {
         let known = self.lock();
-        known.log_start + known.log.len() as u64 + known.registered
+        known.log_start + known.log.len() as u64 + known.registrations.count()
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Known> {
@@ -117,8 +115,7 @@ impl Known {
             again: Budget::new(Self::AGAIN_BURST, Self::AGAIN_REFILL),
             calls: 0,
             next_call: None,
-            registrations: BTreeMap::new(),
-            registered: 0,
+            registrations: Registrations::default(),
             members: BTreeMap::new(),
             log: VecDeque::new(),
             log_start: 0,
@@ -163,7 +160,7 @@ impl Known {
     /// Removes a component of this node.
     pub(super) fn leave(&mut self, own: JausId) {
         self.members.remove(&own);
-        self.registrations.remove(&own);
+        self.registrations.take(own);
         self.tree().remove(own);
         self.tell(Change::Lost(own, Loss::Unlisted));
     }

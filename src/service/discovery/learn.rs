@@ -6,14 +6,14 @@ use std::collections::btree_map::Entry;
 use std::time::Instant;
 
 use super::known::Known;
-use super::peers::NoRoom;
+use super::peers::ShareExhausted;
 use super::questions::{Question, What};
 use super::{Change, Loss, Profile};
 use crate::address::JausId;
 use crate::codec::Text;
 use crate::endpoint::Received;
 use crate::messages::core::{
-    RegisterServices, ReportConfiguration, ReportIdentification, ReportServices,
+    RegisterServices, ReportConfiguration, ReportIdentification, ReportServices, discovery,
 };
 use crate::service::share::Share;
 use crate::service::{Identification, Kind, Level, Offer, read};
@@ -83,7 +83,7 @@ impl Known {
                 self.refuse(now, |refused| &mut refused.no_room);
                 self.lose(now, weaker, Loss::NoRoom);
             }
-            Err(NoRoom) => {
+            Err(ShareExhausted) => {
                 self.refuse(now, |refused| &mut refused.no_room);
                 return false;
             }
@@ -323,6 +323,40 @@ impl Known {
         if self.tree().set_services(id, services) {
             self.tell(Change::Services(id));
             self.examine_server(now, id);
+        }
+    }
+
+    /// Queries the configuration of a component that may be a server of our subsystem.
+    pub(super) fn examine_server(&mut self, now: Instant, id: JausId) {
+        if let Some(peer) = self.peers.get(id)
+            && peer.listed_by.is_none()
+            && self.may_serve_us(id)
+        {
+            self.wonder(now, id, What::Configuration, peer.share);
+        }
+    }
+
+    /// Whether this is a component of our subsystem that offers Discovery.
+    fn may_serve_us(&self, id: JausId) -> bool {
+        let component = self.directory.component(id);
+        component.is_some_and(|component| component.offers(discovery::URN))
+            && self.members().any(|own| own.subsystem() == id.subsystem())
+    }
+
+    /// Queues the registrations of the components of this node that a server does not list.
+    pub(super) fn register_with(
+        &mut self,
+        now: Instant,
+        server: JausId,
+        listed: &BTreeSet<JausId>,
+    ) {
+        if self.may_serve_us(server) {
+            let is_missing =
+                |own: &JausId| own.subsystem() == server.subsystem() && !listed.contains(own);
+            let missing: Vec<_> = self.members().filter(is_missing).collect();
+            for own in missing {
+                self.registrations.add(now, own, server);
+            }
         }
     }
 }

@@ -284,8 +284,7 @@ impl Discovery {
 
     pub(super) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
         let mut known = self.known.lock();
-        let registrations = known.registrations.remove(&self.own);
-        for server in registrations.into_iter().flat_map(|it| it.servers) {
+        for server in known.registrations.take(self.own) {
             if let Some(own) = known.directory.component(self.own) {
                 out.send(server, &registration(own));
             }
@@ -300,7 +299,7 @@ impl Discovery {
         let known = self.known.lock();
         let is_due = self.has_news || known.is_leader(self.own);
         let searches = is_due.then(|| known.poll_timeout()).flatten();
-        let registers = known.registrations.get(&self.own).map(|it| it.since);
+        let registers = known.registrations.due_since(self.own);
         registers.into_iter().chain(searches).min()
     }
 }

@@ -74,13 +74,17 @@ impl Peers {
 
     /// Whether there is room for one more. A component that sends messages itself may replace one
     /// of the same address that is only listed, which is then returned.
-    pub(super) fn room(&self, share: Share, speaks: bool) -> Result<Option<JausId>, NoRoom> {
+    pub(super) fn room(
+        &self,
+        share: Share,
+        speaks: bool,
+    ) -> Result<Option<JausId>, ShareExhausted> {
         if self.entries.has_room(share, 1) {
             return Ok(None);
         }
         let is_weaker = |peer: &Peer| speaks && peer.listed_by.is_some() && peer.share == share;
         let weaker = self.all.iter().find(|(_, peer)| is_weaker(peer));
-        weaker.map(|(&id, _)| Some(id)).ok_or(NoRoom)
+        weaker.map(|(&id, _)| Some(id)).ok_or(ShareExhausted)
     }
 
     pub(super) fn insert(
@@ -251,4 +255,4 @@ impl Peers {
 
 /// The share of the component's address is used up.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct NoRoom;
+pub(super) struct ShareExhausted;

@@ -6,67 +6,56 @@
 //! often as its report lacks it: a server that was restarted has forgotten its clients, and fkie's
 //! forgets a client that does not call for a while. Others list whom they have heard, and get none.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::time::Instant;
 
-use super::known::Known;
-use super::questions::What;
 use crate::address::JausId;
 use crate::codec::Text;
+use crate::messages::core::RegisterServices;
 use crate::messages::core::register_services::ServiceRec;
-use crate::messages::core::{RegisterServices, discovery};
 use crate::service::Component;
 
 /// Limit of servers that a component registers with at a time, however many claim to be servers.
 const MOST_SERVERS: usize = 8;
 
-/// The servers that a component is to register with, and since when.
-#[derive(Debug)]
+/// The registrations that components of this node have yet to send.
+#[derive(Debug, Default)]
 pub(super) struct Registrations {
-    pub(super) since: Instant,
-    pub(super) servers: Vec<JausId>,
+    due: BTreeMap<JausId, Due>,
+    count: u64,
 }
 
-impl Known {
-    /// Asks a component whom it lists, if it may be a server of our subsystem.
-    pub(super) fn examine_server(&mut self, now: Instant, id: JausId) {
-        if let Some(peer) = self.peers.get(id)
-            && peer.listed_by.is_none()
-            && self.may_serve_us(id)
-        {
-            self.wonder(now, id, What::Configuration, peer.share);
+/// The servers that one component is to register with, and since when.
+#[derive(Debug)]
+struct Due {
+    since: Instant,
+    servers: Vec<JausId>,
+}
+
+impl Registrations {
+    /// Queues the registration of a component with a server.
+    pub(super) fn add(&mut self, now: Instant, own: JausId, server: JausId) {
+        let (since, servers) = (now, Vec::new());
+        let due = self.due.entry(own).or_insert(Due { since, servers });
+        if due.servers.len() < MOST_SERVERS {
+            due.servers.push(server);
+            self.count += 1;
         }
     }
 
-    /// Whether this is a component of our subsystem that offers Discovery.
-    fn may_serve_us(&self, id: JausId) -> bool {
-        let component = self.directory.component(id);
-        component.is_some_and(|component| component.offers(discovery::URN))
-            && self.members().any(|own| own.subsystem() == id.subsystem())
+    /// Takes out the servers that a component is to register with now.
+    pub(super) fn take(&mut self, own: JausId) -> Vec<JausId> {
+        self.due.remove(&own).map_or_else(Vec::new, |it| it.servers)
     }
 
-    /// Queues the registrations of the components of this node that a server does not list.
-    pub(super) fn register_with(
-        &mut self,
-        now: Instant,
-        server: JausId,
-        listed: &BTreeSet<JausId>,
-    ) {
-        if !self.may_serve_us(server) {
-            return;
-        }
-        let is_missing =
-            |own: &JausId| own.subsystem() == server.subsystem() && !listed.contains(own);
-        let missing: Vec<_> = self.members().filter(is_missing).collect();
-        for own in missing {
-            let (since, servers) = (now, Vec::new());
-            let waiting = self.registrations.entry(own);
-            let waiting = waiting.or_insert(Registrations { since, servers });
-            if waiting.servers.len() < MOST_SERVERS {
-                waiting.servers.push(server);
-                self.registered += 1;
-            }
-        }
+    /// When a component first had a registration to send.
+    pub(super) fn due_since(&self, own: JausId) -> Option<Instant> {
+        self.due.get(&own).map(|it| it.since)
+    }
+
+    /// The number of registrations ever queued.
+    pub(super) fn count(&self) -> u64 {
+        self.count
     }
 }
 

@@ -278,3 +278,22 @@ fn following(beat: Instant, period: Duration, now: Instant) -> Instant {
     let beats = u32::try_from(missed + 1).unwrap_or(u32::MAX);
     beat + period.saturating_mul(beats)
 }
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_next_time_is_after_now_and_on_the_schedule() {
+        let (beat, period) = (Instant::now(), Duration::from_millis(100));
+        for (late, expected) in [(0, 100), (99, 100), (100, 200), (101, 200), (1050, 1100)] {
+            let now = beat + Duration::from_millis(late);
+            let next = following(beat, period, now) - beat;
+            assert_eq!(next.as_millis(), expected, "{late} ms late");
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! Random events: the generated state machines and the dynamic ones take the same path, and never
 //! enter an impossible state.
 
-use jsidl::behaviour::Run;
+use jsidl::machine::Run;
 use proptest::prelude::*;
 use proptest::sample::Index;
 

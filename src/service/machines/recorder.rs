@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use jsidl::Library;
-use jsidl::behaviour::{self, Action, Guard, Name, Run, Stimulus};
+use jsidl::behaviour::{Action, Guard, Name};
+use jsidl::machine::{self, Run, Stimulus};
 
 use crate::codec::machine::Outcome;
 use crate::messages::core::{self, access_control, events, management};
@@ -236,7 +237,7 @@ pub(super) static LIBRARY: LazyLock<Library> = LazyLock::new(|| {
 });
 
 /// The dynamic state machine of the newest version of a service.
-pub(super) fn dynamic(urn: &str) -> behaviour::Machine<'static> {
+pub(super) fn dynamic(urn: &str) -> machine::Machine<'static> {
     let service = LIBRARY.versions(urn).last().expect("it is ours");
     LIBRARY.machines(service).remove(0)
 }
@@ -263,9 +264,9 @@ pub(super) fn step(
     };
     let outcome = run.step(stimulus, &mut ask, &mut |action| done.push(words(action)));
     match outcome {
-        behaviour::Outcome::Handled => Outcome::Handled,
-        behaviour::Outcome::Ignored => Outcome::Ignored,
-        behaviour::Outcome::Rejected => Outcome::Rejected,
+        machine::Outcome::Handled => Outcome::Handled,
+        machine::Outcome::Ignored => Outcome::Ignored,
+        machine::Outcome::Rejected => Outcome::Rejected,
     }
 }
 
@@ -279,7 +280,7 @@ fn words(action: &Action) -> String {
 }
 
 /// A dynamic state machine in the state with this path.
-pub(super) fn run_at<'m, 'a>(machine: &'m behaviour::Machine<'a>, path: &str) -> Run<'m, 'a> {
+pub(super) fn run_at<'m, 'a>(machine: &'m machine::Machine<'a>, path: &str) -> Run<'m, 'a> {
     let name = Name::parse(path).expect("a path");
     let state = machine.find(&name).expect("a state");
     Run::at(machine, state)

@@ -104,21 +104,33 @@ fn several_messages_of_one_packet_are_read() {
     }
 }
 
-#[test]
-fn an_address_in_the_header_is_read_past() {
+/// A packet with one message whose header holds an address.
+fn addressed(address: &[u8]) -> BytesMut {
     let mut message = BytesMut::new();
     as5669a::emit(&frame(hex("0222")), &mut message).unwrap();
+    let header = [&hex("02 1000"), address].concat();
     let mut check = CHECK.digest();
-    check.update(&hex("02 1000 aabb"));
+    check.update(&header);
     let header_check = check.clone().finalize().to_le_bytes();
     check.update(&header_check);
     check.update(&message);
-    let mut packet = BytesMut::from(&hex("1001 02 101000 aabb 1002")[..]);
+    let mut packet = BytesMut::from(&[DLE, SOH][..]);
+    stuff(&header, &mut packet);
+    packet.put_slice(&[DLE, STX]);
     stuff(&header_check, &mut packet);
     stuff(&message, &mut packet);
     packet.put_slice(&[DLE, ETX]);
     stuff(&check.finalize().to_le_bytes(), &mut packet);
-    assert_eq!(sound(&packet), [frame(hex("0222"))]);
+    packet
+}
+
+#[test]
+fn an_address_of_two_octets_in_the_header_is_read_past_and_no_other() {
+    for (address, is_read) in [("", true), ("aa", false), ("aabb", true), ("aabbcc", false)] {
+        let (frames, counters) = decode(&addressed(&hex(address)));
+        assert_eq!(frames == [frame(hex("0222"))], is_read, "{address}");
+        assert_eq!(counters.bad_headers > 0, !is_read, "{address}");
+    }
 }
 
 #[test]
@@ -154,6 +166,7 @@ fn what_is_wrong_is_counted() {
         counted(&PACKET.replace("7878 0100", "7810 7801 00")).bad_forms,
         1
     );
+    assert_eq!(counted(&PACKET.replace("1003", "")).bad_forms, 1, "no end");
 
     let all = hex(&PACKET.replace("20e2", "20e3"));
     assert_eq!(decode(&all).1.rubbish_octets, all.len() as u64);
@@ -195,6 +208,9 @@ fn noise_does_not_hide_the_next_packet() {
         hex("1001 02 1e00 1002 0a83 10").to_vec(),
         hex("1001 02 1e00 10").to_vec(),
         hex("1010101010").to_vec(),
+        // A false beginning within a false one, and within a packet that is cut off.
+        hex("1001 55 10 1001 55 10").to_vec(),
+        hex("1001 02 1e00 1002 0a83 10 1001 55 10").to_vec(),
         cut(100),
         cut(101),
         cut(long.len() - 1),
@@ -241,6 +257,16 @@ fn nested_beginnings_do_not_multiply_the_work_or_the_memory() {
     }
     let counters = *decoder.counters();
     assert!(counters.bad_forms < 20_000, "{counters:?}");
+}
+
+#[test]
+fn what_was_searched_once_is_not_searched_again_after_a_valid_header() {
+    let header = "1001 02 1e00 1002 0a83";
+    let cut_off = hex(&format!("{header} 10 {header} 00 00 00 00 1010 01 0000"));
+    let (frames, counters) = decode(&[&cut_off[..], &hex(PACKET)].concat());
+    assert_eq!(frames, sound(&hex(PACKET)));
+    assert_eq!((counters.bad_forms, counters.bad_headers), (2, 0));
+    assert_eq!(counters.rubbish_octets, cut_off.len() as u64);
 }
 
 #[test]

@@ -48,7 +48,7 @@ fn message() -> impl Strategy<Value = Received> {
 proptest! {
     #[test]
     #[expect(clippy::disallowed_methods, reason = "virtual time starts at any instant")]
-    fn nothing_that_arrives_upsets_a_component(
+    fn arbitrary_messages_leave_a_component_responsive(
         messages in prop::collection::vec((message(), 0..20_000_u64), 0..200),
     ) {
         let timing = Timing { max_components: 8, ..Timing::default() };

@@ -131,21 +131,21 @@ fn judge(capture: &str, by_multicast: bool) {
 }
 
 #[test]
-fn the_scored_runs_requests_are_answered_by_multicast() {
+fn requests_of_the_scored_run_are_answered_over_multicast() {
     judge("interface_test_1_13pts.pcapng", true);
 }
 
 #[test]
-fn the_scored_runs_requests_are_answered_by_unicast() {
+fn requests_of_the_scored_run_are_answered_over_unicast() {
     judge("interface_test_1_13pts.pcapng", false);
 }
 
 #[test]
-fn the_qualifications_requests_are_answered_by_multicast() {
+fn requests_of_the_qualification_are_answered_over_multicast() {
     judge("qualification-practive-2015.pcap.pcapng", true);
 }
 
 #[test]
-fn the_qualifications_requests_are_answered_by_unicast() {
+fn requests_of_the_qualification_are_answered_over_unicast() {
     judge("qualification-practive-2015.pcap.pcapng", false);
 }

@@ -13,9 +13,10 @@ use jaus_vehicle::parts::Part;
 
 #[derive(Args)]
 struct Flags {
-    /// The vehicle's subsystem [default: the first one discovered]
+    /// A vehicle to show, by its subsystem; the first one is selected at the start (repeatable)
+    /// [default: all that are discovered]
     #[arg(long, value_name = "SUBSYSTEM", value_parser = clap::value_parser!(u16).range(1..=65534))]
-    vehicle: Option<u16>,
+    vehicle: Vec<u16>,
 
     /// The authority used to request control; the higher authority wins
     #[arg(long, value_name = "CODE", default_value = "200")]
@@ -43,12 +44,12 @@ struct Flags {
 impl Ready for Flags {
     const PROGRAM: &'static str = "jaus-ocu";
     const ABOUT: &'static str =
-        "Operator control unit: watch, control and drive a vehicle from a browser";
+        "Operator control unit: watch, control and drive vehicles from a browser";
     const EXAMPLES: &'static str = "Examples:\n  \
         jaus-ocu --loopback                        for a vehicle on this computer\n  \
         jaus-ocu --listen 0.0.0.0:8080             for tablets; prints the address with a token\n  \
         jaus-ocu --listen 0.0.0.0:8080 --token-file /etc/jaus/token --host ocu.local\n  \
-        jaus-ocu --vehicle 101 --interface eth0";
+        jaus-ocu --vehicle 101 --vehicle 102 --interface eth0";
     const ID: JausId = JausId::new(42, 1, 1);
     const KIND: Kind = Kind::OperatorControlUnit;
     const SUBSYSTEM: &'static str = "Operator";
@@ -65,7 +66,7 @@ impl Ready for Flags {
             ));
         }
         Ok(Station {
-            vehicle: self.vehicle,
+            vehicles: self.vehicle,
             authority: self.authority,
             listen,
             token,

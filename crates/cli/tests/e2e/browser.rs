@@ -353,6 +353,22 @@ impl Browser {
         self.value("document.activeElement.blur()");
     }
 
+    /// Presses and releases a key while Shift is held.
+    pub(crate) fn shift_key(&mut self, code: &str, key: &str) {
+        for kind in ["keyDown", "keyUp"] {
+            let event = json!({ "type": kind, "code": code, "key": key, "modifiers": 8 });
+            self.call("Input.dispatchKeyEvent", &event);
+        }
+    }
+
+    /// Presses Enter on the focused element, as a browser's own keyboard would.
+    pub(crate) fn enter(&mut self) {
+        let text = json!({ "type": "keyDown", "code": "Enter", "key": "Enter", "text": "\r",
+            "windowsVirtualKeyCode": 13 });
+        self.call("Input.dispatchKeyEvent", &text);
+        self.key_up("Enter", "Enter");
+    }
+
     pub(crate) fn key_down(&mut self, code: &str, key: &str) {
         self.call(
             "Input.dispatchKeyEvent",

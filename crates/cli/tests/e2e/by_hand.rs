@@ -8,14 +8,18 @@ use crate::browser::{Browser, SCREENS};
 use crate::steps::{emergency, look_from_all_screens, take_control};
 use crate::system::program;
 
+/// The number of this test's multicast group.
+const TEST: u8 = 2;
+
 /// A process; killed when dropped.
-struct Running(Child);
+pub(crate) struct Running(Child);
 
 impl Running {
-    /// Starts a program on this test's own multicast group and waits for a line that contains
-    /// `beginning`. Returns the trimmed rest of that line.
-    fn start(name: &str, flags: &[&str], beginning: &str) -> (Self, String) {
-        let group = format!("239.255.77.2:{}", 20_000 + std::process::id() % 40_000);
+    /// Starts a program on a test's own multicast group, 239.255.77.`test`, and waits for a line that
+    /// contains `beginning`. Returns the trimmed rest of that line.
+    pub(crate) fn start(test: u8, name: &str, flags: &[&str], beginning: &str) -> (Self, String) {
+        let port = 20_000 + std::process::id() % 40_000;
+        let group = format!("239.255.77.{test}:{port}");
         let mut command = Command::new(program(name));
         command.args(flags).args(["--loopback", "--group", &group]);
         let mut child = command
@@ -68,14 +72,18 @@ impl Drop for Running {
 /// Takes control, drives with keys and the stick, and stops in an emergency. Then checks the page
 /// when the station is lost, and that the page connects to the next station.
 pub(crate) fn run() {
-    let (vehicle, _) = Running::start("jaus", &["vehicle", "--name", "G-Bat"], "Ctrl-C");
-    let (station, address) =
-        Running::start("jaus-ocu", &["--listen", "127.0.0.1:0"], "page is at ");
+    let (vehicle, _) = Running::start(TEST, "jaus", &["vehicle", "--name", "G-Bat"], "Ctrl-C");
+    let (station, address) = Running::start(
+        TEST,
+        "jaus-ocu",
+        &["--listen", "127.0.0.1:0"],
+        "page is at ",
+    );
     let mut page = Browser::start(None);
     page.look_on(SCREENS[0]);
     page.open(&address);
     page.wait("document.body.dataset.link === 'live'");
-    page.wait("document.querySelector('#vehicle-select').textContent.includes('G-Bat')");
+    page.wait("document.querySelector('#vehicle-name').textContent.includes('G-Bat')");
     take_control(&mut page);
 
     page.press("[data-show=drive]");
@@ -104,6 +112,7 @@ pub(crate) fn run() {
     page.wait("document.body.dataset.link === 'lost'");
     page.screenshot("by-hand-lost");
     let (_station, _) = Running::start(
+        TEST,
         "jaus-ocu",
         &["--listen", &format!("127.0.0.1:{port}")],
         "page is at ",

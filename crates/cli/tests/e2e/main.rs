@@ -15,6 +15,8 @@
 
 mod browser;
 mod by_hand;
+mod fleet;
+mod handover;
 mod steps;
 mod system;
 
@@ -47,6 +49,28 @@ fn a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once() {
         return not_tested(&this_test(), "not built: jaus-ocu");
     }
     by_hand::run();
+}
+
+#[test]
+fn an_operator_chooses_among_vehicles_and_stops_all_of_them() {
+    if let Some(reason) = browser::missing() {
+        return not_tested(&this_test(), &reason);
+    }
+    if !system::program("jaus-ocu").exists() {
+        return not_tested(&this_test(), "not built: jaus-ocu");
+    }
+    fleet::run();
+}
+
+#[test]
+fn control_is_handed_over_between_the_pages_of_two_operators() {
+    if let Some(reason) = browser::missing() {
+        return not_tested(&this_test(), &reason);
+    }
+    if !system::program("jaus-ocu").exists() {
+        return not_tested(&this_test(), "not built: jaus-ocu");
+    }
+    handover::run();
 }
 
 fn run(system: &System) {

@@ -5,7 +5,11 @@ use std::fmt::Write;
 use bytes::Bytes;
 
 use super::{Error, Object, Value, View};
-use crate::{Bits, FormattedBlob, OutOfRange, Scale, Text, bits};
+use crate::bits;
+use crate::bits::Bits;
+use crate::blob::FormattedBlob;
+use crate::scale::{OutOfRange, Scale};
+use crate::text::Text;
 
 /// Member name for the bits of a bit field outside all sub-fields.
 const RESERVED: &str = "_reserved";

@@ -29,7 +29,7 @@ pub use value::{Object, Value};
 #[doc(hidden)]
 pub use impls::{bits, choice, choice_of, raw_bits, raw_scaled, scaled};
 
-use super::OutOfRange;
+use super::scale::OutOfRange;
 
 /// A type with a human-readable view.
 pub trait View: Sized {
@@ -141,13 +141,4 @@ macro_rules! __codec_view_serde {
             }
         }
     };
-}
-
-#[doc(hidden)]
-pub use crate::__codec_view_serde as serde_by_view;
-
-impl serde::Serialize for dyn super::AnyMessage {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serde::Serialize::serialize(&self.view(), serializer)
-    }
 }

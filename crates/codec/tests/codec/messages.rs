@@ -280,7 +280,8 @@ short_message!(OldSetMode, "SetMode", 0x0C02, true, modes: [u8; 2], "Modes");
 short_message!(QueryDepth, "QueryDepth", 0x2C03, false, sonar: u8, "Sonar");
 
 codec::if_serde! {
-    use codec::view::{Error, Object, Value, View, choice, choice_of, serde_by_view};
+    use codec::serde_by_view;
+    use codec::view::{Error, Object, Value, View, choice, choice_of};
 
     impl View for Height {
         fn view(&self) -> Value {

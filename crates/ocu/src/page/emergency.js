@@ -1,5 +1,6 @@
-// Emergency stop: one touch or key, from anywhere, in any condition. The wish is kept and repeated
-// until the vehicle says that it has stopped, over reconnections as well. Clearing it takes two.
+// Emergency stop of the selected vehicle and of all: one touch or key, from anywhere, in any
+// condition. The wish is kept and repeated until the vehicles say that they have stopped, over
+// reconnections as well. Clearing it takes two.
 
 import { get, mark, say, show, toast } from "./dom.js";
 
@@ -12,47 +13,73 @@ export class Emergency {
   #wanted = false;
   #confirmed = false;
   #refusal = "";
+  /** The same for all vehicles. */
+  #wantedAll = false;
+  #vehicles = [];
 
   constructor(link) {
     this.#link = link;
     get("estop").addEventListener("click", () => this.stop());
+    get("estop-all").addEventListener("click", () => this.stopAll());
     get("estop-clear").addEventListener("click", () => this.#openSheet());
     get("clear-no").addEventListener("click", () => this.#closeSheet());
-    get("clear-yes").addEventListener("click", () => this.#clear());
-    setInterval(() => this.#wanted && this.#send(), REPEAT);
+    get("clear-yes").addEventListener("click", () => this.#clear("emergency"));
+    get("clear-all").addEventListener("click", () => this.#clear("emergency_all"));
+    setInterval(() => {
+      if (this.#wantedAll) this.#send("emergency_all");
+      else if (this.#wanted) this.#send("emergency");
+    }, REPEAT);
     this.#render();
   }
 
   /** Stops the vehicle. */
   stop() {
+    this.#stop("emergency");
+  }
+
+  /** Stops all vehicles. */
+  stopAll() {
+    this.#wantedAll = true;
+    this.#stop("emergency_all");
+  }
+
+  #stop(type) {
     this.#closeSheet();
     this.#wanted = true;
     this.#refusal = "";
-    this.#send();
+    this.#send(type);
     this.#render();
     navigator.vibrate?.(80);
   }
 
-  /** Takes a key; true if it was for the emergency stop. Space types in fields, Escape never does. */
+  /** Takes a key; true if it was for the emergency stop. Space types in fields, Escape never does. With
+   * Shift it stops all vehicles. */
   key(event) {
     const field = event.target instanceof HTMLInputElement;
     if (event.key !== "Escape" && !(event.code === "Space" && !field)) return false;
     event.preventDefault();
-    if (!event.repeat) this.stop();
+    if (!event.repeat) event.shiftKey ? this.stopAll() : this.stop();
     return true;
   }
 
-  /** Takes a state. */
-  update(state) {
+  /** Takes a state and the list of vehicles. */
+  update(state, vehicles) {
+    this.#vehicles = vehicles;
     this.#confirmed = state?.vehicle?.emergency === true;
     if (this.#confirmed) this.#wanted = false;
+    if (this.#moving() === 0) this.#wantedAll = false;
     this.#render();
   }
 
-  async #send() {
+  /** How many of the vehicles that are present have not reported their emergency. */
+  #moving() {
+    return this.#vehicles.filter(({ presence, state }) => presence === "present" && state !== "emergency").length;
+  }
+
+  async #send(type) {
     if (!this.#link.open || !this.#link.settled) return;
-    const reason = await this.#link.ask({ type: "emergency", on: true });
-    if (reason === null || !this.#wanted) return;
+    const reason = await this.#link.ask({ type, on: true });
+    if (reason === null || !(this.#wanted || this.#wantedAll)) return;
     if (this.#refusal !== reason) toast("bad", `Emergency stop: ${reason}`);
     this.#refusal = reason;
   }
@@ -68,6 +95,12 @@ export class Emergency {
     say(get("estop-word"), word);
     say(get("estop-detail"), detail);
     mark(get("estop"), "aria-pressed", String(how !== "ready"));
+    const [count, moving] = [this.#vehicles.length, this.#moving()];
+    show(get("estop-all"), count > 1);
+    const all = this.#wantedAll ? `${moving} not stopped yet` : moving === 0 ? "all are stopped" : `${count} vehicles`;
+    say(get("estop-all-detail"), all);
+    mark(get("estop-all"), "data-wanted", this.#wantedAll ? "yes" : null);
+    show(get("clear-all"), count - moving > 1);
     show(get("estop-clear"), this.#confirmed);
     if (!this.#confirmed) show(get("clear-sheet"), false);
   }
@@ -81,9 +114,9 @@ export class Emergency {
     show(get("clear-sheet"), false);
   }
 
-  async #clear() {
+  async #clear(type) {
     this.#closeSheet();
-    const reason = await this.#link.ask({ type: "emergency", on: false });
+    const reason = await this.#link.ask({ type, on: false });
     if (reason === null) toast("good", "Emergency cleared.");
     else toast("bad", reason);
   }

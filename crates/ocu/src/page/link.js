@@ -24,6 +24,8 @@ export class Link extends EventTarget {
   #ids = 0;
   #waiting = new Map();
   #token = takeToken();
+  /** The vehicle that the page shows: what is asked is meant for it. */
+  #vehicle = null;
   /** Whether the server has said hello and, if it wants a token, has judged ours. */
   settled = false;
 
@@ -62,7 +64,7 @@ export class Link extends EventTarget {
   ask(wish) {
     if (!this.open) return Promise.resolve("No connection: not sent.");
     const id = ++this.#ids;
-    this.#send({ ...wish, id });
+    this.#send({ vehicle: this.#vehicle, ...wish, id });
     return new Promise((resolve) => {
       const timer = setTimeout(() => this.#answer(id, "No answer from the operator's node."), 5_000);
       this.#waiting.set(id, { resolve, timer });
@@ -71,7 +73,7 @@ export class Link extends EventTarget {
 
   /** Sends what needs no answer; false if it could not be sent at once. */
   tell(wish) {
-    return this.#send(wish);
+    return this.#send({ vehicle: this.#vehicle, ...wish });
   }
 
   /** Uses a token from now on; resolves like `ask`. */
@@ -129,7 +131,12 @@ export class Link extends EventTarget {
         this.#stateAt = performance.now();
         this.#pause = FIRST_PAUSE;
         this.#retryAt = 0;
+        this.#vehicle = number(said.vehicle?.subsystem);
         this.#emit("state", said);
+        break;
+      case "fleet":
+      case "tree":
+        this.#emit(said.type, said);
         break;
       case "done":
         this.#answer(number(said.id), null);

@@ -4,19 +4,23 @@
 import { get, mark, plain, say, show, toast, typing } from "./dom.js";
 import { Drive } from "./drive.js";
 import { Emergency } from "./emergency.js";
+import { Fleet } from "./fleet.js";
+import { Handover } from "./handover.js";
 import { Link } from "./link.js";
 import { MapView } from "./map.js";
 import { Messages } from "./messages.js";
 import { Mission } from "./mission.js";
-import { part, showControl, showLink, showMissing, showStatus, showVehicles } from "./status.js";
+import { part, showControl, showLink, showMissing, showStatus } from "./status.js";
 import { followTheme } from "./theme.js";
-import { showSystem } from "./tree.js";
+import { showSystem, showTree } from "./tree.js";
 
 const link = new Link();
 const map = new MapView((place) => choose(place));
 const mission = new Mission(ask, map);
 const emergency = new Emergency(link);
 const drive = new Drive(link, () => emergency.stop());
+const fleet = new Fleet((subsystem) => selectVehicle(subsystem));
+const handover = new Handover(ask);
 new Messages(link);
 followTheme(() => map.recolour());
 
@@ -40,6 +44,11 @@ link.addEventListener("state", ({ detail }) => {
   state = detail;
   render();
 });
+link.addEventListener("fleet", ({ detail }) => {
+  fleet.handle(detail);
+  render();
+});
+link.addEventListener("tree", ({ detail }) => showTree(detail));
 link.addEventListener("close", () => {
   trusted = false;
   render();
@@ -51,14 +60,15 @@ function render() {
   showLink(link, state);
   const live = link.condition === "live";
   const operable = live && trusted && Boolean(state?.vehicle);
-  emergency.update(state);
+  emergency.update(state, fleet.vehicles);
+  fleet.update(state, live && trusted);
   drive.update(state, obstacle(live));
   const mode = part(state, "primitive_driver")?.state;
   get("resume").disabled = !operable || !state.control?.held || mode === "ready";
   get("standby").disabled = !operable || !state.control?.held || mode !== "ready";
   if (!state) return;
-  showVehicles(state);
   showControl(state, authority, operable);
+  handover.update(state, operable);
   showStatus(state, Number.isFinite(link.age) ? link.age : 0);
   showMissing(state, live);
   map.update(state, live, link.token);
@@ -99,15 +109,25 @@ function choose(place) {
 }
 
 get("control-button").addEventListener("click", () => {
-  const on = !(state?.control?.held || state?.control?.wanted);
+  const { held, wanted, asking } = state?.control ?? {};
+  const on = !(held || wanted || asking);
   ask({ type: "control", on });
 });
 get("resume").addEventListener("click", () => ask({ type: "resume" }));
 get("standby").addEventListener("click", () => ask({ type: "standby" }));
-get("vehicle-select").addEventListener("change", (event) => {
-  ask({ type: "select", subsystem: Number(event.target.value) });
-  event.target.blur();
-});
+get("vehicle-button").addEventListener("click", () => showFleet());
+
+/** Selects a vehicle: the one before stops, unless it is on a mission. */
+async function selectVehicle(subsystem) {
+  drive.release();
+  mission.forget();
+  await ask({ type: "select", subsystem });
+}
+
+function showFleet() {
+  select("vehicles");
+  fleet.focus();
+}
 
 // The token.
 
@@ -143,7 +163,7 @@ get("control-text").addEventListener("click", () => {
 function select(view) {
   const { body } = document;
   body.dataset.view = view;
-  if (view === "system" || view === "messages") body.dataset.inspect = view;
+  if (["vehicles", "system", "messages"].includes(view)) body.dataset.inspect = view;
   for (const button of document.querySelectorAll("[data-show]")) {
     mark(button, "aria-pressed", String(button.dataset.show === view));
     button.classList.toggle("inspected", button.dataset.show === body.dataset.inspect);
@@ -156,6 +176,10 @@ select("mission");
 
 addEventListener("keydown", (event) => {
   if (emergency.key(event) || typing()) return;
+  if (event.code === "KeyV" && !event.ctrlKey && !event.metaKey && !event.altKey) {
+    event.preventDefault();
+    return showFleet();
+  }
   if (drive.keyDown(event) || (!event.ctrlKey && !event.metaKey && !event.altKey && map.key(event.key))) event.preventDefault();
 });
 

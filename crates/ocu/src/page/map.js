@@ -13,7 +13,7 @@ const TAP = 9;
 export class MapView {
   #canvas = get("map");
   #context = this.#canvas.getContext("2d");
-  #raster = new Raster();
+  #raster = new Raster(null);
   #camera = { x: 0, y: 0, scale: 24 };
   #placed = false;
   /** Whether somebody has chosen what is seen, so that a turned screen leaves it alone. */
@@ -47,6 +47,7 @@ export class MapView {
     if (vehicle?.subsystem !== this.#vehicle) {
       this.#vehicle = vehicle?.subsystem;
       this.#trail = [];
+      this.#raster = new Raster(this.#vehicle);
       this.#placed = false;
     }
     const pose = vehicle?.pose;

@@ -61,6 +61,11 @@ export class Mission {
     this.#draft({ x, y });
   }
 
+  /** Forgets the place that was chosen, because it was meant for another vehicle. */
+  forget() {
+    this.#draft(null);
+  }
+
   /** Shows the place that is chosen but not planned yet. */
   #draft(place) {
     this.#map.draft = place;

@@ -41,6 +41,8 @@ pub(crate) const FILES: &[File] = files! {
     "/main.js" SCRIPT "main.js",
     "/dom.js" SCRIPT "dom.js",
     "/link.js" SCRIPT "link.js",
+    "/fleet.js" SCRIPT "fleet.js",
+    "/handover.js" SCRIPT "handover.js",
     "/status.js" SCRIPT "status.js",
     "/map.js" SCRIPT "map.js",
     "/raster.js" SCRIPT "raster.js",

@@ -7,6 +7,7 @@ const LARGEST = 4096;
 const RETRY = 2_000;
 
 export class Raster {
+  #vehicle;
   #shown = "";
   #loading = false;
   #cells = null;
@@ -19,6 +20,11 @@ export class Raster {
   /** Why there is no picture, for people. */
   problem = "";
 
+  /** The raster of a vehicle, by its subsystem number. */
+  constructor(vehicle) {
+    this.#vehicle = vehicle;
+  }
+
   /** Takes the description of a state; calls `changed` when there is a new picture. */
   update(info, token, changed) {
     if (!valid(info)) {
@@ -28,7 +34,7 @@ export class Raster {
     const wanted = `${info.id}/${info.revision}/${info.rows}x${info.columns}`;
     if (wanted === this.#shown || this.#loading || performance.now() < this.#notBefore) return;
     this.#loading = true;
-    load(info, token)
+    load(this.#vehicle, info, token)
       .then((cells) => {
         this.#shown = wanted;
         this.#cells = cells;
@@ -84,9 +90,9 @@ function valid(info) {
   );
 }
 
-async function load({ id, revision, rows, columns }, token) {
+async function load(vehicle, { id, revision, rows, columns }, token) {
   const headers = token ? { Authorization: `Bearer ${token}` } : {};
-  const answer = await fetch(`/map/${id}?revision=${revision}`, { headers, cache: "no-store" });
+  const answer = await fetch(`/map/${vehicle}/${id}?revision=${revision}`, { headers, cache: "no-store" });
   if (!answer.ok) throw new Error(`the server answered ${answer.status}`);
   const cells = new Uint8Array(await answer.arrayBuffer());
   if (cells.length !== rows * columns) {

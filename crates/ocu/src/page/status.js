@@ -1,7 +1,7 @@
-// The top bar and the status panel: which vehicle, how good the connection is, who is in control,
-// and how the vehicle moves.
+// The top bar and the status panel: how good the connection is, who is in control, and how the
+// vehicle moves.
 
-import { duration, figure, get, list, make, mark, number, plain, say, show, toast, words } from "./dom.js";
+import { duration, figure, get, list, mark, number, plain, say, show, toast, words } from "./dom.js";
 
 const FRESH = 1_000;
 
@@ -28,22 +28,6 @@ export function showLink(link, state) {
   }[condition];
   show(banner, Boolean(text));
   if (text) say(banner, text);
-}
-
-/** Shows the vehicles that there are, and which one is operated. */
-export function showVehicles(state) {
-  const select = get("vehicle-select");
-  const vehicles = list(state.tree, 64).filter((one) => one?.kind === "vehicle" && number(one.subsystem) !== null);
-  const chosen = number(state.vehicle?.subsystem);
-  if (chosen !== null && !vehicles.some((one) => one.subsystem === chosen)) vehicles.unshift(state.vehicle);
-  const key = JSON.stringify([chosen, vehicles.map((one) => [one.subsystem, one.name])]);
-  if (select.dataset.key === key || document.activeElement === select) return;
-  select.dataset.key = key;
-  const options = vehicles.map((one) =>
-    make("option", { value: one.subsystem }, `${plain(one.name, 40) || "Vehicle"} · ${one.subsystem}`));
-  select.replaceChildren(...(options.length ? options : [make("option", {}, "No vehicle found")]));
-  if (chosen !== null) select.value = String(chosen);
-  select.disabled = !options.length;
 }
 
 /** How a part is missing, in words. */
@@ -73,21 +57,25 @@ export function showMissing(state, live) {
   say(notice, texts.slice(0, 2).join(" · ") + more);
 }
 
-/** Shows who controls, and offers to take or release control. */
+/** Shows who controls, and offers to take, request or release control. */
 export function showControl(state, authority, operable) {
-  const { held, wanted, reason } = state.control ?? {};
+  const { held, wanted, asking, reason } = state.control ?? {};
   const driver = part(state, "primitive_driver");
   const [word, detail] = held
     ? ["You have control", number(authority) === null ? "" : `authority ${authority}`]
-    : wanted
-      ? ["Taking control", plain(reason)]
-      : ["Not in control", plain(reason) || holder(driver)];
+    : asking
+      ? ["Control requested", `from ${plain(asking, 16)}`]
+      : wanted
+        ? ["Taking control", plain(reason)]
+        : ["Not in control", plain(reason) || holder(driver)];
   say(get("control-word"), word);
   say(get("control-detail"), detail);
-  document.body.dataset.control = held ? "held" : wanted ? "wanted" : "none";
+  document.body.dataset.control = held ? "held" : asking ? "asking" : wanted ? "wanted" : "none";
   const button = get("control-button");
-  say(button, held || wanted ? "Release" : "Take control");
-  button.classList.toggle("primary", !held && !wanted);
+  const outranks = Boolean(driver?.controller) && driver.authority >= authority;
+  const offer = outranks ? "Request control" : "Take control";
+  say(button, asking ? "Withdraw" : held || wanted ? "Release" : offer);
+  button.classList.toggle("primary", !held && !wanted && !asking);
   button.disabled = !operable;
 }
 

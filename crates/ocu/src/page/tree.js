@@ -7,15 +7,19 @@ import { authority } from "./status.js";
 const PERIOD = 400;
 let shown = 0;
 
-/** Shows the tree of a state; not more often than anybody can read. */
-export function showSystem(state, urgent) {
-  const now = performance.now();
-  if (!urgent && now - shown < PERIOD) return;
-  shown = now;
-  const subsystems = list(state.tree, 256);
+/** Shows the tree of components. */
+export function showTree(tree) {
+  const subsystems = list(tree?.subsystems, 256);
   const counts = { nodes: 0, components: 0 };
   update(get("tree"), subsystems.map((one) => subsystem(one, counts)));
   say(get("system-count"), `${counts.components} components on ${counts.nodes} nodes`);
+}
+
+/** Shows the parts of the selected vehicle; not more often than anybody can read. */
+export function showSystem(state) {
+  const now = performance.now();
+  if (now - shown < PERIOD) return;
+  shown = now;
   showParts(list(state.vehicle?.parts, 64), list(state.vehicle?.missing, 64));
 }
 

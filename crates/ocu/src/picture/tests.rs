@@ -48,7 +48,7 @@ fn planner() -> Component {
 
 /// A vehicle with these components.
 fn picture(now: Instant, components: &[Component]) -> Picture {
-    let mut picture = Picture::new(JausId::new(42, 1, 1), Some(101));
+    let mut picture = Picture::new(JausId::new(42, 1, 1), 101, Depth::Full);
     picture.set_parts(now, components.iter());
     picture
 }

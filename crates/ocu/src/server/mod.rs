@@ -104,7 +104,7 @@ impl Server {
         });
         let router = files
             .route("/ws", get(serve_page))
-            .route("/map/{id}", get(serve_map))
+            .route("/map/{vehicle}/{map}", get(serve_map))
             .route("/health", get(health))
             .layer(middleware::from_fn_with_state(self.shared.clone(), admit))
             .with_state(self.shared);
@@ -153,11 +153,11 @@ async fn health(State(shared): State<Arc<Shared>>) -> Json<Health> {
     })
 }
 
-/// The cells of a map, one octet each, row by row. The snapshot states the revision; the one in the
+/// The cells of a vehicle's map, one octet each, row by row. The snapshot states the revision; the one in the
 /// URL only separates the entries in browser caches.
 async fn serve_map(
     State(shared): State<Arc<Shared>>,
-    Path(map): Path<u16>,
+    Path((vehicle, map)): Path<(u16, u16)>,
     headers: HeaderMap,
 ) -> Response {
     if !shared.lets_read(&headers) {
@@ -169,7 +169,11 @@ async fn serve_map(
         // Fails only if the request has been dropped.
         let _ = reply.send(result);
     });
-    let order = Order::Cells { map, reply };
+    let order = Order::Cells {
+        vehicle,
+        map,
+        reply,
+    };
     // On failure the reply end is dropped as well, which is handled below.
     let _ = shared.access.orders.send(order).await;
     match cells.await {

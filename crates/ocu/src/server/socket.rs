@@ -21,7 +21,7 @@ use crate::session::{Order, Reply};
 use jaus_view::Filter;
 
 /// Version of the protocol between page and station.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Limit of queued answers per page. Further answers are dropped.
 const ANSWERS: usize = 64;
 /// A page that accepts no data for this time is disconnected.
@@ -135,7 +135,9 @@ impl Reader<'_> {
                     "this requires the token that jaus-ocu printed or read from its file",
                 );
             }
-            Said::OperatorRequest(request) => self.request(frame.id, request).await,
+            Said::OperatorRequest(request) => {
+                self.request(frame.id, frame.vehicle, request).await;
+            }
         }
         None
     }
@@ -175,10 +177,11 @@ impl Reader<'_> {
         may_read(self.shared, self.trusted)
     }
 
-    async fn request(&mut self, id: Option<u64>, request: OperatorRequest) {
+    async fn request(&mut self, id: Option<u64>, vehicle: Option<u16>, request: OperatorRequest) {
         let (page, reply) = (self.page, self.reply(id));
         let order = Order::OperatorRequest {
             page,
+            vehicle,
             request,
             reply,
         };
@@ -272,15 +275,10 @@ async fn write(
                 Some(json) => Some(Message::Text(json)),
                 None => return,
             },
-            changed = snapshots.changed() => {
-                if changed.is_err() {
-                    return;
-                }
-                let json = snapshots.borrow_and_update().clone();
-                let shown = may_read(shared, trusted) && !json.is_empty();
-                let json = Some(json).filter(|_| shown);
-                json.map(|json| Message::Text(Utf8Bytes::from(&*json)))
-            }
+            snapshot = snapshots.next(), if may_read(shared, trusted) => match snapshot {
+                Some(json) => Some(Message::Text(Utf8Bytes::from(&*json))),
+                None => return,
+            },
             _ = pings.tick() => Some(Message::Ping(axum::body::Bytes::new())),
             Some(filter) = chosen.recv() => {
                 view = filter.zip(shared.admission.node.as_ref()).map(|(filter, node)| {

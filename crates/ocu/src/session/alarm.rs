@@ -46,7 +46,7 @@ impl Alarm {
         reply: Reply,
     ) {
         if !self.wanted {
-            tracing::info!("emergency: stopping {}", vehicle(picture));
+            tracing::info!("emergency: stopping vehicle {}", picture.vehicle());
         }
         self.wanted = true;
         self.clearing = None;
@@ -66,7 +66,7 @@ impl Alarm {
         reply: Reply,
     ) {
         if self.wanted {
-            tracing::info!("emergency: cleared for {}", vehicle(picture));
+            tracing::info!("emergency: cleared for vehicle {}", picture.vehicle());
         }
         self.wanted = false;
         self.clearing = Some(now + Self::PATIENCE);
@@ -127,11 +127,6 @@ impl Alarm {
             }
         }
     }
-}
-
-fn vehicle(picture: &Picture) -> String {
-    let number = picture.vehicle();
-    number.map_or_else(|| "no vehicle".to_owned(), |it| format!("vehicle {it}"))
 }
 
 fn in_words(on: bool, left: &[JausId]) -> String {

@@ -8,6 +8,7 @@ use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::timeout;
 
 use super::Reply;
+use super::lease::release_all;
 use crate::state::Edition;
 use crate::stick::Push;
 use jaus::address::JausId;
@@ -25,6 +26,8 @@ pub(super) enum Finished {
         peer: JausId,
         result: Result<Session, SessionError>,
     },
+    /// A vehicle that was deselected has stopped and was released, or did not answer.
+    Left { vehicle: u16 },
     /// Result of a page's request.
     Requested {
         reply: Reply,
@@ -34,6 +37,7 @@ pub(super) enum Finished {
     Steered { push: Push, acknowledged: bool },
     /// Result of a request for map cells.
     Mapped {
+        store: JausId,
         edition: Edition,
         result: Result<Bytes, String>,
     },
@@ -75,6 +79,10 @@ impl Client {
             jobs: JoinSet::new(),
             effort: None,
         }
+    }
+
+    pub(super) const fn authority(&self) -> u8 {
+        self.authority
     }
 
     pub(super) const fn component(&self) -> &Component {
@@ -124,6 +132,30 @@ impl Client {
                 Err(format!("the vehicle has not answered for {waited} s"))
             });
             Finished::Requested { reply, result }
+        });
+    }
+
+    /// Stops and releases a vehicle that was deselected: its primitive driver, if held, confirms
+    /// the end of manual drive first.
+    pub(super) fn leave(
+        &mut self,
+        vehicle: u16,
+        driver: Option<Arc<Session>>,
+        sessions: Vec<Arc<Session>>,
+    ) {
+        let stop = effort(Push::NONE).ok();
+        self.jobs.spawn(async move {
+            let stopped = async {
+                if let Some((driver, stop)) = driver.zip(stop) {
+                    // Fails if it is not ready, and then it is at rest.
+                    let _ = driver.deliver(&stop).await;
+                }
+                release_all(sessions).await;
+            };
+            if timeout(PATIENCE, stopped).await.is_err() {
+                tracing::warn!("vehicle {vehicle} has not confirmed its release");
+            }
+            Finished::Left { vehicle }
         });
     }
 

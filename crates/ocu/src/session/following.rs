@@ -1,5 +1,5 @@
-//! The session's subscriptions to all reports of every vehicle part, renewed for as long as the
-//! part exists.
+//! The session's subscriptions to the reports of a vehicle's parts, renewed for as long as the part
+//! exists: all of the selected vehicle, and the few of the others that the list of vehicles shows.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::sleep;
 
-use crate::picture::Picture;
+use crate::picture::{Depth, Picture};
 use crate::report::Report;
 use crate::role;
 use jaus::address::JausId;
@@ -38,14 +38,15 @@ struct Followed {
 }
 
 /// The reports that a part offers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Topics {
-    status: bool,
+    status: Option<When>,
     control: bool,
     stage: bool,
     pose: bool,
     velocity: bool,
     mission: bool,
+    path: bool,
     maps: bool,
 }
 
@@ -53,18 +54,37 @@ struct Topics {
 const MOTION: When = When::hz(10.0);
 /// Rate of status reports.
 const STATUS: When = When::hz(4.0);
+/// Rate of status reports of a vehicle that is only in the list.
+const BRIEF_STATUS: When = When::hz(1.0);
 /// Delay before a failed subscription is retried.
 const PAUSE: Duration = Duration::from_secs(1);
 
 impl Topics {
-    fn of(part: &Known) -> Self {
+    fn of(part: &Known, picture: &Picture) -> Self {
+        match picture.depth() {
+            Depth::Brief => Self::brief(part, picture.principal()),
+            Depth::Full => Self::full(part),
+        }
+    }
+
+    fn brief(part: &Known, principal: Option<JausId>) -> Self {
         Self {
-            status: role::is_managed(part),
+            status: (principal == Some(part.id)).then_some(BRIEF_STATUS),
+            control: principal == Some(part.id) || part.offers(mission_planner::URN),
+            mission: part.offers(mission_planner::URN),
+            ..Self::default()
+        }
+    }
+
+    fn full(part: &Known) -> Self {
+        Self {
+            status: role::is_managed(part).then_some(STATUS),
             control: role::is_managed(part) || part.offers(access_control::URN),
             stage: role::tells_stage(part),
             pose: role::reports_pose(part),
             velocity: role::reports_velocity(part),
             mission: part.offers(mission_planner::URN),
+            path: part.offers(mission_planner::URN),
             maps: part.offers(raster_maps::URN),
         }
     }
@@ -86,7 +106,7 @@ impl Following {
             let Some(part) = picture.directory().component(*id) else {
                 continue;
             };
-            let topics = Topics::of(part);
+            let topics = Topics::of(part, picture);
             if self.parts.get(id).is_none_or(|it| it.topics != topics) {
                 let _tasks = self.start(*id, topics);
                 self.parts.insert(*id, Followed { topics, _tasks });
@@ -96,11 +116,12 @@ impl Following {
 
     fn start(&self, peer: JausId, topics: Topics) -> JoinSet<()> {
         let mut tasks = JoinSet::new();
-        if topics.status {
-            tasks.spawn(self.ask(peer, QueryStatus {}, STATUS));
+        if let Some(rate) = topics.status {
+            tasks.spawn(self.ask(peer, QueryStatus {}, rate));
         }
         if topics.control {
-            tasks.spawn(self.ask(peer, QueryControl {}, STATUS));
+            let rate = topics.status.unwrap_or(BRIEF_STATUS);
+            tasks.spawn(self.ask(peer, QueryControl {}, rate));
         }
         if topics.stage {
             tasks.spawn(self.ask(peer, QueryStage {}, STATUS));
@@ -114,7 +135,10 @@ impl Following {
             tasks.spawn(self.ask(peer, query, MOTION));
         }
         if topics.mission {
-            tasks.spawn(self.ask(peer, QueryMission {}, STATUS));
+            let rate = topics.status.unwrap_or(BRIEF_STATUS);
+            tasks.spawn(self.ask(peer, QueryMission {}, rate));
+        }
+        if topics.path {
             let path = QueryPlannedPath {};
             tasks.spawn(self.ask(peer, path, When::OnChange));
         }

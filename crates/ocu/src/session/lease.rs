@@ -147,6 +147,11 @@ impl Lease {
         self.set_target(TargetState::Standby);
     }
 
+    /// Puts parts that are taken from another operator into standby.
+    pub(super) fn stand_by(&mut self) {
+        self.set_target(TargetState::Standby);
+    }
+
     /// Whether the vehicle was stopped because its driving client was lost, and its drivers are
     /// held.
     pub(super) fn is_stopped(&self, picture: &Picture) -> bool {
@@ -271,7 +276,17 @@ impl Lease {
             held,
             wanted,
             reason,
+            ..state::Control::default()
         }
+    }
+
+    /// Whether another client has taken control of the part without which the operator cannot act.
+    pub(super) fn is_taken(&self, picture: &Picture) -> bool {
+        let principal = self
+            .principal(picture)
+            .and_then(|part| self.holds.get(&part));
+        let state = principal.map(Hold::state);
+        matches!(state, Some(SessionState::Lost { why, .. }) if why.is_opposition())
     }
 
     fn reasons(&self, picture: &Picture) -> String {

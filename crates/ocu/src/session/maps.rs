@@ -52,7 +52,11 @@ impl Maps {
             let component = client.component().clone();
             client.start(async move {
                 let result = cells(&component, store, &map).await;
-                Finished::Mapped { edition, result }
+                Finished::Mapped {
+                    store,
+                    edition,
+                    result,
+                }
             });
         }
     }

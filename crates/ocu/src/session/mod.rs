@@ -1,36 +1,38 @@
-//! The operator session: monitors a vehicle, takes control of it, drives and stops it, on request
-//! of the pages. A single task that never waits for the network: slow operations are jobs that
+//! The operator session: monitors vehicles, takes control of the selected one, drives and stops it,
+//! on request of the pages. A single task that never waits for the network: slow operations are jobs that
 //! report their completion.
 
 mod alarm;
 mod client;
+mod fleet;
 mod following;
+mod handover;
 mod lease;
 mod maps;
 mod requests;
+mod vehicle;
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use tokio::sync::{mpsc, watch};
 use tokio::time::{MissedTickBehavior, interval};
 
-use self::alarm::Alarm;
 use self::client::{Client, Finished};
-use self::following::{Following, Sighting};
-use self::lease::{Lease, Wanted};
+use self::fleet::Fleet;
+use self::following::Sighting;
+use self::handover::Notice;
 pub(super) use self::maps::CellsReply;
-use self::maps::Maps;
+use self::vehicle::Vehicle;
 use super::PageId;
-use super::missing::Absence;
-use super::picture::Picture;
+use super::answer::Said;
+use super::picture::Depth;
 use super::request::OperatorRequest;
-use super::role::Role;
-use super::state::{Drive, State};
+use super::state::{Control, Drive, State};
 use super::stick::{Push, Stick};
-use jaus::address::JausId;
-use jaus::component::Component;
+use jaus::component::{Component, Handlers};
+use jaus::service::Directory;
 use jaus_vehicle::parts::PartError;
 use jaus_view::Timestamp;
 
@@ -41,11 +43,17 @@ pub(super) type Reply = Box<dyn FnOnce(Result<(), String>) + Send>;
 pub(super) enum Order {
     OperatorRequest {
         page: PageId,
+        /// The vehicle that the page means; `None` for the selected one.
+        vehicle: Option<u16>,
         request: OperatorRequest,
         reply: Reply,
     },
-    /// Request for the cells of a map.
-    Cells { map: u16, reply: CellsReply },
+    /// Request for the cells of a map of a vehicle.
+    Cells {
+        vehicle: u16,
+        map: u16,
+        reply: CellsReply,
+    },
     /// A page is gone. If it held the stick, the stick is released.
     Gone(PageId),
 }
@@ -54,56 +62,128 @@ pub(super) enum Order {
 #[derive(Clone)]
 pub(super) struct Access {
     pub(super) orders: mpsc::Sender<Order>,
-    /// The last snapshot as JSON; empty before the first.
-    pub(super) snapshots: watch::Receiver<Arc<str>>,
+    pub(super) snapshots: Snapshots,
+}
+
+/// The last snapshots as JSON; empty before the first.
+#[derive(Clone)]
+pub(super) struct Snapshots {
+    /// The selected vehicle, ten times a second.
+    state: watch::Receiver<Arc<str>>,
+    /// The list of vehicles, once a second.
+    fleet: watch::Receiver<Arc<str>>,
+    /// The tree of components, when it has changed.
+    tree: watch::Receiver<Arc<str>>,
+}
+
+impl Snapshots {
+    /// Makes all snapshots new, for a page that has just connected.
+    pub(super) fn mark_changed(&mut self) {
+        for snapshots in [&mut self.state, &mut self.fleet, &mut self.tree] {
+            snapshots.mark_changed();
+        }
+    }
+
+    /// The next new snapshot; `None` when the session has ended. The returned future is cancel safe.
+    pub(super) async fn next(&mut self) -> Option<Arc<str>> {
+        loop {
+            let (changed, snapshots) = tokio::select! {
+                biased;
+                changed = self.tree.changed() => (changed, &mut self.tree),
+                changed = self.fleet.changed() => (changed, &mut self.fleet),
+                changed = self.state.changed() => (changed, &mut self.state),
+            };
+            changed.ok()?;
+            let json = snapshots.borrow_and_update().clone();
+            if !json.is_empty() {
+                return Some(json);
+            }
+        }
+    }
+}
+
+/// The senders of [`Snapshots`].
+struct Publisher {
+    state: watch::Sender<Arc<str>>,
+    fleet: watch::Sender<Arc<str>>,
+    tree: watch::Sender<Arc<str>>,
+}
+
+impl Publisher {
+    fn new() -> (Self, Snapshots) {
+        let (state, states) = watch::channel(Arc::from(""));
+        let (fleet, fleets) = watch::channel(Arc::from(""));
+        let (tree, trees) = watch::channel(Arc::from(""));
+        let snapshots = Snapshots {
+            state: states,
+            fleet: fleets,
+            tree: trees,
+        };
+        (Self { state, fleet, tree }, snapshots)
+    }
+}
+
+fn publish(sender: &watch::Sender<Arc<str>>, snapshot: &Said<'_>) {
+    // Serialisation cannot fail for numbers and text. Unlike `send`, `send_replace` never fails. The
+    // server holds a receiver even without pages.
+    if let Ok(json) = serde_json::to_string(snapshot) {
+        sender.send_replace(json.into());
+    }
 }
 
 /// The operator session.
 pub(super) struct Session {
     client: Client,
-    picture: Picture,
-    following: Following,
+    fleet: Fleet,
     stick: Stick,
-    lease: Lease,
-    alarm: Alarm,
-    maps: Maps,
-    /// The missing parts that have been logged.
-    missing: BTreeMap<JausId, Absence>,
+    /// Deselected vehicles that are still being stopped and released. Until then no other one is
+    /// driven.
+    leaving: BTreeSet<u16>,
+    /// Whether all vehicles are to be in emergency, also those that appear later.
+    all_stopped: bool,
     /// Why the station ended manual drive, until a page drives again.
     halted: Option<String>,
     orders: mpsc::Receiver<Order>,
     sightings: mpsc::Receiver<Sighting>,
-    snapshots: watch::Sender<Arc<str>>,
+    notices: mpsc::Receiver<Notice>,
+    /// The service that receives the notices, until it is offered.
+    handoff: Option<Handlers>,
+    publisher: Publisher,
+    /// The directory whose tree was published.
+    published: Arc<Directory>,
     seq: u64,
 }
 
 impl Session {
     /// Period of manual drive commands and of all other periodic work.
     const BEAT: Duration = Duration::from_millis(50);
-    /// Number of periods between two snapshots.
+    /// Number of periods between two snapshots of the selected vehicle.
     const SNAPSHOT: u64 = 2;
+    /// Number of periods between two snapshots of the list of vehicles, and of the tree.
+    const FLEET_SNAPSHOT: u64 = 20;
     /// Capacity of the order and report queues.
     const QUEUE: usize = 256;
 
-    /// Creates a session for a component. `vehicle` selects the vehicle, by default the first one
-    /// discovered; `authority` is used to request control.
-    pub(super) fn new(component: Component, vehicle: Option<u16>, authority: u8) -> (Self, Access) {
+    /// Creates a session for a component. `vehicles` are shown, by default all that are discovered;
+    /// the first is selected. `authority` is used to request control.
+    pub(super) fn new(component: Component, vehicles: Vec<u16>, authority: u8) -> (Self, Access) {
         let (orders, inbox) = mpsc::channel(Self::QUEUE);
         let (sighted, sightings) = mpsc::channel(Self::QUEUE);
-        let (publisher, snapshots) = watch::channel(Arc::from(""));
+        let (noticed, notices) = mpsc::channel(Self::QUEUE);
+        let (publisher, snapshots) = Publisher::new();
         let session = Self {
-            picture: Picture::new(component.id(), vehicle),
-            following: Following::new(component.clone(), sighted),
+            fleet: Fleet::new(component.clone(), vehicles, sighted),
             client: Client::new(component, authority),
             stick: Stick::default(),
-            lease: Lease::default(),
-            alarm: Alarm::default(),
-            maps: Maps::default(),
-            missing: BTreeMap::new(),
+            leaving: BTreeSet::new(),
+            all_stopped: false,
             halted: None,
             orders: inbox,
             sightings,
-            snapshots: publisher,
+            notices,
+            handoff: Some(handover::service(noticed)),
+            publisher,
+            published: Arc::default(),
             seq: 0,
         };
         (session, Access { orders, snapshots })
@@ -111,6 +191,11 @@ impl Session {
 
     /// Runs until the component stops.
     pub(super) async fn run(mut self) -> PartError {
+        if let Some(handoff) = self.handoff.take()
+            && let Err(error) = self.client.component().offer(handoff).await
+        {
+            return PartError::Broken(error.to_string());
+        }
         let mut standing = self.client.component().watch_standing();
         let mut beat = interval(Self::BEAT);
         beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -121,7 +206,14 @@ impl Session {
                 },
                 Some(order) = self.orders.recv() => self.handle_order(Instant::now(), order),
                 Some((by, report)) = self.sightings.recv() => {
-                    self.picture.handle_report(Instant::now(), by, report);
+                    if let Some(vehicle) = self.fleet.get_mut(by.subsystem()) {
+                        vehicle.handle_report(Instant::now(), by, report);
+                    }
+                }
+                Some((part, content)) = self.notices.recv() => {
+                    if let Some(vehicle) = self.fleet.get_mut(part.subsystem()) {
+                        vehicle.handle_handover(Instant::now(), part, &content, &mut self.client);
+                    }
                 }
                 Some(finished) = self.client.finished() => {
                     self.handle_finished(Instant::now(), finished);
@@ -133,66 +225,66 @@ impl Session {
 
     fn handle_finished(&mut self, now: Instant, finished: Finished) {
         match finished {
-            Finished::Begun { peer, result } => self.lease.handle_begun(peer, result),
+            Finished::Begun { peer, result } => {
+                // Without its vehicle the session is dropped, which releases the part.
+                if let Some(vehicle) = self.fleet.get_mut(peer.subsystem()) {
+                    vehicle.lease.handle_begun(peer, result);
+                }
+            }
+            Finished::Left { vehicle } => {
+                self.leaving.remove(&vehicle);
+            }
             Finished::Requested { reply, result } => reply(result),
             Finished::Steered { push, acknowledged } => {
                 if acknowledged && push == Push::NONE {
                     self.stick.handle_stopped();
                 }
             }
-            Finished::Mapped { edition, result } => self.maps.handle_mapped(edition, &result),
+            Finished::Mapped {
+                store,
+                edition,
+                result,
+            } => {
+                if let Some(vehicle) = self.fleet.get_mut(store.subsystem()) {
+                    vehicle.maps.handle_mapped(edition, &result);
+                }
+            }
             Finished::Alarmed { peer, status } => {
-                self.alarm.handle_told(peer);
-                if let Some(report) = status {
-                    self.picture.handle_report(now, peer, report.into());
+                if let Some(vehicle) = self.fleet.get_mut(peer.subsystem()) {
+                    vehicle.alarm.handle_told(peer);
+                    if let Some(report) = status {
+                        vehicle.handle_report(now, peer, report.into());
+                    }
                 }
             }
         }
     }
 
     fn handle_beat(&mut self, now: Instant) {
-        self.look_around(now);
-        self.log_missing(now);
-        self.halt_on_old_picture(now);
-        if self.alarm.is_wanted() || self.picture.in_emergency().next().is_some() {
-            // Whatever the source of the emergency: nothing resumes on its own afterwards.
-            self.stick.stop(now);
-            self.lease.set_ready(false);
+        for joined in self.fleet.handle_directory(now) {
+            self.stop_latecomer(now, joined);
         }
-        self.alarm.handle_time(now, &self.picture, &mut self.client);
-        self.stop_after_lost_planner(now);
-        self.lease.handle_time(&self.picture, &mut self.client);
+        self.halt_on_old_picture(now);
+        if self.fleet.selected().is_some_and(Vehicle::is_stopped) {
+            self.stick.stop(now);
+        }
+        for (is_selected, vehicle) in self.fleet.iter_mut() {
+            vehicle.handle_time(now, &mut self.client);
+            if !is_selected && vehicle.is_wanted() && !vehicle.is_on_mission(now) {
+                tracing::info!("vehicle {}: the mission is over", vehicle.number());
+                drop(vehicle.release());
+                vehicle.set_depth(Depth::Brief);
+            }
+        }
+        self.fleet.drop_absent();
         self.steer(now);
         self.seq += 1;
         if self.seq.is_multiple_of(Self::SNAPSHOT) {
-            self.publish(now);
+            publish(&self.publisher.state, &Said::State(&self.state(now)));
         }
-    }
-
-    fn look_around(&mut self, now: Instant) {
-        self.picture.handle_time(now);
-        let directory = self.client.component().directory();
-        if !std::ptr::eq(&*directory, self.picture.directory()) {
-            self.picture.handle_directory(now, directory);
-            self.following.follow(&self.picture);
+        if self.seq % Self::FLEET_SNAPSHOT == 1 {
+            self.publish_fleet(now);
         }
-    }
-
-    /// Logs parts that disappear, fall silent or return.
-    fn log_missing(&mut self, now: Instant) {
-        let mut missing = BTreeMap::new();
-        for (id, name, how) in self.picture.missing(now) {
-            missing.insert(id, how);
-            if self.missing.get(&id) != Some(&how) {
-                tracing::warn!("{name} {id} is {}", how.name());
-            }
-        }
-        for id in self.missing.keys().filter(|id| !missing.contains_key(id)) {
-            if self.picture.parts().contains_key(id) {
-                tracing::info!("{id} is back");
-            }
-        }
-        self.missing = missing;
     }
 
     /// Ends manual drive when the picture is stale.
@@ -200,25 +292,11 @@ impl Session {
         if self.stick.driven().is_none() {
             return;
         }
-        if let Some(why) = self.picture.stale(now) {
+        let stale = self.fleet.selected().and_then(|it| it.picture.stale(now));
+        if let Some(why) = stale {
             tracing::warn!("manual drive ended: {why}");
             self.stick.stop(now);
             self.halted = Some(why);
-        }
-    }
-
-    /// Stops the vehicle after the planner was lost while driving for this operator. Its drivers
-    /// have no supervising client left, so the station takes control and sends them to standby.
-    fn stop_after_lost_planner(&mut self, now: Instant) {
-        let Some((planner, how)) = self.picture.lost_planner(now) else {
-            return;
-        };
-        if self.lease.wanted() == Wanted::Planner {
-            tracing::warn!(
-                "the planner {planner} is {} while it drives: stopping the vehicle",
-                how.name()
-            );
-            self.lease.want_stopped(&self.picture);
         }
     }
 
@@ -236,47 +314,41 @@ impl Session {
         let Some(push) = self.stick.poll_push(now) else {
             return;
         };
-        let driver = self.picture.find(Role::PrimitiveDriver);
-        match driver.and_then(|driver| self.lease.held(driver)) {
+        let driver = self.fleet.selected().and_then(Vehicle::driver);
+        match driver {
             Some(session) if session.check().is_ok() => self.client.steer(now, &session, push),
             // Without control and in standby, earlier commands no longer affect the vehicle.
             _ => self.stick.handle_stopped(),
         }
     }
 
-    fn publish(&mut self, now: Instant) {
-        let state = self.state(now);
-        // Serialisation cannot fail for numbers and text.
-        let Ok(json) = serde_json::to_string(&super::answer::Said::State(&state)) else {
-            return;
-        };
-        // Unlike `send`, this never fails. The server holds a receiver even without pages.
-        self.snapshots.send_replace(json.into());
+    fn publish_fleet(&mut self, now: Instant) {
+        let fleet = self.fleet.state(now);
+        publish(&self.publisher.fleet, &Said::Fleet(&fleet));
+        if !Arc::ptr_eq(&self.published, self.fleet.directory()) {
+            self.published = Arc::clone(self.fleet.directory());
+            publish(&self.publisher.tree, &Said::Tree(&self.fleet.tree()));
+        }
     }
 
     fn state(&self, now: Instant) -> State {
         let driven = self.stick.driven();
         let push = driven.unwrap_or_default();
-        let emergency = self.alarm.is_wanted();
+        let vehicle = self.fleet.selected();
         State {
             seq: self.seq / Self::SNAPSHOT,
             time: time_of_day().to_string(),
             operator: self.client.component().id().to_string(),
-            tree: self.picture.tree(),
-            vehicle: self
-                .picture
-                .vehicle_state(now, emergency, |part| self.lease.obstacle(part)),
-            control: self.lease.state(&self.picture),
+            vehicle: vehicle.and_then(|it| it.state(now)),
+            control: vehicle.map_or_else(Control::default, Vehicle::control_state),
             drive: Drive {
                 active: driven.is_some(),
                 forward: push.forward(),
                 turn: push.turn(),
                 reason: self.halt_reason(),
             },
-            mission: self
-                .picture
-                .mission_state(now, self.lease.is_stopped(&self.picture)),
-            map: self.picture.map_state(),
+            mission: vehicle.and_then(|it| it.mission_state(now)),
+            map: vehicle.and_then(|it| it.picture.map_state()),
         }
     }
 }

@@ -105,10 +105,10 @@ async fn if_looking_needs_the_token_nothing_is_shown_before() {
     page.say(&json!({"type": "control", "on": true, "id": 1}))
         .await;
     assert_eq!(page.next().await["type"], "refused", "and no state before");
-    let map = get(&scene, "/map/1", "Host: localhost\r\n").await;
+    let map = get(&scene, "/map/101/1", "Host: localhost\r\n").await;
     assert!(map.starts_with("HTTP/1.1 401"), "{map}");
     let shown = format!("Host: localhost\r\nAuthorization: Bearer {TOKEN}\r\n");
-    let map = get(&scene, "/map/1", &shown).await;
+    let map = get(&scene, "/map/101/1", &shown).await;
     assert!(map.starts_with("HTTP/1.1 404"), "{map}");
     page.ask(json!({"type": "token", "token": TOKEN}))
         .await

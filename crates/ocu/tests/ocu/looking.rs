@@ -30,13 +30,13 @@ async fn the_map_of_the_store_is_shown_with_all_its_cells() {
     assert_eq!(map["name"], "traversability");
     assert_eq!((&map["rows"], &map["columns"]), (&json!(16), &json!(16)));
     for _ in 0..2 {
-        let path = format!("/map/{}?revision={}", map["id"], map["revision"]);
+        let path = format!("/map/101/{}?revision={}", map["id"], map["revision"]);
         let (head, cells) = get(&scene, &path).await;
         assert!(head.starts_with("http/1.1 200"), "{head}");
         assert!(head.contains("content-length: 256"), "{head}");
         assert_eq!(cells, picture.cells);
     }
-    let (head, _) = get(&scene, "/map/999").await;
+    let (head, _) = get(&scene, "/map/101/999").await;
     assert!(head.starts_with("http/1.1 404"), "{head}");
     running.abort();
 }

@@ -12,6 +12,8 @@
 mod scene;
 
 mod drive;
+mod fleet;
+mod handover;
 mod hostile;
 mod looking;
 mod missing;

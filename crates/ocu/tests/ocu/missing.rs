@@ -87,7 +87,7 @@ async fn a_page_that_falls_silent_while_it_drives_is_told_why_the_vehicle_stoppe
 }
 
 /// A planner with mission 7 in the given stage.
-fn planner(scene: &Scene, stage: Arc<AtomicU8>) -> Component {
+pub(crate) fn planner(scene: &Scene, stage: Arc<AtomicU8>) -> Component {
     let mission = Handlers::new(mission_planner::LATEST).answer(move |_: QueryMission| {
         let stage = stage.load(Ordering::Relaxed).into();
         ReportMission {

@@ -1,19 +1,26 @@
 //! Test scene: a vehicle, the operator's station, and pages.
 
 use std::net::{Ipv4Addr, SocketAddr};
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, UNIX_EPOCH};
 
 use futures_util::{SinkExt, StreamExt};
-use jaus::component::{AccessControl, Builder, Component, Handlers, Kind, Management, TimeOfDay};
+use jaus::address::JausId;
+use jaus::component::{
+    AccessControl, Builder, Component, Handlers, Kind, Management, Scope, TimeOfDay,
+};
 use jaus::link::Group;
 use jaus::messages::mobility::report_local_pose::TimeStamp;
-use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
+use jaus::messages::mobility::{
+    QueryLocalPose, ReportLocalPose, SetWrenchEffort, local_pose_sensor, primitive_driver,
+};
 use jaus::node::{Config, Node};
 use jaus_ocu::{Listen, Station};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::{LIMIT, until, within_limit};
+use jaus_vehicle::handoff::Handoff;
 use jaus_vehicle::mobility::Vehicle;
 use jaus_vehicle::motion::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 use jaus_vehicle::parts::{Part, Slot};
@@ -54,9 +61,7 @@ impl Scene {
     async fn start(station: Station, timeout: u8, frozen: Option<Arc<AtomicBool>>) -> Self {
         let group = own_group();
         let node = Node::start(Config::loopback(101, 1).group(group)).unwrap();
-        let platform = SkidSteer::new(SkidSteerConfig::default());
-        let vehicle = Vehicle::new(Pilot::new(platform, Frame::at(52.5, 13.4)))
-            .with_clock(TimeOfDay::new(|| UNIX_EPOCH.elapsed().unwrap()));
+        let vehicle = simulated();
         let rover = rover(&vehicle, &node, timeout, frozen.as_ref());
         let station = Station {
             listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
@@ -77,12 +82,46 @@ impl Scene {
 
     /// Starts another operator's station on the same network. Returns its address, and handles that
     /// keep it alive.
-    pub(crate) async fn another_station(&self) -> (SocketAddr, JoinHandle<()>, Node) {
+    pub(crate) async fn another_station(
+        &self,
+        authority: u8,
+    ) -> (SocketAddr, JoinHandle<()>, Node) {
         let station = Station {
+            authority,
             listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
             ..Station::default()
         };
         start(station, 43, self.group).await
+    }
+
+    /// Starts another vehicle on the same network.
+    pub(crate) fn another_vehicle(&self, subsystem: u16) -> OtherVehicle {
+        let node = Node::start(Config::loopback(subsystem, 1).group(self.group)).unwrap();
+        let vehicle = simulated();
+        let rover = rover(&vehicle, &node, 0, None);
+        OtherVehicle {
+            vehicle,
+            rover,
+            node,
+        }
+    }
+
+    /// Starts vehicles that obey and do not move, on a node that carries all of them.
+    pub(crate) fn unmoving_vehicles(&self, subsystems: Range<u16>) -> (Node, Vec<Component>) {
+        let node = Node::start(Config::loopback(subsystems.start, 2).group(self.group)).unwrap();
+        let start = |subsystem| {
+            let driver = Handlers::new(primitive_driver::LATEST)
+                .command(|_: SetWrenchEffort, _, _| {})
+                .on_stop(|_| {});
+            let rover = Component::builder(Kind::Vehicle, "Rover")
+                .scope(Scope::Nobody)
+                .management(Management::new())
+                .offer(driver);
+            let port = node.attach_as(JausId::new(subsystem, 1, 1)).unwrap();
+            rover.live_on(port).unwrap()
+        };
+        let vehicles = subsystems.map(start).collect();
+        (node, vehicles)
     }
 
     pub(crate) async fn page(&self) -> Page {
@@ -122,6 +161,11 @@ impl Scene {
         self.rover = Some(rover(&self.vehicle, &self.nodes[0], self.timeout, frozen));
     }
 
+    /// Ends this station without notice to its pages.
+    pub(crate) fn end_station(&self) {
+        self.station.abort();
+    }
+
     pub(crate) fn is_controlled(&self) -> bool {
         let standing = self.rover.as_ref().map(Component::standing);
         standing.is_some_and(|it| it.controller.is_some())
@@ -153,6 +197,25 @@ impl Scene {
     }
 }
 
+/// A further vehicle.
+pub(crate) struct OtherVehicle {
+    pub(crate) vehicle: Vehicle,
+    pub(crate) rover: Component,
+    pub(crate) node: Node,
+}
+
+impl OtherVehicle {
+    pub(crate) fn speed(&self) -> f64 {
+        self.vehicle.motion().velocity.x
+    }
+}
+
+fn simulated() -> Vehicle {
+    let platform = SkidSteer::new(SkidSteerConfig::default());
+    Vehicle::new(Pilot::new(platform, Frame::at(52.5, 13.4)))
+        .with_clock(TimeOfDay::new(|| UNIX_EPOCH.elapsed().unwrap()))
+}
+
 impl Drop for Scene {
     fn drop(&mut self) {
         self.station.abort();
@@ -169,6 +232,7 @@ fn rover(
     let control = AccessControl::new().timeout(timeout);
     let rover = Component::builder(Kind::Vehicle, "Rover")
         .management(Management::new().access_control(control))
+        .offer(Handoff::new())
         .offer(vehicle.velocity_state_sensor())
         .offer(vehicle.primitive_driver());
     let rover = match frozen {
@@ -273,6 +337,12 @@ impl Page {
         self.said("state").await
     }
 
+    /// The next list of vehicles that satisfies the condition.
+    pub(crate) async fn fleet_until(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
+        let frame = self.said_until("fleet", |it| wanted(&it["vehicles"]));
+        frame.await["vehicles"].take()
+    }
+
     /// The next frame of a type.
     pub(crate) async fn said(&mut self, wanted: &str) -> Value {
         loop {
@@ -285,17 +355,26 @@ impl Page {
 
     /// The next state that satisfies the condition.
     pub(crate) async fn until(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
+        self.said_until("state", wanted).await
+    }
+
+    /// The next frame of a type that satisfies the condition.
+    pub(crate) async fn said_until(
+        &mut self,
+        kind: &str,
+        wanted: impl Fn(&Value) -> bool,
+    ) -> Value {
         let mut last = Value::Null;
         let found = tokio::time::timeout(LIMIT, async {
             loop {
-                last = self.state().await;
+                last = self.said(kind).await;
                 if wanted(&last) {
                     return last.clone();
                 }
             }
         });
         match found.await {
-            Ok(state) => state,
+            Ok(frame) => frame,
             Err(_) => panic!("it never came to that: {last:#}"),
         }
     }

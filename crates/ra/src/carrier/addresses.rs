@@ -10,7 +10,7 @@ use std::net::{IpAddr, SocketAddr};
 use std::time::Instant;
 
 use super::{Dialect, Settings};
-use crate::{Counter, Counters};
+use crate::counters::{Counter, Counters};
 use jaus::endpoint::Buckets;
 
 /// Address of a subsystem.

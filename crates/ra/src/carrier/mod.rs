@@ -29,8 +29,10 @@ use bytes::Bytes;
 pub use settings::{Dialect, Settings};
 pub use transmit::{SendError, To, Transmit};
 
+use super::RaId;
 use super::Recipients;
-use super::{Counter, Counters, Message, RaId};
+use super::counters::{Counter, Counters};
+use super::message::Message;
 use addresses::Addresses;
 use jaus::endpoint::Buckets;
 use jaus::wire::Acknowledgement;

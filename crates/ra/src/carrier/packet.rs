@@ -9,7 +9,7 @@
 use bytes::{Buf, BufMut, Bytes, BytesMut};
 
 use super::Dialect;
-use crate::Counter;
+use crate::counters::Counter;
 use jaus::wire::ra::{HEADER_LEN, Header, PREFIX};
 use jaus::wire::{as5669, judp};
 

@@ -12,7 +12,8 @@ use std::time::{Duration, Instant};
 use bytes::{Bytes, BytesMut};
 
 use super::Settings;
-use crate::{Counter, Counters, RaId};
+use crate::RaId;
+use crate::counters::{Counter, Counters};
 use jaus::wire::ra::MAX_DATA;
 
 /// Bookkeeping cost of a part, in octets.

@@ -7,7 +7,9 @@ use bytes::Bytes;
 use super::pace::Pace;
 use super::{Carrier, Dialect, packet, parts};
 use crate::BadId;
-use crate::{Counter, Message, RaId};
+use crate::RaId;
+use crate::counters::Counter;
+use crate::message::Message;
 use jaus::wire::Acknowledgement;
 use jaus::wire::ra::{Fields, Header};
 

@@ -3,12 +3,14 @@
 use std::time::Instant;
 
 use super::{CannotConnect, ConnectionId, Connections, Event, Request, ResponseCode, period};
+use crate::RaId;
+use crate::counters::Counter;
+use crate::message::Message;
 use crate::messages::ra33::create_service_connection::RequestedPeriodicUpdateRate;
 use crate::messages::ra33::{
     ActivateServiceConnection, ConfirmServiceConnection, CreateServiceConnection,
     SuspendServiceConnection,
 };
-use crate::{Counter, Message, RaId};
 use jaus::codec::DecodeError;
 
 /// Our service connection to a remote report.

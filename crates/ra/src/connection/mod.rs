@@ -28,7 +28,9 @@ use std::time::{Duration, Instant};
 pub use crate::messages::ra33::confirm_service_connection::ResponseCode;
 pub use settings::Settings;
 
-use super::{Counter, Counters, Message, RaId};
+use super::RaId;
+use super::counters::{Counter, Counters};
+use super::message::Message;
 use crate::messages::ra33::{
     ActivateServiceConnection, ConfirmServiceConnection, CreateServiceConnection,
     SuspendServiceConnection, TerminateServiceConnection,

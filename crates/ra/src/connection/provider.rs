@@ -5,12 +5,13 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 
 use super::{ConnectionId, Connections, Event, Request, ResponseCode, period};
+use crate::counters::Counter;
+use crate::message::Message;
 use crate::messages::ra33::confirm_service_connection::ConfirmedPeriodicUpdateRate;
 use crate::messages::ra33::{
     ActivateServiceConnection, ConfirmServiceConnection, CreateServiceConnection,
     SuspendServiceConnection, TerminateServiceConnection,
 };
-use crate::{Counter, Message};
 use jaus::codec::DecodeError;
 
 /// A service connection of a remote client to a report of ours.

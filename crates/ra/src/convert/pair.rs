@@ -4,8 +4,8 @@ use bytes::{BufMut, Bytes, BytesMut};
 
 use super::carry::Counterpart;
 use super::{Context, Refusal};
+use crate::forgiving::forgiving;
 use crate::ids::RaComponent;
-use crate::messages::forgiving;
 use jaus::codec::Message;
 
 /// Octets of the message code before the content.

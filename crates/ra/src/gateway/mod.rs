@@ -43,10 +43,11 @@ pub use self::settings::{Settings, Show};
 use self::convert::Ids;
 use self::counters::Tally;
 use self::proxy::{Proxy, Target};
+use crate::RaId;
 use crate::carrier::Transmit;
 use crate::ids::{Collision, IdTable, InvalidIds, RaComponent, Side, Unmapped};
+use crate::message::Message;
 use crate::node::{self, RaNode};
-use crate::{Message, RaId};
 use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::service::{

@@ -6,11 +6,13 @@
 use std::time::Instant;
 
 use super::RaNode;
+use crate::RaId;
+use crate::counters::Counter;
+use crate::message::Message;
 use crate::messages::ra33::{
     QueryConfiguration, QueryHeartbeatPulse, QueryIdentification, QueryServices,
     ReportHeartbeatPulse,
 };
-use crate::{Counter, Message, RaId};
 use jaus::codec;
 
 impl RaNode {

@@ -5,6 +5,9 @@ use std::time::{Duration, Instant};
 use super::RaNode;
 use super::peer::{Peer, Question, commands};
 use super::subsystem::{Command, Component, Node, Service};
+use crate::RaId;
+use crate::counters::Counter;
+use crate::message::Message;
 use crate::messages::ra33::query_configuration::QueryField as Parts;
 use crate::messages::ra33::query_identification::QueryField as Whose;
 use crate::messages::ra33::{
@@ -12,7 +15,6 @@ use crate::messages::ra33::{
     QueryServices, RejectEventRequest, ReportConfiguration, ReportIdentification, ReportServices,
     create_event, report_services,
 };
-use crate::{Counter, Message, RaId};
 use jaus::codec::{Message as _, Text};
 
 /// Octets of a complete Report Identification.

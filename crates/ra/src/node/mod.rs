@@ -37,7 +37,8 @@ pub use settings::Settings;
 pub use subsystem::{BadSubsystem, Command, Component, Node, Service, Subsystem, Where};
 
 use super::carrier::{Carrier, SendError, Transmit};
-use super::{Counter, Counters, Message};
+use super::counters::{Counter, Counters};
+use super::message::Message;
 use crate::messages::ra33::{
     CancelEvent, CreateEvent, QueryConfiguration, QueryHeartbeatPulse, QueryIdentification,
     QueryServices, ReportHeartbeatPulse,

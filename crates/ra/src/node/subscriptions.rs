@@ -3,12 +3,14 @@
 use std::time::Instant;
 
 use super::RaNode;
+use crate::RaId;
+use crate::counters::Counter;
+use crate::message::Message;
 use crate::messages::ra33::confirm_event_request::ResponseCode;
 use crate::messages::ra33::query_configuration::QueryField;
 use crate::messages::ra33::{
     CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryConfiguration, ReportConfiguration,
 };
-use crate::{Counter, Message, RaId};
 use jaus::codec::{EncodeError, Message as _};
 use jaus::wire::ra::CODE_LEN;
 

@@ -12,12 +12,13 @@ use std::time::Instant;
 use super::RaNode;
 use super::own::Own;
 use super::peer::Peer;
+use crate::RaId;
 use crate::carrier::SendError;
+use crate::message::Message;
 use crate::messages::ra33::query_configuration::QueryField;
 use crate::messages::ra33::{
     QueryConfiguration, QueryHeartbeatPulse, ReportConfiguration, ReportHeartbeatPulse,
 };
-use crate::{Message, RaId};
 use jaus::codec::Message as _;
 
 impl RaNode {

@@ -171,7 +171,7 @@ fn run(shared: &Shared, mut stepper: Stepper, mut lines: impl Lines) {
             _ if state.has_ramped_down(now) => return,
             StepperPoll::Wait(next) => {
                 let wake = state.wakes_at(next);
-                state = wait_for_news(shared, state, wake, now);
+                state = wait_for_command(shared, state, wake, now);
             }
             StepperPoll::Step { backwards } => {
                 drop(state);
@@ -202,7 +202,7 @@ fn mend<'a>(
     while state.ends.is_none() {
         let now = Instant::now();
         if now < retry {
-            state = wait_for_news(shared, state, Some(retry), now);
+            state = wait_for_command(shared, state, Some(retry), now);
             continue;
         }
         drop(state);
@@ -219,7 +219,7 @@ fn mend<'a>(
 }
 
 /// Waits for a new command or the drop of the motor, at most until `wake`.
-fn wait_for_news<'a>(
+fn wait_for_command<'a>(
     shared: &'a Shared,
     state: MutexGuard<'a, State>,
     wake: Option<Instant>,
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn pulses_come_both_ways_and_what_is_told_as_travel_is_what_was_sent() {
+    fn reported_travel_equals_the_pulses_sent_in_both_directions() {
         let chip = Chip::lasting(usize::MAX);
         let mut motor = PulseMotor::start(StepperConfig::default(), chip.clone()).unwrap();
         command_until(&mut motor, 0.2, |motor| motor.travel() > 0.02);
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn no_pulse_comes_without_a_command_nor_after_the_end() {
+    fn no_pulse_is_sent_before_a_command_or_after_the_drop() {
         let chip = Chip::lasting(usize::MAX);
         let motor = PulseMotor::start(StepperConfig::default(), chip.clone()).unwrap();
         drop(motor);
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn pulses_end_by_themselves_when_the_program_hangs() {
+    fn pulses_end_when_the_program_hangs() {
         let chip = Chip::lasting(usize::MAX);
         let mut motor = PulseMotor::start(StepperConfig::default(), chip.clone()).unwrap();
         command_until(&mut motor, 0.2, |motor| motor.travel() > 0.02);
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chip_that_breaks_is_a_fault_until_it_works_again() {
+    fn a_broken_chip_is_a_fault_until_it_recovers() {
         let chip = Chip::lasting(5);
         let mut motor = PulseMotor::start(StepperConfig::default(), chip.clone()).unwrap();
         command_until(&mut motor, 1.0, |motor| motor.fault().is_some());

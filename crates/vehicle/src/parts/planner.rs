@@ -20,6 +20,7 @@ use tokio::sync::{Notify, mpsc};
 use super::drivers::{Sense, shut_down};
 use super::{Part, PartError, Slot};
 use crate::ground::Missions;
+use crate::handoff::Handoff;
 use crate::mission::{Link, Settings, Vehicle};
 use jaus::address::JausId;
 use jaus::component::{AccessControl, Component, Management};
@@ -65,6 +66,7 @@ impl Part for Planner {
             .component("Planner")
             .management(Management::new().access_control(control))
             .offer(missions.service())
+            .offer(Handoff::new())
             .live_on(slot.port)?;
         let (tell, news) = mpsc::channel(PlannerTask::NEWS);
         let task = PlannerTask::new(&self, &component, missions, &wake);

@@ -18,6 +18,7 @@ use crate::actuator::{
     WheelsConfig,
 };
 use crate::ground::{StageBoard, StageReport, StageState, WheelOdometry};
+use crate::handoff::Handoff;
 use crate::messages::ground::QueryStage;
 use crate::mobility::Vehicle;
 use crate::motion::{Frame, Pilot};
@@ -195,6 +196,7 @@ impl PrimitiveDriver {
             .offer(vehicle.primitive_driver())
             .offer(WheelOdometry::new(odometer.clone(), vehicle.clone()))
             .offer(board.service())
+            .offer(Handoff::new())
             .live_on(slot.port)?;
         let driver = Running {
             component,

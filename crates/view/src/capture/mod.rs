@@ -30,7 +30,7 @@ use thiserror::Error;
 
 pub use writer::{CaptureWriter, InterfaceNumber};
 
-use super::Timestamp;
+use super::time::Timestamp;
 
 /// A capture opened for reading.
 ///

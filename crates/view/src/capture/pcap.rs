@@ -5,7 +5,7 @@ use std::io::Read;
 
 use super::input::{Input, LONGEST};
 use super::{CaptureError, Fault, LinkType, Packet};
-use crate::Timestamp;
+use crate::time::Timestamp;
 
 const HEADER: usize = 24;
 const RECORD: usize = 16;

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use super::input::{Input, LONGEST};
 use super::{CaptureError, Fault, LinkType, Packet};
-use crate::Timestamp;
+use crate::time::Timestamp;
 
 /// Type of a Section Header Block. Identical in both byte orders.
 pub(super) const SECTION_HEADER: [u8; 4] = [0x0a, 0x0d, 0x0d, 0x0a];

@@ -9,7 +9,7 @@ use std::io;
 use std::path::PathBuf;
 
 use super::{JournalFormat, JournalSettings};
-use crate::Timestamp;
+use crate::time::Timestamp;
 
 /// Prefix of all file names.
 const NAME: &str = "jaus-";

@@ -25,7 +25,8 @@ use tokio::time::MissedTickBehavior;
 
 use self::directory::Directory;
 use self::sink::Sink;
-use super::{Dictionary, Filter, Links, MessageStream};
+use super::dictionary::Dictionary;
+use super::stream::{Filter, Links, MessageStream};
 use jaus::node::{Node, Tap, Tapped};
 
 /// Passages that may wait to be written.

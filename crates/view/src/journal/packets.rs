@@ -5,8 +5,8 @@ use std::net::{Ipv4Addr, SocketAddr};
 
 use bytes::Bytes;
 
-use crate::stream::Seen;
-use crate::{Links, timestamp, udp_packet};
+use crate::network::{JAUS_PORT, udp_packet};
+use crate::stream::{Links, Seen, timestamp};
 use jaus::endpoint::{LinkId, Remote, To};
 use jaus::node::{Passage, Way};
 use jaus::wire::{DataControl, Frame, judp};
@@ -14,8 +14,7 @@ use jaus::wire::{DataControl, Frame, judp};
 /// Maximum payload per packet for messages that were not datagrams.
 const MOST: usize = 60_000;
 /// Substitute address for messages within the node and on serial lines.
-const NOWHERE: SocketAddr =
-    SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), crate::JAUS_PORT);
+const NOWHERE: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), JAUS_PORT);
 
 /// An IP packet and its interface.
 #[derive(Debug)]

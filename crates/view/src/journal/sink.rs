@@ -11,7 +11,9 @@ use std::time::Duration;
 use super::directory::Directory;
 use super::packets::{Packet, Packets};
 use super::{JournalSettings, Numbers};
-use crate::{CaptureWriter, InterfaceNumber, LinkType, Links, MessageStream, Timestamp, timestamp};
+use crate::capture::{CaptureWriter, InterfaceNumber, LinkType};
+use crate::stream::{Links, MessageStream, timestamp};
+use crate::time::Timestamp;
 use jaus::node::Passage;
 
 /// Maximum overhead per packet in a capture, in octets: its block, a description of a new

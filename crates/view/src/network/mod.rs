@@ -12,7 +12,7 @@ use etherparse::{
 };
 
 use self::fragments::{Fragment, Fragments, Key};
-use super::{Frame, LinkType};
+use super::capture::{Frame, LinkType};
 
 pub use packet::udp_packet;
 

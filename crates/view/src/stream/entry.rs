@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde_json::{Map, Value as Json};
 
-use crate::Line;
+use crate::line::Line;
 use jaus::address::JausId;
 
 /// A message or an error as one JSON object.

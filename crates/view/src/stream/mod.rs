@@ -16,7 +16,10 @@ mod tests;
 use bytes::Bytes;
 use serde_json::Value as Json;
 
-use super::{Datagram, Dictionary, MessageLog, Timestamp};
+use super::dictionary::Dictionary;
+use super::log::MessageLog;
+use super::network::Datagram;
+use super::time::Timestamp;
 use jaus::wire::{Frame, judp};
 
 pub use entry::Entry;

@@ -5,7 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::seen::Seen;
 use super::{Entry, MessageStream};
-use crate::Timestamp;
+use crate::time::Timestamp;
 use jaus::address::JausId;
 use jaus::endpoint::{LinkId, To};
 use jaus::node::{Node, Passage, Way};

@@ -6,7 +6,7 @@ use std::collections::{HashMap, VecDeque};
 use std::hash::{BuildHasher, RandomState};
 use std::time::Duration;
 
-use crate::Timestamp;
+use crate::time::Timestamp;
 use jaus::wire::{Acknowledgement, Frame, Version};
 
 /// Number of messages remembered.

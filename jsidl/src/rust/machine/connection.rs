@@ -4,7 +4,7 @@
 use super::super::ident::Names;
 use super::super::services::is_core;
 use super::{Emitter, Event, Kind, Messages, Method, Writer, machines_of, queries};
-use crate::behaviour::Machine;
+use crate::machine::Machine;
 use crate::model::{Message, Service};
 
 /// The guard that the stack answers.

@@ -23,8 +23,9 @@ use super::messages::Plan;
 use super::queries;
 use super::services::is_core;
 use super::writer::Writer;
-use crate::behaviour::{MOST_REMEMBERED, Machine, StateIndex, TransitionKind};
+use crate::behaviour::TransitionKind;
 use crate::library::Library;
+use crate::machine::{MOST_REMEMBERED, Machine, StateIndex};
 use crate::model::{Message, Service};
 
 /// Locations of the message types.

@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 
 use super::super::ident::Names;
-use crate::behaviour::{Machine, Name, StateIndex};
+use crate::behaviour::Name;
+use crate::machine::{Machine, StateIndex};
 
 /// The leaf states with their names.
 pub(super) struct States {

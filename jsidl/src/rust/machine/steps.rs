@@ -3,9 +3,8 @@
 use super::super::writer::Writer;
 use super::states::States;
 use super::vocabulary::{Event, Kind, Method, Value, Vocabulary};
-use crate::behaviour::{
-    Action, Declared, Guard, Machine, StateIndex, Stimulus, Transition, TransitionKind, Trigger,
-};
+use crate::behaviour::{Action, Guard, Transition, TransitionKind, Trigger};
+use crate::machine::{Declared, Machine, StateIndex, Stimulus};
 
 /// Input of the generator.
 pub(super) struct Steps<'a> {

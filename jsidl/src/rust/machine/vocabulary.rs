@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use heck::ToSnakeCase;
 
 use super::super::ident::Names;
-use crate::behaviour::{Action, Argument, Guard, Machine, Transition, Trigger};
+use crate::behaviour::{Action, Argument, Guard, Transition, Trigger};
+use crate::machine::Machine;
 
 /// All names in the generated types of one machine.
 pub(super) struct Vocabulary {

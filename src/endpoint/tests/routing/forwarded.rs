@@ -244,3 +244,107 @@ fn what_the_lists_do_not_allow_is_not_passed_on() {
         "C at first, too"
     );
 }
+
+#[test]
+fn a_message_on_another_path_is_a_copy_as_long_as_it_may_be_repeated() {
+    let window = Config::default().retransmission_window;
+    for (pause, passed) in [(window - Duration::from_millis(1), 0), (window, 1)] {
+        let mut between = Between::new(router_config());
+        between.hear(0, 7, &acknowledged(C));
+        between.sent();
+        between.world.now += pause;
+        between.hear(0, 99, &acknowledged(C));
+        assert_eq!(between.sent().len(), passed, "after {pause:?}");
+    }
+}
+
+#[test]
+fn a_repetition_that_comes_too_soon_for_its_sender_is_a_copy() {
+    for (pause, passed) in [(999, 0), (1000, 1)] {
+        let mut between = Between::new(router_config());
+        between.hear(0, 7, &acknowledged(C));
+        between.sent();
+        between.world.now += Duration::from_micros(pause);
+        between.hear(0, 7, &acknowledged(C));
+        assert_eq!(between.sent().len(), passed, "after {pause} µs");
+    }
+}
+
+#[test]
+fn older_messages_without_numbers_are_copies_only_on_another_path() {
+    let mut between = Between::new(router_config());
+    let older = Frame {
+        version: Version::Ra,
+        ..message(A, C, 0)
+    };
+    for (host, passed) in [(7, 1), (7, 1), (99, 0), (7, 1)] {
+        between.hear(0, host, &older);
+        assert_eq!(between.sent().len(), passed, "from host {host}");
+    }
+}
+
+#[test]
+fn a_message_for_many_is_astray_where_its_sender_was_not_heard_in_the_last_second() {
+    let (none, group) = (Broadcast::None, Broadcast::Global);
+    let unknown = JausId::new(9, 9, 9);
+    for (destination, broadcast, pause, astray) in [
+        (C, none, 0, 0),
+        (C, group, 0, 1),
+        (unknown, none, 0, 1),
+        (JausId::EVERYONE, none, 999, 1),
+        (JausId::EVERYONE, none, 1000, 0),
+    ] {
+        let mut between = Between::new(router_config());
+        between.world.now += Duration::from_millis(pause);
+        let frame = Frame {
+            flags: Flags::default().with_broadcast(broadcast),
+            ..message(A, destination, 2)
+        };
+        between.hear(1, 66, &frame);
+        let row = (destination, broadcast, pause);
+        assert_eq!(between.count(Counter::NotTheWayBack), astray, "{row:?}");
+    }
+}
+
+#[test]
+fn neither_an_invalid_destination_nor_an_answer_is_searched_for() {
+    let mut between = Between::new(router_config());
+    between.hear(0, 7, &message(A, JausId::new(3, 0, 1), 2));
+    let flags = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+    let answer = Frame {
+        flags,
+        payload: Bytes::new(),
+        ..message(A, JausId::new(9, 9, 9), 3)
+    };
+    between.hear(0, 7, &answer);
+    assert_eq!(between.sent(), []);
+    assert_eq!(between.count(Counter::NotForUs), 2);
+}
+
+/// A link of connections has no group: each connection is a hop of its own.
+#[test]
+fn a_broadcast_from_a_connection_goes_to_the_other_connections_and_links() {
+    let mut world = World::new();
+    let router = world.add(router_config(), &[0]);
+    world.plug(router, 1, Framing::Jtcp);
+    let connection = |host| Path {
+        link: LinkId(1),
+        peer: SocketAddr::from(([10, 0, 1, host], 4000)).into(),
+    };
+    let sent = |world: &mut World| -> Vec<_> {
+        let router = &mut world.nodes[router];
+        let transmits = std::iter::from_fn(|| router.poll_transmit(world.now));
+        transmits.map(|it| (it.link, it.to)).collect()
+    };
+    for (host, source) in [(7, A), (8, B), (9, C), (9, JausId::new(4, 1, 1))] {
+        let heard = message(source, JausId::EVERYONE, 1);
+        let (now, inbox) = (world.now, &mut world.inboxes[router]);
+        world.nodes[router].handle_frame(now, connection(host), &heard, inbox);
+    }
+    sent(&mut world);
+    let heard = message(A, JausId::EVERYONE, 2);
+    let (now, inbox) = (world.now, &mut world.inboxes[router]);
+    world.nodes[router].handle_frame(now, connection(7), &heard, inbox);
+    let to = |host| (LinkId(1), To::Peer(connection(host).peer));
+    assert_eq!(sent(&mut world), [(LinkId(0), To::Group), to(8), to(9)]);
+}

@@ -1,6 +1,7 @@
 //! Tests of the client side against a scripted peer, in virtual time.
 
 mod control;
+mod dispatch;
 mod session;
 mod streams;
 mod subscriptions;

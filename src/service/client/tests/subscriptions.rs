@@ -17,7 +17,7 @@ use crate::service::{
     SubscriptionNews, Topic, When,
 };
 
-fn status(when: When) -> Topic {
+pub(super) fn status(when: When) -> Topic {
     Topic {
         peer: PEER,
         query: QueryStatus {}.encode().expect("a query"),
@@ -35,7 +35,7 @@ fn control(when: When) -> Topic {
     }
 }
 
-fn subscribe(bench: &mut Bench, topic: &Topic) -> SubscriptionId {
+pub(super) fn subscribe(bench: &mut Bench, topic: &Topic) -> SubscriptionId {
     let subscribed = bench.stack.subscribe(bench.now, topic, Patience::default());
     bench.collect();
     subscribed.expect("nothing is in the way")
@@ -61,7 +61,7 @@ fn confirm_all(bench: &mut Bench, event_id: u8, hz: f64) -> usize {
     asked.len()
 }
 
-fn event_of(event_id: u8, sequence_number: u8, report_message: Bytes) -> Event {
+pub(super) fn event_of(event_id: u8, sequence_number: u8, report_message: Bytes) -> Event {
     Event {
         event_id,
         sequence_number,
@@ -75,7 +75,7 @@ pub(super) fn fire(bench: &mut Bench, event: u8, sequence: u8) {
 }
 
 /// A notification in short form.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Notice {
     Up(Option<u32>),
     Report { lost: u8 },

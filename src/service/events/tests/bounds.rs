@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use bytes::Bytes;
 
 use super::super::rejecting::{INVALID_EVENT, rejection};
-use super::{CLIENT, COUNTER, OTHER, Rig, SECOND, answer, events, periodic};
+use super::{CLIENT, COUNTER, OTHER, Rig, SECOND, answer, events, on_change, periodic};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::{LinkId, Path};
@@ -325,4 +325,41 @@ fn a_query_is_answered_once_for_all_clients_that_are_told_together() {
     let told = rig.said();
     assert_eq!(told.len(), 100);
     assert_eq!(asked.load(Ordering::Relaxed) - before, 1);
+}
+
+#[test]
+fn at_its_limit_a_client_can_change_its_events_and_have_no_others() {
+    let mut rig = Rig::with(EventSettings {
+        per_client: 1,
+        reports_per_second: 10.0,
+        ..EventSettings::default()
+    });
+    for (client, create, is_granted) in [
+        (CLIENT, periodic(1, 1.0, &QueryStatus), true),
+        (CLIENT, periodic(2, 10.0, &QueryStatus), true),
+        (CLIENT, on_change(3), false),
+        (OTHER, on_change(4), true),
+        (OTHER, periodic(5, 1.0, &QueryStatus), false),
+        (CLIENT, periodic(6, 9.0, &QueryStatus), true),
+    ] {
+        let said = rig.create(client, &create);
+        let is_confirmed = ConfirmEventRequest::decode(&said[0].1).is_ok();
+        assert_eq!(is_confirmed, is_granted, "request {}", create.request_id);
+    }
+    assert_eq!(rig.stack.event_count(), 2);
+}
+
+#[test]
+fn an_event_that_becomes_faster_needs_room_for_the_difference() {
+    let mut rig = Rig::with(EventSettings {
+        reports_per_second: 10.0,
+        ..EventSettings::default()
+    });
+    for (request, hertz, is_granted) in [(1, 6.0, true), (2, 10.0, true), (3, 11.0, false)] {
+        let said = rig.create(CLIENT, &periodic(request, hertz, &QueryStatus));
+        let is_confirmed = ConfirmEventRequest::decode(&said[0].1).is_ok();
+        assert_eq!(is_confirmed, is_granted, "{hertz} Hz");
+    }
+    let said = rig.create(CLIENT, &periodic(4, 1.0, &QueryControl));
+    let _: RejectEventRequest = answer(&said);
 }

@@ -26,7 +26,7 @@ pub(crate) struct Definitions {
 /// All built-in message definitions.
 pub(crate) fn built_in() -> Dictionary {
     Dictionary::of(jaus_vehicle::messages::registry())
-        .with_reference_architecture(jaus_ra::messages::registry(), jaus_ra::messages::decode)
+        .with_reference_architecture(jaus_ra::messages::registry(), jaus_ra::forgiving::decode)
         .with_catalogue()
 }
 

@@ -19,6 +19,7 @@ use jaus_cli::network::Network;
 use jaus_cli::output::Output;
 use jaus_cli::runtime::{self, Clock, between};
 use jaus_cli::tree;
+use jaus_vehicle::handoff::Handoff;
 use jaus_vehicle::mobility::Vehicle;
 use jaus_vehicle::motion::{Frame, Limits, Motion, Pilot, SkidSteer, SkidSteerConfig};
 use tokio::time::{MissedTickBehavior, interval};
@@ -262,6 +263,7 @@ fn drivable(
     builder
         .management(Management::new().access_control(control).initializes())
         .offer(Time::new(time))
+        .offer(Handoff::new())
         .offer(vehicle.list_manager())
         .offer(vehicle.velocity_state_sensor())
         .offer(vehicle.local_pose_sensor())

@@ -26,7 +26,7 @@ fn an_effort_is_the_same_percentage_on_both_sides() {
 }
 
 #[test]
-fn standing_still_stays_standing_still() {
+fn zero_velocity_stays_zero() {
     let mut ours = mobility::SetWrenchEffort::default();
     ours.set_propulsive_linear_effort_x_percent(0.0).unwrap();
     let theirs: ra33::SetWrenchEffort = into_theirs(&ours).unwrap();
@@ -57,7 +57,7 @@ fn a_place_on_the_globe_is_the_same_place() {
 }
 
 #[test]
-fn all_ends_of_a_range_that_both_have_can_be_said() {
+fn both_ends_of_a_shared_range_convert() {
     for end in [-std::f64::consts::PI, std::f64::consts::PI] {
         let mut theirs = ra33::ReportLocalPose::default();
         theirs.set_yaw_rad(end).unwrap();

@@ -11,10 +11,10 @@ use bytes::Bytes;
 use super::ra_client::RaClient;
 use super::ra_event::RaEvent;
 use super::target::{RaRequest, Target};
-use crate::Message;
 use crate::gateway::convert::{self, Words};
 use crate::gateway::counters::{Counter, Tally};
 use crate::gateway::pairs;
+use crate::message::Message;
 use crate::messages::ra33::confirm_event_request::ResponseCode;
 use crate::messages::ra33::create_event::{CreateEventRec, EventType};
 use crate::messages::ra33::{

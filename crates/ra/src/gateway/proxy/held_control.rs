@@ -14,9 +14,9 @@ use super::motion::moves;
 use super::ra_client::{HeldControl, RaClient};
 use super::stop;
 use super::target::{RaRequest, Target};
-use crate::Message;
 use crate::gateway::counters::Counter;
 use crate::ids::RaComponent;
+use crate::message::Message;
 use jaus::messages::core::Standby;
 use jaus::service::{Stack, StopCause, Validity};
 

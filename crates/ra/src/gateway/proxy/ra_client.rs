@@ -24,10 +24,11 @@ use super::codes::{
 use super::hold::{ClientLife, Hold};
 use super::ra_event::RaEvent;
 use super::target::{RaRequest, Target, element_query, place_report, places};
+use crate::RaId;
 use crate::connection::{ConnectionId, Connections, Request, ResponseCode};
 use crate::convert::Refusal;
+use crate::message::Message;
 use crate::messages::ra33::CreateServiceConnection;
-use crate::{Message, RaId};
 use jaus::address::JausId;
 use jaus::codec::Message as _;
 use jaus::messages::core::ReleaseControl;

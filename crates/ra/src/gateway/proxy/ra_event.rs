@@ -2,10 +2,11 @@
 
 use bytes::Bytes;
 
+use crate::RaId;
 use crate::gateway::convert::Words;
+use crate::message::Message;
 use crate::messages::ra33::Event;
 use crate::messages::ra33::create_event::CreateEventRec;
-use crate::{Message, RaId};
 use jaus::service::Topic;
 
 /// An event of the RA component.

@@ -12,10 +12,11 @@ use bytes::Bytes;
 
 use super::Proxy;
 use super::codes::STATUS;
+use crate::RaId;
 use crate::connection::ConnectionId;
 use crate::ids::RaComponent;
+use crate::message::Message;
 use crate::messages::ra33::ReportComponentControl;
-use crate::{Message, RaId};
 
 /// The service connection that reports the gateway's readiness to the RA component.
 #[derive(Debug, Default)]

@@ -5,10 +5,10 @@ use std::time::Instant;
 
 use bytes::Bytes;
 
-use crate::Message;
 use crate::convert::{Element, Places, Refusal};
 use crate::gateway::counters::{Counter, Tally};
 use crate::ids::RaComponent;
+use crate::message::Message;
 use jaus::address::JausId;
 use jaus::codec::Message as _;
 use jaus::messages::core::{QueryElement, ReportElement};

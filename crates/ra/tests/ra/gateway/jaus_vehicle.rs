@@ -50,7 +50,7 @@ fn says(destination: RaId, code: u16, hex: &str) -> Message {
 }
 
 #[test]
-fn it_is_listed_once_for_each_of_its_services_with_names() {
+fn it_is_listed_by_name_once_per_service() {
     let (world, ra, _) = world();
     let peer = &world.ra[ra].node;
     let shown = peer.subsystems().find(|it| it.id == 101).unwrap();
@@ -90,7 +90,7 @@ fn only_the_chosen_subsystems_are_shown() {
 }
 
 #[test]
-fn its_pose_is_told_when_it_is_asked_for() {
+fn it_answers_a_pose_query() {
     let (mut world, ra, _) = world();
     world.ra_says(ra, &says(RA_POSE, 0x2402, "ff00"));
     world.run(Duration::from_secs(1));
@@ -131,7 +131,7 @@ fn a_service_connection_runs_at_its_rate_until_it_is_terminated() {
 }
 
 #[test]
-fn a_service_connection_for_what_is_not_there_is_refused() {
+fn a_service_connection_to_a_missing_service_is_refused() {
     let (mut world, ra, _) = world();
     world.ra_says(ra, &says(RA_POSE, 0x0008, "00405802ff000000"));
     let told = world.ra_heard(ra, 0x0009);
@@ -171,7 +171,7 @@ fn it_is_driven_by_the_ra_component_that_controls_it() {
 }
 
 #[test]
-fn control_that_is_not_to_be_had_is_rejected_as_openjaus_does() {
+fn unavailable_control_is_rejected_as_openjaus_does() {
     let (mut world, ra, rover) = world();
     let operator = world.add_operator();
     let now = world.now;
@@ -187,7 +187,7 @@ fn control_that_is_not_to_be_had_is_rejected_as_openjaus_does() {
 }
 
 #[test]
-fn control_is_lost_with_the_ra_system_that_had_it() {
+fn control_ends_when_its_ra_system_disappears() {
     let (mut world, ra, rover) = world();
     world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
     world.run(Duration::from_secs(1));
@@ -198,7 +198,7 @@ fn control_is_lost_with_the_ra_system_that_had_it() {
 }
 
 #[test]
-fn a_question_that_is_repeated_while_it_waits_is_asked_once() {
+fn a_query_repeated_before_its_answer_is_forwarded_once() {
     let (mut world, ra, rover) = world();
     world.jaus[rover].up = false;
     for _ in 0..50 {
@@ -209,7 +209,7 @@ fn a_question_that_is_repeated_while_it_waits_is_asked_once() {
 }
 
 #[test]
-fn its_departure_is_told() {
+fn its_departure_is_reported() {
     let (mut world, ra, rover) = world();
     world.jaus[rover].up = false;
     world.run(Duration::from_secs(25));
@@ -217,7 +217,7 @@ fn its_departure_is_told() {
 }
 
 #[test]
-fn what_has_no_counterpart_is_refused_and_counted() {
+fn a_message_without_counterpart_is_refused_and_counted() {
     let (mut world, ra, _) = world();
     world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
     world.run(Duration::from_secs(1));

@@ -8,7 +8,8 @@ use bytes::Bytes;
 use jaus::codec::Message;
 use jaus::wire::ra::{HEADER_LEN, Header};
 use jaus::wire::{Frame, judp};
-use jaus_ra::messages::{forgiving, ra33};
+use jaus_ra::forgiving::forgiving;
+use jaus_ra::messages::ra33;
 use jaus_test_kit::evidence;
 use jaus_view::{Capture, Datagram, Network};
 

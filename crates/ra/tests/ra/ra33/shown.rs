@@ -5,14 +5,14 @@ use std::fs::File;
 
 use bytes::Bytes;
 use jaus::wire::judp;
-use jaus_ra::messages;
+use jaus_ra::{forgiving, messages};
 use jaus_test_kit::evidence;
 use jaus_view::{Capture, Dictionary, MessageLog, Network};
 use serde_json::Value;
 
 fn dictionary() -> Dictionary {
     Dictionary::new()
-        .with_reference_architecture(messages::registry(), messages::decode)
+        .with_reference_architecture(messages::registry(), forgiving::decode)
         .with_catalogue()
 }
 

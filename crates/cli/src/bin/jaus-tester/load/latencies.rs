@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn without_any_all_is_zero() {
+    fn an_empty_histogram_reports_zero() {
         let none = Latencies::default();
         assert_eq!((none.mean(), none.percentile(0.5)), Default::default());
     }

@@ -2,6 +2,7 @@
 //! peers' deviations that decoding has elsewhere.
 
 use bytes::Bytes;
+use jaus_ra::forgiving::forgiving;
 use jaus_ra::messages;
 use jsidl::dynamic::Raw;
 use jsidl::explain::{Explanation, Kind, Row, ServiceName, Unexplained, explain};
@@ -41,7 +42,7 @@ fn mended(octets: &Bytes) -> Bytes {
     let code = octets.first_chunk().map(|&code| u16::from_le_bytes(code));
     let info = code.and_then(|code| messages::registry().by_code(code).next());
     let read = info.map(|info| {
-        messages::forgiving(octets, |tried| {
+        forgiving(octets, |tried| {
             (info.decode)(tried).map(|_message| tried.clone())
         })
     });

@@ -14,6 +14,7 @@ use jaus::messages::mobility::{
     QueryGlobalPathSegment, QueryGlobalPathSegmentExt, QueryGlobalWaypoint, QueryGlobalWaypointExt,
     QueryLocalPathSegment, QueryLocalPathSegmentExt, QueryLocalWaypoint, QueryLocalWaypointExt,
 };
+use jaus_vehicle::messages::handoff::{RemoveHandoffRequest, RequestHandoff};
 use jaus_vehicle::messages::registry;
 use serde_json::Value as Json;
 
@@ -33,14 +34,16 @@ const WANDERING: f64 = 0.02;
 const LEAST_WANDERING: f64 = 0.1;
 
 /// Commands that do not require control.
-const ANYBODYS: [u16; 9] = [
+const ANYBODYS: [u16; 11] = [
     CancelEvent::CODE,
     ClearEmergency::CODE,
     CreateCommandEvent::CODE,
     CreateEvent::CODE,
     RegisterServices::CODE,
     ReleaseControl::CODE,
+    RemoveHandoffRequest::CODE,
     RequestControl::CODE,
+    RequestHandoff::CODE,
     SetEmergency::CODE,
     UpdateEvent::CODE,
 ];
@@ -321,7 +324,9 @@ mod tests {
                 Some((service.id.major, service.id.minor))
             });
             let has_steps = !steps.is_empty() || service.inputs.is_empty();
-            assert!(has_steps || service.name == "Transport", "{}", service.id);
+            // These receive reports and notices only.
+            let is_passive = ["Transport", "HandoffController"].contains(&service.name);
+            assert!(has_steps || is_passive, "{}", service.id);
         }
     }
 

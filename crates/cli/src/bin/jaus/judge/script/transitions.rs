@@ -17,7 +17,8 @@ use jaus::messages::core::{
     clear_emergency, management, set_emergency,
 };
 use jsidl::Loader;
-use jsidl::behaviour::{Action, Guard, Machine, StateIndex, Stimulus, Transition, TransitionKind};
+use jsidl::behaviour::{Action, Guard, Transition, TransitionKind};
+use jsidl::machine::{Machine, StateIndex, Stimulus};
 use jsidl::model::{Id, Service};
 
 use super::super::memory::Memory;

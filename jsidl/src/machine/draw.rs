@@ -7,10 +7,8 @@
 
 use std::fmt::Write;
 
-use super::{
-    Action, Argument, Call, Declared, Guard, Machine, Name, StateIndex, Stimulus, Transition,
-    TransitionKind,
-};
+use super::{Declared, Machine, StateIndex, Stimulus};
+use crate::behaviour::{Action, Argument, Call, Guard, Name, Transition, TransitionKind};
 
 /// The machine as a graph in the language DOT, for `dot -Tsvg`. Composite states are clusters.
 pub fn dot(machine: &Machine<'_>) -> String {

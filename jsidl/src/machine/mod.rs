@@ -1,4 +1,5 @@
-//! Merged state machine of a service and its bases.
+//! Merged state machine of a service and its bases: [`Run`] executes it, [`dot`] and [`mermaid`]
+//! draw it.
 //!
 //! States with the same path are the same state in all services; letter case is ignored, because
 //! published definitions are inconsistent. Every transition and action keeps its declaring service,
@@ -6,11 +7,17 @@
 //! service the innermost state before the outer ones, and default states last, in the same order.
 //! The public JAUS Tool Set uses this order.
 
+mod draw;
+mod run;
+
 use std::collections::HashMap;
 
-use super::{Action, Guard, Name, State, StateMachine, Transition, TransitionKind};
+use crate::behaviour::{Action, Guard, Name, State, StateMachine, Transition, TransitionKind};
 use crate::library::Library;
 use crate::model::Service;
+
+pub use draw::{dot, mermaid};
+pub use run::{MOST_REMEMBERED, Outcome, Run};
 
 /// Index of a state of a [`Machine`]; only meaningful for the machine that returned it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -394,9 +401,10 @@ impl<'a> Merge<'a> {
 
     /// The index of a state, which is added if it is new.
     fn place(&mut self, parent: Option<StateIndex>, state: &'a State) -> StateIndex {
-        let mut path = parent.map_or_else(Vec::new, |parent| self.states[parent.0].path.0.clone());
-        path.push(state.name.clone());
-        let path = Name(path);
+        let path = match parent {
+            Some(parent) => self.states[parent.0].path.join(&state.name),
+            None => Name::of(vec![&state.name]),
+        };
         let key = key(&path);
         if let Some(index) = self.paths.get(&key) {
             return *index;

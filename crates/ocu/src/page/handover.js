@@ -1,0 +1,35 @@
+// Handing over control between operators: shows another operator's request, takes the answer, and
+// tells how control changed hands.
+
+import { get, list, number, plain, say, show, toast } from "./dom.js";
+
+export class Handover {
+  #ask;
+  #request = null;
+  #told = "";
+
+  /** Sends answers by `ask`. */
+  constructor(ask) {
+    this.#ask = ask;
+    get("handover-yes").addEventListener("click", () => this.#answer(true));
+    get("handover-no").addEventListener("click", () => this.#answer(false));
+  }
+
+  /** Takes a state; `operable` says whether this page may answer. */
+  update(state, operable) {
+    const { requests, handover } = state.control ?? {};
+    const ending = plain(handover, 200);
+    if (ending && ending !== this.#told) toast("warn", ending.replace(/^./, (letter) => letter.toUpperCase()));
+    this.#told = ending;
+    const [first] = list(requests, 8);
+    this.#request = number(first?.id);
+    show(get("handover"), operable && this.#request !== null);
+    if (this.#request === null) return;
+    const why = plain(first.explanation, 120);
+    say(get("handover-text"), `${plain(first.operator, 16)} requests control (authority ${first.authority})${why ? `: ${why}` : ""}`);
+  }
+
+  #answer(grant) {
+    if (this.#request !== null) this.#ask({ type: "handover", request: this.#request, grant });
+  }
+}

@@ -1,0 +1,129 @@
+//! A part of the vehicle: what Discovery and its own reports tell of it.
+
+use std::time::{Duration, Instant};
+
+use super::Sample;
+use crate::role::{self, Role};
+use crate::sample_clock::SampleClock;
+use crate::state;
+use jaus::address::JausId;
+use jaus::service::{Component, State};
+
+/// Which reports of the vehicle's parts are expected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Depth {
+    /// What the list of vehicles shows: the state of the principal part, control, and the mission.
+    Brief,
+    /// All reports of all parts.
+    Full,
+}
+
+impl Depth {
+    /// A part with periodic reports is silent after this time without a report.
+    pub(super) const fn silent(self) -> Duration {
+        match self {
+            Self::Brief => Duration::from_secs(4),
+            Self::Full => Duration::from_millis(1500),
+        }
+    }
+
+    /// An emergency that was reported earlier is checked again.
+    pub(super) const fn fresh(self) -> Duration {
+        match self {
+            Self::Brief => Duration::from_secs(5),
+            Self::Full => Duration::from_secs(2),
+        }
+    }
+}
+
+/// A component of the vehicle.
+#[derive(Debug, Clone)]
+pub(crate) struct Part {
+    pub(crate) role: Role,
+    /// Whether the part offers Management.
+    pub(crate) managed: bool,
+    pub(super) status: Option<Sample<u8>>,
+    /// The client in control, with its authority.
+    pub(super) controller: Option<Sample<Option<(JausId, u8)>>>,
+    pub(super) stage: Option<state::Stage>,
+    /// Name of the part.
+    pub(super) name: String,
+    pub(super) reports_pose: bool,
+    pub(super) reports_velocity: bool,
+    pub(super) pose_clock: Option<SampleClock>,
+    pub(super) velocity_clock: Option<SampleClock>,
+    /// Time of its last report.
+    pub(super) heard: Option<Instant>,
+    /// Whether the last subscription event was a loss of reports.
+    pub(super) is_down: bool,
+}
+
+impl Part {
+    /// A part whose subscription is down is silent after this time without a report.
+    const DOWN: Duration = Duration::from_secs(1);
+
+    pub(super) fn new(role: Role) -> Self {
+        Self {
+            role,
+            managed: false,
+            status: None,
+            controller: None,
+            stage: None,
+            name: String::new(),
+            reports_pose: false,
+            reports_velocity: false,
+            pose_clock: None,
+            velocity_clock: None,
+            heard: None,
+            is_down: false,
+        }
+    }
+
+    /// Updates the part from discovery data.
+    pub(super) fn describe(&mut self, component: &Component, role: Role) {
+        self.role = role;
+        self.managed = role::is_managed(component);
+        self.reports_pose = role::reports_pose(component);
+        self.reports_velocity = role::reports_velocity(component);
+        let own_name = component.identification.as_ref().map(|it| it.name.clone());
+        let own_name = own_name.filter(|it| !it.is_empty());
+        self.name = role.title().map_or_else(
+            || own_name.unwrap_or_else(|| "Component".to_owned()),
+            str::to_owned,
+        );
+    }
+
+    /// Forgets its reports.
+    pub(super) fn forget(&mut self) {
+        (self.status, self.controller, self.stage) = (None, None, None);
+        (self.pose_clock, self.velocity_clock) = (None, None);
+        (self.heard, self.is_down) = (None, false);
+    }
+
+    /// Whether its reports have ceased.
+    pub(super) fn is_silent(&self, now: Instant, limit: Duration) -> bool {
+        let is_periodic = self.managed || self.reports_pose || self.reports_velocity;
+        self.heard.is_some_and(|heard| {
+            let silence = now.saturating_duration_since(heard);
+            (is_periodic && silence >= limit) || (self.is_down && silence >= Self::DOWN)
+        })
+    }
+
+    pub(super) fn was_heard_within(&self, limit: Duration, now: Instant) -> bool {
+        self.heard
+            .is_some_and(|heard| now.saturating_duration_since(heard) < limit)
+    }
+
+    pub(crate) fn is(&self, state: State) -> bool {
+        self.status.is_some_and(|it| it.what == state as u8)
+    }
+
+    pub(crate) fn controller(&self) -> Option<JausId> {
+        self.told_controller()?
+    }
+
+    /// The reported client in control, which may be none; `None` before a report.
+    pub(crate) fn told_controller(&self) -> Option<Option<JausId>> {
+        Some(self.controller?.what.map(|(id, _)| id))
+    }
+}

@@ -1,0 +1,191 @@
+//! The vehicles of the station, one of which is selected: those of the settings, or all that
+//! Discovery finds.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use tokio::sync::mpsc;
+
+use super::following::Sighting;
+use super::vehicle::Vehicle;
+use crate::picture::Depth;
+use crate::role;
+use crate::state;
+use jaus::component::Component;
+use jaus::service::{Directory, Kind, Subsystem};
+
+/// The vehicles of the station.
+pub(super) struct Fleet {
+    component: Component,
+    sighted: mpsc::Sender<Sighting>,
+    /// The vehicles of the settings; empty for all that are discovered.
+    chosen: Vec<u16>,
+    directory: Arc<Directory>,
+    vehicles: BTreeMap<u16, Vehicle>,
+    selected: Option<u16>,
+}
+
+impl Fleet {
+    /// Limit of vehicles. Further ones are not shown.
+    const MOST: usize = 256;
+
+    pub(super) fn new(
+        component: Component,
+        chosen: Vec<u16>,
+        sighted: mpsc::Sender<Sighting>,
+    ) -> Self {
+        let mut fleet = Self {
+            component,
+            sighted,
+            directory: Arc::default(),
+            vehicles: BTreeMap::new(),
+            selected: None,
+            chosen,
+        };
+        for number in fleet.chosen.clone() {
+            fleet.add(number);
+        }
+        if let Some(&first) = fleet.chosen.first() {
+            fleet.select(first);
+        }
+        fleet
+    }
+
+    pub(super) fn get_mut(&mut self, number: u16) -> Option<&mut Vehicle> {
+        self.vehicles.get_mut(&number)
+    }
+
+    pub(super) fn contains(&self, number: u16) -> bool {
+        self.vehicles.contains_key(&number)
+    }
+
+    /// All vehicles, each with whether it is selected.
+    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = (bool, &mut Vehicle)> {
+        let selected = self.selected;
+        let all = self.vehicles.iter_mut();
+        all.map(move |(number, vehicle)| (selected == Some(*number), vehicle))
+    }
+
+    pub(super) const fn selected_number(&self) -> Option<u16> {
+        self.selected
+    }
+
+    pub(super) fn selected(&self) -> Option<&Vehicle> {
+        self.vehicles.get(&self.selected?)
+    }
+
+    pub(super) fn selected_mut(&mut self) -> Option<&mut Vehicle> {
+        self.vehicles.get_mut(&self.selected?)
+    }
+
+    /// Selects a vehicle of the list.
+    pub(super) fn select(&mut self, number: u16) {
+        let before = self.selected.replace(number);
+        for number in before.into_iter().chain([number]) {
+            self.set_depth(number);
+        }
+    }
+
+    /// Follows all reports of the selected vehicle and of those under control, and few of others.
+    pub(super) fn set_depth(&mut self, number: u16) {
+        let is_selected = self.selected == Some(number);
+        if let Some(vehicle) = self.vehicles.get_mut(&number) {
+            let is_full = is_selected || vehicle.is_wanted();
+            vehicle.set_depth(if is_full { Depth::Full } else { Depth::Brief });
+        }
+    }
+
+    /// Handles a change of the discovered components. Returns the vehicles that have joined.
+    pub(super) fn handle_directory(&mut self, now: Instant) -> Vec<u16> {
+        let directory = self.component.directory();
+        if Arc::ptr_eq(&directory, &self.directory) {
+            return Vec::new();
+        }
+        self.directory = directory;
+        let directory = Arc::clone(&self.directory);
+        let own = self.component.id().subsystem();
+        let others = directory.subsystems().filter(|(number, _)| *number != own);
+        let members = others.filter(|(number, known)| self.may_join(*number, known));
+        let joined: Vec<u16> = members.map(|(number, _)| number).collect();
+        let joined = joined.into_iter().filter(|&number| self.add(number));
+        let joined = joined.collect();
+        for vehicle in self.vehicles.values_mut() {
+            vehicle.handle_directory(now, &directory);
+        }
+        if self.selected.is_none()
+            && let Some(first) = self.first()
+        {
+            self.select(first);
+        }
+        joined
+    }
+
+    fn may_join(&self, number: u16, known: &Subsystem) -> bool {
+        self.chosen.is_empty() && !self.contains(number) && role::is_vehicle(known)
+    }
+
+    /// Adds a vehicle; false if it is known or the list is full.
+    fn add(&mut self, number: u16) -> bool {
+        if self.contains(number) {
+            return false;
+        }
+        if self.vehicles.len() >= Self::MOST {
+            tracing::warn!(
+                "vehicle {number} is not shown: the list has {} already",
+                Self::MOST
+            );
+            return false;
+        }
+        let vehicle = Vehicle::new(&self.component, number, self.sighted.clone());
+        self.vehicles.insert(number, vehicle);
+        true
+    }
+
+    /// The vehicle to begin with: preferably one that calls itself a vehicle.
+    fn first(&self) -> Option<u16> {
+        let is_named = |number: &&u16| {
+            let known = self.directory.subsystem(**number);
+            let identification = known.and_then(Subsystem::identification);
+            identification.is_some_and(|it| it.kind == Kind::Vehicle)
+        };
+        let named = self.vehicles.keys().find(is_named);
+        named.or_else(|| self.vehicles.keys().next()).copied()
+    }
+
+    /// Drops vehicles that have stayed away, and those that turned out to be none.
+    pub(super) fn drop_absent(&mut self) {
+        let Self {
+            chosen,
+            selected,
+            directory,
+            ..
+        } = self;
+        self.vehicles.retain(|number, vehicle| {
+            let known = directory.subsystem(*number);
+            let is_other = known.is_some_and(|it| !role::is_vehicle(it));
+            let is_absent = vehicle.picture.is_empty() || is_other;
+            !is_absent || *selected == Some(*number) || chosen.contains(number)
+        });
+    }
+
+    /// The list of vehicles.
+    pub(super) fn state(&self, now: Instant) -> state::Fleet {
+        let vehicles = self
+            .vehicles
+            .iter()
+            .map(|(number, vehicle)| vehicle.fleet_state(now, self.selected == Some(*number)));
+        state::Fleet {
+            vehicles: vehicles.collect(),
+        }
+    }
+
+    /// The tree of all known components.
+    pub(super) fn tree(&self) -> state::Tree {
+        crate::tree::of(&self.directory)
+    }
+
+    pub(super) const fn directory(&self) -> &Arc<Directory> {
+        &self.directory
+    }
+}

@@ -1,0 +1,247 @@
+//! Requests for control at a component with Management, in virtual time.
+
+use bytes::Bytes;
+use jaus::messages::core::{ReleaseControl, RequestControl, Resume, SetEmergency};
+use jaus::service::{Discovery, Kind, Management, Profile, Scope, Stack, Timing};
+use jaus::wire::{Broadcast, Priority};
+
+use super::*;
+use crate::messages::handoff::confirm_release_control::ReleaseControlRec;
+
+const ROVER: JausId = JausId::new(101, 1, 1);
+const HOLDER: JausId = JausId::new(42, 1, 1);
+const OTHER: JausId = JausId::new(43, 1, 1);
+const THIRD: JausId = JausId::new(44, 1, 1);
+
+/// A component that HOLDER controls, ready.
+struct Rover {
+    stack: Stack,
+    now: Instant,
+    sent: Vec<(JausId, Bytes)>,
+}
+
+impl Rover {
+    fn new() -> Self {
+        let profile = Profile::new(Kind::Vehicle, "Rover");
+        let discovery = Discovery::new(ROVER, profile, Scope::Nobody, Timing::default(), 1);
+        let stack = Stack::new(discovery, vec![Box::new(Handoff::new())]);
+        let mut rover = Self {
+            stack: stack.management(Management::new()),
+            now: Instant::now(),
+            sent: Vec::new(),
+        };
+        rover.stack.start(rover.now);
+        rover.hear(
+            HOLDER,
+            &RequestControl {
+                authority_code: 200,
+            },
+        );
+        rover.hear(HOLDER, &Resume {});
+        rover
+    }
+
+    fn hear<M: Message>(&mut self, source: JausId, message: &M) {
+        let received = Received {
+            source,
+            destination: ROVER,
+            to: ROVER,
+            priority: Priority::Standard,
+            broadcast: Broadcast::None,
+            payload: message.encode().unwrap(),
+            path: None,
+        };
+        self.sent.clear();
+        self.stack.handle_message(self.now, &received);
+        self.note();
+    }
+
+    fn note(&mut self) {
+        while let Some(out) = self.stack.poll_transmit() {
+            self.sent.push((out.destination, out.payload));
+        }
+    }
+
+    /// Lets time pass in steps of 1 s, in which OTHER repeats its request if it `insists`. HOLDER
+    /// renews its control.
+    fn pass(&mut self, seconds: u8, insists: bool) {
+        let mut sent = Vec::new();
+        for _ in 0..seconds {
+            self.now += Duration::from_secs(1);
+            self.hear(
+                HOLDER,
+                &RequestControl {
+                    authority_code: 200,
+                },
+            );
+            sent.append(&mut self.sent);
+            if insists {
+                self.hear(OTHER, &request(200));
+                sent.append(&mut self.sent);
+            }
+            self.stack.handle_timeout(self.now);
+            self.note();
+            sent.append(&mut self.sent);
+        }
+        self.sent = sent;
+    }
+
+    /// The messages of a type that were sent last to a client.
+    fn sent_to<M: Message>(&self, client: JausId) -> Vec<M> {
+        let sent = self.sent.iter().filter(|(to, _)| *to == client);
+        sent.filter_map(|(_, octets)| M::decode(octets).ok())
+            .collect()
+    }
+
+    /// The last answer to a client.
+    fn answer_to(&self, client: JausId) -> Option<Answer> {
+        let answers = self.sent_to::<ConfirmHandoffRequest>(client);
+        answers.last().map(|it| it.response_code)
+    }
+
+    /// The clients whose requests the client in control was told of last.
+    fn told(&self, holder: JausId) -> Option<Vec<u16>> {
+        let told = self.sent_to::<RequestReleaseControl>(holder);
+        let requests = told.last()?.request_release_control_list.iter();
+        Some(requests.map(|it| it.src_subsystem_id).collect())
+    }
+
+    fn stands(&self) -> (State, Option<JausId>) {
+        let standing = self.stack.standing();
+        (standing.state, standing.controller.map(|it| it.id))
+    }
+}
+
+fn request(authority_code: u8) -> RequestHandoff {
+    RequestHandoff {
+        authority_code,
+        ..RequestHandoff::default()
+    }
+}
+
+fn decide(id: u8, response_code: Decision) -> ConfirmReleaseControl {
+    ConfirmReleaseControl {
+        release_control_list: vec![ReleaseControlRec { id, response_code }],
+    }
+}
+
+#[test]
+fn a_grant_hands_control_over_in_standby_and_refuses_the_others() {
+    let mut rover = Rover::new();
+    rover.hear(OTHER, &request(200));
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::QUEUED));
+    rover.hear(THIRD, &request(100));
+    assert_eq!(rover.told(HOLDER), Some(vec![43, 44]));
+    assert_eq!(rover.stands(), (State::Ready, Some(HOLDER)), "not yet");
+
+    rover.hear(HOLDER, &decide(1, Decision::GRANTED));
+    assert_eq!(rover.stands(), (State::Standby, Some(OTHER)));
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::GRANTED));
+    assert_eq!(rover.answer_to(THIRD), Some(Answer::DENIED));
+    rover.hear(HOLDER, &Resume {});
+    assert_eq!(rover.stands(), (State::Standby, Some(OTHER)));
+}
+
+#[test]
+fn a_refusal_changes_nothing_and_only_the_client_in_control_decides() {
+    let mut rover = Rover::new();
+    rover.hear(OTHER, &request(200));
+    for stranger in [OTHER, THIRD] {
+        rover.hear(stranger, &decide(1, Decision::GRANTED));
+        assert_eq!(rover.stands(), (State::Ready, Some(HOLDER)));
+    }
+    rover.hear(HOLDER, &decide(1, Decision::DENIED));
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::DENIED));
+    assert_eq!(rover.told(HOLDER), Some(vec![]), "the display empties");
+    rover.hear(HOLDER, &decide(1, Decision::GRANTED));
+    assert_eq!(rover.stands(), (State::Ready, Some(HOLDER)), "it is over");
+}
+
+#[test]
+fn a_request_lapses_without_repetition_and_ends_without_a_decision() {
+    let mut rover = Rover::new();
+    rover.hear(OTHER, &request(200));
+    rover.pass(Handoff::LAPSE - 1, false);
+    assert_eq!(rover.told(HOLDER), Some(vec![43]), "told again and again");
+    rover.pass(1, false);
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::TIMEOUT));
+    assert_eq!(rover.told(HOLDER), Some(vec![]));
+
+    rover.hear(OTHER, &request(200));
+    rover.pass(Handoff::ANSWER - 1, true);
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::QUEUED));
+    rover.hear(HOLDER, &decide(2, Decision::WAIT));
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::DEFERRED));
+    rover.pass(Handoff::ANSWER - 1, true);
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::QUEUED), "later");
+    rover.pass(1, true);
+    let answers = rover.sent_to::<ConfirmHandoffRequest>(OTHER);
+    assert!(answers.iter().any(|it| it.response_code == Answer::TIMEOUT));
+    assert_eq!(rover.stands(), (State::Ready, Some(HOLDER)));
+}
+
+#[test]
+fn control_that_is_released_or_free_goes_to_the_client_that_waits() {
+    let mut rover = Rover::new();
+    rover.hear(OTHER, &request(1));
+    rover.hear(HOLDER, &ReleaseControl {});
+    assert_eq!(rover.stands(), (State::Standby, Some(OTHER)));
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::GRANTED));
+    rover.hear(OTHER, &ReleaseControl {});
+    rover.hear(THIRD, &request(1));
+    assert_eq!(rover.answer_to(THIRD), Some(Answer::GRANTED));
+    assert_eq!(rover.stands(), (State::Standby, Some(THIRD)));
+}
+
+#[test]
+fn a_request_that_is_withdrawn_is_over() {
+    let mut rover = Rover::new();
+    rover.hear(OTHER, &request(200));
+    rover.hear(OTHER, &RemoveHandoffRequest { id: 1 });
+    assert_eq!(rover.told(HOLDER), Some(vec![]));
+    rover.hear(HOLDER, &ReleaseControl {});
+    assert_eq!(rover.stands(), (State::Standby, None));
+}
+
+#[test]
+fn a_takeover_leaves_requests_to_the_new_client_in_control() {
+    let mut rover = Rover::new();
+    rover.hear(OTHER, &request(200));
+    rover.hear(
+        THIRD,
+        &RequestControl {
+            authority_code: 250,
+        },
+    );
+    assert_eq!(rover.told(THIRD), Some(vec![43]));
+    rover.hear(HOLDER, &decide(1, Decision::GRANTED));
+    assert_eq!(rover.stands().1, Some(THIRD));
+    rover.hear(THIRD, &decide(1, Decision::GRANTED));
+    assert_eq!(rover.stands(), (State::Standby, Some(OTHER)));
+}
+
+#[test]
+fn an_emergency_and_a_full_list_refuse_requests() {
+    let mut rover = Rover::new();
+    for number in 0..=Handoff::MOST {
+        let client = JausId::new(50 + u16::try_from(number).unwrap(), 1, 1);
+        rover.hear(client, &request(200));
+        let is_full = number == Handoff::MOST;
+        let expected = if is_full {
+            Answer::NOT_AVAILABLE
+        } else {
+            Answer::QUEUED
+        };
+        assert_eq!(rover.answer_to(client), Some(expected), "{number}");
+    }
+    let mut rover = Rover::new();
+    rover.hear(
+        HOLDER,
+        &SetEmergency {
+            emergency_code: 1.into(),
+        },
+    );
+    rover.hear(OTHER, &request(200));
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::NOT_AVAILABLE));
+    assert_eq!(rover.stands(), (State::Emergency, Some(HOLDER)));
+}
