@@ -1,10 +1,10 @@
 //! A vehicle that reports its speed to queries and subscriptions, until Ctrl-C.
 //! `cargo run --example client` subscribes to it.
 
-use std::time::UNIX_EPOCH;
+use std::time::{Duration, SystemTime};
 
-use jaus::component::{Component, Handlers, Kind};
-use jaus::messages::mobility::report_velocity_state::{TimeStamp, VelocityX, YawRate};
+use jaus::component::{Component, Handlers, Kind, PublishError};
+use jaus::messages::mobility::report_velocity_state::{VelocityX, YawRate};
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
 
@@ -15,20 +15,28 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
         .offer(speedometer())
         .attach(&node, 33)?;
     println!("{} is up; Ctrl-C ends it", rover.id());
-    Ok(tokio::signal::ctrl_c().await?)
+    tokio::select! {
+        failure = measure(&rover) => Ok(failure?),
+        ended = tokio::signal::ctrl_c() => Ok(ended?),
+    }
 }
 
 pub(crate) fn speedometer() -> Handlers {
-    let mut time = 0.0_f64;
-    Handlers::new(velocity_state_sensor::LATEST).answer(move |_: QueryVelocityState| {
+    Handlers::new(velocity_state_sensor::LATEST).publishes::<QueryVelocityState>()
+}
+
+pub(crate) async fn measure(rover: &Component) -> Result<(), PublishError> {
+    for step in 0.. {
         // A real vehicle would read its sensors here.
-        time += 0.1;
-        // Clients get the fields that their presence vectors request.
-        ReportVelocityState {
+        let time = 0.1 * f64::from(step);
+        let report = ReportVelocityState {
             velocity_x: VelocityX::new(1.5 + time.sin()).ok(),
             yaw_rate: YawRate::new(0.1 * time.cos()).ok(),
-            time_stamp: UNIX_EPOCH.elapsed().ok().map(TimeStamp::at),
             ..ReportVelocityState::default()
-        }
-    })
+        };
+        // Clients get the fields that they request, and the time of the sample.
+        rover.publish(report, SystemTime::now()).await?;
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    Ok(())
 }

@@ -18,8 +18,8 @@ use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::QueryHeartbeatPulse;
 use crate::node::{self, Port, Resident};
 use crate::service::{
-    Change, Condition, Event, Inquiry, NoAnswer, Patience, QueryOptions, Service, Stack, Standing,
-    UnsafeService,
+    Change, Condition, Event, Inquiry, NoAnswer, NotPublished, Patience, Publication, QueryOptions,
+    Service, Stack, Standing, UnsafeService,
 };
 
 /// A request of the application to its component's task. What is large is boxed, because every
@@ -35,6 +35,8 @@ pub(super) enum Command {
     Withdraw(&'static str),
     /// Set the reported condition of the component.
     Condition(Condition),
+    /// Publish a report.
+    Publish(Publication, oneshot::Sender<Result<(), NotPublished>>),
     /// Notify subscribers that the answer to the query with this code has changed.
     Announce(u16),
     /// Report the end of the command with this code, and whether it was successful.
@@ -233,6 +235,10 @@ impl Driver {
             Command::Condition(condition) => self.stack.set_condition(Instant::now(), condition),
             Command::End(command, successful) => {
                 self.stack.end_command(Instant::now(), command, successful);
+            }
+            Command::Publish(publication, reply) => {
+                // As above.
+                let _ = reply.send(self.stack.publish(Instant::now(), &publication));
             }
             Command::Announce(query) => self.stack.announce(Instant::now(), query),
         }

@@ -7,8 +7,8 @@ use crate::address::JausId;
 use crate::codec::{DecodeError, EncodeError, OutOfRange};
 use crate::node;
 use crate::service::{
-    CannotSubscribe, ControlLost, ControlRefused, NoAnswer, Offer, SessionState, State,
-    SubscriptionEnd,
+    CannotSubscribe, ControlLost, ControlRefused, NoAnswer, NotPublished, Offer, SessionState,
+    State, SubscriptionEnd,
 };
 
 /// Why a message was not sent.
@@ -110,6 +110,18 @@ impl QueryError {
             waited,
         }
     }
+}
+
+/// Why a report was not published.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PublishError {
+    /// No service of the component publishes it.
+    #[error(transparent)]
+    NotPublished(#[from] NotPublished),
+    /// The component has stopped, because its node has.
+    #[error("the component stopped with its node and publishes no more reports")]
+    Stopped,
 }
 
 /// Why there is no subscription.

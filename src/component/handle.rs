@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU8;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use tokio::sync::{mpsc, oneshot, watch};
 
@@ -12,17 +12,17 @@ use super::driver::{Answer, Ask, Command};
 use super::offers::missing_for;
 use super::watch::Outlet;
 use super::{
-    Builder, Control, ControlError, DeliverError, FindError, Messages, QueryError, SendError,
-    SubscribeError, Subscription, Watch,
+    Builder, Control, ControlError, DeliverError, FindError, Messages, PublishError, QueryError,
+    SendError, SubscribeError, Subscription, Watch,
 };
 use crate::address::JausId;
-use crate::codec::{Message, Query, ServiceId};
+use crate::codec::{Message, Query, Report, ServiceId};
 use crate::endpoint::{Outgoing, Received};
 use crate::messages;
 use crate::node;
 use crate::service::{
-    Change, Condition, Directory, Kind, LaterAnswer, NodeDirectory, Offer, QueryOptions, Service,
-    Standing, Topic, UnsafeService, When,
+    Change, Condition, Directory, Kind, LaterAnswer, NodeDirectory, Offer, Publication,
+    QueryOptions, Service, Standing, Topic, UnsafeService, When,
 };
 use crate::wire::Priority;
 
@@ -103,6 +103,28 @@ impl Component {
             .commands
             .send(Command::Condition(condition))
             .await;
+    }
+
+    /// Publishes a report: queries are answered with it from now on, subscribers on change get it
+    /// at once, and periodic reports carry it. A service must be
+    /// [offered](super::Handlers::publishes) that publishes it.
+    ///
+    /// `sampled_at` is the time of the sample (UTC). The report's time fields get it, unless they
+    /// are set or the definition has none.
+    ///
+    /// # Errors
+    /// [`PublishError`] names the report that no service publishes.
+    pub async fn publish<R: Report>(
+        &self,
+        report: R,
+        sampled_at: SystemTime,
+    ) -> Result<(), PublishError> {
+        let publication = Publication::new(report, sampled_at);
+        let (reply, taken) = oneshot::channel();
+        let command = Command::Publish(publication, reply);
+        let sent = self.shared.commands.send(command).await;
+        sent.map_err(|_| PublishError::Stopped)?;
+        Ok(taken.await.map_err(|_| PublishError::Stopped)??)
     }
 
     /// Notifies the subscribers of the query `Q` that its answer has changed.
@@ -228,7 +250,7 @@ impl Component {
         peer: JausId,
         query: &Q,
     ) -> Result<Q::Report, QueryError> {
-        self.ask(options, peer, query).await
+        self.request_with(options, peer, query).await
     }
 
     /// Like [`query`](Self::query), for a message whose answer does not follow from its type: a
@@ -242,10 +264,15 @@ impl Component {
         peer: JausId,
         message: &M,
     ) -> Result<R, QueryError> {
-        self.ask(QueryOptions::default(), peer, message).await
+        self.request_with(QueryOptions::default(), peer, message)
+            .await
     }
 
-    async fn ask<R: Message, M: Message>(
+    /// Like [`request`](Self::request), with a priority and with its own patience.
+    ///
+    /// # Errors
+    /// Those of [`query`](Self::query).
+    pub async fn request_with<R: Message, M: Message>(
         &self,
         options: QueryOptions,
         peer: JausId,

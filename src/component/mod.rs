@@ -95,8 +95,8 @@ pub use builder::{AttachError, Builder};
 pub use command::RunningCommand;
 pub use control::Control;
 pub use error::{
-    ControlError, DeliverError, FindError, ManageError, QueryError, RequestError, SendError,
-    SessionError, SubscribeError,
+    ControlError, DeliverError, FindError, ManageError, PublishError, QueryError, RequestError,
+    SendError, SessionError, SubscribeError,
 };
 pub use group::{GroupSubscription, GroupUpdate, Results};
 pub use handle::Component;

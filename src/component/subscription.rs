@@ -23,6 +23,22 @@ use crate::service::{Outage, SubscriptionEnd};
 /// back, after a second or a day. In the meantime [`next`](Self::next) reports the outage. Up to
 /// 256 updates wait for a slow reader, or fewer as set by [`depth`](Self::depth); then the oldest
 /// report is dropped. It is a [`Stream`] too.
+///
+/// Several tasks share the latest report through a channel:
+///
+/// ```no_run
+/// # use jaus::component::Subscription;
+/// # use jaus::messages::mobility::ReportVelocityState;
+/// # fn share(mut speeds: Subscription<ReportVelocityState>) {
+/// let (share, latest) = tokio::sync::watch::channel(None);
+/// tokio::spawn(async move {
+///     while let Some(report) = speeds.report().await {
+///         share.send_replace(Some(report));
+///     }
+/// });
+/// let for_another_task = latest.clone();
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Subscription<R> {
     /// Dropped before the component.

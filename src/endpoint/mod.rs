@@ -223,12 +223,6 @@ impl Endpoint {
         self.reassembly.cost()
     }
 
-    /// When the latest fragment of an unfinished message from `source` to `destination` arrived.
-    #[must_use]
-    pub fn last_fragment(&self, source: JausId, destination: JausId) -> Option<Instant> {
-        self.reassembly.last_fragment(source, destination)
-    }
-
     /// Handles timeouts. Call it when [`poll_timeout`](Self::poll_timeout) is reached; early calls
     /// are harmless.
     pub fn handle_timeout(&mut self, now: Instant) {

@@ -294,6 +294,9 @@ impl Endpoint {
         } else {
             let style = self.peers.large_style(source);
             let inserted = self.reassembly.insert(arrival, style, &mut self.counters)?;
+            if inserted.is_none() {
+                sink.progress(arrival.now, source, frame.destination);
+            }
             inserted.inspect(|whole| self.recall_beginning(arrival, whole))
         };
         if let Some(whole) = large {

@@ -1,5 +1,7 @@
 //! The sink: how an endpoint delivers messages to local components.
 
+use std::time::Instant;
+
 use super::{Path, Received};
 use crate::address::JausId;
 use crate::wire::Priority;
@@ -17,6 +19,11 @@ pub trait Sink {
 
     /// Delivers a message to the component [`Received::to`].
     fn deliver(&mut self, message: Received);
+
+    /// Notes that a part of a large message from `source` has arrived, which is not complete yet.
+    fn progress(&mut self, now: Instant, source: JausId, to: JausId) {
+        let _ = (now, source, to);
+    }
 }
 
 /// Accepts every message.

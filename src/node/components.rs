@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
+use std::time::Instant;
 
 use super::ComponentReport;
 use super::events::EventSender;
@@ -191,6 +192,12 @@ impl Sink for Components {
         self.taps.message(&message);
         if let Some(attached) = self.attached.get(&message.to) {
             attached.mailbox.deliver(message);
+        }
+    }
+
+    fn progress(&mut self, now: Instant, source: JausId, to: JausId) {
+        if let Some(attached) = self.attached.get(&to) {
+            attached.mailbox.note_progress(now, source);
         }
     }
 }

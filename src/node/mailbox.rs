@@ -6,11 +6,14 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
+use std::time::Instant;
 
 use tokio::sync::Notify;
 
 #[cfg(feature = "serde")]
 use super::config::units;
+use super::progress::Progress;
+use crate::address::JausId;
 use crate::endpoint::Received;
 use crate::link::backlog::{Backlog, Bounds};
 use crate::wire::Priority;
@@ -66,12 +69,31 @@ struct Inner<T> {
     dropped: u64,
     closed: bool,
     reader: Option<Waker>,
+    progress: Progress,
 }
 
 impl Mailbox {
     /// Queues a message.
     pub(super) fn deliver(&self, message: Received) {
         self.push(message.priority, message.payload.len(), message);
+    }
+
+    /// Notes that a part of an unfinished message has arrived from a peer.
+    pub(super) fn note_progress(&self, now: Instant, source: JausId) {
+        let mut inner = self.lock();
+        if inner.progress.note(now, source) {
+            inner.wake();
+        }
+    }
+
+    /// When a part of a large message last arrived from a peer.
+    pub(super) fn last_fragment(&self, source: JausId) -> Option<Instant> {
+        self.lock().progress.latest(source)
+    }
+
+    /// Passes on the peers from which parts have arrived, for the component's process.
+    pub(super) fn drain_progress(&self, each: impl FnMut(JausId)) {
+        self.lock().progress.take_news().for_each(each);
     }
 
     /// Whether `messages` more fit, or the mailbox is empty.
@@ -109,6 +131,7 @@ impl<T> Mailbox<T> {
                 dropped: 0,
                 closed: false,
                 reader: None,
+                progress: Progress::default(),
             }),
             read: Notify::new(),
         }
@@ -196,7 +219,6 @@ mod tests {
     use bytes::Bytes;
 
     use super::*;
-    use crate::address::JausId;
     use crate::wire::Broadcast;
 
     fn message(priority: Priority) -> Received {

@@ -47,6 +47,7 @@ mod links;
 mod local;
 mod mailbox;
 mod port;
+mod progress;
 mod resident;
 mod tap;
 

@@ -116,13 +116,10 @@ impl Port {
         }
     }
 
-    /// When the latest fragment of an unfinished message of this peer to the component arrived. A
-    /// component on the node of another process does not know.
+    /// When a part of a large message last arrived from this peer for the component. A component on
+    /// the node of another process learns of it at most 50 ms later.
     pub(crate) fn last_fragment(&self, peer: JausId) -> Option<Instant> {
-        match &self.sender.way {
-            Attachment::Here(shared) => shared.lock().endpoint.last_fragment(peer, self.id()),
-            Attachment::Host(_) => None,
-        }
+        self.mailbox.last_fragment(peer)
     }
 
     /// Counts of the messages for this component.

@@ -2,14 +2,14 @@
 //! changes and finished commands.
 
 use std::collections::BTreeSet;
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 
 use bytes::Bytes;
 
 use super::life::Life;
-use super::{Controller, Outbox, Standing, StopCause};
+use super::{Controller, Outbox, Publication, Standing, StopCause};
 use crate::address::JausId;
-use crate::codec::{Message, Query};
+use crate::codec::{Message, Query, Report};
 use crate::endpoint::Received;
 
 /// What services have reported since the stack last looked.
@@ -17,6 +17,8 @@ use crate::endpoint::Received;
 pub(crate) struct News {
     /// The codes of queries whose answers have changed.
     pub(crate) changed: BTreeSet<u16>,
+    /// Published reports, on their way to the services that answer with them.
+    pub(crate) published: Vec<Publication>,
     /// The codes of commands that have ended, and whether successfully.
     pub(crate) ended: Vec<(u16, bool)>,
     /// Faults (`Err`) and recoveries (`Ok`), in the order of their reports.
@@ -119,9 +121,26 @@ impl<'a> Context<'a> {
         self.out.reply_until_acknowledged(to, message);
     }
 
+    /// Like [`reply`](Self::reply), with a message that is encoded already.
+    pub(super) fn reply_octets(&mut self, to: &Received, payload: Bytes) {
+        self.out.send_octets_with(to.source, to.priority, payload);
+    }
+
+    /// Publishes a report, as [`Stack::publish`](super::Stack::publish) does, from within a
+    /// service. It is an error in the log if no service of the component publishes it.
+    pub fn publish<R: Report>(&mut self, report: R, sampled_at: SystemTime) {
+        let publication = Publication::new(report, sampled_at);
+        self.news.published.push(publication);
+    }
+
     /// Reports that the answer to the query `Q` has changed, which notifies its subscribers.
     pub fn changed<Q: Query>(&mut self) {
-        self.news.changed.insert(Q::CODE);
+        self.answer_changed(Q::CODE);
+    }
+
+    /// The same for a query with this code.
+    pub(super) fn answer_changed(&mut self, query: u16) {
+        self.news.changed.insert(query);
     }
 
     /// Reports that the last accepted command with this code has ended, and whether successfully.

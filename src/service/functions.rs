@@ -4,15 +4,45 @@ use std::any::TypeId;
 use std::collections::BTreeMap;
 use std::fmt;
 
-use super::{Call, Context, Handlers, Hazards, Standing, Validity};
+use super::publication::Latest;
+use super::{Call, Context, Handlers, Hazards, Publication, Standing, Validity};
 use crate::address::JausId;
 use crate::codec::machine::Outcome;
 use crate::codec::{self, Call as _, DecodeError, Message, Query, ServiceId};
 use crate::endpoint::Received;
 
 type Stop = Box<dyn FnMut(&mut Context<'_>) + Send>;
-/// Handles a message, or fails if its octets are no message of its type.
-type Function = Box<dyn FnMut(&mut Call<'_>) -> Result<(), DecodeError> + Send>;
+
+/// Handles one layout of a message.
+trait Function: Send {
+    /// Handles a message, or fails if its octets are no message of its type.
+    fn handle(&mut self, call: &mut Call<'_>) -> Result<(), DecodeError>;
+
+    /// Takes a published report; returns whether it answers queries with it from now on.
+    fn publish(&mut self, _publication: &Publication) -> bool {
+        false
+    }
+}
+
+impl<F> Function for F
+where
+    F: FnMut(&mut Call<'_>) -> Result<(), DecodeError> + Send,
+{
+    fn handle(&mut self, call: &mut Call<'_>) -> Result<(), DecodeError> {
+        self(call)
+    }
+}
+
+impl<Q: Query> Function for Latest<Q> {
+    fn handle(&mut self, call: &mut Call<'_>) -> Result<(), DecodeError> {
+        call.received()
+            .map_or(Ok(()), |received| self.answer(received, call))
+    }
+
+    fn publish(&mut self, publication: &Publication) -> bool {
+        self.publish(publication)
+    }
+}
 
 /// One function per message: what [`Handlers::new`] begins with.
 #[derive(Default)]
@@ -29,7 +59,7 @@ struct Layout {
     name: &'static str,
     /// The services that have another layout of the message, or of its report.
     others: [&'static [ServiceId]; 2],
-    function: Function,
+    function: Box<dyn Function>,
 }
 
 impl Layout {
@@ -43,10 +73,12 @@ impl Handlers {
     /// A service without functions.
     #[must_use]
     pub fn new(id: ServiceId) -> Self {
-        Self::of(Functions {
+        let mut handlers = Self::of(Functions {
             offers: vec![id],
             ..Functions::default()
-        })
+        });
+        handlers.publish = Functions::publish;
+        handlers
     }
 
     /// Also offers another version, usually an older one whose clients it understands.
@@ -56,7 +88,27 @@ impl Handlers {
         self
     }
 
-    /// Answers every query of type `Q`. The report goes to the sender of the query, and to
+    /// Answers every query of type `Q` with the latest report that the application
+    /// [publishes](super::Stack::publish), and notifies subscribers of each. The report is encoded
+    /// once for all clients that request the same fields.
+    ///
+    /// Until the first report is published, the answer is a report without values. If the
+    /// definition requires values, the query has no answer until then, and events are rejected.
+    ///
+    /// ```
+    /// use jaus::messages::mobility::{QueryVelocityState, velocity_state_sensor};
+    /// use jaus::service::Handlers;
+    ///
+    /// let speedometer =
+    ///     Handlers::new(velocity_state_sensor::LATEST).publishes::<QueryVelocityState>();
+    /// ```
+    #[must_use]
+    pub fn publishes<Q: Query>(mut self) -> Self {
+        self.handle::<Q>(Q::Report::OTHER_LAYOUTS, Latest::<Q>::new());
+        self
+    }
+
+    /// Answers every query of type `Q` with a report that is made for it. The report goes to the sender of the query, and to
     /// subscribers, without the optional fields that they did not
     /// [request](Query::drop_unrequested). To report in the layout of an older version,
     /// [`receive`](Self::receive) the query and [reply](Context::reply).
@@ -65,7 +117,7 @@ impl Handlers {
         mut self,
         mut function: impl FnMut(Q) -> Q::Report + Send + 'static,
     ) -> Self {
-        self.handle::<Q>(Q::Report::OTHER_LAYOUTS, move |call| {
+        self.handle::<Q>(Q::Report::OTHER_LAYOUTS, move |call: &mut Call<'_>| {
             call.answer(|query, _| Some(function(query)))
         });
         self
@@ -153,7 +205,7 @@ impl Handlers {
         validity: Option<Validity>,
         mut function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
     ) -> Self {
-        self.handle::<M>(&[], move |call| {
+        self.handle::<M>(&[], move |call: &mut Call<'_>| {
             let Some(received) = call.received() else {
                 return Ok(());
             };
@@ -173,7 +225,7 @@ impl Handlers {
     fn handle<M: Message>(
         &mut self,
         reports: &'static [ServiceId],
-        function: impl FnMut(&mut Call<'_>) -> Result<(), DecodeError> + Send + 'static,
+        function: impl Function + 'static,
     ) {
         let layout = Layout {
             of: TypeId::of::<M>(),
@@ -186,6 +238,22 @@ impl Handlers {
             Some(place) => *place = layout,
             None => layouts.push(layout),
         }
+    }
+}
+
+impl Functions {
+    /// Passes a published report on; returns the codes of the queries that it answers.
+    fn publish(&mut self, publication: &Publication) -> Vec<u16> {
+        let takes = |layouts: &mut Vec<Layout>| {
+            let taken = layouts
+                .iter_mut()
+                .map(|it| it.function.publish(publication));
+            taken.fold(false, |any, it| any | it)
+        };
+        let queries = self.by_code.iter_mut();
+        queries
+            .filter_map(|(&code, layouts)| takes(layouts).then_some(code))
+            .collect()
     }
 }
 
@@ -219,7 +287,7 @@ impl<'a> codec::Provider<Call<'a>> for Functions {
         let layouts = self.by_code.get_mut(&code)?.iter_mut();
         let mut result = Ok(());
         for layout in layouts {
-            result = (layout.function)(call);
+            result = layout.function.handle(call);
             if result.is_ok() {
                 break;
             }

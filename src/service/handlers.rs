@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use super::functions::Functions;
 use super::{
-    Call, Context, Handled, Hazards, MotionGuard, MotionPolicy, Service, Standing, StopCause,
-    code_of,
+    Call, Context, Handled, Hazards, MotionGuard, MotionPolicy, Publication, Service, Standing,
+    StopCause, code_of,
 };
 use crate::address::JausId;
 use crate::codec::{Message, Provider, ServiceId};
@@ -102,6 +102,8 @@ use crate::endpoint::Received;
 /// ```
 pub struct Handlers<P = Functions> {
     pub(super) provider: P,
+    /// Passes a published report on; returns the codes of the queries that it answers.
+    pub(super) publish: fn(&mut P, &Publication) -> Vec<u16>,
     guard: MotionGuard,
     told: BTreeSet<u16>,
     timers: Timers,
@@ -114,6 +116,7 @@ impl<P> Handlers<P> {
     pub fn of(provider: P) -> Self {
         Self {
             provider,
+            publish: |_, _| Vec::new(),
             guard: MotionGuard::default(),
             told: BTreeSet::new(),
             timers: Timers::default(),
@@ -200,6 +203,21 @@ where
             }
         }
         Handled::Yes
+    }
+
+    fn handle_publication(
+        &mut self,
+        publication: &Publication,
+        context: &mut Context<'_>,
+    ) -> Handled {
+        let queries = (self.publish)(&mut self.provider, publication);
+        for &query in &queries {
+            context.answer_changed(query);
+        }
+        match queries.is_empty() {
+            true => Handled::No,
+            false => Handled::Yes,
+        }
     }
 
     fn handle_timeout(&mut self, now: Instant, context: &mut Context<'_>) {

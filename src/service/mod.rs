@@ -40,6 +40,7 @@ mod liveness;
 #[cfg(test)]
 mod machines;
 mod outbox;
+mod publication;
 #[cfg(any(test, feature = "arbitrary"))]
 pub mod rig;
 mod safety;
@@ -78,6 +79,7 @@ pub use life::{Life, Rank};
 pub use list::{ElementList, Elements, ListManager};
 pub use liveness::Liveness;
 pub use outbox::Outbox;
+pub use publication::{NotPublished, Publication};
 pub use safety::UnsafeService;
 pub use stack::{Event, Stack};
 pub use standing::{Controller, Standing, State};
@@ -97,6 +99,18 @@ pub trait Service: Send {
         message: &Received,
         context: &mut Context<'_>,
     ) -> Handled;
+
+    /// Takes a published report, with which it answers queries from now on, and
+    /// [announces](Context::changed) the change. The first service that returns [`Handled::Yes`]
+    /// takes it.
+    fn handle_publication(
+        &mut self,
+        publication: &Publication,
+        context: &mut Context<'_>,
+    ) -> Handled {
+        let _ = (publication, context);
+        Handled::No
+    }
 
     /// Called when the time of [`poll_timeout`](Self::poll_timeout) has come.
     fn handle_timeout(&mut self, now: Instant, context: &mut Context<'_>) {

@@ -17,8 +17,8 @@ use super::inquiries::Inquiries;
 use super::life::{Life, Rank};
 use super::{
     Change, Context, ControlId, ControlNews, Directory, Discovery, Handled, Inquiry, NoAnswer,
-    Outbox, Service, SessionId, SessionState, Standing, StopCause, SubscriptionId,
-    SubscriptionNews, UnsafeService, code_of,
+    NotPublished, Outbox, Publication, Service, SessionId, SessionState, Standing, StopCause,
+    SubscriptionId, SubscriptionNews, UnsafeService, code_of,
 };
 use safeguard::Faults;
 
@@ -171,6 +171,28 @@ impl Stack {
         self.collect(now);
     }
 
+    /// Publishes a report, for the application: the service that
+    /// [publishes](super::Handlers::publishes) it answers queries with it from now on, and
+    /// subscribers on change get it at once.
+    ///
+    /// # Errors
+    /// If no service publishes it.
+    pub fn publish(&mut self, now: Instant, publication: &Publication) -> Result<(), NotPublished> {
+        let taken = self.pass_on(publication);
+        self.collect(now);
+        taken
+    }
+
+    fn pass_on(&mut self, publication: &Publication) -> Result<(), NotPublished> {
+        let (out, standing, life, news) =
+            (&mut self.out, &self.standing, &self.life, &mut self.news);
+        let is_taken = self.services.iter_mut().any(|service| {
+            let mut context = Context::new(out, standing, life, news);
+            service.handle_publication(publication, &mut context) == Handled::Yes
+        });
+        is_taken.then_some(()).ok_or_else(|| publication.refused())
+    }
+
     /// Reports, for the application, that the command with this code has ended, and whether
     /// successfully.
     pub fn end_command(&mut self, now: Instant, command: u16, successful: bool) {
@@ -310,6 +332,7 @@ impl Stack {
         let found = std::mem::replace(&mut self.news, news);
         self.news.faults.extend(found.faults);
         self.news.ended.extend(found.ended);
+        self.news.published.extend(found.published);
         let mut said = std::mem::replace(&mut self.out, out);
         std::iter::from_fn(|| said.pop())
             .find(|answer| answer.destination == client)
@@ -464,6 +487,11 @@ impl Stack {
         // A stop may itself report a fault, and a change of control a handover.
         self.follow_services(now);
         self.watch_clients(now);
+        for publication in std::mem::take(&mut self.news.published) {
+            if let Err(error) = self.pass_on(&publication) {
+                tracing::error!(%error, "report dropped");
+            }
+        }
         self.tell_subscribers(now);
         self.collect_client_news(now);
     }

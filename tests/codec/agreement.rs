@@ -116,7 +116,7 @@ fn check(info: &MessageInfo, message: &Message, cases: u32) {
 fn both_codecs_agree_on_every_generated_message() {
     let library = catalogue();
     let wanted = std::env::var("JAUS_CASES").ok();
-    let wanted = wanted.map_or(24, |cases| cases.parse().unwrap());
+    let wanted = wanted.map_or(12, |cases| cases.parse().unwrap());
     let mut types = 0;
     for info in jaus_vehicle::messages::registry().iter() {
         for service in info.services {

@@ -56,12 +56,17 @@ impl Example {
 
     /// Waits until it prints a line that contains this text.
     fn expect(&mut self, wanted: &str) {
+        self.expect_line(wanted, |line| line.contains(wanted));
+    }
+
+    /// Waits until it prints a line of which this is true.
+    fn expect_line(&mut self, wanted: &str, is_wanted: impl Fn(&str) -> bool) {
         let end = Instant::now() + LIMIT;
-        while self.seen.last().is_none_or(|line| !line.contains(wanted)) {
+        while self.seen.last().is_none_or(|line| !is_wanted(line)) {
             let left = end.saturating_duration_since(Instant::now());
             match self.lines.recv_timeout(left) {
                 Ok(line) => self.seen.push(line),
-                Err(_) => panic!("{} printed no {wanted:?}: {:#?}", self.name, self.seen),
+                Err(_) => panic!("{} did not print {wanted:?}: {:#?}", self.name, self.seen),
             }
         }
     }
@@ -140,6 +145,16 @@ fn the_group_stops_everybody_when_one_is_too_fast() {
     group.expect("101.1.33 reports its speed");
     group.expect("stopping all vehicles");
     group.expect("102.1.33 acknowledged the stop");
+}
+
+#[cfg(feature = "every-set")]
+#[test]
+fn a_slow_viewer_gets_the_latest_of_large_images() {
+    let mut images = Example::start("images");
+    images.expect("1048576 octets");
+    images.expect_line("that the viewer missed images", |line| {
+        !line.ends_with(" 0 missed")
+    });
 }
 
 #[test]

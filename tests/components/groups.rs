@@ -6,8 +6,8 @@ use std::time::Duration;
 use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::component::{
-    Audience, CannotSubscribe, Component, GroupUpdate, Handlers, Kind, Messages, SubscribeError,
-    SubscriptionEnd, Timing, When,
+    Audience, CannotSubscribe, Component, GroupUpdate, Handlers, Kind, Messages, Priority,
+    QueryOptions, SubscribeError, SubscriptionEnd, Timing, When,
 };
 use jaus::link::Group;
 use jaus::messages::core::{QueryIdentification, ReportHeartbeatPulse, discovery};
@@ -226,4 +226,39 @@ async fn what_no_member_could_grant_is_refused_at_once_and_a_stopped_node_ends_t
     let mut speeds = subscribe(When::OnChange).unwrap();
     node.shutdown().await;
     assert!(within_limit(speeds.next()).await.is_none());
+}
+
+#[tokio::test]
+async fn queries_of_one_component_and_of_a_group_reach_it_with_their_priority() {
+    let network = Network::new();
+    let (heard, mut priorities) = tokio::sync::mpsc::unbounded_channel();
+    let sensor = Handlers::new(velocity_state_sensor::LATEST).receive(
+        move |_: QueryVelocityState, query, context| {
+            heard.send(query.priority).unwrap();
+            context.reply(query, &ReportVelocityState::default());
+        },
+    );
+    let sensor = Component::builder(Kind::Vehicle, "Sensor")
+        .offer(sensor)
+        .attach(&network.node(101, 1), 42)
+        .unwrap();
+    let operator = network.operator();
+    let audience = Audience::providers(velocity_state_sensor::URN);
+    gathered(&operator, &audience, 1).await;
+    let urgent = QueryOptions::default().priority(Priority::High);
+    let answers = async {
+        operator
+            .query_with(urgent, sensor.id(), &QUERY)
+            .await
+            .unwrap();
+        let request = operator.request_with(urgent, sensor.id(), &QUERY).await;
+        let _: ReportVelocityState = request.unwrap();
+        operator.query_all_with(urgent, &audience, &QUERY).await
+    };
+    assert!(within_limit(answers).await.is_complete());
+    for _query in 0..3 {
+        assert_eq!(priorities.recv().await, Some(Priority::High));
+    }
+    operator.query(sensor.id(), &QUERY).await.unwrap();
+    assert_eq!(priorities.recv().await, Some(Priority::Standard));
 }

@@ -1,6 +1,6 @@
 //! An endpoint with a store for delivered messages, like a node's mailboxes.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::ops::{Deref, DerefMut};
 use std::time::Instant;
 
@@ -29,21 +29,30 @@ pub struct OwnedEndpoint {
 }
 
 #[derive(Debug, Default)]
-struct Inbox([VecDeque<Received>; Priority::ALL.len()]);
+struct Inbox {
+    /// By priority.
+    waiting: [VecDeque<Received>; Priority::ALL.len()],
+    /// When a part of an unfinished message last arrived, by source and destination.
+    parts: BTreeMap<(JausId, JausId), Instant>,
+}
 
 impl Sink for Inbox {
     fn has_room(&self, _: JausId, priority: Priority) -> bool {
-        self.0[usize::from(priority.bits())].len() < ROOM / 2
+        self.waiting[usize::from(priority.bits())].len() < ROOM / 2
     }
 
     /// The second half of the queue is for messages that cannot be refused. When it is full too,
     /// the oldest message is dropped.
     fn deliver(&mut self, message: Received) {
-        let waiting = &mut self.0[usize::from(message.priority.bits())];
+        let waiting = &mut self.waiting[usize::from(message.priority.bits())];
         waiting.push_back(message);
         if waiting.len() > ROOM {
             waiting.pop_front();
         }
+    }
+
+    fn progress(&mut self, now: Instant, source: JausId, to: JausId) {
+        self.parts.insert((source, to), now);
     }
 }
 
@@ -64,11 +73,16 @@ impl OwnedEndpoint {
             .handle_datagram(now, from, datagram, &mut self.inbox);
     }
 
+    /// When a part of a large message last arrived.
+    pub fn last_fragment(&self, source: JausId, to: JausId) -> Option<Instant> {
+        self.inbox.parts.get(&(source, to)).copied()
+    }
+
     /// The owner's next event: the endpoint's own events first, then the most urgent message.
     pub fn poll_event(&mut self) -> Option<Event> {
         let news = self.endpoint.poll_event().map(Event::News);
         news.or_else(|| {
-            let mut most_urgent_first = self.inbox.0.iter_mut().rev();
+            let mut most_urgent_first = self.inbox.waiting.iter_mut().rev();
             let message = most_urgent_first.find_map(VecDeque::pop_front);
             message.map(Event::Received)
         })

@@ -14,6 +14,7 @@
 //! | [`ledger`] | sent messages, and checks of their delivery |
 //! | [`judges`] | invariants of endpoints: bounds, and silence when all is quiet |
 //! | [`totals`] | events over all seeds |
+//! | [`answers`] | a large answer over a slow wire |
 //! | [`large`], [`streams`], [`control`], [`directories`] | separate scenarios: a large message, subscriptions, operators, discovery |
 //!
 //! `JAUS_SEEDS=n` runs n seeds, `JAUS_SEED=n` only seed n, and `JAUS_TRACE=1` prints its events. A
@@ -25,6 +26,7 @@
 
 #![expect(clippy::expect_used, clippy::panic, reason = "tests")]
 
+mod answers;
 mod control;
 mod directories;
 mod faults;
@@ -46,13 +48,13 @@ mod vehicle;
 use totals::run_seeds;
 
 /// The default number of seeds.
-const SEEDS: u64 = 1000;
+const SEEDS: u64 = 300;
 /// Default number of seeds that send a large message: it has 736 fragments.
-const LARGE_SEEDS: u64 = 100;
+const LARGE_SEEDS: u64 = 30;
 /// Default number of seeds with operators that contend for a vehicle for two minutes.
-const CONTROL_SEEDS: u64 = 50;
+const CONTROL_SEEDS: u64 = 25;
 /// Default number of seeds with clients that subscribe to reports for three minutes.
-const STREAM_SEEDS: u64 = 15;
+const STREAM_SEEDS: u64 = 8;
 /// Default number of seeds with components that discover each other for two minutes.
 const DIRECTORY_SEEDS: u64 = 20;
 

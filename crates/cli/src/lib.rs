@@ -9,6 +9,7 @@
 )]
 
 pub mod failure;
+mod fence;
 mod identity;
 pub mod junit;
 mod launch;
@@ -21,6 +22,7 @@ pub mod statistics;
 mod systemd;
 
 pub use failure::{Failure, Outcome};
+pub use fence::FenceFlags;
 pub use launch::{Ready, launch};
 
 pub use jaus_view::tree;

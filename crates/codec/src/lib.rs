@@ -49,7 +49,7 @@ pub use fixed::{Count, Fixed};
 #[doc(hidden)]
 pub use message::View;
 pub use message::{AnyMessage, Message, ServiceId};
-pub use query::{Query, report_code};
+pub use query::{Query, Report, report_code};
 pub use reader::Reader;
 #[doc(hidden)]
 pub use registry::RandomMessage;

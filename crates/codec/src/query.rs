@@ -1,16 +1,32 @@
 //! Queries and the reports that answer them: by type and by message code.
 
+use std::time::Duration;
+
 use super::message::Message;
 
 /// A query, which its report answers. Generated for each message `QueryX` whose service declares a
 /// `ReportX` with the code of [`report_code`].
 pub trait Query: Message {
     /// The report. Of several layouts the newest that a service declares beside the query.
-    type Report: Message;
+    type Report: Report;
 
     /// Removes the optional fields of a report that the query's presence vector does not request.
     /// Without effect if the query has no presence vector for the report's own fields.
     fn drop_unrequested(&self, _report: &mut Self::Report) {}
+}
+
+/// A report, which answers a query. Generated for each message that is the [`Query::Report`] of one.
+pub trait Report: Message {
+    /// Sets the time of the sample, since the beginning of 1970 (UTC), in the time fields that are
+    /// unset: the standard's time stamp, or seconds and nanoseconds. Without effect if the
+    /// definition has neither in the records that every report contains.
+    fn stamp(&mut self, _since_1970: Duration) {}
+
+    /// The report without any value; `None` if its definition requires one.
+    #[must_use]
+    fn without_values() -> Option<Self> {
+        None
+    }
 }
 
 /// The code of the report that answers a query; `None` if the code is not a query.

@@ -32,7 +32,3 @@ mod tree;
 
 pub use station::{Listen, OpenStation, Station};
 pub use token::{Token, TokenError};
-
-/// Identifies one page connection, for example the one that holds the stick.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct PageId(pub u64);

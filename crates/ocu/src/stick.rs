@@ -3,7 +3,9 @@
 
 use std::time::{Duration, Instant};
 
-use super::PageId;
+/// Identifies one page connection, for example the one that holds the stick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PageId(pub u64);
 
 /// Stick position, each axis from -1 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`motion`] | a platform, real or simulated, and the motion control over it |
 //! | [`actuator`] | wheels and what turns them: a simulated motor, stepper motors on GPIO lines |
+//! | [`zones`] | areas to stay in or keep out of |
 //! | [`world`] | vector objects and raster maps, their index and their file |
 //! | [`mission`] | path planning over a map, and the stages of a mission |
 //! | [`mobility`] | the services of the mobility set (AS6009), which command a [`motion::Pilot`] |
@@ -24,3 +25,4 @@ pub mod mobility;
 pub mod motion;
 pub mod parts;
 pub mod world;
+pub mod zones;

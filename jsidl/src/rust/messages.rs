@@ -33,6 +33,14 @@ impl Plan<'_> {
             None => self.ident.clone(),
         }
     }
+
+    /// The path of the module with its nested types from the root of the set.
+    pub(super) fn module_path(&self) -> String {
+        match &self.version {
+            Some(version) => format!("{version}::{}", self.module),
+            None => self.module.clone(),
+        }
+    }
 }
 
 /// Members of a message's struct.
@@ -51,11 +59,7 @@ pub(super) fn message<'m>(
     other_layouts: &[String],
     shared: &mut HashMap<String, String>,
 ) {
-    let inside = match &plan.version {
-        Some(version) => format!("{version}::{}", plan.module),
-        None => plan.module.clone(),
-    };
-    let mut nested = Nested::new(shared, inside);
+    let mut nested = Nested::new(shared, plan.module_path());
     let content = content(plan.message, sections, &mut nested);
     let definitions = nested.definitions;
     let prefix = format!("{}::", plan.module);
@@ -165,13 +169,23 @@ fn content<'m>(
     if !sections.is_empty() {
         return Content::Flat(nested.fields(sections), None);
     }
+    let fields = fields(message, nested);
+    match message.body.as_ref().map(|body| &body.shape) {
+        None => Content::Flat(fields, None),
+        Some(Shape::Group(group)) => Content::Flat(fields, group.presence),
+        Some(_) => Content::Single(fields),
+    }
+}
+
+/// The fields of a message's body.
+pub(super) fn fields<'m>(message: &'m Message, nested: &mut Nested<'m, '_>) -> Vec<Field<'m>> {
     match &message.body {
-        None => Content::Flat(Vec::new(), None),
+        None => Vec::new(),
         Some(Item {
             shape: Shape::Group(group),
             ..
-        }) => Content::Flat(nested.fields(&group.members), group.presence),
-        Some(body) => Content::Single(nested.fields([body])),
+        }) => nested.fields(&group.members),
+        Some(body) => nested.fields([body]),
     }
 }
 

@@ -13,12 +13,15 @@ mod docs;
 mod encode;
 mod fingerprint;
 mod ident;
+mod layout;
 mod machine;
 mod messages;
 mod newtypes;
 mod queries;
 mod random;
 mod registry;
+mod reports;
+mod selections;
 mod services;
 mod structs;
 mod types;
@@ -178,7 +181,8 @@ fn write(out: &mut Writer, plans: &[Plan<'_>], paths: &ServicePaths<'_>) {
     for (plan, sections) in all().filter(|(plan, _)| plan.version.is_none()) {
         let others = other_layouts(plan, plans, paths);
         messages::message(out, plan, sections, &others, &mut shared);
-        queries::implement(out, plan, plans);
+        queries::implement(out, plan, plans, &shared);
+        reports::implement(out, plan, plans);
     }
     let mut versions: Vec<_> = plans
         .iter()
@@ -196,7 +200,8 @@ fn write(out: &mut Writer, plans: &[Plan<'_>], paths: &ServicePaths<'_>) {
         for (plan, sections) in all().filter(|(plan, _)| plan.version.as_ref() == Some(version)) {
             let others = other_layouts(plan, plans, paths);
             messages::message(out, plan, sections, &others, &mut shared);
-            queries::implement(out, plan, plans);
+            queries::implement(out, plan, plans, &shared);
+            reports::implement(out, plan, plans);
         }
         out.push("}");
     }

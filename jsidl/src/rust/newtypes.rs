@@ -4,9 +4,7 @@ use super::docs;
 use super::types::{SubType, number_type, unsigned_type, width};
 use super::writer::Writer;
 use crate::dynamic::Steps;
-use crate::model::{
-    BitField, Item, NamedValue, Number, Rounding, Scale, SubField, Unsigned, ValueSet,
-};
+use crate::model::{BitField, Item, NamedValue, Number, Rounding, Scale, Unsigned, ValueSet};
 
 const DERIVES: &str = "#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]";
 
@@ -109,7 +107,7 @@ pub(super) fn bits(
     for field in fields {
         sub_field(out, bits.base, field);
     }
-    if is_time_stamp(bits, fields) {
+    if is_time_stamp(bits) {
         out.gap();
         out.push("/// The stamp of a time since the beginning of 1970 (UTC).\n#[must_use]");
         out.push("pub const fn at(since_1970: ::std::time::Duration) -> Self {");
@@ -134,11 +132,9 @@ pub(super) fn bits(
 }
 
 /// Whether it is the standard's time stamp, in the layout of `jaus_codec::time_stamp`.
-fn is_time_stamp(bits: &BitField, fields: &[SubType<'_>]) -> bool {
-    let layout = fields.iter().map(|sub| {
-        let SubField { name, from, to, .. } = sub.field;
-        (&**name, *from, *to)
-    });
+pub(super) fn is_time_stamp(bits: &BitField) -> bool {
+    let fields = bits.fields.iter();
+    let layout = fields.map(|field| (&*field.name, field.from, field.to));
     bits.base == Unsigned::U32 && layout.eq(TIME_STAMP)
 }
 

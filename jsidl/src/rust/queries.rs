@@ -1,13 +1,24 @@
-//! Generates the pairs of queries and reports, and the selection of a report's fields by the
-//! presence vector of its query.
+//! Generates the pairs of queries and reports, and the builders of presence vectors.
 
+use std::collections::HashMap;
+
+use super::fingerprint;
 use super::ident::Names;
+use super::layout::Layout;
 use super::messages::Plan;
+use super::selections::{Record, Selection, Step, selections};
+use super::types::{Field, Kind, Type, shared_key};
 use super::writer::Writer;
-use crate::model::{Group, Item, Meaning, Message, Number, Scalar, Shape};
+use crate::model::{Item, Meaning, Number, Scalar, Shape};
 
-/// Implements `Query` if the message is a query with a report in the set.
-pub(super) fn implement(out: &mut Writer, query: &Plan<'_>, plans: &[Plan<'_>]) {
+/// Implements `Query` if the message is a query with a report in the set. `shared` has the types
+/// that are defined so far, with their paths.
+pub(super) fn implement(
+    out: &mut Writer,
+    query: &Plan<'_>,
+    plans: &[Plan<'_>],
+    shared: &HashMap<String, String>,
+) {
     let Some(report) = report(query, plans) else {
         return;
     };
@@ -18,16 +29,34 @@ pub(super) fn implement(out: &mut Writer, query: &Plan<'_>, plans: &[Plan<'_>]) 
         (Some(_), _) => report.ident.clone(),
         (None, _) => report.path(),
     };
-    let selection = Selection::of(query.message, report.message);
+    let layouts = Layout::of(query.message).zip(Layout::of(report.message));
+    let request = layouts
+        .as_ref()
+        .and_then(|(query, report)| Request::of(query, report));
     out.gap();
     out.push(format!("impl codec::Query for {} {{", query.ident));
     out.push(format!("type Report = {path};"));
-    if let Some(selection) = &selection {
-        selection.drop_unrequested(out, &path);
+    let types = path.strip_suffix(&report.ident).unwrap_or_default();
+    let types = format!("{types}{}::", report.module);
+    if let Some(request) = &request {
+        request.drop_unrequested(out, &path, &types);
     }
     out.push("}");
-    if let Some(selection) = &selection {
-        selection.builder(out, &query.ident, &path);
+    match request {
+        Some(Request {
+            selections,
+            has_more,
+            list: None,
+        }) => Builder::new(&selections, has_more).write(out, &query.ident, &path),
+        Some(Request {
+            selections,
+            has_more,
+            list: Some(list),
+        }) if list.is_defined_in(query, shared) => {
+            let ident = format!("{}::{}", query.module, list.ident);
+            Builder::new(&selections, has_more).write(out, &ident, &path);
+        }
+        _ => {}
     }
 }
 
@@ -61,74 +90,244 @@ const fn report_code(query: u16) -> Option<u16> {
     }
 }
 
-/// The presence vector in a query's body, and the optional fields of the report that it requests:
-/// bit *i* is the *i*-th. Nested presence vectors have no selection.
-struct Selection<'m> {
-    /// The query's member.
-    vector: String,
-    /// Whether the query has other members.
+/// The presence vectors of a query.
+struct Request<'m> {
+    selections: Vec<Selection<'m>>,
+    /// Whether the record with the vectors has other members.
     has_more: bool,
-    /// The optional fields: name in the definition, and member of the report.
-    fields: Vec<(&'m str, String)>,
+    /// The query's list, if the vectors are in its elements.
+    list: Option<List<'m>>,
 }
 
-impl<'m> Selection<'m> {
-    fn of(query: &Message, report: &'m Message) -> Option<Self> {
-        let (asked, members) = (members(query)?, members(report)?);
-        let (vector, bits) = asked.iter().find_map(|(item, ident)| {
-            let is_vector = matches!(&*item.name, "PresenceVector" | "QueryPresenceVector");
-            let bits = unsigned_bits(item).filter(|_| is_vector)?;
-            Some((ident.clone(), bits))
-        })?;
-        let fields = members.into_iter().filter(|(item, _)| item.optional);
-        let fields: Vec<_> = fields.map(|(item, ident)| (&*item.name, ident)).collect();
-        let fits = (1..=bits).contains(&fields.len());
-        fits.then_some(Self {
-            vector,
-            has_more: asked.len() > 1,
-            fields,
+/// The list of a query whose elements have presence vectors.
+struct List<'m> {
+    /// The query's member.
+    member: String,
+    /// The type of the elements, and their definition.
+    ident: String,
+    element: &'m Item,
+    /// How the elements of query and report identify each other, if the definition says so.
+    keys: Option<[String; 2]>,
+}
+
+impl<'m> Request<'m> {
+    fn of(query: &Layout<'m>, report: &Layout<'m>) -> Option<Self> {
+        let own = selections(&query.fields, report);
+        if !own.is_empty() {
+            return Some(Self {
+                has_more: query.fields.len() > own.len(),
+                selections: own,
+                list: None,
+            });
+        }
+        let [field] = &*query.fields else {
+            return None;
+        };
+        let (ident, element, fields) = element(query, field)?;
+        let selections = selections(fields, report);
+        let list = List {
+            member: field.ident.clone(),
+            ident: ident.to_owned(),
+            element,
+            keys: fields.first().and_then(|key| keys(key, report)),
+        };
+        (!selections.is_empty()).then_some(Self {
+            has_more: fields.len() > selections.len(),
+            selections,
+            list: Some(list),
         })
     }
 
-    fn drop_unrequested(&self, out: &mut Writer, report: &str) {
+    fn drop_unrequested(&self, out: &mut Writer, report: &str, types: &str) {
+        if self.list.as_ref().is_some_and(|list| list.keys.is_none()) {
+            return;
+        }
         out.gap();
         out.push(format!(
             "fn drop_unrequested(&self, report: &mut {report}) {{"
         ));
-        for (bit, (_, field)) in self.fields.iter().enumerate() {
-            let mask = 1_u64 << bit;
-            out.push(format!("if self.{} & {mask:#06x} == 0 {{", self.vector));
-            out.push(format!("report.{field} = None;\n}}"));
+        for selection in &self.selections {
+            for record in &selection.records {
+                drop_fields(out, selection, record, self.list.as_ref(), types);
+            }
         }
         out.push("}");
     }
+}
 
-    fn builder(&self, out: &mut Writer, query: &str, report: &str) {
-        let mut names = Names::reserving(&["all", "none"]);
+impl List<'_> {
+    /// Whether the type of the elements is the message's own. If it is defined by another message,
+    /// that has the builder.
+    fn is_defined_in(&self, query: &Plan<'_>, shared: &HashMap<String, String>) -> bool {
+        let content = fingerprint::content(&self.element.shape);
+        let path = shared.get(&shared_key(&self.element.name, &content));
+        path.is_some_and(|path| *path == format!("{}::{}", query.module_path(), self.ident))
+    }
+}
+
+/// The type of a list's elements, if it is a record: its name, its definition and its fields.
+fn element<'l, 'm>(
+    layout: &'l Layout<'m>,
+    list: &'l Field<'m>,
+) -> Option<(&'l str, &'m Item, &'l [Field<'m>])> {
+    let Type::List { element, .. } = &list.ty else {
+        return None;
+    };
+    let (Type::Composite { ident, .. } | Type::Record { ident, .. }) = &**element else {
+        return None;
+    };
+    match layout.definition(element)? {
+        Kind::Struct { item, fields, .. } => Some((ident, item, fields)),
+        _ => None,
+    }
+}
+
+/// The members by which an element of a query's list and one of the report's list are compared.
+fn keys(key: &Field<'_>, report: &Layout<'_>) -> Option<[String; 2]> {
+    let [list] = &*report.fields else {
+        return None;
+    };
+    let (_, _, fields) = element(report, list)?;
+    let same = fields.iter().find(|it| it.item.name == key.item.name)?;
+    let number = |field: &Field<'_>| match &field.ty {
+        Type::Number(number) => Some((*number, field.ident.clone())),
+        Type::Newtype {
+            number,
+            scale: None,
+            ..
+        } => Some((*number, format!("{}.0", field.ident))),
+        _ => None,
+    };
+    let (asked, told) = (number(key)?, number(same)?);
+    (asked.0 == told.0 && !same.item.optional).then_some([asked.1, told.1])
+}
+
+/// Writes the statements that drop what a vector does not request from a record of the report.
+fn drop_fields(
+    out: &mut Writer,
+    Selection { vector, .. }: &Selection<'_>,
+    record: &Record<'_>,
+    list: Option<&List<'_>>,
+    types: &str,
+) {
+    let (mut place, mut request, mut blocks) = ("report".to_owned(), "self", 0);
+    let mut list = list;
+    for step in &record.steps {
+        match step {
+            Step::Member(member) => place = format!("{place}.{member}"),
+            Step::Each => {
+                out.push(format!("for item in &mut {place} {{"));
+                (place, blocks) = ("item".to_owned(), blocks + 1);
+                if let Some(List {
+                    member,
+                    keys: Some([asked, told]),
+                    ..
+                }) = list.take()
+                {
+                    out.push(format!("let mut requests = self.{member}.iter();"));
+                    out.push(format!(
+                        "let Some(request) = requests.find(|it| it.{asked} == item.{told}) else {{"
+                    ));
+                    out.push("continue;\n};");
+                    request = "request";
+                }
+            }
+            Step::Alternative { path, is_only } => {
+                let borrow = if place.contains('.') { "&mut " } else { "" };
+                let binding = format!("let {types}{path}(value) = {borrow}{place}");
+                match is_only {
+                    true => out.push(format!("{binding};")),
+                    false => {
+                        out.push(format!("if {binding} {{"));
+                        blocks += 1;
+                    }
+                }
+                place = "value".to_owned();
+            }
+        }
+    }
+    for (bit, (_, field)) in record.fields.iter().enumerate() {
+        let mask = 1_u64 << bit;
+        out.push(format!("if {request}.{vector} & {mask:#06x} == 0 {{"));
+        out.push(format!("{place}.{field} = None;\n}}"));
+    }
+    for _ in 0..blocks {
+        out.push("}");
+    }
+}
+
+/// The builder of a record with presence vectors.
+struct Builder<'s, 'm> {
+    selections: &'s [Selection<'m>],
+    has_more: bool,
+    /// Whether fields of two parts have the same name, so that the part is in the method's name.
+    names_parts: bool,
+}
+
+impl<'s, 'm> Builder<'s, 'm> {
+    fn new(selections: &'s [Selection<'m>], has_more: bool) -> Self {
+        let fields = selections.iter().map(Selection::fields);
+        let names: Vec<&str> = fields.flatten().map(|(name, _)| name).collect();
+        let mut numbered = names.iter().enumerate();
+        Self {
+            selections,
+            has_more,
+            names_parts: numbered.any(|(place, name)| names[..place].contains(name)),
+        }
+    }
+
+    fn write(&self, out: &mut Writer, ident: &str, report: &str) {
         out.gap();
-        out.push(format!("impl {query} {{"));
-        let all = (1_u128 << self.fields.len()) - 1;
-        self.constructor(
-            out,
-            &format!("Requests every optional field of [`{report}`]."),
-            ("all", all),
-        );
+        out.push(format!("impl {ident} {{"));
+        let all = |selection: &Selection<'_>| {
+            let bits = selection.fields().into_iter().map(|(_, bit)| 1_u64 << bit);
+            bits.fold(0, std::ops::BitOr::bitor)
+        };
+        let doc = format!("Requests every optional field of [`{report}`].");
+        self.constructor(out, &doc, "all", all);
         out.gap();
         let doc = format!("Requests no optional field of [`{report}`] yet.");
-        self.constructor(out, &doc, ("none", 0));
-        for (bit, (name, _)) in self.fields.iter().enumerate() {
-            let method = names.snake(&format!("with {name}"));
-            let mask = 1_u64 << bit;
-            out.gap();
-            out.doc([format!("Also requests `{name}`, bit {bit}.").as_str()]);
-            out.push("#[must_use]");
-            out.push(format!("pub const fn {method}(mut self) -> Self {{"));
-            out.push(format!("self.{} |= {mask:#06x};\nself\n}}", self.vector));
+        self.constructor(out, &doc, "none", |_| 0);
+        let mut names = Names::reserving(&["all", "none"]);
+        for selection in self.selections {
+            for (name, bit) in selection.fields() {
+                self.method(out, &mut names, selection, (name, bit));
+            }
         }
         out.push("}");
     }
 
-    fn constructor(&self, out: &mut Writer, doc: &str, (name, value): (&str, u128)) {
+    fn method(
+        &self,
+        out: &mut Writer,
+        names: &mut Names,
+        selection: &Selection<'_>,
+        (name, bit): (&str, usize),
+    ) {
+        let (part, of) = match &*selection.stem {
+            "" => ("", String::new()),
+            stem if self.names_parts => (stem, format!(" of `{stem}`")),
+            stem => ("", format!(" of `{stem}`")),
+        };
+        let method = names.snake(&format!("with {part} {name}"));
+        let mask = 1_u64 << bit;
+        out.gap();
+        out.doc([format!("Also requests `{name}`{of}, bit {bit}.").as_str()]);
+        out.push("#[must_use]");
+        out.push(format!("pub const fn {method}(mut self) -> Self {{"));
+        out.push(format!(
+            "self.{} |= {mask:#06x};\nself\n}}",
+            selection.vector
+        ));
+    }
+
+    fn constructor(
+        &self,
+        out: &mut Writer,
+        doc: &str,
+        name: &str,
+        value: impl Fn(&Selection<'_>) -> u64,
+    ) {
         let (constness, rest) = match self.has_more {
             true => ("", "..Self::default()\n"),
             false => ("const ", ""),
@@ -136,25 +335,15 @@ impl<'m> Selection<'m> {
         out.doc([doc]);
         out.push("#[must_use]");
         out.push(format!("pub {constness}fn {name}() -> Self {{\nSelf {{"));
-        out.push(format!("{}: {value:#06x},\n{rest}}}\n}}", self.vector));
+        for selection in self.selections {
+            out.push(format!("{}: {:#06x},", selection.vector, value(selection)));
+        }
+        out.push(format!("{rest}}}\n}}"));
     }
 }
 
-/// The members of a message's struct and their names there, if its body is a group.
-fn members(message: &Message) -> Option<Vec<(&Item, String)>> {
-    let shape = message.body.as_ref().map(|body| &body.shape)?;
-    let (Shape::Group(Group { members, .. }), None, None) =
-        (shape, &message.header, &message.footer)
-    else {
-        return None;
-    };
-    let mut names = Names::default();
-    let named = members.iter().map(|item| (item, names.snake(&item.name)));
-    Some(named.collect())
-}
-
 /// The bits of a field that is a plain unsigned integer.
-fn unsigned_bits(item: &Item) -> Option<usize> {
+pub(super) fn unsigned_bits(item: &Item) -> Option<usize> {
     match &item.shape {
         Shape::Scalar(Scalar {
             number: Number::Unsigned(unsigned),

@@ -190,7 +190,7 @@ impl<'m, 's> Nested<'m, 's> {
         content: &str,
         make: impl FnOnce(&mut Self) -> Kind<'m>,
     ) -> String {
-        let key = format!("{} {content}", name.to_upper_camel_case());
+        let key = shared_key(name, content);
         if let Some(ident) = self.known.get(&key) {
             return ident.clone();
         }
@@ -402,6 +402,11 @@ impl<'m, 's> Nested<'m, 's> {
             element,
         }
     }
+}
+
+/// The fingerprint of a type with its name.
+pub(super) fn shared_key(name: &str, content: &str) -> String {
+    format!("{} {content}", name.to_upper_camel_case())
 }
 
 /// The smallest integer that holds a sub-field.

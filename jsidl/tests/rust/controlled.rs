@@ -515,3 +515,5 @@ codec::if_arbitrary! {
         }
     }
 }
+
+impl codec::Report for ReportSiren {}

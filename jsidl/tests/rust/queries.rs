@@ -32,6 +32,12 @@ pub mod queries {
 
         /// Handles `QueryCodes`.
         fn query_codes(&mut self, message: super::QueryCodes, call: &mut C);
+
+        /// Answers `QueryMotion`; `None` is for no answer, or a later one.
+        fn query_motion(&mut self, query: super::QueryMotion, call: &mut C) -> Option<super::ReportMotion>;
+
+        /// Answers `QueryCameras`; `None` is for no answer, or a later one.
+        fn query_cameras(&mut self, query: super::QueryCameras, call: &mut C) -> Option<super::ReportCameras>;
     }
 
     /// Passes messages to a [`Service`].
@@ -59,6 +65,8 @@ pub mod queries {
                 0xE0A2 => call.answer(|query: super::QueryDrive, call| self.service.query_drive(query, call)),
                 0xE0A3 => call.receive(|message: super::QueryEcho, call| self.service.query_echo(message, call)),
                 0xE0A4 => call.receive(|message: super::QueryCodes, call| self.service.query_codes(message, call)),
+                0xE0A5 => call.answer(|query: super::QueryMotion, call| self.service.query_motion(query, call)),
+                0xE0A6 => call.answer(|query: super::QueryCameras, call| self.service.query_cameras(query, call)),
                 _ => return None,
             })
         }
@@ -71,8 +79,8 @@ pub static SERVICES: &[codec::ServiceInfo] = &[
         name: "Queries",
         id: queries::V1_0,
         inherits_from: None,
-        inputs: &[0xE0A1, 0xE0A2, 0xE0A3, 0xE0A4],
-        outputs: &[0xF0A1, 0xF0A2, 0xF0A3, 0xF0A7],
+        inputs: &[0xE0A1, 0xE0A2, 0xE0A3, 0xE0A4, 0xE0A5, 0xE0A6],
+        outputs: &[0xF0A1, 0xF0A2, 0xF0A3, 0xF0A7, 0xF0A5, 0xF0A6],
     },
 ];
 
@@ -90,6 +98,12 @@ pub static MESSAGES: &[codec::MessageInfo] = &[
     codec::MessageInfo::of::<QueryCodes>(&[
         queries::V1_0,
     ]),
+    codec::MessageInfo::of::<QueryMotion>(&[
+        queries::V1_0,
+    ]),
+    codec::MessageInfo::of::<QueryCameras>(&[
+        queries::V1_0,
+    ]),
     codec::MessageInfo::of::<ReportPlace>(&[
         queries::V1_0,
     ]),
@@ -97,6 +111,12 @@ pub static MESSAGES: &[codec::MessageInfo] = &[
         queries::V1_0,
     ]),
     codec::MessageInfo::of::<ReportSound>(&[
+        queries::V1_0,
+    ]),
+    codec::MessageInfo::of::<ReportMotion>(&[
+        queries::V1_0,
+    ]),
+    codec::MessageInfo::of::<ReportCameras>(&[
         queries::V1_0,
     ]),
     codec::MessageInfo::of::<ReportCodes>(&[
@@ -446,6 +466,347 @@ codec::if_arbitrary! {
     }
 }
 
+/// `QueryMotion` (E0A5h).
+///
+/// Asks for some fields of two records.
+///
+/// Declared by `urn:example:Queries 1.0`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct QueryMotion {
+    /// `VelocityVarPresenceVector`.
+    pub velocity_var_presence_vector: u8,
+    /// `PosePresenceVector`.
+    pub pose_presence_vector: u8,
+}
+
+impl codec::Message for QueryMotion {
+    const CODE: u16 = 0xE0A5;
+    const NAME: &'static str = "QueryMotion";
+    const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
+
+    fn encoded_len(&self) -> usize {
+        4
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        let run = output.run::<4>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.velocity_var_presence_vector, run, 2);
+        codec::Fixed::put(self.pose_presence_vector, run, 3);
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
+        let run = input.run::<2>(&[
+            ("VelocityVarPresenceVector", 1),
+            ("PosePresenceVector", 1),
+        ])?;
+        let velocity_var_presence_vector = codec::Fixed::get(run, 0);
+        let pose_presence_vector = codec::Fixed::get(run, 1);
+        Ok(Self {
+            velocity_var_presence_vector,
+            pose_presence_vector,
+        })
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for QueryMotion {
+        #[inline(never)]
+        fn view(&self) -> codec::view::Value {
+            codec::view::Value::object(2)
+            .with("VelocityVarPresenceVector", codec::view::View::view(&self.velocity_var_presence_vector))
+            .with("PosePresenceVector", codec::view::View::view(&self.pose_presence_vector))
+        }
+
+        #[inline(never)]
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            let object = codec::view::Object::new(value, &["VelocityVarPresenceVector", "PosePresenceVector"])?;
+            Ok(Self {
+                velocity_var_presence_vector: object.member("VelocityVarPresenceVector")?,
+                pose_presence_vector: object.member("PosePresenceVector")?,
+            })
+        }
+    }
+    codec::serde_by_view!(QueryMotion);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for QueryMotion {
+        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self {
+                velocity_var_presence_vector: codec::arbitrary::Arbitrary::arbitrary(random)?,
+                pose_presence_vector: codec::arbitrary::Arbitrary::arbitrary(random)?,
+            })
+        }
+    }
+}
+
+impl codec::Query for QueryMotion {
+    type Report = ReportMotion;
+
+    fn drop_unrequested(&self, report: &mut ReportMotion) {
+        if let report_motion::VelocityVar::ForwardRec(value) = &mut report.velocity_var {
+            if self.velocity_var_presence_vector & 0x0001 == 0 {
+                value.forward = None;
+            }
+            if self.velocity_var_presence_vector & 0x0002 == 0 {
+                value.up = None;
+            }
+        }
+        if let report_motion::VelocityVar::NorthRec(value) = &mut report.velocity_var {
+            if self.velocity_var_presence_vector & 0x0001 == 0 {
+                value.north = None;
+            }
+            if self.velocity_var_presence_vector & 0x0002 == 0 {
+                value.up = None;
+            }
+        }
+        if self.pose_presence_vector & 0x0001 == 0 {
+            report.report_pose_rec.up = None;
+        }
+        if self.pose_presence_vector & 0x0002 == 0 {
+            report.report_pose_rec.time_seconds = None;
+        }
+        if self.pose_presence_vector & 0x0004 == 0 {
+            report.report_pose_rec.time_nano_seconds = None;
+        }
+    }
+}
+
+impl QueryMotion {
+    /// Requests every optional field of [`ReportMotion`].
+    #[must_use]
+    pub const fn all() -> Self {
+        Self {
+            velocity_var_presence_vector: 0x0003,
+            pose_presence_vector: 0x0007,
+        }
+    }
+
+    /// Requests no optional field of [`ReportMotion`] yet.
+    #[must_use]
+    pub const fn none() -> Self {
+        Self {
+            velocity_var_presence_vector: 0x0000,
+            pose_presence_vector: 0x0000,
+        }
+    }
+
+    /// Also requests `Forward` of `VelocityVar`, bit 0.
+    #[must_use]
+    pub const fn with_velocity_var_forward(mut self) -> Self {
+        self.velocity_var_presence_vector |= 0x0001;
+        self
+    }
+
+    /// Also requests `Up` of `VelocityVar`, bit 1.
+    #[must_use]
+    pub const fn with_velocity_var_up(mut self) -> Self {
+        self.velocity_var_presence_vector |= 0x0002;
+        self
+    }
+
+    /// Also requests `North` of `VelocityVar`, bit 0.
+    #[must_use]
+    pub const fn with_velocity_var_north(mut self) -> Self {
+        self.velocity_var_presence_vector |= 0x0001;
+        self
+    }
+
+    /// Also requests `Up` of `Pose`, bit 0.
+    #[must_use]
+    pub const fn with_pose_up(mut self) -> Self {
+        self.pose_presence_vector |= 0x0001;
+        self
+    }
+
+    /// Also requests `TimeSeconds` of `Pose`, bit 1.
+    #[must_use]
+    pub const fn with_pose_time_seconds(mut self) -> Self {
+        self.pose_presence_vector |= 0x0002;
+        self
+    }
+
+    /// Also requests `TimeNanoSeconds` of `Pose`, bit 2.
+    #[must_use]
+    pub const fn with_pose_time_nano_seconds(mut self) -> Self {
+        self.pose_presence_vector |= 0x0004;
+        self
+    }
+}
+
+/// `QueryCameras` (E0A6h).
+///
+/// Asks for some fields of each camera.
+///
+/// Declared by `urn:example:Queries 1.0`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct QueryCameras {
+    /// `QueryCameraList`: up to 255 elements.
+    pub query_camera_list: Vec<query_cameras::QueryCameraRec>,
+}
+
+impl codec::Message for QueryCameras {
+    const CODE: u16 = 0xE0A6;
+    const NAME: &'static str = "QueryCameras";
+    const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
+
+    fn encoded_len(&self) -> usize {
+        2
+        + 1 + 2 * self.query_camera_list.len()
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
+        output.member("QueryCameraList", |output| output.list::<u8, _>(&self.query_camera_list, 0, 255, |value, output| { output.fixed(*value); Ok(()) }))?;
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
+        let query_camera_list = input.member("QueryCameraList", |input| input.list::<u8, _>(0, 255, 2, codec::Reader::fixed))?;
+        Ok(Self {
+            query_camera_list,
+        })
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for QueryCameras {
+        #[inline(never)]
+        fn view(&self) -> codec::view::Value {
+            codec::view::View::view(&self.query_camera_list)
+        }
+
+        #[inline(never)]
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            Ok(Self { query_camera_list: codec::view::View::from_view(value)? })
+        }
+    }
+    codec::serde_by_view!(QueryCameras);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for QueryCameras {
+        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self {
+                query_camera_list: codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary)?,
+            })
+        }
+    }
+}
+
+/// The types inside [`QueryCameras`].
+pub mod query_cameras {
+    use super::codec;
+
+    /// `QueryCameraRec`.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub struct QueryCameraRec {
+        /// `Camera`.
+        pub camera: u8,
+        /// `QueryPresenceVector`.
+        pub query_presence_vector: u8,
+    }
+
+    impl codec::Fixed for QueryCameraRec {
+        const SIZE: usize = 2;
+
+        #[inline]
+        fn get(run: &[u8], at: usize) -> Self {
+            Self {
+                camera: codec::Fixed::get(run, at),
+                query_presence_vector: codec::Fixed::get(run, at + 1),
+            }
+        }
+
+        #[inline]
+        fn put(self, run: &mut [u8], at: usize) {
+            codec::Fixed::put(self.camera, run, at);
+            codec::Fixed::put(self.query_presence_vector, run, at + 1);
+        }
+    }
+
+    codec::if_serde! {
+        impl codec::view::View for QueryCameraRec {
+            #[inline(never)]
+            fn view(&self) -> codec::view::Value {
+                codec::view::Value::object(2)
+                .with("Camera", codec::view::View::view(&self.camera))
+                .with("QueryPresenceVector", codec::view::View::view(&self.query_presence_vector))
+            }
+
+            #[inline(never)]
+            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+                let object = codec::view::Object::new(value, &["Camera", "QueryPresenceVector"])?;
+                Ok(Self {
+                    camera: object.member("Camera")?,
+                    query_presence_vector: object.member("QueryPresenceVector")?,
+                })
+            }
+        }
+        codec::serde_by_view!(QueryCameraRec);
+    }
+
+    codec::if_arbitrary! {
+        impl<'a> codec::arbitrary::Arbitrary<'a> for QueryCameraRec {
+            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+                Ok(Self {
+                    camera: codec::arbitrary::Arbitrary::arbitrary(random)?,
+                    query_presence_vector: codec::arbitrary::Arbitrary::arbitrary(random)?,
+                })
+            }
+        }
+    }
+}
+
+impl codec::Query for QueryCameras {
+    type Report = ReportCameras;
+
+    fn drop_unrequested(&self, report: &mut ReportCameras) {
+        for item in &mut report.camera_list {
+            let mut requests = self.query_camera_list.iter();
+            let Some(request) = requests.find(|it| it.camera == item.camera) else {
+                continue;
+            };
+            if request.query_presence_vector & 0x0001 == 0 {
+                item.zoom = None;
+            }
+        }
+    }
+}
+
+impl query_cameras::QueryCameraRec {
+    /// Requests every optional field of [`ReportCameras`].
+    #[must_use]
+    pub fn all() -> Self {
+        Self {
+            query_presence_vector: 0x0001,
+            ..Self::default()
+        }
+    }
+
+    /// Requests no optional field of [`ReportCameras`] yet.
+    #[must_use]
+    pub fn none() -> Self {
+        Self {
+            query_presence_vector: 0x0000,
+            ..Self::default()
+        }
+    }
+
+    /// Also requests `Zoom`, bit 0.
+    #[must_use]
+    pub const fn with_zoom(mut self) -> Self {
+        self.query_presence_vector |= 0x0001;
+        self
+    }
+}
+
 /// `ReportPlace` (F0A1h).
 ///
 /// The place.
@@ -696,6 +1057,14 @@ pub mod report_place {
     ]);
 }
 
+impl codec::Report for ReportPlace {
+    fn stamp(&mut self, since_1970: ::std::time::Duration) {
+        if self.time_stamp.is_none() {
+            self.time_stamp.get_or_insert_default().0 = codec::time_stamp(since_1970);
+        }
+    }
+}
+
 /// `ReportDrive` (F0A2h).
 ///
 /// One drive.
@@ -813,6 +1182,8 @@ codec::if_arbitrary! {
     }
 }
 
+impl codec::Report for ReportDrive {}
+
 /// `ReportSound` (F0A3h).
 ///
 /// Not the report of Query Echo.
@@ -863,6 +1234,696 @@ codec::if_arbitrary! {
         fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
             Ok(Self)
         }
+    }
+}
+
+/// `ReportMotion` (F0A5h).
+///
+/// Its optional fields are in records.
+///
+/// Declared by `urn:example:Queries 1.0`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReportMotion {
+    /// `VelocityVar`.
+    pub velocity_var: report_motion::VelocityVar,
+    /// `ReportPoseRec`.
+    pub report_pose_rec: report_motion::ReportPoseRec,
+}
+
+impl codec::Message for ReportMotion {
+    const CODE: u16 = 0xF0A5;
+    const NAME: &'static str = "ReportMotion";
+    const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
+
+    fn encoded_len(&self) -> usize {
+        2
+        + codec::Composite::encoded_len(&self.velocity_var)
+        + codec::Composite::encoded_len(&self.report_pose_rec)
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
+        output.member("VelocityVar", |output| codec::Composite::write(&self.velocity_var, output))?;
+        output.member("ReportPoseRec", |output| codec::Composite::write(&self.report_pose_rec, output))?;
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
+        let velocity_var = input.member("VelocityVar", codec::Composite::read)?;
+        let report_pose_rec = input.member("ReportPoseRec", codec::Composite::read)?;
+        Ok(Self {
+            velocity_var,
+            report_pose_rec,
+        })
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for ReportMotion {
+        #[inline(never)]
+        fn view(&self) -> codec::view::Value {
+            codec::view::Value::object(2)
+            .with("VelocityVar", codec::view::View::view(&self.velocity_var))
+            .with("ReportPoseRec", codec::view::View::view(&self.report_pose_rec))
+        }
+
+        #[inline(never)]
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            let object = codec::view::Object::new(value, &["VelocityVar", "ReportPoseRec"])?;
+            Ok(Self {
+                velocity_var: object.member("VelocityVar")?,
+                report_pose_rec: object.member("ReportPoseRec")?,
+            })
+        }
+    }
+    codec::serde_by_view!(ReportMotion);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportMotion {
+        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self {
+                velocity_var: codec::arbitrary::Arbitrary::arbitrary(random)?,
+                report_pose_rec: codec::arbitrary::Arbitrary::arbitrary(random)?,
+            })
+        }
+    }
+}
+
+/// The types inside [`ReportMotion`].
+pub mod report_motion {
+    use super::codec;
+
+    /// `ForwardRec`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ForwardRec {
+        /// `Forward`: bit 0 of the presence vector.
+        pub forward: Option<u8>,
+        /// `Up`: bit 1 of the presence vector.
+        pub up: Option<u8>,
+    }
+
+    impl codec::Composite for ForwardRec {
+        const MIN_LEN: usize = 1;
+
+        fn encoded_len(&self) -> usize {
+            1
+            + usize::from(self.forward.is_some())
+            + usize::from(self.up.is_some())
+        }
+
+        #[inline]
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            if let Self {
+                forward: Some(forward),
+                up: Some(up),
+            } = self
+            {
+                let run = output.run::<3>();
+                codec::Fixed::put(0x3_u8, run, 0);
+                codec::Fixed::put(*forward, run, 1);
+                codec::Fixed::put(*up, run, 2);
+                return Ok(());
+            }
+            self.write_some(output);
+            Ok(())
+        }
+
+        #[inline]
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            let present = input.presence::<u8>(0x3)?;
+            if present == 0x3 {
+                let run = input.run::<2>(&[
+                    ("Forward", 1),
+                    ("Up", 1),
+                ])?;
+                return Ok(Self {
+                    forward: Some(codec::Fixed::get(run, 0)),
+                    up: Some(codec::Fixed::get(run, 1)),
+                });
+            }
+            Self::read_some(input, present)
+        }
+    }
+
+    impl ForwardRec {
+        #[inline(never)]
+        fn write_some(&self, output: &mut codec::Writer<'_>) {
+            let present =
+            u8::from(self.forward.is_some())
+            | u8::from(self.up.is_some()) << 1;
+            output.fixed(present);
+            output.optional(self.forward);
+            output.optional(self.up);
+        }
+
+        #[inline(never)]
+        fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
+            let mut input = place.clone();
+            let forward = input.optional(present & 0x1 != 0, "Forward", codec::Reader::fixed)?;
+            let up = input.optional(present & 0x2 != 0, "Up", codec::Reader::fixed)?;
+            *place = input;
+            Ok(Self {
+                forward,
+                up,
+            })
+        }
+    }
+
+    codec::if_serde! {
+        impl codec::view::View for ForwardRec {
+            #[inline(never)]
+            fn view(&self) -> codec::view::Value {
+                codec::view::Value::object(2)
+                .with("Forward", codec::view::View::view(&self.forward))
+                .with("Up", codec::view::View::view(&self.up))
+            }
+
+            #[inline(never)]
+            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+                let object = codec::view::Object::new(value, &["Forward", "Up"])?;
+                Ok(Self {
+                    forward: object.member("Forward")?,
+                    up: object.member("Up")?,
+                })
+            }
+        }
+        codec::serde_by_view!(ForwardRec);
+    }
+
+    codec::if_arbitrary! {
+        impl<'a> codec::arbitrary::Arbitrary<'a> for ForwardRec {
+            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+                Ok(Self {
+                    forward: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
+                    up: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
+                })
+            }
+        }
+    }
+
+    /// `NorthRec`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct NorthRec {
+        /// `North`: bit 0 of the presence vector.
+        pub north: Option<u8>,
+        /// `Up`: bit 1 of the presence vector.
+        pub up: Option<u8>,
+    }
+
+    impl codec::Composite for NorthRec {
+        const MIN_LEN: usize = 1;
+
+        fn encoded_len(&self) -> usize {
+            1
+            + usize::from(self.north.is_some())
+            + usize::from(self.up.is_some())
+        }
+
+        #[inline]
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            if let Self {
+                north: Some(north),
+                up: Some(up),
+            } = self
+            {
+                let run = output.run::<3>();
+                codec::Fixed::put(0x3_u8, run, 0);
+                codec::Fixed::put(*north, run, 1);
+                codec::Fixed::put(*up, run, 2);
+                return Ok(());
+            }
+            self.write_some(output);
+            Ok(())
+        }
+
+        #[inline]
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            let present = input.presence::<u8>(0x3)?;
+            if present == 0x3 {
+                let run = input.run::<2>(&[
+                    ("North", 1),
+                    ("Up", 1),
+                ])?;
+                return Ok(Self {
+                    north: Some(codec::Fixed::get(run, 0)),
+                    up: Some(codec::Fixed::get(run, 1)),
+                });
+            }
+            Self::read_some(input, present)
+        }
+    }
+
+    impl NorthRec {
+        #[inline(never)]
+        fn write_some(&self, output: &mut codec::Writer<'_>) {
+            let present =
+            u8::from(self.north.is_some())
+            | u8::from(self.up.is_some()) << 1;
+            output.fixed(present);
+            output.optional(self.north);
+            output.optional(self.up);
+        }
+
+        #[inline(never)]
+        fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
+            let mut input = place.clone();
+            let north = input.optional(present & 0x1 != 0, "North", codec::Reader::fixed)?;
+            let up = input.optional(present & 0x2 != 0, "Up", codec::Reader::fixed)?;
+            *place = input;
+            Ok(Self {
+                north,
+                up,
+            })
+        }
+    }
+
+    codec::if_serde! {
+        impl codec::view::View for NorthRec {
+            #[inline(never)]
+            fn view(&self) -> codec::view::Value {
+                codec::view::Value::object(2)
+                .with("North", codec::view::View::view(&self.north))
+                .with("Up", codec::view::View::view(&self.up))
+            }
+
+            #[inline(never)]
+            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+                let object = codec::view::Object::new(value, &["North", "Up"])?;
+                Ok(Self {
+                    north: object.member("North")?,
+                    up: object.member("Up")?,
+                })
+            }
+        }
+        codec::serde_by_view!(NorthRec);
+    }
+
+    codec::if_arbitrary! {
+        impl<'a> codec::arbitrary::Arbitrary<'a> for NorthRec {
+            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+                Ok(Self {
+                    north: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
+                    up: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
+                })
+            }
+        }
+    }
+
+    /// `VelocityVar`: one of its alternatives.
+    #[derive(Debug, Clone, PartialEq)]
+    pub enum VelocityVar {
+        /// `ForwardRec`.
+        ForwardRec(ForwardRec),
+        /// `NorthRec`.
+        NorthRec(NorthRec),
+    }
+
+    impl Default for VelocityVar {
+        fn default() -> Self {
+            Self::ForwardRec(Default::default())
+        }
+    }
+
+    impl codec::Composite for VelocityVar {
+        const MIN_LEN: usize = 2;
+
+        fn encoded_len(&self) -> usize {
+            match self {
+                Self::ForwardRec(value) => 1 + codec::Composite::encoded_len(value),
+                Self::NorthRec(value) => 1 + codec::Composite::encoded_len(value),
+            }
+        }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            match self {
+                Self::ForwardRec(value) => {
+                    output.fixed(0_u8);
+                    output.member("ForwardRec", |output| codec::Composite::write(value, output))
+                }
+                Self::NorthRec(value) => {
+                    output.fixed(1_u8);
+                    output.member("NorthRec", |output| codec::Composite::write(value, output))
+                }
+            }
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            match input.tag::<u8>(2)? {
+                0 => input.member("ForwardRec", codec::Composite::read).map(Self::ForwardRec),
+                _ => input.member("NorthRec", codec::Composite::read).map(Self::NorthRec),
+            }
+        }
+    }
+
+    codec::if_serde! {
+        impl codec::view::View for VelocityVar {
+            fn view(&self) -> codec::view::Value {
+                match self {
+                    Self::ForwardRec(value) => {
+                        codec::view::Value::alternative("ForwardRec", codec::view::View::view(value))
+                    }
+                    Self::NorthRec(value) => {
+                        codec::view::Value::alternative("NorthRec", codec::view::View::view(value))
+                    }
+                }
+            }
+
+            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+                let (name, value) = value.chosen()?;
+                let read = match name {
+                    "ForwardRec" => codec::view::View::from_view(value).map(Self::ForwardRec),
+                    "NorthRec" => codec::view::View::from_view(value).map(Self::NorthRec),
+                    _ => return Err(codec::view::Error::unknown_key(name, &["ForwardRec", "NorthRec"])),
+                };
+                read.map_err(|error| error.within(name))
+            }
+        }
+        codec::serde_by_view!(VelocityVar);
+    }
+
+    codec::if_arbitrary! {
+        impl<'a> codec::arbitrary::Arbitrary<'a> for VelocityVar {
+            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+                match random.int_in_range(0..=1)? {
+                    0 => codec::arbitrary::Arbitrary::arbitrary(random).map(Self::ForwardRec),
+                    _ => codec::arbitrary::Arbitrary::arbitrary(random).map(Self::NorthRec),
+                }
+            }
+        }
+    }
+
+    /// `ReportPoseRec`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ReportPoseRec {
+        /// `Up`: bit 0 of the presence vector.
+        pub up: Option<u8>,
+        /// `TimeSeconds`: bit 1 of the presence vector.
+        pub time_seconds: Option<u32>,
+        /// `TimeNanoSeconds`: bit 2 of the presence vector.
+        pub time_nano_seconds: Option<u32>,
+    }
+
+    impl codec::Composite for ReportPoseRec {
+        const MIN_LEN: usize = 1;
+
+        fn encoded_len(&self) -> usize {
+            1
+            + usize::from(self.up.is_some())
+            + 4 * usize::from(self.time_seconds.is_some())
+            + 4 * usize::from(self.time_nano_seconds.is_some())
+        }
+
+        #[inline]
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            if let Self {
+                up: Some(up),
+                time_seconds: Some(time_seconds),
+                time_nano_seconds: Some(time_nano_seconds),
+            } = self
+            {
+                let run = output.run::<10>();
+                codec::Fixed::put(0x7_u8, run, 0);
+                codec::Fixed::put(*up, run, 1);
+                codec::Fixed::put(*time_seconds, run, 2);
+                codec::Fixed::put(*time_nano_seconds, run, 6);
+                return Ok(());
+            }
+            self.write_some(output);
+            Ok(())
+        }
+
+        #[inline]
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            let present = input.presence::<u8>(0x7)?;
+            if present == 0x7 {
+                let run = input.run::<9>(&[
+                    ("Up", 1),
+                    ("TimeSeconds", 4),
+                    ("TimeNanoSeconds", 4),
+                ])?;
+                return Ok(Self {
+                    up: Some(codec::Fixed::get(run, 0)),
+                    time_seconds: Some(codec::Fixed::get(run, 1)),
+                    time_nano_seconds: Some(codec::Fixed::get(run, 5)),
+                });
+            }
+            Self::read_some(input, present)
+        }
+    }
+
+    impl ReportPoseRec {
+        #[inline(never)]
+        fn write_some(&self, output: &mut codec::Writer<'_>) {
+            let present =
+            u8::from(self.up.is_some())
+            | u8::from(self.time_seconds.is_some()) << 1
+            | u8::from(self.time_nano_seconds.is_some()) << 2;
+            output.fixed(present);
+            output.optional(self.up);
+            output.optional(self.time_seconds);
+            output.optional(self.time_nano_seconds);
+        }
+
+        #[inline(never)]
+        fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
+            let mut input = place.clone();
+            let up = input.optional(present & 0x1 != 0, "Up", codec::Reader::fixed)?;
+            let time_seconds = input.optional(present & 0x2 != 0, "TimeSeconds", codec::Reader::fixed)?;
+            let time_nano_seconds = input.optional(present & 0x4 != 0, "TimeNanoSeconds", codec::Reader::fixed)?;
+            *place = input;
+            Ok(Self {
+                up,
+                time_seconds,
+                time_nano_seconds,
+            })
+        }
+    }
+
+    codec::if_serde! {
+        impl codec::view::View for ReportPoseRec {
+            #[inline(never)]
+            fn view(&self) -> codec::view::Value {
+                codec::view::Value::object(3)
+                .with("Up", codec::view::View::view(&self.up))
+                .with("TimeSeconds", codec::view::View::view(&self.time_seconds))
+                .with("TimeNanoSeconds", codec::view::View::view(&self.time_nano_seconds))
+            }
+
+            #[inline(never)]
+            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+                let object = codec::view::Object::new(value, &["Up", "TimeSeconds", "TimeNanoSeconds"])?;
+                Ok(Self {
+                    up: object.member("Up")?,
+                    time_seconds: object.member("TimeSeconds")?,
+                    time_nano_seconds: object.member("TimeNanoSeconds")?,
+                })
+            }
+        }
+        codec::serde_by_view!(ReportPoseRec);
+    }
+
+    codec::if_arbitrary! {
+        impl<'a> codec::arbitrary::Arbitrary<'a> for ReportPoseRec {
+            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+                Ok(Self {
+                    up: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
+                    time_seconds: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
+                    time_nano_seconds: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
+                })
+            }
+        }
+    }
+}
+
+impl codec::Report for ReportMotion {
+    fn stamp(&mut self, since_1970: ::std::time::Duration) {
+        if self.report_pose_rec.time_seconds.is_none() && self.report_pose_rec.time_nano_seconds.is_none() {
+            self.report_pose_rec.time_seconds = u32::try_from(since_1970.as_secs()).ok();
+            self.report_pose_rec.time_nano_seconds = Some(since_1970.subsec_nanos());
+        }
+    }
+}
+
+/// `ReportCameras` (F0A6h).
+///
+/// Its optional fields are in the elements of a list.
+///
+/// Declared by `urn:example:Queries 1.0`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReportCameras {
+    /// `CameraList`: up to 255 elements.
+    pub camera_list: Vec<report_cameras::CameraRec>,
+}
+
+impl codec::Message for ReportCameras {
+    const CODE: u16 = 0xF0A6;
+    const NAME: &'static str = "ReportCameras";
+    const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
+
+    fn encoded_len(&self) -> usize {
+        2
+        + 1 + self.camera_list.iter().map(codec::Composite::encoded_len).sum::<usize>()
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
+        output.member("CameraList", |output| output.list::<u8, _>(&self.camera_list, 0, 255, |value, output| codec::Composite::write(value, output)))?;
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
+        let camera_list = input.member("CameraList", |input| input.list::<u8, _>(0, 255, 2, codec::Composite::read))?;
+        Ok(Self {
+            camera_list,
+        })
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for ReportCameras {
+        #[inline(never)]
+        fn view(&self) -> codec::view::Value {
+            codec::view::View::view(&self.camera_list)
+        }
+
+        #[inline(never)]
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            Ok(Self { camera_list: codec::view::View::from_view(value)? })
+        }
+    }
+    codec::serde_by_view!(ReportCameras);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportCameras {
+        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self {
+                camera_list: codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary)?,
+            })
+        }
+    }
+}
+
+/// The types inside [`ReportCameras`].
+pub mod report_cameras {
+    use super::codec;
+
+    /// `CameraRec`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct CameraRec {
+        /// `Camera`.
+        pub camera: u8,
+        /// `Zoom`: bit 0 of the presence vector.
+        pub zoom: Option<u8>,
+    }
+
+    impl codec::Composite for CameraRec {
+        const MIN_LEN: usize = 2;
+
+        fn encoded_len(&self) -> usize {
+            2
+            + usize::from(self.zoom.is_some())
+        }
+
+        #[inline]
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            if let Self {
+                camera,
+                zoom: Some(zoom),
+            } = self
+            {
+                let run = output.run::<3>();
+                codec::Fixed::put(0x1_u8, run, 0);
+                codec::Fixed::put(*camera, run, 1);
+                codec::Fixed::put(*zoom, run, 2);
+                return Ok(());
+            }
+            self.write_some(output);
+            Ok(())
+        }
+
+        #[inline]
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            let present = input.presence::<u8>(0x1)?;
+            if present == 0x1 {
+                let run = input.run::<2>(&[
+                    ("Camera", 1),
+                    ("Zoom", 1),
+                ])?;
+                return Ok(Self {
+                    camera: codec::Fixed::get(run, 0),
+                    zoom: Some(codec::Fixed::get(run, 1)),
+                });
+            }
+            Self::read_some(input, present)
+        }
+    }
+
+    impl CameraRec {
+        #[inline(never)]
+        fn write_some(&self, output: &mut codec::Writer<'_>) {
+            let present =
+            u8::from(self.zoom.is_some());
+            let run = output.run::<2>();
+            codec::Fixed::put(present, run, 0);
+            codec::Fixed::put(self.camera, run, 1);
+            output.optional(self.zoom);
+        }
+
+        #[inline(never)]
+        fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
+            let mut input = place.clone();
+            let camera = input.member("Camera", codec::Reader::fixed)?;
+            let zoom = input.optional(present & 0x1 != 0, "Zoom", codec::Reader::fixed)?;
+            *place = input;
+            Ok(Self {
+                camera,
+                zoom,
+            })
+        }
+    }
+
+    codec::if_serde! {
+        impl codec::view::View for CameraRec {
+            #[inline(never)]
+            fn view(&self) -> codec::view::Value {
+                codec::view::Value::object(2)
+                .with("Camera", codec::view::View::view(&self.camera))
+                .with("Zoom", codec::view::View::view(&self.zoom))
+            }
+
+            #[inline(never)]
+            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+                let object = codec::view::Object::new(value, &["Camera", "Zoom"])?;
+                Ok(Self {
+                    camera: object.member("Camera")?,
+                    zoom: object.member("Zoom")?,
+                })
+            }
+        }
+        codec::serde_by_view!(CameraRec);
+    }
+
+    codec::if_arbitrary! {
+        impl<'a> codec::arbitrary::Arbitrary<'a> for CameraRec {
+            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+                Ok(Self {
+                    camera: codec::arbitrary::Arbitrary::arbitrary(random)?,
+                    zoom: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
+                })
+            }
+        }
+    }
+}
+
+impl codec::Report for ReportCameras {
+    fn without_values() -> Option<Self> {
+        Some(Self::default())
     }
 }
 

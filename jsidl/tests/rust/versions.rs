@@ -364,6 +364,8 @@ pub mod report_state {
     ]);
 }
 
+impl codec::Report for ReportState {}
+
 /// `ReportMode` (F082h).
 ///
 /// The mode; only names were added.
@@ -435,6 +437,8 @@ pub mod report_mode {
     #[doc(inline)]
     pub use super::report_state::Mode;
 }
+
+impl codec::Report for ReportMode {}
 
 /// Messages as services of version 1.0 had them, where newer ones differ.
 pub mod v1_0 {
@@ -616,4 +620,6 @@ pub mod v1_0 {
             (0, "Off"),
         ]);
     }
+
+    impl codec::Report for ReportState {}
 }

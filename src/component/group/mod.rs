@@ -12,7 +12,7 @@ use super::{Component, DeliverError, QueryError, SendError};
 use crate::address::JausId;
 use crate::codec::{Message, Query};
 use crate::endpoint::Outgoing;
-use crate::service::{Audience, CannotSubscribe, Topic, When};
+use crate::service::{Audience, CannotSubscribe, QueryOptions, Topic, When};
 
 pub use reports::{GroupSubscription, GroupUpdate};
 pub use results::Results;
@@ -80,8 +80,21 @@ impl Component {
         audience: impl Into<Audience>,
         query: &Q,
     ) -> Results<Q::Report, QueryError> {
+        self.query_all_with(QueryOptions::default(), audience, query)
+            .await
+    }
+
+    /// Like [`query_all`](Self::query_all), with a priority and with its own patience for each
+    /// member.
+    pub async fn query_all_with<Q: Query>(
+        &self,
+        options: QueryOptions,
+        audience: impl Into<Audience>,
+        query: &Q,
+    ) -> Results<Q::Report, QueryError> {
         let members = self.members(audience);
-        results::of_each(members, AT_ONCE, |member| self.query(member, query)).await
+        let ask = |member| self.query_with(options, member, query);
+        results::of_each(members, AT_ONCE, ask).await
     }
 
     /// Subscribes to a query at every member of an audience, including those that are found later.

@@ -472,17 +472,6 @@ impl Reassembly {
         Some(listed + self.config.reassembly_timeout)
     }
 
-    /// When the latest fragment of an unfinished message arrived.
-    pub(in crate::endpoint) fn last_fragment(
-        &self,
-        source: JausId,
-        destination: JausId,
-    ) -> Option<Instant> {
-        let runs = &self.senders.get(&source)?.runs;
-        let runs = runs.range((destination, 0)..=(destination, u16::MAX));
-        runs.map(|(_, run)| run.updated).max()
-    }
-
     /// The octets buffered, overhead included.
     pub(in crate::endpoint) const fn cost(&self) -> usize {
         self.cost

@@ -14,6 +14,8 @@ fn a_large_message_arrives_whole_over_a_good_wire_without_repetitions() {
     assert_eq!(wire.delivered(), [payload]);
     assert_eq!(wire.results(), [Event::Acknowledged { message, by: PEER }]);
     assert_eq!(wire.ends[0].counters().get(Counter::Retransmissions), 0);
+    let peer = wire.ends[0].peers().next().unwrap();
+    assert_eq!(peer.round_trip, Some(Duration::from_millis(1)));
     assert!(
         took < Duration::from_millis(20),
         "736 packets in windows of up to 512: {took:?}"

@@ -58,6 +58,8 @@ const PEER_HOST: u8 = 2;
 struct Inbox {
     messages: Vec<Received>,
     full: Vec<JausId>,
+    /// The parts of unfinished messages: when each arrived, its source and its destination.
+    parts: Vec<(Instant, JausId, JausId)>,
 }
 
 impl Sink for Inbox {
@@ -67,6 +69,10 @@ impl Sink for Inbox {
 
     fn deliver(&mut self, message: Received) {
         self.messages.push(message);
+    }
+
+    fn progress(&mut self, now: Instant, source: JausId, to: JausId) {
+        self.parts.push((now, source, to));
     }
 }
 

@@ -183,6 +183,18 @@ fn a_full_datagram_does_not_wait() {
 }
 
 #[test]
+fn messages_share_a_datagram_up_to_its_last_octet() {
+    for (length, datagrams) in [(711, 1), (712, 2)] {
+        let mut rig = with_packing(Packing::Within(Duration::ZERO));
+        for length in [700, length] {
+            rig.send(unreliable(large(length), Priority::Standard))
+                .unwrap();
+        }
+        assert_eq!(rig.transmits().len(), datagrams, "{length}");
+    }
+}
+
+#[test]
 fn older_headers_are_not_packed() {
     let mut rig = with_packing(Packing::Within(Duration::from_millis(5)));
     rig.hear(&Frame {

@@ -34,6 +34,17 @@ fn a_message_to_an_unknown_id_goes_to_the_group_until_the_answer_teaches_the_add
 }
 
 #[test]
+fn a_call_of_an_unknown_id_is_not_repeated() {
+    let mut rig = Rig::new();
+    rig.send(to_peer()).unwrap();
+    assert_eq!(
+        (rig.transmits().len(), rig.endpoint.poll_timeout()),
+        (1, None)
+    );
+    assert_eq!(rig.endpoint.flow(PEER), None);
+}
+
+#[test]
 fn a_message_goes_to_the_group_of_every_link() {
     let mut rig = Rig::new();
     rig.endpoint.add_link(LinkId(7), LinkProfile::judp([]));

@@ -13,6 +13,7 @@
 //! | 18 | Refused | reason u8 | why |
 //! | 19 | Deliver | flags u8, source u32, destination u32, path | the message |
 //! | 20 | Outcome | handle u64, outcome u8; if 1: destination u32, reason u8, acknowledged u32, length u32 | why |
+//! | 21 | Progress | source u32 | |
 //!
 //! A path is 00h for a message from the same node; 01h and the link u16 for a serial line or
 //! Junior's node manager; 02h, link u16, IPv6 address (IPv4 mapped), port u16 and scope u32 for a
@@ -34,7 +35,7 @@ use crate::endpoint::{LinkId, Path, Remote, Shortfall};
 use crate::wire::Flags;
 
 /// The version of the format.
-pub const VERSION: u8 = 3;
+pub const VERSION: u8 = 4;
 /// Octets of the length field before each record.
 pub const LENGTH: usize = 4;
 /// The longest message that a record carries, in octets.
@@ -123,6 +124,13 @@ pub enum Head {
         handle: u64,
         /// The outcome.
         outcome: Outcome,
+    },
+    /// A part of a large message for the component has arrived, and the message was not complete. So
+    /// the component repeats no query to its source. At most one in 50 ms for each source.
+    #[deku(id = 21)]
+    Progress {
+        /// The sender of the message.
+        source: JausId,
     },
 }
 

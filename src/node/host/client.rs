@@ -5,7 +5,7 @@ use std::convert::Infallible;
 use std::future::poll_fn;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, ready};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::{Notify, watch};
 use tokio::time::{sleep, timeout};
@@ -318,6 +318,7 @@ impl Client {
                     to: self.id,
                 });
             }
+            Head::Progress { source } => self.mailbox.note_progress(Instant::now(), source),
             Head::Outcome { handle, outcome } => self.handle_outcome(handle, outcome, &record),
             _ => return Err(RecordError::Unexpected),
         }

@@ -80,6 +80,8 @@ impl Session {
             writer.queue(&delivery(message));
             writer.len() < FULL
         });
+        self.mailbox
+            .drain_progress(|source| writer.queue(&Head::Progress { source }.into()));
         if !writer.is_empty() {
             return Poll::Ready(true);
         }

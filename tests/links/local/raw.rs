@@ -5,8 +5,9 @@ use std::os::unix::net::{UnixListener, UnixStream};
 
 use jaus::address::JausId;
 use jaus::link::local::record::{Head, Reason, Record};
-use jaus::node::{ComponentEvent, Departure, HostError};
+use jaus::node::{ComponentEvent, Config, Departure, HostError, Node};
 use jaus::wire::Flags;
+use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::within_limit;
 
 use crate::local::place::{Place, component_event, message, receive};
@@ -114,7 +115,7 @@ async fn a_node_of_an_older_release_is_named_as_the_reason() {
         let mut hello = [0; 15];
         stream.read_exact(&mut hello).unwrap();
         // A version 1 node reads up to here, sees another version, and refuses.
-        assert_eq!(hello[4..11], *b"\x01JAUS\x03\x01");
+        assert_eq!(hello[4..11], *b"\x01JAUS\x04\x01");
         assert_eq!(hello[11..], JausId::new(0, 0, 33).to_wire());
         stream.write_all(b"\x05\0\0\0\x12\x01old").unwrap();
     });
@@ -148,4 +149,30 @@ async fn a_connection_that_begins_with_something_else_is_closed() {
     })
     .await;
     assert_eq!(read, 0);
+}
+
+#[tokio::test]
+async fn a_component_is_told_of_the_parts_of_a_large_message() {
+    let (place, group) = (Place::new(), own_group());
+    let _node = Node::start(place.config().group(group)).unwrap();
+    let far = Node::start(Config::loopback(102, 1).group(group)).unwrap();
+    let mut camera = far.attach(1).unwrap();
+    let (path, id, source) = (place.path(), JausId::new(101, 1, 33), camera.id());
+    let mut stream = blocking(move || {
+        let mut stream = UnixStream::connect(path).unwrap();
+        write(&mut stream, &Head::hello(id).into());
+        assert!(matches!(read(&mut stream).head, Head::Welcome { .. }));
+        let head = Head::Send {
+            flags: Flags::default(),
+            handle: 1,
+            destination: source,
+        };
+        let payload = vec![0x00, 0x4D].into();
+        write(&mut stream, &Record { head, payload });
+        stream
+    })
+    .await;
+    receive(&mut camera).await;
+    camera.send(message(&camera, id, vec![7; 1 << 20])).unwrap();
+    blocking(move || while read(&mut stream).head != (Head::Progress { source }) {}).await;
 }

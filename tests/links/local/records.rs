@@ -77,6 +77,7 @@ fn head() -> impl Strategy<Value = Head> {
         8 => (flags(), id(), id(), path()).prop_map(|(flags, source, destination, path)| {
             Head::Deliver { flags, source, destination, path }
         }),
+        1 => id().prop_map(|source| Head::Progress { source }),
         4 => (any::<u64>(), outcome())
             .prop_map(|(handle, outcome)| Head::Outcome { handle, outcome }),
     ]

@@ -7,7 +7,7 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus_cli::failure::Failure;
 use jaus_cli::runtime::{between, seconds};
-use jaus_cli::{Ready, launch};
+use jaus_cli::{FenceFlags, Ready, launch};
 use jaus_vehicle::motion::Limits;
 use jaus_vehicle::parts::{Part, VectorDriver};
 
@@ -40,6 +40,9 @@ struct Flags {
     /// Control timeout in seconds: control ends unless the client renews it; 0 for never
     #[arg(long, value_name = "SECONDS", default_value = "3")]
     control_timeout: u8,
+
+    #[command(flatten)]
+    fence: FenceFlags,
 }
 
 impl Ready for Flags {
@@ -68,6 +71,7 @@ impl Ready for Flags {
             silence: self.silence,
             stale: self.stale,
             authority: self.authority,
+            fence: self.fence.into(),
             control_timeout: self.control_timeout,
         })
     }

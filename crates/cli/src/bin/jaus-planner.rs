@@ -49,6 +49,10 @@ struct Flags {
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = runtime::seconds)]
     stall: Duration,
 
+    /// The maximum number of new paths in one attempt because the map has changed on the way
+    #[arg(long, value_name = "COUNT", default_value = "10")]
+    detours: u8,
+
     /// What to do when the operator's link is lost: stop; hold position and keep the mission for a
     /// new operator's approval; or return along the driven path
     #[arg(long, value_name = "POLICY", default_value = "stop", value_parser = lost_link)]
@@ -89,6 +93,7 @@ impl Ready for Flags {
                 pause: self.pause,
                 patience: self.patience,
                 stall: self.stall,
+                detours: self.detours,
                 speed: self.speed,
                 lost_link: self.lost_link,
                 ..Settings::default()

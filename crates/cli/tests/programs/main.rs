@@ -1,4 +1,5 @@
-//! Programs as processes: components, whole systems, `jaus-tester load`, and the package.
+//! Programs as processes: the tool `jaus`, components, `jaus-tester load`, whole systems up to the
+//! operator's page, and the package.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,
@@ -9,13 +10,15 @@
 )]
 
 #[cfg(target_os = "linux")]
+mod e2e;
+#[cfg(target_os = "linux")]
 mod load;
 #[cfg(target_os = "linux")]
 mod packaging;
 #[cfg(target_os = "linux")]
 mod parts;
 mod store;
-#[path = "../support/mod.rs"]
 mod support;
+mod tool;
 #[cfg(target_os = "linux")]
 mod up;

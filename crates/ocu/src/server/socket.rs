@@ -14,10 +14,10 @@ use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 use super::Shared;
 use super::bounds::Rate;
 use super::view::{self, MessageView};
-use crate::PageId;
 use crate::answer::Said as Answer;
 use crate::request::{Frame, MessageFilter, OperatorRequest, Said};
 use crate::session::{Order, Reply};
+use crate::stick::PageId;
 use jaus_view::Filter;
 
 /// Version of the protocol between page and station.
@@ -38,7 +38,7 @@ const REFUSAL: Duration = Duration::from_secs(1);
 /// Serves a page until either side closes the connection.
 pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>) {
     let page = PageId(shared.pages.fetch_add(1, Relaxed));
-    let (mut sink, stream) = socket.split();
+    let (mut sink, mut stream) = socket.split();
     let (answers, waiting) = mpsc::channel(ANSWERS);
     let (views, chosen) = mpsc::channel(ANSWERS);
     let trusted = AtomicBool::new(!shared.needs_token());
@@ -53,7 +53,7 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>) {
         refused: None,
     };
     let parting = tokio::select! {
-        parting = reader.run(stream) => parting,
+        parting = reader.run(&mut stream) => parting,
         () = write(&mut sink, &shared, &trusted, waiting, chosen) => None,
     };
     // Release the stick first, since the page that may hold it is gone.
@@ -63,8 +63,14 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>) {
             code,
             reason: Utf8Bytes::from_static(reason),
         };
-        let close = sink.send(Message::Close(Some(frame)));
-        // Best effort: the page may not be reading.
+        let close = async {
+            sink.send(Message::Close(Some(frame))).await?;
+            // Closing a socket with unread frames resets the connection, and the page would not
+            // receive the reason.
+            while stream.next().await.transpose()?.is_some() {}
+            Ok::<(), axum::Error>(())
+        };
+        // Best effort: the page may not be reading, or not answer.
         let _ = timeout(STUCK, close).await;
     }
 }
@@ -86,7 +92,7 @@ struct Reader<'s> {
 }
 
 impl Reader<'_> {
-    async fn run(mut self, mut stream: SplitStream<WebSocket>) -> Option<Parting> {
+    async fn run(mut self, stream: &mut SplitStream<WebSocket>) -> Option<Parting> {
         while let Some(message) = stream.next().await {
             let message = match message {
                 Ok(message) => message,

@@ -8,7 +8,6 @@ use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::timeout;
 
 use super::Reply;
-use super::lease::release_all;
 use crate::state::Edition;
 use crate::stick::Push;
 use jaus::address::JausId;
@@ -268,4 +267,14 @@ fn effort(push: Push) -> Result<SetWrenchEffort, OutOfRange> {
     effort.set_resistive_linear_effort_x_percent(brake)?;
     effort.set_resistive_rotational_effort_z_percent(brake)?;
     Ok(effort)
+}
+
+/// Releases these parts and waits for the confirmations. If a job still uses a session, that job
+/// releases it at its end.
+pub(super) async fn release_all(sessions: Vec<Arc<Session>>) {
+    for session in sessions {
+        if let Ok(session) = Arc::try_unwrap(session) {
+            session.release().await;
+        }
+    }
 }

@@ -322,13 +322,3 @@ fn direct(session: &Session, target: TargetState) {
         tracing::debug!(%error, "not ordered");
     }
 }
-
-/// Releases these parts and waits for the confirmations. If a job still uses a session, that job
-/// releases it at its end.
-pub(super) async fn release_all(sessions: Vec<Arc<Session>>) {
-    for session in sessions {
-        if let Ok(session) = Arc::try_unwrap(session) {
-            session.release().await;
-        }
-    }
-}

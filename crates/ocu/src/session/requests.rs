@@ -5,13 +5,13 @@ use std::time::Instant;
 
 use tokio::sync::oneshot;
 
-use super::client::{Client, Finished, deliver};
-use super::lease::{Wanted, release_all};
+use super::client::{Client, Finished, deliver, release_all};
+use super::lease::Wanted;
 use super::vehicle::Vehicle;
 use super::{Order, Reply, Session};
-use crate::PageId;
 use crate::request::OperatorRequest;
 use crate::role::Role;
+use crate::stick::PageId;
 use crate::stick::Push;
 use jaus::address::JausId;
 use jaus::component::Session as PartSession;

@@ -1,10 +1,12 @@
-//! Ground vehicle services specific to this project, which no published service set covers.
+//! Ground vehicle services over models of this crate: those of this project, which no published
+//! service set covers, and the operating zones of AS6009.
 //!
 //! Each service is a thin layer over a model in another module: missions in
-//! [`mission`](crate::mission), objects and maps in [`world`](crate::world).
+//! [`mission`](crate::mission), objects, maps and zones in [`world`](crate::world).
 
 mod knowledge_store;
 mod odometry;
+mod operating_zones;
 mod planner;
 mod raster_cells;
 mod raster_maps;
@@ -13,6 +15,7 @@ mod world_store;
 
 pub use knowledge_store::VectorKnowledgeStore;
 pub use odometry::WheelOdometry;
+pub use operating_zones::{OperatingZones, reported_zones};
 pub use planner::{MissionPlanner, Missions, News};
 pub use raster_cells::{RasterEdition, fetch_cells};
 pub use raster_maps::RasterMaps;

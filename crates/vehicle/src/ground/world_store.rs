@@ -19,9 +19,10 @@ use crate::messages::ground::{
 use crate::motion::Frame;
 use crate::world::{Change, Done, KeepError, MapId, Refusal, World};
 use jaus::endpoint::Received;
+use jaus::messages::mobility::{QueryExcursion, QueryGlobalOperatingZone, QueryLocalOperatingZone};
 use jaus::service::Context;
 
-use super::{RasterMaps, VectorKnowledgeStore};
+use super::{OperatingZones, RasterMaps, VectorKnowledgeStore};
 
 /// A world shared by the services that use it.
 #[derive(Clone)]
@@ -29,6 +30,8 @@ pub struct WorldStore {
     shared: Arc<Mutex<Shared>>,
     frame: Frame,
     fail: Arc<dyn Fn(&KeepError) + Send + Sync>,
+    /// Whether any client may change objects and maps.
+    open: bool,
 }
 
 struct Shared {
@@ -54,6 +57,8 @@ pub(super) enum Answer {
     Creation { request_id: u8, count: usize },
     /// Report Raster Change for a map, 0 if it does not exist yet.
     Raster { request_id: u8, map: u16 },
+    /// The end of the command with this code.
+    Command(u16),
 }
 
 impl WorldStore {
@@ -82,7 +87,16 @@ impl WorldStore {
             shared: Arc::new(Mutex::new(shared)),
             frame,
             fail: Arc::new(fail),
+            open: false,
         }
+    }
+
+    /// Lets any client change objects and maps, also behind Access Control. Zones are for the client
+    /// in control only.
+    #[must_use]
+    pub const fn open_to_all(mut self) -> Self {
+        self.open = true;
+        self
     }
 
     /// Creates the service Raster Maps.
@@ -95,6 +109,12 @@ impl WorldStore {
     #[must_use]
     pub fn vector_knowledge_store(&self) -> VectorKnowledgeStore {
         VectorKnowledgeStore::new(self.clone())
+    }
+
+    /// Creates the services Local and Global Operating Zone, which need Access Control.
+    #[must_use]
+    pub fn operating_zones(&self) -> OperatingZones {
+        OperatingZones::new(self.clone())
     }
 
     /// The local frame.
@@ -127,7 +147,8 @@ impl WorldStore {
         answer: Answer,
         context: &mut Context<'_>,
     ) {
-        if !context.standing().obeys(request.source) {
+        let is_open = self.open && !matches!(answer, Answer::Command(_));
+        if !is_open && !context.standing().obeys(request.source) {
             tracing::debug!(source = %request.source, "ignored a change from a client that is not \
                 in control");
             return;
@@ -215,6 +236,11 @@ fn announce(done: &Done, context: &mut Context<'_>) {
             context.changed::<QueryRasterCells>();
             context.changed::<QueryVksTraversability>();
         }
+        Done::Zones => {
+            context.changed::<QueryLocalOperatingZone>();
+            context.changed::<QueryGlobalOperatingZone>();
+            context.changed::<QueryExcursion>();
+        }
     }
 }
 
@@ -229,6 +255,12 @@ fn tell(
     }
     match (answer, result) {
         (Answer::None, _) => {}
+        (Answer::Command(code), result) => {
+            if let Err(refusal) = result {
+                tracing::warn!(source = %request.source, "zones refused: {refusal}");
+            }
+            context.ended(code, result.is_ok());
+        }
         (Answer::Creation { request_id, .. }, Ok(Done::Added(added))) => {
             let numbers = added.iter().map(|id| id.map_or(0, |id| id.0));
             context.reply_until_acknowledged(request, &creation(request_id, numbers));
@@ -262,6 +294,7 @@ fn tell(
 fn tell_failed(request: &Received, answer: Answer, error: &KeepError, context: &mut Context<'_>) {
     match answer {
         Answer::None => {}
+        Answer::Command(code) => context.ended(code, false),
         Answer::Creation { request_id, count } => {
             context.reply_until_acknowledged(
                 request,

@@ -31,12 +31,14 @@ impl Ground {
         let mut ground = Self {
             rows,
             columns,
-            cells: terrain.cells().to_vec(),
+            cells: terrain.open_cells(),
             least: 0,
         };
         if radius > 0.5 {
             ground.keep_away(radius);
-            ground.open_around(start, radius, terrain.cells());
+        }
+        if radius > 0.5 || !terrain.zones().is_empty() {
+            ground.open_around(start, radius, terrain);
         }
         let best = ground.cells.iter().max().copied().unwrap_or_default();
         ground.least = weight_of(best);
@@ -77,7 +79,7 @@ impl Ground {
     }
 
     /// Opens all traversable cells near a point, so that a vehicle standing there can leave.
-    fn open_around(&mut self, (row, column): (f64, f64), radius: f64, cells: &[u8]) {
+    fn open_around(&mut self, (row, column): (f64, f64), radius: f64, terrain: &Terrain) {
         let reach = radius + 1.0;
         let span = |middle: f64, side: usize| {
             let first = (middle - reach).floor().max(0.0) as usize;
@@ -86,11 +88,13 @@ impl Ground {
         };
         for at_row in span(row, self.rows) {
             for at_column in span(column, self.columns) {
-                let (up, aside) = (at_row as f64 + 0.5 - row, at_column as f64 + 0.5 - column);
+                let middle = (at_row as f64 + 0.5, at_column as f64 + 0.5);
+                let is_near = (middle.0 - row).hypot(middle.1 - column) <= reach;
                 let at = at_row * self.columns + at_column;
-                if up.hypot(aside) <= reach && self.cells[at] == 0 {
+                let is_own = (at_row, at_column) == (row as usize, column as usize);
+                if is_near && self.cells[at] == 0 && (is_own || terrain.admits(middle)) {
                     // Worst traversability, so that the path leads away from here.
-                    self.cells[at] = cells[at].min(1);
+                    self.cells[at] = terrain.cells()[at].min(1);
                 }
             }
         }

@@ -4,6 +4,7 @@
 //! fetched, and the path planned, approved, handed to the path segment driver and driven. When a
 //! stage is blocked it starts over. Neither does I/O, reads a clock or depends on messages.
 
+mod barred;
 mod blocks;
 mod ground;
 mod lost_link;
@@ -16,7 +17,7 @@ mod tests;
 mod waterfall;
 
 pub use lost_link::LostLink;
-pub use path::{NoPath, Path, Point, Vehicle, plan};
+pub use path::{NoPath, Path, Point, Vehicle, blocked_after, plan};
 pub use terrain::{Terrain, TerrainError};
 pub use waterfall::{
     Action, Destination, Link, LinkState, Mission, NotPlanned, Refusal, Report, Run, Settings,

@@ -2,6 +2,7 @@
 
 use super::ground::Ground;
 use super::{Terrain, search, sight};
+use crate::zones::ZoneId;
 
 /// A point of the local frame: X (north) and Y (east) in metres.
 pub type Point = (f64, f64);
@@ -89,6 +90,27 @@ pub enum NoPath {
         /// The south-west and the north-east corner of the map.
         corners: [Point; 2],
     },
+    /// Zones bar the destination.
+    #[error(
+        "the destination at {} is barred by {zone}: choose another one, or change the zone",
+        At(*.destination)
+    )]
+    DestinationBarred {
+        /// The destination.
+        destination: Point,
+        /// The zone.
+        zone: ZoneId,
+    },
+    /// The vehicle is where zones do not allow it.
+    #[error(
+        "the vehicle at {} is beyond {zone}: drive it out manually, or change the zone", At(*.start)
+    )]
+    StartBarred {
+        /// The vehicle's position.
+        start: Point,
+        /// The zone.
+        zone: ZoneId,
+    },
     /// The destination is in an obstacle or too close to one.
     #[error(
         "the destination at {} is closer than {clearance:.2} m to an obstacle: choose one with \
@@ -124,7 +146,7 @@ pub enum NoPath {
     /// No path to the destination exists for a vehicle of this size.
     #[error(
         "there is no path from {} to {} with {clearance:.2} m of clearance: clear obstacles, \
-         correct the map, or choose another destination", At(*.start), At(*.destination)
+         correct the map or the zones, or choose another destination", At(*.start), At(*.destination)
     )]
     Unreachable {
         /// The vehicle's position.
@@ -165,6 +187,57 @@ impl std::fmt::Display for At {
     }
 }
 
+/// The distance from the vehicle at which the map blocks the rest of a path, in metres; `None` if the
+/// path is clear.
+///
+/// `segment` is the segment that the vehicle drives, counted from 0. It needs only the vehicle's
+/// width: a path that was planned with a margin stays valid when an obstacle is seen a little nearer.
+#[must_use]
+pub fn blocked_after(
+    terrain: &Terrain,
+    vehicle: &Vehicle,
+    here: Point,
+    path: &Path,
+    segment: usize,
+) -> Option<f64> {
+    // Off the map nothing is known.
+    let from = terrain.to_grid(here)?;
+    let ground = Ground::new(terrain, vehicle.width / 2.0, from);
+    let mut passed = 0.0;
+    let mut from = here;
+    for &to in path.points().iter().skip(segment + 1) {
+        let length = (to.0 - from.0).hypot(to.1 - from.1);
+        let is_clear = |share: f64| {
+            let to = (
+                from.0 + (to.0 - from.0) * share,
+                from.1 + (to.1 - from.1) * share,
+            );
+            let ends = terrain.to_grid(from).zip(terrain.to_grid(to));
+            ends.is_none_or(|(from, to)| sight::cost(&ground, from, to).is_some())
+        };
+        if !is_clear(1.0) {
+            return Some(passed + length * last_clear(is_clear));
+        }
+        passed += length;
+        from = to;
+    }
+    None
+}
+
+/// The largest share of a line that is clear, to one part in 256.
+fn last_clear(is_clear: impl Fn(f64) -> bool) -> f64 {
+    let (mut good, mut bad) = (0.0, 1.0);
+    for _ in 0..8 {
+        let middle = f64::midpoint(good, bad);
+        *(if is_clear(middle) {
+            &mut good
+        } else {
+            &mut bad
+        }) = middle;
+    }
+    good
+}
+
 /// Finds the cheapest path with sufficient clearance for the vehicle. Cost combines distance and
 /// traversability. On maps with more than 512 x 512 cells the path may cost slightly more than the
 /// optimum.
@@ -197,6 +270,16 @@ pub fn plan(
         ground.is_open(row, column)
     };
     let (first, last) = (ground.cell_at(from), ground.cell_at(to));
+    let barring = |point| {
+        let clearance = terrain.zones().clearance(point);
+        clearance.filter(|it| it.metres < 0.0).map(|it| it.zone)
+    };
+    if let Some(zone) = barring(start) {
+        return Err(NoPath::StartBarred { start, zone });
+    }
+    if let Some(zone) = barring(destination) {
+        return Err(NoPath::DestinationBarred { destination, zone });
+    }
     if !is_open(first) {
         return Err(NoPath::StartBlocked { start });
     }

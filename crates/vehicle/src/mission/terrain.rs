@@ -1,4 +1,9 @@
-//! The planning map: a raster with the traversability of each cell.
+//! The planning map: a raster with the traversability of each cell, less what zones bar.
+
+use std::sync::Arc;
+
+use super::barred;
+use crate::zones::Zones;
 
 /// Traversability of the cells of a rectangle in the local frame.
 ///
@@ -11,6 +16,9 @@ pub struct Terrain {
     cell: f64,
     corner: (f64, f64),
     cells: Vec<u8>,
+    /// Whether zones touch each cell; empty without zones.
+    barred: Vec<bool>,
+    zones: Arc<Zones>,
 }
 
 /// Error: a raster is unsuitable for planning.
@@ -91,7 +99,41 @@ impl Terrain {
             cell,
             corner,
             cells,
+            barred: Vec::new(),
+            zones: Arc::default(),
         })
+    }
+
+    /// The same map, on which no path leads through a keep-out zone or out of the operating zone.
+    #[must_use]
+    pub fn within(mut self, zones: Arc<Zones>) -> Self {
+        self.barred = barred::cells(&self, &zones);
+        self.zones = zones;
+        self
+    }
+
+    /// The zones that bar cells of this map.
+    pub(super) fn zones(&self) -> &Zones {
+        &self.zones
+    }
+
+    /// The traversability of the cells, 0 for those that zones touch.
+    pub(super) fn open_cells(&self) -> Vec<u8> {
+        let mut cells = self.cells.clone();
+        for (cell, _) in cells
+            .iter_mut()
+            .zip(&self.barred)
+            .filter(|(_, barred)| **barred)
+        {
+            *cell = 0;
+        }
+        cells
+    }
+
+    /// Whether the vehicle's centre may be at a point, in rows and columns, whatever its clearance.
+    pub(super) fn admits(&self, at: (f64, f64)) -> bool {
+        let clearance = self.zones.clearance(self.to_local(at));
+        clearance.is_none_or(|it| it.metres >= 0.0)
     }
 
     /// Number of rows.

@@ -28,6 +28,8 @@ pub struct Settings {
     pub settling: Duration,
     /// How long the vehicle may drive without progress.
     pub stall: Duration,
+    /// Maximum number of new paths in one attempt because the map has changed on the way.
+    pub detours: u8,
     /// Default speed limit in metres per second, for destinations without one.
     pub speed: f64,
     /// Behaviour when the operator's link is lost.
@@ -42,6 +44,7 @@ impl Default for Settings {
             patience: Duration::from_secs(15),
             settling: Duration::from_secs(1),
             stall: Duration::from_secs(60),
+            detours: 10,
             speed: 1.0,
             lost_link: LostLink::Stop,
         }
@@ -154,6 +157,8 @@ pub struct Mission {
     approved: bool,
     /// Whether the mission waits for a new lease after a lost link.
     held: bool,
+    /// Number of new paths in this attempt.
+    detours: u8,
     /// The path driven from its start.
     trail: Trail,
     path: Arc<Path>,
@@ -182,6 +187,7 @@ impl Mission {
             },
             approved: false,
             held: false,
+            detours: 0,
             trail: Trail::default(),
             path: Arc::default(),
             links: Links::default(),
@@ -379,6 +385,24 @@ impl Mission {
         }
     }
 
+    /// Handles a change of the map that blocks the path under way: stops the vehicle and plans another
+    /// path. After [`Settings::detours`] of them the attempt has failed.
+    pub fn handle_blocked_path(&mut self, now: Instant, run: Run, reason: &str) {
+        if self.report.run != run || !self.report.stage.is_handed_over() {
+            return;
+        }
+        if self.detours >= self.settings.detours {
+            let count = self.settings.detours;
+            return self.set_back(now, &format!("{reason}, after {count} other paths"));
+        }
+        self.detours += 1;
+        self.halt();
+        reason.clone_into(&mut self.report.reason);
+        self.report.progress = 0;
+        self.enter(now, Stage::Planning);
+        self.action = Some(Action::Plan(run, self.report.destination));
+    }
+
     /// Handles a state report of a driver of the chain.
     pub fn handle_link(&mut self, now: Instant, link: Link, state: LinkState) {
         self.links.note(now, link, state);
@@ -442,6 +466,7 @@ impl Mission {
     /// Starts an attempt.
     fn begin(&mut self, now: Instant) {
         self.again = None;
+        self.detours = 0;
         self.links.close();
         self.enter(now, Stage::Map);
         self.action = Some(Action::FetchMap(self.report.run));

@@ -45,7 +45,7 @@ fn report(_: &QueryAccelerationState, exchange: &mut Exchange<'_, '_>) -> Report
         pitch_acceleration: fields::PitchAcceleration::new(acceleration.pitch).ok(),
         yaw_acceleration: fields::YawAcceleration::new(acceleration.yaw).ok(),
         rotational_acceleration_rms: None,
-        time_stamp: exchange.stamp(),
+        time_stamp: None,
     }
 }
 
@@ -53,7 +53,6 @@ fn report_ext(
     _: &QueryAccelerationStateExt,
     exchange: &mut Exchange<'_, '_>,
 ) -> ReportAccelerationStateExt {
-    let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
     let acceleration = exchange.controls.pilot.motion().acceleration;
     ReportAccelerationStateExt {
         acceleration_x: ext::AccelerationX::new(acceleration.x).ok(),
@@ -64,7 +63,7 @@ fn report_ext(
         pitch_acceleration: ext::PitchAcceleration::new(acceleration.pitch).ok(),
         yaw_acceleration: ext::YawAcceleration::new(acceleration.yaw).ok(),
         rotational_acceleration_rms: None,
-        time_seconds: seconds,
-        time_nano_seconds: nanoseconds,
+        time_seconds: None,
+        time_nano_seconds: None,
     }
 }

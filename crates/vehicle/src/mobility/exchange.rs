@@ -5,9 +5,8 @@ use std::time::{Duration, Instant};
 use super::controls::Controls;
 use crate::motion::{Goal, Ticket};
 use jaus::address::JausId;
-use jaus::codec::{Message, OutOfRange, Query};
+use jaus::codec::{Message, OutOfRange, Query, Report};
 use jaus::endpoint::Received;
-use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::service::{Context, Standing, State, Validity, read};
 
 /// A command from the client in control.
@@ -51,8 +50,12 @@ impl Exchange<'_, '_> {
         }
     }
 
-    /// Sends the report with the fields that the query requests.
+    /// Sends the report with the fields that the query requests, and the sample time of the
+    /// vehicle's motion if there is a clock.
     pub(super) fn report<Q: Query>(&mut self, query: &Q, mut report: Q::Report) {
+        if let Some(since_1970) = self.sampled_since_1970() {
+            report.stamp(since_1970);
+        }
         query.drop_unrequested(&mut report);
         self.reply(&report);
     }
@@ -108,22 +111,5 @@ impl Exchange<'_, '_> {
         let sampled_at = self.controls.pilot.motion().sampled_at;
         let clock = self.controls.clock.as_mut()?;
         Some(clock.since_1970(self.now, sampled_at))
-    }
-
-    /// Sample time of the motion for version 1.1 reports: seconds since 1970, and the remainder in
-    /// nanoseconds.
-    pub(super) fn seconds_and_nanoseconds(&mut self) -> (Option<u32>, Option<u32>) {
-        let Some(time) = self.sampled_since_1970() else {
-            return (None, None);
-        };
-        (
-            u32::try_from(time.as_secs()).ok(),
-            Some(time.subsec_nanos()),
-        )
-    }
-
-    /// Sample time of the motion for version 1.0 reports.
-    pub(super) fn stamp(&mut self) -> Option<TimeStamp> {
-        self.sampled_since_1970().map(TimeStamp::at)
     }
 }

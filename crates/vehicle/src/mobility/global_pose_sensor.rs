@@ -120,12 +120,11 @@ fn report(_: &QueryGlobalPose, exchange: &mut Exchange<'_, '_>) -> ReportGlobalP
         pitch: fields::Pitch::new(pose.pitch).ok(),
         yaw: fields::Yaw::new(pose.yaw).ok(),
         attitude_rms: None,
-        time_stamp: exchange.stamp(),
+        time_stamp: None,
     }
 }
 
 fn report_ext(_: &QueryGlobalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportGlobalPoseExt {
-    let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
     let pose = pose(exchange);
     ReportGlobalPoseExt {
         latitude: ext::Latitude::new(pose.latitude).ok(),
@@ -134,8 +133,6 @@ fn report_ext(_: &QueryGlobalPoseExt, exchange: &mut Exchange<'_, '_>) -> Report
         roll: ext::Roll::new(pose.roll).ok(),
         pitch: ext::Pitch::new(pose.pitch).ok(),
         heading: ext::Heading::new(pose.yaw).ok(),
-        time_seconds: seconds,
-        time_nano_seconds: nanoseconds,
         ..ReportGlobalPoseExt::default()
     }
 }

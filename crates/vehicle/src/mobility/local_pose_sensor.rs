@@ -106,12 +106,11 @@ fn report(_: &QueryLocalPose, exchange: &mut Exchange<'_, '_>) -> ReportLocalPos
         pitch: fields::Pitch::new(pose.pitch).ok(),
         yaw: fields::Yaw::new(pose.yaw).ok(),
         attitude_rms: None,
-        time_stamp: exchange.stamp(),
+        time_stamp: None,
     }
 }
 
 fn report_ext(_: &QueryLocalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportLocalPoseExt {
-    let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
     let pose = pose(exchange);
     ReportLocalPoseExt {
         x: ext::X::new(pose.x).ok(),
@@ -120,8 +119,6 @@ fn report_ext(_: &QueryLocalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportL
         roll: ext::Roll::new(pose.roll).ok(),
         pitch: ext::Pitch::new(pose.pitch).ok(),
         heading: ext::Heading::new(pose.yaw).ok(),
-        time_seconds: seconds,
-        time_nano_seconds: nanoseconds,
         ..ReportLocalPoseExt::default()
     }
 }

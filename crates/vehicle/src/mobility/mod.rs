@@ -49,6 +49,6 @@ pub use vehicle::{OnVehicle, Vehicle};
 use jaus::codec::ServiceId;
 
 /// A service in versions 1.1 and 1.0. Version 1.0 has no messages that version 1.1 lacks.
-const fn both_versions(newest: ServiceId) -> [ServiceId; 2] {
+pub(crate) const fn both_versions(newest: ServiceId) -> [ServiceId; 2] {
     [newest, ServiceId { minor: 0, ..newest }]
 }

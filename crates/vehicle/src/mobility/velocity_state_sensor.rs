@@ -4,6 +4,7 @@ use super::behaviour::Behaviour;
 use super::both_versions;
 use super::controls::Controls;
 use super::exchange::Exchange;
+use crate::motion::Velocity;
 use jaus::codec::{Message, ServiceId};
 use jaus::messages::mobility::report_velocity_state::{
     PitchRate, RollRate, VelocityX, VelocityY, VelocityZ, YawRate,
@@ -40,50 +41,49 @@ impl Behaviour for VelocityStateSensor {
 }
 
 fn report(_: &QueryVelocityState, exchange: &mut Exchange<'_, '_>) -> ReportVelocityState {
-    let velocity = exchange.controls.pilot.motion().velocity;
-    ReportVelocityState {
-        velocity_x: VelocityX::new(velocity.x).ok(),
-        velocity_y: VelocityY::new(velocity.y).ok(),
-        velocity_z: VelocityZ::new(velocity.z).ok(),
-        velocity_rms: None,
-        roll_rate: RollRate::new(velocity.roll).ok(),
-        pitch_rate: PitchRate::new(velocity.pitch).ok(),
-        yaw_rate: YawRate::new(velocity.yaw).ok(),
-        rate_rms: None,
-        time_stamp: exchange.stamp(),
-    }
+    exchange.controls.pilot.motion().velocity.into()
 }
 
 fn report_ext(
-    query: &QueryVelocityStateExt,
+    _: &QueryVelocityStateExt,
     exchange: &mut Exchange<'_, '_>,
 ) -> ReportVelocityStateExt {
-    let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
-    let velocity = exchange.controls.pilot.motion().velocity;
-    let asked = query.velocity_var_presence_vector.into();
-    let along = VelocityVehicleXyzRec {
-        velocity_x: requested(asked, 0, VelocityX::new(velocity.x).ok()),
-        velocity_y: requested(asked, 1, VelocityY::new(velocity.y).ok()),
-        velocity_z: requested(asked, 2, VelocityZ::new(velocity.z).ok()),
-    };
-    let asked = query.report_velocity_state_ext_rec_presence_vector;
-    let over_ground = SpeedOverGround::new(velocity.x.hypot(velocity.y));
-    ReportVelocityStateExt {
-        velocity_var: VelocityVar::VelocityVehicleXyzRec(along),
-        report_velocity_state_ext_rec: ext::ReportVelocityStateExtRec {
-            roll_rate: requested(asked, 1, ext::RollRate::new(velocity.roll).ok()),
-            pitch_rate: requested(asked, 2, ext::PitchRate::new(velocity.pitch).ok()),
-            yaw_rate: requested(asked, 3, ext::YawRate::new(velocity.yaw).ok()),
-            speed_over_ground: requested(asked, 5, over_ground.ok()),
-            time_seconds: requested(asked, 9, seconds),
-            time_nano_seconds: requested(asked, 10, nanoseconds),
-            ..Default::default()
-        },
+    exchange.controls.pilot.motion().velocity.into()
+}
+
+/// Without the components that are NaN.
+impl From<Velocity> for ReportVelocityState {
+    fn from(velocity: Velocity) -> Self {
+        Self {
+            velocity_x: VelocityX::new(velocity.x).ok(),
+            velocity_y: VelocityY::new(velocity.y).ok(),
+            velocity_z: VelocityZ::new(velocity.z).ok(),
+            roll_rate: RollRate::new(velocity.roll).ok(),
+            pitch_rate: PitchRate::new(velocity.pitch).ok(),
+            yaw_rate: YawRate::new(velocity.yaw).ok(),
+            ..Self::default()
+        }
     }
 }
 
-/// The field of a nested record, if its bit of the presence vector is set. Queries select only the
-/// report's own fields by themselves.
-fn requested<T>(presence_vector: u16, bit: u32, field: Option<T>) -> Option<T> {
-    field.filter(|_| presence_vector >> bit & 1 == 1)
+/// Without the components that are NaN.
+impl From<Velocity> for ReportVelocityStateExt {
+    fn from(velocity: Velocity) -> Self {
+        let along = VelocityVehicleXyzRec {
+            velocity_x: VelocityX::new(velocity.x).ok(),
+            velocity_y: VelocityY::new(velocity.y).ok(),
+            velocity_z: VelocityZ::new(velocity.z).ok(),
+        };
+        let over_ground = SpeedOverGround::new(velocity.x.hypot(velocity.y));
+        Self {
+            velocity_var: VelocityVar::VelocityVehicleXyzRec(along),
+            report_velocity_state_ext_rec: ext::ReportVelocityStateExtRec {
+                roll_rate: ext::RollRate::new(velocity.roll).ok(),
+                pitch_rate: ext::PitchRate::new(velocity.pitch).ok(),
+                yaw_rate: ext::YawRate::new(velocity.yaw).ok(),
+                speed_over_ground: over_ground.ok(),
+                ..Default::default()
+            },
+        }
+    }
 }

@@ -50,6 +50,7 @@
 
 mod curve;
 mod deadline;
+mod fence;
 mod frame;
 mod kinematics;
 mod observed;
@@ -66,6 +67,7 @@ mod tests;
 
 pub use curve::Curve;
 pub use deadline::CommandDeadline;
+pub use fence::{Fence, FenceConfig};
 pub use frame::{Frame, GlobalPose};
 pub use kinematics::{Acceleration, Motion, Pose, Velocity, wrap};
 pub use observed::Observed;

@@ -2,10 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use super::steering::{towards, turn_rate};
+use super::fence::Bounds;
+use super::steering::{along, towards, turn_rate};
 use super::{
-    Curve, Drive, Effort, Frame, GlobalPose, Limits, Motion, Platform, Pose, Velocity, Waypoint,
-    wrap,
+    Curve, Drive, Effort, Fence, Frame, GlobalPose, Limits, Motion, Platform, Pose, Velocity,
+    Waypoint, wrap,
 };
 
 /// A motion goal of a vehicle.
@@ -84,6 +85,7 @@ pub struct Pilot {
     time: Option<Instant>,
     /// Maximum age of a pose to steer by.
     max_pose_age: Duration,
+    fence: Fence,
     /// The trouble that ended the last goal, until it is taken.
     trouble: Option<Trouble>,
 }
@@ -131,6 +133,7 @@ impl Pilot {
             steps: 0,
             time: None,
             max_pose_age: Self::MAX_POSE_AGE,
+            fence: Fence::default(),
             trouble: None,
         }
     }
@@ -141,6 +144,13 @@ impl Pilot {
     #[must_use]
     pub const fn max_pose_age(mut self, age: Duration) -> Self {
         self.max_pose_age = age;
+        self
+    }
+
+    /// Keeps the vehicle within a fence, whatever its goal.
+    #[must_use]
+    pub fn with_fence(mut self, fence: Fence) -> Self {
+        self.fence = fence;
         self
     }
 
@@ -373,7 +383,8 @@ impl Pilot {
                 self.course = None;
             }
         }
-        let pose = self.motion().pose;
+        let motion = self.motion();
+        let pose = motion.pose;
         let limits = self.limits;
         let north = -self.frame.heading;
         let setpoint = match &mut self.course {
@@ -381,8 +392,16 @@ impl Pilot {
             None => Setpoint::Drive(Drive::Stop),
         };
         match setpoint {
-            Setpoint::Drive(command) => self.drive(command),
+            Setpoint::Drive(command) => {
+                let wanted = Bounds::wanted(&command);
+                let bounds = self.fence.bounds(time, &motion, &limits, wanted);
+                self.drive(bounds.apply(command, motion.velocity.x));
+            }
             Setpoint::Head { heading, speed } => {
+                // Before it drives, the vehicle turns.
+                let wanted = along(pose.yaw, heading, speed, &limits).x;
+                let bounds = self.fence.bounds(time, &motion, &limits, wanted);
+                let speed = bounds.clamp(speed);
                 self.command = Drive::Velocity(Velocity::forward(speed, 0.0));
                 self.platform.head(heading, speed, &limits);
             }

@@ -1,20 +1,26 @@
-//! The vector knowledge store: objects and maps for all parts of a vehicle, stored in a file.
+//! The vector knowledge store: objects, maps and operating zones for all parts of a vehicle, stored in a file.
+#![expect(clippy::disallowed_methods, reason = "notices a silent pose sensor")]
 
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use bytes::Bytes;
 use tokio::sync::mpsc;
+use tokio::time::timeout;
 
+use super::drivers::Sense;
 use super::{Part, PartError, Slot};
-use crate::ground::WorldStore;
+use crate::ground::{OperatingZones, WorldStore};
 use crate::motion::Frame;
 use crate::world::{Change, Done, OpenError, Picture, Raster, World};
-use jaus::component::Component;
+use jaus::component::{AccessControl, Component};
+use jaus::messages::mobility::QueryExcursion;
 
 /// Stores the world of a vehicle and serves it to all clients.
 ///
-/// It offers Vector Knowledge Store and Raster Maps, without access control.
+/// It offers Vector Knowledge Store and Raster Maps, whose changes it accepts from any client, and
+/// Local and Global Operating Zone, whose changes it accepts from the client in control.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnowledgeStore {
     /// The file. It is created if it does not exist.
@@ -87,16 +93,38 @@ impl Part for KnowledgeStore {
             // Without a receiver the part has already ended.
             let _ = fail.send(error.to_string());
         });
+        let store = store.open_to_all();
+        let zones = store.operating_zones();
         let component = slot
             .component("Vector Knowledge Store")
+            .access_control(AccessControl::new())
             .offer(store.vector_knowledge_store())
             .offer(store.raster_maps())
+            .offer(zones.clone())
             .live_on(slot.port)?;
         // A remaining copy of the store would keep the file open after the component's end.
         drop(store);
         tokio::select! {
             failure = failures.recv() => Err(failure.map_or(PartError::NodeStopped, PartError::Broken)),
             () = gone(&component) => Err(PartError::NodeStopped),
+            end = follow(&component, &zones) => end,
+        }
+    }
+}
+
+/// How long a position counts without a new one.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Keeps the vehicle's position for Report Excursion.
+async fn follow(component: &Component, zones: &OperatingZones) -> Result<Infallible, PartError> {
+    let mut poses = Sense::pose(component, 5.0)?;
+    loop {
+        let place = match timeout(PATIENCE, poses.next()).await {
+            Ok(report) => report.map(|pose| pose.x_m().zip(pose.y_m()))?,
+            Err(_) => None,
+        };
+        if zones.handle_place(place) {
+            component.changed::<QueryExcursion>().await;
         }
     }
 }

@@ -79,6 +79,9 @@ pub enum PartError {
     /// The underlying node has stopped.
     #[error("the node has stopped")]
     NodeStopped,
+    /// The component cannot publish its reports.
+    #[error(transparent)]
+    Publish(#[from] component::PublishError),
     /// A resource is missing or defective. The text contains the cause and a remedy, for the
     /// operator.
     #[error("{0}")]

@@ -10,7 +10,7 @@ use super::drivers::{
 use super::{Part, PartError, Slot};
 use crate::ground::StageBoard;
 use crate::mobility::Vehicle;
-use crate::motion::{Frame, Limits, Motion, Pilot};
+use crate::motion::{Fence, FenceConfig, Frame, Limits, Motion, Pilot};
 use jaus::messages::mobility::{SetLocalVector, local_vector_driver, set_local_vector};
 
 /// Follows the segments of a list by sending headings and speeds to the vector driver, based on the
@@ -24,6 +24,8 @@ pub struct PathDriver {
     pub limits: Limits,
     /// Maximum age of the pose. The vehicle stops when it is older.
     pub stale: Duration,
+    /// Dimensions and delays by which it keeps to the operating zones.
+    pub fence: FenceConfig,
     /// The authority used to control the vector driver.
     pub authority: u8,
     /// Control timeout in seconds unless the client renews control; 0 disables it.
@@ -39,6 +41,7 @@ impl Default for PathDriver {
                 ..Limits::default()
             },
             stale: Duration::from_millis(600),
+            fence: FenceConfig::default(),
             authority: 100,
             control_timeout: 3,
         }
@@ -57,7 +60,9 @@ impl Part for PathDriver {
             stale: self.stale,
             by_heading: true,
         });
-        let vehicle = Vehicle::new(Pilot::new(remote_platform.clone(), Frame::default()));
+        let fence = Fence::new(self.fence);
+        let pilot = Pilot::new(remote_platform.clone(), Frame::default());
+        let vehicle = Vehicle::new(pilot.with_fence(fence.clone()));
         let board = StageBoard::default();
         let component = slot
             .component("Local Path Segment Driver")
@@ -67,11 +72,13 @@ impl Part for PathDriver {
             .offer(board.service())
             .live_on(slot.port)?;
         let poses = Sense::pose(&component, Self::HZ)?;
+        let zones = Sense::zones(&component)?;
         let own = component.clone();
         let next = Next {
             component,
             vehicle,
             remote_platform: remote_platform.clone(),
+            fence: fence.clone(),
             board,
             language: Vectors,
             authority: self.authority,
@@ -81,6 +88,7 @@ impl Part for PathDriver {
         };
         tokio::select! {
             end = poses.steer(&remote_platform) => end,
+            end = zones.enclose(&fence) => end,
             end = next.run() => end,
             end = shut_down(&own) => end,
         }

@@ -9,6 +9,7 @@
 pub(super) mod chain;
 mod hand_over;
 pub(super) mod map;
+mod survey;
 mod task;
 
 use std::convert::Infallible;

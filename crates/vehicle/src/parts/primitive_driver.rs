@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::drivers::{FaultMonitor, Watchman, guard, shut_down};
+use super::drivers::{FaultMonitor, Sense, Watchman, guard, shut_down};
 use super::stop_line::StopLine;
 use super::{Part, PartError, Slot};
 use crate::actuator::{
@@ -21,7 +21,7 @@ use crate::ground::{StageBoard, StageReport, StageState, WheelOdometry};
 use crate::handoff::Handoff;
 use crate::messages::ground::QueryStage;
 use crate::mobility::Vehicle;
-use crate::motion::{Frame, Pilot};
+use crate::motion::{Fence, FenceConfig, Frame, Pilot};
 use jaus::component::{Component, Condition, State};
 use jaus::service::{MotionPolicy, StopCause};
 
@@ -32,6 +32,9 @@ use jaus::service::{MotionPolicy, StopCause};
 /// Closing the line clears all emergencies, on the assumption that the operator on site has dealt
 /// with them. The component is then in Standby, and nothing moves before it is resumed.
 ///
+/// While operating zones are set, it drives only with a pose of the pose sensor, and stops before it
+/// crosses an edge, whatever its client commands.
+///
 /// It offers Primitive Driver, Wheel Odometry and Stage, with Management and Access Control.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrimitiveDriver {
@@ -41,6 +44,8 @@ pub struct PrimitiveDriver {
     pub stop: Option<Stop>,
     /// Parameters of the platform.
     pub wheels: WheelsConfig,
+    /// Dimensions and delays by which it keeps to the operating zones.
+    pub fence: FenceConfig,
     /// The motors stop without an effort command for this time.
     pub silence: Duration,
     /// Control timeout in seconds unless the client renews control; 0 disables it.
@@ -125,6 +130,7 @@ impl Default for PrimitiveDriver {
             motors: Motors::Simulated(MotorConfig::default()),
             stop: None,
             wheels: WheelsConfig::default(),
+            fence: FenceConfig::default(),
             silence: Duration::from_millis(500),
             control_timeout: 3,
         }
@@ -172,6 +178,9 @@ impl Part for PrimitiveDriver {
 }
 
 impl PrimitiveDriver {
+    /// Report rate requested from the pose sensor, in hertz.
+    const HZ: f64 = 10.0;
+
     /// Runs on custom hardware in place of [`motors`](Self::motors) and [`stop`](Self::stop).
     ///
     /// # Errors
@@ -186,7 +195,8 @@ impl PrimitiveDriver {
         let odometer = Odometer::new(random());
         let wheels = Wheels::new(left, right, self.wheels, odometer.clone());
         let wheels = wheels.with_interlock(interlock.clone());
-        let pilot = Pilot::new(wheels, Frame::default());
+        let fence = Fence::located_elsewhere(self.fence);
+        let pilot = Pilot::new(wheels, Frame::default()).with_fence(fence.clone());
         let policy = MotionPolicy::Expire(self.silence);
         let vehicle = Vehicle::new(pilot).motion_policy(policy);
         let board = StageBoard::default();
@@ -198,8 +208,11 @@ impl PrimitiveDriver {
             .offer(board.service())
             .offer(Handoff::new())
             .live_on(slot.port)?;
+        let poses = Sense::pose(&component, Self::HZ)?;
+        let zones = Sense::zones(&component)?;
         let driver = Running {
             component,
+            fence: fence.clone(),
             vehicle,
             odometer,
             board,
@@ -210,6 +223,8 @@ impl PrimitiveDriver {
         let component = driver.component.clone();
         tokio::select! {
             end = driver.watch() => end,
+            end = poses.locate(&fence) => end,
+            end = zones.enclose(&fence) => end,
             end = shut_down(&component) => end,
         }
     }
@@ -232,6 +247,7 @@ async fn pressed(stop: &mut Option<StopLine>) {
 struct Running {
     component: Component,
     vehicle: Vehicle,
+    fence: Fence,
     odometer: Odometer,
     board: StageBoard,
     interlock: Interlock,
@@ -328,7 +344,8 @@ impl Running {
             return told(StageState::Idle, reason);
         }
         match self.vehicle.is_under_way() {
-            true => told(StageState::Active, String::new()),
+            // Not blocked: the driver above it would stand down, but it may steer away.
+            true => told(StageState::Active, self.fence.held().unwrap_or_default()),
             false => told(StageState::Idle, String::new()),
         }
     }

@@ -10,7 +10,7 @@ use super::drivers::{
 use super::{Part, PartError, Slot};
 use crate::ground::StageBoard;
 use crate::mobility::Vehicle;
-use crate::motion::{Effort, Frame, Limits, Motion, Pilot, Throttle};
+use crate::motion::{Effort, Fence, FenceConfig, Frame, Limits, Motion, Pilot, Throttle};
 use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
 
 /// Holds the commanded speed and heading by sending efforts to the primitive driver, based on the
@@ -26,6 +26,8 @@ pub struct VectorDriver {
     pub silence: Duration,
     /// Maximum age of pose and velocity. The vehicle stops when they are older.
     pub stale: Duration,
+    /// Dimensions and delays by which it keeps to the operating zones.
+    pub fence: FenceConfig,
     /// The authority used to control the primitive driver.
     pub authority: u8,
     /// Control timeout in seconds unless the client renews control; 0 disables it.
@@ -38,6 +40,7 @@ impl Default for VectorDriver {
             limits: Limits::default(),
             silence: Duration::from_secs(1),
             stale: Duration::from_millis(600),
+            fence: FenceConfig::default(),
             authority: 100,
             control_timeout: 3,
         }
@@ -56,8 +59,9 @@ impl Part for VectorDriver {
             stale: self.stale,
             by_heading: false,
         });
+        let fence = Fence::new(self.fence);
         let pilot = Pilot::new(remote_platform.clone(), Frame::default());
-        let vehicle = Vehicle::new(pilot);
+        let vehicle = Vehicle::new(pilot.with_fence(fence.clone()));
         let board = StageBoard::default();
         let component = slot
             .component("Local Vector Driver")
@@ -66,12 +70,14 @@ impl Part for VectorDriver {
             .offer(board.service())
             .live_on(slot.port)?;
         let poses = Sense::pose(&component, Self::HZ)?;
+        let zones = Sense::zones(&component)?;
         let velocities = Sense::velocity(&component, Self::HZ)?;
         let own = component.clone();
         let next = Next {
             component,
             vehicle,
             remote_platform: remote_platform.clone(),
+            fence: fence.clone(),
             board,
             language: Efforts(Throttle::new(self.limits)),
             authority: self.authority,
@@ -81,6 +87,7 @@ impl Part for VectorDriver {
         tokio::select! {
             end = poses.steer(&remote_platform) => end,
             end = velocities.steer(&remote_platform) => end,
+            end = zones.enclose(&fence) => end,
             end = next.run() => end,
             end = shut_down(&own) => end,
         }

@@ -5,16 +5,20 @@
 )]
 
 use std::convert::Infallible;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use tokio::time::timeout;
 
 use super::drivers::{Freshness, Sense};
 use super::{Part, PartError, Slot};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
-use crate::mobility::Vehicle;
-use crate::motion::{Frame, Motion, Observed, Pilot, Speedometer, Velocity, WheelCount};
-use jaus::messages::mobility::{QueryVelocityState, QueryVelocityStateExt};
+use crate::mobility::both_versions;
+use crate::motion::{Speedometer, Velocity, WheelCount};
+use jaus::component::Handlers;
+use jaus::messages::mobility::{
+    QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, ReportVelocityStateExt,
+    velocity_state_sensor,
+};
 
 /// Computes the velocity of the vehicle from the travel of its wheels.
 ///
@@ -39,12 +43,14 @@ impl Default for VelocitySensor {
 
 impl Part for VelocitySensor {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
-        let observed = Observed::new(moving(unknown(), None));
-        let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
-            .with_clock(super::host_clock());
+        let [newest, older] = both_versions(velocity_state_sensor::V1_1);
+        let sensor = Handlers::new(newest)
+            .and_version(older)
+            .publishes::<QueryVelocityState>()
+            .publishes::<QueryVelocityStateExt>();
         let component = slot
             .component("Velocity State Sensor")
-            .offer(vehicle.velocity_state_sensor())
+            .offer(sensor)
             .live_on(slot.port)?;
         let query = QueryWheelOdometry {};
         let mut counts: Sense<ReportWheelOdometry> = Sense::of(
@@ -56,7 +62,7 @@ impl Part for VelocitySensor {
         )?;
         let mut speedometer = Speedometer::default();
         let mut freshness = Freshness::default();
-        let mut sampled_at = None;
+        let mut sampled_at = SystemTime::now();
         loop {
             let heard = timeout(self.silence, counts.next()).await;
             let now = Instant::now();
@@ -68,28 +74,22 @@ impl Part for VelocitySensor {
                     let count = WheelCount::from(&report?);
                     let read_at = Duration::from_millis(count.time_ms.into());
                     if let Some(at) = freshness.handle(now, Some(read_at)) {
-                        sampled_at = Some(at);
+                        sampled_at = SystemTime::now() - now.saturating_duration_since(at);
                     }
                     speedometer.handle_count(count)
                 }
                 Err(_) => {
                     speedometer = Speedometer::default();
-                    sampled_at = Some(now);
+                    sampled_at = SystemTime::now();
                     None
                 }
             };
-            observed.set(moving(velocity.unwrap_or_else(unknown), sampled_at));
-            component.changed::<QueryVelocityState>().await;
-            component.changed::<QueryVelocityStateExt>().await;
+            let velocity = velocity.unwrap_or_else(unknown);
+            let report = ReportVelocityState::from(velocity);
+            component.publish(report, sampled_at).await?;
+            let report = ReportVelocityStateExt::from(velocity);
+            component.publish(report, sampled_at).await?;
         }
-    }
-}
-
-fn moving(velocity: Velocity, sampled_at: Option<Instant>) -> Motion {
-    Motion {
-        velocity,
-        sampled_at,
-        ..Motion::default()
     }
 }
 

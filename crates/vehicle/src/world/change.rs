@@ -5,6 +5,8 @@ use bytes::Bytes;
 use super::object::{Object, ObjectId};
 use super::raster::{MapId, Raster, Window};
 use super::selection::Selection;
+use super::zone::Outline;
+use crate::zones::ZoneId;
 
 /// A requested change.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +24,10 @@ pub enum Change {
     SetCells(MapId, Window, Bytes),
     /// Remove a map.
     RemoveRaster(MapId),
+    /// Add or replace zones; all or none. Their outlines must be valid.
+    SetZones(Vec<Outline>),
+    /// Remove zones. Those that do not exist do not matter.
+    RemoveZones(Vec<ZoneId>),
 }
 
 /// How to change the description of a feature class.
@@ -48,6 +54,8 @@ pub enum Done {
     Described,
     /// A map was added, changed or removed, with its current or last revision.
     Raster(MapId, u32),
+    /// The zones have changed.
+    Zones,
 }
 
 /// Why a change was refused.

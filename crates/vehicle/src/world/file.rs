@@ -18,16 +18,25 @@ use super::object::{Object, ObjectId};
 use super::raster::{MapId, Raster, Window};
 use super::record;
 use super::tiles::{self, TileId};
+use super::zone::Outline;
+use crate::zones::ZoneId;
 
 /// Format version of the file. A newer program reads older formats or rejects them explicitly.
-const FORMAT: u64 = 1;
+const FORMAT: u64 = 2;
+/// Format of a file without zones. Programs that know no zones read it.
+const FORMAT_WITHOUT_ZONES: u64 = 1;
 /// Size of the page cache in octets. A map of 1024 x 1024 cells fits.
 const CACHE: usize = 4 << 20;
+
+/// Key of the format version in the table of numbers.
+const FORMAT_KEY: &str = "format";
 
 const NUMBERS: TableDefinition<'_, &str, u64> = TableDefinition::new("numbers");
 const OBJECTS: TableDefinition<'_, u32, &[u8]> = TableDefinition::new("objects");
 const CLASSES: TableDefinition<'_, u16, &str> = TableDefinition::new("classes");
 const RASTERS: TableDefinition<'_, u16, &[u8]> = TableDefinition::new("rasters");
+/// Absent from a file in which no zone was ever set.
+const ZONES: TableDefinition<'_, u16, &[u8]> = TableDefinition::new("zones");
 /// Key: map, row and column of the tile.
 const TILES: TableDefinition<'_, (u16, u16, u16), &[u8]> = TableDefinition::new("tiles");
 
@@ -128,6 +137,7 @@ pub(super) struct Loaded {
     pub(super) objects: Collection,
     pub(super) classes: Vec<(u16, String)>,
     pub(super) rasters: Vec<(MapId, Raster)>,
+    pub(super) zones: Vec<(ZoneId, Outline)>,
     pub(super) last_object: u32,
     pub(super) last_map: u16,
 }
@@ -207,24 +217,24 @@ impl File {
 
     /// The format version of the file. Initialises a new file.
     fn format(&self) -> Result<u64, KeepError> {
-        const KEY: &str = "format";
         let reading = self.database.begin_read()?;
         match reading.open_table(NUMBERS) {
-            Ok(numbers) => match numbers.get(KEY)? {
+            Ok(numbers) => match numbers.get(FORMAT_KEY)? {
                 Some(format) => Ok(format.value()),
                 None => Err(KeepError::record(&"its format is missing")),
             },
             Err(TableError::TableDoesNotExist(_)) => {
                 let writing = self.database.begin_write()?;
                 {
-                    writing.open_table(NUMBERS)?.insert(KEY, FORMAT)?;
+                    let mut numbers = writing.open_table(NUMBERS)?;
+                    numbers.insert(FORMAT_KEY, FORMAT_WITHOUT_ZONES)?;
                     writing.open_table(OBJECTS)?;
                     writing.open_table(CLASSES)?;
                     writing.open_table(RASTERS)?;
                     writing.open_table(TILES)?;
                 }
                 writing.commit()?;
-                Ok(FORMAT)
+                Ok(FORMAT_WITHOUT_ZONES)
             }
             Err(error) => Err(error.into()),
         }
@@ -251,6 +261,11 @@ impl File {
                 record::read_raster(octets.value()).map_err(|error| KeepError::record(&error))?;
             rasters.push((MapId(id.value()), raster));
         }
+        let zones = match reading.open_table(ZONES) {
+            Ok(table) => load_zones(&table)?,
+            Err(TableError::TableDoesNotExist(_)) => Vec::new(),
+            Err(error) => return Err(error.into()),
+        };
         let numbers = reading.open_table(NUMBERS)?;
         let last = |counter: Counter| -> Result<u64, KeepError> {
             Ok(numbers.get(counter.key())?.map_or(0, |it| it.value()))
@@ -259,6 +274,7 @@ impl File {
             objects: Collection::new(objects.into_iter()),
             classes,
             rasters,
+            zones,
             last_object: last(Counter::LastObject)? as u32,
             last_map: last(Counter::LastMap)? as u16,
         })
@@ -320,6 +336,21 @@ impl Writing {
         Ok(())
     }
 
+    /// Sets a zone. The file then has the format with zones, so that no program drives without them.
+    pub(super) fn put_zone(&self, zone: &Outline) -> Result<(), KeepError> {
+        let octets = record::write_zone(zone).map_err(|error| KeepError::record(&error))?;
+        let mut zones = self.transaction.open_table(ZONES)?;
+        zones.insert(zone.id.number(), &octets[..])?;
+        let mut numbers = self.transaction.open_table(NUMBERS)?;
+        numbers.insert(FORMAT_KEY, FORMAT)?;
+        Ok(())
+    }
+
+    pub(super) fn remove_zone(&self, id: ZoneId) -> Result<(), KeepError> {
+        self.transaction.open_table(ZONES)?.remove(id.number())?;
+        Ok(())
+    }
+
     /// Removes a map with all its tiles.
     pub(super) fn remove_raster(&self, id: MapId) -> Result<(), KeepError> {
         self.transaction.open_table(RASTERS)?.remove(id.0)?;
@@ -371,6 +402,20 @@ fn builder() -> Builder {
     builder.set_cache_size(CACHE);
     builder.set_check_integrity_on_open(true);
     builder
+}
+
+fn load_zones(
+    table: &impl ReadableTable<u16, &'static [u8]>,
+) -> Result<Vec<(ZoneId, Outline)>, KeepError> {
+    let mut zones = Vec::new();
+    for entry in table.iter()? {
+        let (number, octets) = entry?;
+        let id = ZoneId::of(number.value());
+        let id = id.ok_or_else(|| KeepError::record(&"a zone has the number 0"))?;
+        let zone = record::read_zone(id, octets.value());
+        zones.push((id, zone.map_err(|error| KeepError::record(&error))?));
+    }
+    Ok(zones)
 }
 
 fn whole(tile: &[u8]) -> Result<&[u8], KeepError> {

@@ -1,4 +1,4 @@
-//! World model: objects on the globe and raster maps, stored in a file that survives power cuts.
+//! World model: objects on the globe, raster maps and operating zones, stored in a file that survives power cuts.
 //!
 //! A [`World`] is opened from a file and changed by [`Change`]s, several at a time if several wait.
 //! A change is on disk when [`World::apply`] returns. If the power fails before that, the change
@@ -12,6 +12,7 @@
 //! | `collection` | all objects, with a spatial index |
 //! | `raster` | maps of cells, their windows and tiles |
 //! | `traversability` | the cells of a map as objects |
+//! | `zone` | outlines of operating zones and keep-out zones |
 //! | `import` | maps from images and text |
 //! | `file` | the file and its format |
 
@@ -29,6 +30,7 @@ mod shape;
 mod tests;
 mod tiles;
 mod traversability;
+mod zone;
 
 pub use change::{Change, Describe, Done, Refusal};
 pub use collection::Collection;
@@ -39,6 +41,7 @@ pub use object::{Attribute, FeatureClass, Geometry, Object, ObjectId, Place};
 pub use raster::{MapId, Raster, Window};
 pub use selection::{Region, Selection};
 pub use traversability::as_objects;
+pub use zone::{Outline, OutlineError};
 
 /// For tests, and for stores on other backends than a file.
 pub use redb::StorageBackend;

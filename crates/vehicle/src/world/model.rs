@@ -1,4 +1,4 @@
-//! The world: objects and maps, held in memory for queries and in the file for durability.
+//! The world: objects, maps and zones, held in memory for queries and in the file for durability.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,8 +12,10 @@ use super::file::{Counter, File, KeepError, Loaded, OpenError, Writing};
 use super::object::{Object, ObjectId};
 use super::raster::{MapId, Raster, Window};
 use super::selection::Selection;
+use super::zone::Outline;
+use crate::zones::ZoneId;
 
-/// Objects, feature classes and maps.
+/// Objects, feature classes, maps and zones.
 ///
 /// Objects and descriptions are in memory and take at most some tens of megabytes. Cells remain in
 /// the file and are read on demand.
@@ -23,6 +25,7 @@ pub struct World {
     objects: Collection,
     classes: BTreeMap<u16, String>,
     rasters: BTreeMap<MapId, Raster>,
+    zones: BTreeMap<ZoneId, Outline>,
     last_object: u32,
     last_map: u16,
     failed: bool,
@@ -37,6 +40,12 @@ impl World {
     pub const MOST_DESCRIPTION: usize = u16::MAX as usize;
     /// Maximum number of feature classes with a description.
     pub const MOST_CLASSES: usize = 256;
+
+    /// Maximum number of keep-out zones: the count in messages is one octet.
+    pub const MOST_KEEP_OUT_ZONES: usize = u8::MAX as usize;
+    /// Maximum number of vertices of all zones together. Drivers measure their distance from all of
+    /// them many times a second.
+    pub const MOST_ZONE_VERTICES: usize = 4096;
 
     /// Opens the file of a world, or creates an empty one. Recovers a file that was being written
     /// during a power cut.
@@ -61,6 +70,7 @@ impl World {
             objects: loaded.objects,
             classes: loaded.classes.into_iter().collect(),
             rasters: loaded.rasters.into_iter().collect(),
+            zones: loaded.zones.into_iter().collect(),
             last_object: loaded.last_object,
             last_map: loaded.last_map,
             failed: false,
@@ -89,6 +99,12 @@ impl World {
     #[must_use]
     pub const fn rasters(&self) -> &BTreeMap<MapId, Raster> {
         &self.rasters
+    }
+
+    /// The zones by number.
+    #[must_use]
+    pub const fn zones(&self) -> &BTreeMap<ZoneId, Outline> {
+        &self.zones
     }
 
     /// The cells of a window, row by row from the south.
@@ -152,6 +168,8 @@ impl World {
             Change::AddRaster(raster, cells) => self.add_raster(raster, &cells, writing),
             Change::SetCells(map, window, cells) => self.set_cells(map, window, &cells, writing),
             Change::RemoveRaster(map) => self.remove_raster(map, writing),
+            Change::SetZones(zones) => self.set_zones(&zones, writing),
+            Change::RemoveZones(ids) => self.remove_zones(&ids, writing).map(Ok),
         }
     }
 
@@ -311,6 +329,38 @@ impl World {
         writing.remove_raster(map)?;
         self.rasters.remove(&map);
         Ok(Ok(Done::Raster(map, revision)))
+    }
+
+    fn set_zones(
+        &mut self,
+        zones: &[Outline],
+        writing: &Writing,
+    ) -> Result<Result<Done, Refusal>, KeepError> {
+        let mut all = self.zones.clone();
+        all.extend(zones.iter().map(|zone| (zone.id, zone.clone())));
+        let keep_out = all.keys().filter(|&&id| id != ZoneId::Operating).count();
+        if keep_out > Self::MOST_KEEP_OUT_ZONES {
+            let most = "at most 255 keep-out zones; delete some first";
+            return Ok(Err(Refusal::Full(most)));
+        }
+        let vertices: usize = all.values().map(|zone| zone.vertices.len()).sum();
+        if vertices > Self::MOST_ZONE_VERTICES {
+            let most = "all zones together have at most 4096 vertices; delete some first";
+            return Ok(Err(Refusal::Full(most)));
+        }
+        for zone in zones {
+            writing.put_zone(zone)?;
+        }
+        self.zones = all;
+        Ok(Ok(Done::Zones))
+    }
+
+    fn remove_zones(&mut self, ids: &[ZoneId], writing: &Writing) -> Result<Done, KeepError> {
+        for id in ids {
+            writing.remove_zone(*id)?;
+            self.zones.remove(id);
+        }
+        Ok(Done::Zones)
     }
 
     fn raster(&self, map: MapId) -> Result<&Raster, Refusal> {

@@ -5,6 +5,8 @@ use deku::prelude::*;
 
 use super::object::{FeatureClass, Geometry, Object, Place};
 use super::raster::Raster;
+use super::zone::Outline;
+use crate::zones::ZoneId;
 
 #[derive(DekuRead, DekuWrite)]
 #[deku(endian = "little")]
@@ -32,6 +34,38 @@ struct RasterRecord {
     y: f64,
     fill: u8,
     revision: u32,
+}
+
+#[derive(DekuRead, DekuWrite)]
+#[deku(endian = "little")]
+struct ZoneRecord {
+    /// 1 for latitude and longitude.
+    on_globe: u8,
+    coordinate_count: u16,
+    #[deku(count = "coordinate_count")]
+    coordinates: Vec<f64>,
+}
+
+/// Encodes a valid zone, without its number.
+pub(super) fn write_zone(zone: &Outline) -> Result<Vec<u8>, DekuError> {
+    let coordinates: Vec<_> = zone.vertices.iter().flat_map(|&(a, b)| [a, b]).collect();
+    let record = ZoneRecord {
+        on_globe: zone.on_globe.into(),
+        coordinate_count: coordinates.len() as u16,
+        coordinates,
+    };
+    record.to_bytes()
+}
+
+/// Decodes the zone with this number.
+pub(super) fn read_zone(id: ZoneId, octets: &[u8]) -> Result<Outline, DekuError> {
+    let record = ZoneRecord::try_from(octets)?;
+    let vertices = record.coordinates.chunks_exact(2);
+    Ok(Outline {
+        id,
+        on_globe: record.on_globe != 0,
+        vertices: vertices.map(|pair| (pair[0], pair[1])).collect(),
+    })
 }
 
 /// Encodes a valid object.

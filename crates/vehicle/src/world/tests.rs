@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use bytes::Bytes;
 
 use super::*;
+use crate::zones::ZoneId;
 
 /// A test directory, deleted afterwards.
 struct Directory(PathBuf);
@@ -144,6 +145,32 @@ fn everything_is_there_when_the_file_is_opened_again() {
     let all = world.cells(MapId(1), Window::default()).unwrap().unwrap();
     assert_eq!(all.len(), 40 * 70);
     assert_eq!(all.iter().filter(|&&cell| cell != 7).count(), 6);
+}
+
+#[test]
+fn zones_are_there_after_a_restart_and_a_file_from_before_them_opens() {
+    let directory = Directory::new("zones");
+    let mut world = World::open(&directory.file()).unwrap();
+    let outline = |id, on_globe| Outline {
+        id,
+        on_globe,
+        vertices: vec![(0.5, 1.0), (-2.0, 1.0), (0.5, 3.25)],
+    };
+    let zones = [
+        outline(ZoneId::Operating, true),
+        outline(ZoneId::KeepOut(2), false),
+        outline(ZoneId::KeepOut(65535), false),
+    ];
+    drop(world);
+    world = World::open(&directory.file()).unwrap();
+    assert!(world.zones().is_empty());
+    change(&mut world, Change::SetZones(zones.to_vec())).unwrap();
+    let removed = Change::RemoveZones(vec![ZoneId::KeepOut(2), ZoneId::KeepOut(3)]);
+    change(&mut world, removed).unwrap();
+    drop(world);
+    let world = World::open(&directory.file()).unwrap();
+    let kept: Vec<_> = world.zones().values().collect();
+    assert_eq!(kept, [&zones[0], &zones[2]]);
 }
 
 #[test]

@@ -55,6 +55,23 @@ fn a_conflict_is_settled_for_two_seconds() {
 }
 
 #[test]
+fn while_both_paths_may_answer_only_the_known_one_is_verified_at_once() {
+    let (stays, undecided) = (Some(Some(here())), Some(None));
+    for (first, second, route) in [
+        ((here(), 7), (far(), 8), RouteState::Verified),
+        ((far(), 8), (here(), 7), RouteState::Unverified),
+    ] {
+        let mut rig = Rig::new();
+        rig.hear_frame(&frame(PEER, 1), here());
+        rig.challenge(probe(here(), 7, false), Some(probe(far(), 8, false)));
+        assert_eq!(rig.answer(first.0, first.1), undecided);
+        assert_eq!(rig.peer().peer.route, route);
+        assert_eq!(rig.answer(second.0, second.1), stays);
+        assert_eq!(rig.peer().peer.route, RouteState::Verified);
+    }
+}
+
+#[test]
 fn a_verified_move_is_followed_by_the_next_at_once() {
     let mut rig = Rig::new();
     rig.hear_frame(&frame(PEER, 1), here());

@@ -2,6 +2,7 @@
 
 mod bounds;
 mod commands;
+mod published;
 
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;

@@ -226,7 +226,7 @@ impl Encounter<'_> {
     /// Runs continuous queries and, in turn, every scenario that did not fail on its own.
     fn mix(&self, side: Side, act: &str) -> Result<(), String> {
         let end =
-            Instant::now() + Duration::from_secs(crate::suite::number("JAUS_INTEROP_MIXED", 10));
+            Instant::now() + Duration::from_secs(crate::suite::number("JAUS_INTEROP_MIXED", 3));
         let most = crate::suite::number("JAUS_INTEROP_MIXED_OCTETS", usize::MAX as u64) as usize;
         let (actor, answerer) = (self.actor.party, self.answerer.party);
         let can = |scenario: &Scenario| {

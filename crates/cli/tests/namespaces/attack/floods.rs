@@ -1,11 +1,25 @@
 //! Floods: garbage, fragments, answers, reports.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use super::scene::{GAP, MEMORY, Scene, figures, on_scene, on_testbed};
 use crate::testbed::Host;
+
+/// Held by a flood beside a client that asks for no acknowledgements, ...
+pub(crate) static UNANSWERED: Mutex<()> = Mutex::new(());
+/// ... and by a flood among acknowledged messages.
+static ACKNOWLEDGED: Mutex<()> = Mutex::new(());
+
+/// Waits for other floods of the same kind: many at once would only show how few processors there
+/// are.
+pub(crate) fn alone(floods: &Mutex<()>) -> MutexGuard<'_, ()> {
+    floods.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// In a flood the client loses no more than an echo socket does, and the vehicle stays within the
 /// memory limit.
 fn a_flood_costs_nothing(attack: &str) {
+    let _alone = alone(&UNANSWERED);
     on_testbed(|bed| {
         let echo = bed.start(Host::Vehicle, "echo", "");
         echo.says("echoes");
@@ -42,6 +56,7 @@ fn reports_of_many_services_stay_within_the_memory_limit() {
 /// Two nodes exchange acknowledged messages, one of them on the attacked host. Each message arrives
 /// once and complete, and the sender receives its acknowledgement.
 fn acknowledged_messages_arrive(attack: &str) {
+    let _alone = alone(&ACKNOWLEDGED);
     on_testbed(|bed| {
         let ids = ["101.1.1", "102.1.1"];
         let talkers = [

@@ -3,6 +3,7 @@
 use std::process::Stdio;
 
 use super::attacks::BESIDE;
+use super::floods::{UNANSWERED, alone};
 use super::scene::{MEMORY, memory, on_testbed};
 use crate::gateway::Gateway;
 use crate::testbed::{Host, Testbed};
@@ -25,6 +26,7 @@ fn ra_vehicle(bed: &Testbed) -> Process {
 
 #[test]
 fn an_ra_vehicle_is_watched_and_driven_in_a_flood_of_ra_messages() {
+    let _alone = alone(&UNANSWERED);
     on_testbed(|bed| {
         let running = gateway(bed);
         let vehicle = ra_vehicle(bed);

@@ -17,6 +17,7 @@ pub(super) const SETTINGS: Settings = Settings {
     settling: SECOND,
     stall: Duration::from_secs(30),
     speed: 1.0,
+    detours: 2,
     lost_link: LostLink::Stop,
 };
 

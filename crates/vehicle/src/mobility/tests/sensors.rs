@@ -1,6 +1,7 @@
 //! Reports and settings of the sensors, and the conditions under which effort moves the vehicle.
 
 use super::*;
+use jaus::messages::mobility::report_velocity_state_ext::VelocityVar;
 use jaus::messages::mobility::{
     QueryAccelerationState, QueryGeomagneticProperty, QueryGlobalPose, QueryLocalPose,
     QueryLocalPoseExt, QueryVelocityState, QueryVelocityStateExt, QueryWrenchEffort,
@@ -186,11 +187,15 @@ fn effort_moves_the_vehicle_and_all_sensors_agree_on_it() {
     let speed = velocity(&mut rig).velocity_x_m_per_s().unwrap();
     assert!(speed > 1.5, "{speed}");
     assert!(local_pose(&mut rig).x_m().unwrap() > 3.0);
-    let query = QueryVelocityStateExt {
-        velocity_var_presence_vector: 7,
-        report_velocity_state_ext_rec_presence_vector: 0xFFFF,
-    };
+    let query = QueryVelocityStateExt::none()
+        .with_velocity_x()
+        .with_speed_over_ground();
     let report: ReportVelocityStateExt = rig.ask(&query).unwrap();
+    let VelocityVar::VelocityVehicleXyzRec(along) = &report.velocity_var else {
+        panic!("not along the vehicle's axes: {report:?}");
+    };
+    assert!(along.velocity_x.is_some() && along.velocity_y.is_none());
+    assert_eq!(report.report_velocity_state_ext_rec.yaw_rate, None);
     let over_ground = report
         .report_velocity_state_ext_rec
         .speed_over_ground

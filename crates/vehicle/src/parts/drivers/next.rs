@@ -19,7 +19,7 @@ use super::{FaultMonitor, Watchman};
 use crate::ground::{StageBoard, StageReport, StageState};
 use crate::messages::ground::QueryStage;
 use crate::mobility::Vehicle;
-use crate::motion::Motion;
+use crate::motion::{Fence, Motion};
 use crate::parts::PartError;
 use jaus::address::JausId;
 use jaus::codec::Message;
@@ -50,6 +50,7 @@ pub(in crate::parts) struct Next<L> {
     pub(in crate::parts) component: Component,
     pub(in crate::parts) vehicle: Vehicle,
     pub(in crate::parts) remote_platform: RemotePlatform,
+    pub(in crate::parts) fence: Fence,
     pub(in crate::parts) board: StageBoard,
     pub(in crate::parts) language: L,
     /// The authority used to control the next driver.
@@ -213,12 +214,11 @@ impl<L: Language> Next<L> {
         match plan {
             Plan::Go(order, motion) => {
                 self.check_sensors(None).await;
-                let (state, why) = match is_silent {
-                    true => (
-                        StageState::Blocked,
-                        format!("{peer} does not acknowledge commands"),
-                    ),
-                    false => (StageState::Active, String::new()),
+                let silence = || format!("{peer} does not acknowledge commands");
+                let blocked = is_silent.then(silence).or_else(|| self.fence.held());
+                let (state, why) = match blocked {
+                    Some(why) => (StageState::Blocked, why),
+                    None => (StageState::Active, String::new()),
                 };
                 self.tell(state, Some(peer), why).await;
                 self.language.command(now, order, &motion)

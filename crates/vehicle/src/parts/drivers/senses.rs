@@ -6,13 +6,17 @@ use std::convert::Infallible;
 use std::time::Instant;
 
 use super::RemotePlatform;
-use super::freshness::time_in_month;
+use super::freshness::{Freshness, time_in_month};
+use crate::ground::reported_zones;
+use crate::motion::{Fence, Pose};
 use crate::parts::PartError;
+use crate::zones::Zones;
 use jaus::address::JausId;
 use jaus::codec::{Message, Query};
 use jaus::component::{Audience, Component, GroupSubscription, GroupUpdate, When};
 use jaus::messages::mobility::{
-    QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState, local_pose_sensor,
+    QueryLocalOperatingZone, QueryLocalPose, QueryVelocityState, ReportLocalOperatingZone,
+    ReportLocalPose, ReportVelocityState, local_operating_zone, local_pose_sensor,
     velocity_state_sensor,
 };
 
@@ -110,6 +114,63 @@ impl Sense<ReportLocalPose> {
             let place = report.x_m().zip(report.y_m()).zip(report.yaw_rad());
             let stamp = report.time_stamp.and_then(time_in_month);
             remote_platform.handle_pose(now, stamp, place.map(|((x, y), yaw)| (x, y, yaw)));
+        }
+    }
+}
+
+impl Sense<ReportLocalPose> {
+    /// Passes all reports to a fence whose platform does not know its pose in the zones' frame.
+    pub(in crate::parts) async fn locate(mut self, fence: &Fence) -> Result<Infallible, PartError> {
+        let mut freshness = Freshness::default();
+        loop {
+            let report = self.next().await?;
+            let place = report.x_m().zip(report.y_m()).zip(report.yaw_rad());
+            let stamp = report.time_stamp.and_then(time_in_month);
+            if self.take_loss() || place.is_none() {
+                freshness.forget();
+                fence.handle_pose(None);
+            }
+            let sampled_at = freshness.handle(Instant::now(), stamp);
+            if let Some((((x, y), yaw), sampled_at)) = place.zip(sampled_at) {
+                let pose = Pose {
+                    yaw,
+                    ..Pose::at(x, y)
+                };
+                fence.handle_pose(Some((pose, sampled_at)));
+            }
+        }
+    }
+}
+
+impl Sense<ReportLocalOperatingZone> {
+    /// Report rate, in hertz. A new zone takes effect within its period.
+    const HZ: f64 = 2.0;
+
+    /// The zones of the vehicle.
+    pub(in crate::parts) fn zones(component: &Component) -> Result<Self, PartError> {
+        let urn = local_operating_zone::URN;
+        let query = QueryLocalOperatingZone::default();
+        Self::of(component, urn, &query, Self::HZ, "operating zones")
+    }
+
+    /// Waits for the next valid zones. While their store is lost the last ones hold, and invalid
+    /// zones leave the previous ones in force.
+    pub(in crate::parts) async fn next_zones(&mut self) -> Result<Zones, PartError> {
+        loop {
+            match reported_zones(&self.next().await?) {
+                Ok(zones) => return Ok(zones),
+                Err(why) => tracing::error!("unusable operating zones, the last ones hold: {why}"),
+            }
+        }
+    }
+
+    /// Passes all zones to a fence.
+    pub(in crate::parts) async fn enclose(
+        mut self,
+        fence: &Fence,
+    ) -> Result<Infallible, PartError> {
+        loop {
+            fence.set_zones(self.next_zones().await?);
         }
     }
 }

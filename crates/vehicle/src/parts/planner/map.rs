@@ -1,15 +1,18 @@
-//! Fetches the map from the knowledge store, and the pose from the pose sensor.
+//! Fetches the map and the zones from the knowledge store, and the pose from the pose sensor.
 
 use std::sync::Arc;
 
 use super::{find_soon, hand_over::in_words};
-use crate::ground::{RasterEdition, fetch_cells};
+use crate::ground::{RasterEdition, fetch_cells, reported_zones};
 use crate::messages::ground::report_raster_maps::MapRec;
 use crate::messages::ground::{QueryRasterMaps, raster_maps};
 use crate::mission::{Point, Terrain};
+use crate::zones::Zones;
 use jaus::address::JausId;
-use jaus::component::Component;
-use jaus::messages::mobility::{QueryLocalPose, local_pose_sensor};
+use jaus::component::{Audience, Component};
+use jaus::messages::mobility::{
+    QueryLocalOperatingZone, QueryLocalPose, local_operating_zone, local_pose_sensor,
+};
 
 /// Number of attempts to fetch a map that changes during the transfer.
 const TRIES: u32 = 3;
@@ -98,6 +101,22 @@ fn choose(maps: Vec<MapRec>, name: &str, store: JausId) -> Result<MapRec, String
             names.join(", ")
         )),
     }
+}
+
+/// Fetches the operating zones from the first component of the subsystem that has them. `None` if
+/// there is no such component.
+pub(super) async fn fetch_zones(component: &Component) -> Result<Option<Zones>, String> {
+    let providers = Audience::providers(local_operating_zone::URN);
+    let providers = providers.in_subsystem(component.id().subsystem());
+    let Some(&store) = component.members(providers).first() else {
+        return Ok(None);
+    };
+    let query = QueryLocalOperatingZone::default();
+    let report = component.query(store, &query).await.map_err(in_words)?;
+    let zones = reported_zones(&report);
+    zones
+        .map(Some)
+        .map_err(|why| format!("{store} has unusable operating zones: {why}"))
 }
 
 /// Fetches the vehicle's position.

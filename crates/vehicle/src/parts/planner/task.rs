@@ -14,12 +14,15 @@ use tokio::sync::{Notify, mpsc};
 
 use super::chain::{self, News};
 use super::map::{self, Map};
+use super::survey::{self, Survey, UnderWay};
 use super::{PATIENCE, Planner, find_soon, hand_over};
 use crate::ground::Missions;
 use crate::messages::ground::{QueryMission, QueryPlannedPath, QueryStage, ReportStage, stage};
 use crate::mission::{
-    self, Action, Destination, Link, LinkState, Mission, NotPlanned, Path, Run, Stage,
+    self, Action, Destination, Link, LinkState, Mission, NotPlanned, Path, Point, Run, Stage,
+    Terrain,
 };
+use crate::zones::Zones;
 use jaus::address::JausId;
 use jaus::component::{
     Component, Retake, Session, SessionLoss, SessionSettings, SessionState, State,
@@ -33,11 +36,12 @@ type Job = Pin<Box<dyn Future<Output = Done> + Send>>;
 
 /// Result of a job.
 enum Done {
-    Map(Run, Result<Map, String>),
+    Map(Run, Result<(Map, Option<Zones>), String>),
     Planned(Run, Result<Path, NotPlanned>),
     HandedOver(Run, Result<(Session, Vec<(Link, LinkState)>), String>),
     /// Whether the client that lost control is alive.
     Checked(Run, bool),
+    Surveyed(Run, Survey),
 }
 
 /// State of the planner's task.
@@ -47,9 +51,15 @@ pub(super) struct PlannerTask<'a> {
     missions: Missions,
     wake: &'a Notify,
     map: Option<Map>,
+    zones: Arc<Zones>,
     /// The session with the path segment driver during a mission.
     session: Option<Session>,
     job: Option<Job>,
+    /// The vehicle's position.
+    here: Option<Point>,
+    /// The survey under way, and when the next one begins.
+    survey: Option<Job>,
+    survey_at: Option<Instant>,
     /// The drivers, indexed by link.
     peers: [Option<JausId>; 3],
     controllers: [Option<JausId>; 3],
@@ -72,8 +82,12 @@ impl<'a> PlannerTask<'a> {
             missions,
             wake,
             map: None,
+            zones: Arc::default(),
             session: None,
             job: None,
+            here: None,
+            survey: None,
+            survey_at: None,
             peers: [None; 3],
             controllers: [None; 3],
             told: None,
@@ -84,12 +98,21 @@ impl<'a> PlannerTask<'a> {
     pub(super) async fn work(mut self, mut news: mpsc::Receiver<News>) {
         loop {
             self.act().await;
+            self.schedule_survey();
             let (timeout, _) = self.missions.tell(|mission| mission.poll_timeout());
             tokio::select! {
                 () = self.wake.notified() => {}
                 done = working(&mut self.job) => {
                     self.job = None;
                     self.handle(done).await;
+                }
+                done = working(&mut self.survey) => {
+                    self.survey = None;
+                    self.handle(done).await;
+                }
+                () = until(self.survey_at) => {
+                    self.survey_at = None;
+                    self.survey = self.survey();
                 }
                 news = news.recv() => match news {
                     Some(news) => self.hear(news).await,
@@ -174,13 +197,20 @@ impl<'a> PlannerTask<'a> {
     fn fetch_map(&self, run: Run) -> Job {
         let (component, name) = (self.component.clone(), self.settings.map.clone());
         let known = self.map.clone();
-        Box::pin(async move { Done::Map(run, map::fetch(&component, &name, known).await) })
+        Box::pin(async move {
+            let fetched = async {
+                let map = map::fetch(&component, &name, known).await?;
+                Ok((map, map::fetch_zones(&component).await?))
+            };
+            Done::Map(run, fetched.await)
+        })
     }
 
     fn plan(&self, run: Run, to: Destination) -> Job {
         let component = self.component.clone();
         let vehicle = self.settings.vehicle;
         let terrain = self.map.as_ref().map(|map| Arc::clone(&map.terrain));
+        let zones = Arc::clone(&self.zones);
         Box::pin(async move {
             let passing = |reason| NotPlanned {
                 reason,
@@ -192,6 +222,7 @@ impl<'a> PlannerTask<'a> {
             };
             let plan = move || {
                 let terrain = terrain.ok_or_else(|| passing("there is no map".to_owned()))?;
+                let terrain = Terrain::clone(&terrain).within(zones);
                 Ok(mission::plan(&terrain, &vehicle, start, (to.x, to.y))?)
             };
             let planned = tokio::task::spawn_blocking(plan).await;
@@ -222,10 +253,47 @@ impl<'a> PlannerTask<'a> {
         })
     }
 
+    /// Surveys the path as long as the vehicle drives it.
+    fn schedule_survey(&mut self) {
+        let (report, _) = self.missions.tell(|mission| mission.report().stage);
+        if !report.is_handed_over() {
+            (self.survey, self.survey_at) = (None, None);
+        } else if self.survey.is_none() && self.survey_at.is_none() {
+            self.survey_at = Instant::now().checked_add(survey::PERIOD);
+        }
+    }
+
+    fn survey(&self) -> Option<Job> {
+        let known = Survey {
+            map: self.map.clone()?,
+            zones: Arc::clone(&self.zones),
+            blocked: None,
+        };
+        let ((run, progress, path), _) = self.missions.tell(|mission| {
+            let report = mission.report();
+            (report.run, report.progress, Arc::clone(mission.path()))
+        });
+        let way = UnderWay {
+            vehicle: self.settings.vehicle,
+            here: self.here?,
+            segment: UnderWay::segment(&path, progress),
+            path,
+        };
+        let (component, name) = (self.component.clone(), self.settings.map.clone());
+        Some(Box::pin(async move {
+            Done::Surveyed(run, known.make(&component, &name, way).await)
+        }))
+    }
+
     async fn handle(&mut self, done: Done) {
         match done {
             Done::Map(run, result) => {
-                let result = result.map(|map| self.map = Some(map));
+                let result = result.map(|(map, zones)| {
+                    self.map = Some(map);
+                    if let Some(zones) = zones {
+                        self.zones = Arc::new(zones);
+                    }
+                });
                 self.tell(|mission, now| mission.handle_map(now, run, result))
                     .await;
             }
@@ -247,6 +315,14 @@ impl<'a> PlannerTask<'a> {
                 self.tell(|mission, now| mission.handle_handed_over(now, run, Err(reason)))
                     .await;
             }
+            Done::Surveyed(run, survey) => {
+                self.map = Some(survey.map);
+                self.zones = survey.zones;
+                if let Some(why) = survey.blocked {
+                    self.tell(|mission, now| mission.handle_blocked_path(now, run, &why))
+                        .await;
+                }
+            }
             Done::Checked(run, is_alive) => {
                 self.tell(|mission, now| mission.handle_lost_client(now, run, is_alive))
                     .await;
@@ -256,7 +332,10 @@ impl<'a> PlannerTask<'a> {
 
     async fn hear(&mut self, news: News) {
         match news {
-            News::Pose(point) => self.tell(|mission, _| mission.handle_pose(point)).await,
+            News::Pose(point) => {
+                self.here = Some(point);
+                self.tell(|mission, _| mission.handle_pose(point)).await;
+            }
             News::Found(link, peer) => self.peers[link as usize] = peer,
             News::Stage(link, state, progress) => {
                 self.tell(|mission, now| {

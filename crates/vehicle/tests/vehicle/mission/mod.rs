@@ -15,3 +15,4 @@
 mod fake;
 mod missions;
 mod whole;
+mod zones;

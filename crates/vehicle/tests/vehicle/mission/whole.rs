@@ -10,10 +10,10 @@ use jaus_vehicle::parts::tester::steps::{Step, all_pass};
 use jaus_vehicle::parts::tester::{Alone, MissionTest};
 
 /// A test's own directory, removed when dropped.
-struct Directory(PathBuf);
+pub(super) struct Directory(pub(super) PathBuf);
 
 impl Directory {
-    fn new(name: &str) -> Self {
+    pub(super) fn new(name: &str) -> Self {
         let name = format!("jaus-mission-{name}-{}", std::process::id());
         let path = std::env::temp_dir().join(name);
         let _ = std::fs::remove_dir_all(&path);

@@ -6,7 +6,7 @@
 //! path.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -16,10 +16,10 @@ use jaus::messages::core::{
     ReportStatus, RequestControl, Reset, Resume, SetAuthority, SetEmergency, Standby,
     clear_emergency, management, set_emergency,
 };
-use jsidl::Loader;
 use jsidl::behaviour::{Action, Guard, Transition, TransitionKind};
 use jsidl::machine::{Machine, StateIndex, Stimulus};
 use jsidl::model::{Id, Service};
+use jsidl::{Library, Loader};
 
 use super::super::memory::Memory;
 use super::super::step::{
@@ -126,23 +126,24 @@ struct Answer {
 /// Titles and acts of the steps of a service's machine; none if the service declares no states of
 /// its own and leaves them to its bases, which can be tested separately.
 pub(super) fn walk(service: ServiceId) -> Vec<(String, Vec<Act>)> {
-    let mut loader = Loader::new();
-    loader.catalogue();
-    let loaded = loader.load();
-    let mut versions = loaded.library.versions(service.urn);
+    /// The built-in definitions, which take longer to load than to walk.
+    static CATALOGUE: LazyLock<Library> = LazyLock::new(|| {
+        let mut loader = Loader::new();
+        loader.catalogue();
+        loader.load().library
+    });
+    let mut versions = CATALOGUE.versions(service.urn);
     let is_it = |id: &Id| id.version.to_string() == format!("{}.{}", service.major, service.minor);
     let has_its_own = |it: &&Arc<Service>| is_it(&it.id) && !it.behaviour.is_empty();
     let Some(definition) = versions.find(has_its_own) else {
         return Vec::new();
     };
-    let machines = loaded.library.machines(definition);
+    let machines = CATALOGUE.machines(definition);
     let Some(machine) = machines.iter().find(|it| is_about_control(it)) else {
         return Vec::new();
     };
-    let tells_status = loaded
-        .library
-        .lineage(definition)
-        .any(|it| &*it.id.urn == management::URN);
+    let mut lineage = CATALOGUE.lineage(definition);
+    let tells_status = lineage.any(|it| &*it.id.urn == management::URN);
     steps(machine, tells_status)
 }
 

@@ -1,0 +1,156 @@
+//! Manual driving: the page and its station with the simulated vehicle of `jaus vehicle`, all on
+//! this host.
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+
+use super::browser::{Browser, SCREENS};
+use super::steps::{emergency, look_from_all_screens, take_control};
+use super::system::program;
+
+/// The number of this test's multicast group.
+const TEST: u8 = 2;
+
+/// A process; killed when dropped.
+pub(crate) struct Running(Child);
+
+impl Running {
+    /// Starts a program on a test's own multicast group, 239.255.77.`test`, and waits for a line that
+    /// contains `beginning`. Returns the trimmed rest of that line.
+    pub(crate) fn start(test: u8, name: &str, flags: &[&str], beginning: &str) -> (Self, String) {
+        let port = 20_000 + std::process::id() % 40_000;
+        let group = format!("239.255.77.{test}:{port}");
+        let mut command = Command::new(program(name));
+        command.args(flags).args(["--loopback", "--group", &group]);
+        let mut child = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (stdout, stderr) = (child.stdout.take().unwrap(), child.stderr.take().unwrap());
+        let (sender, lines) = std::sync::mpsc::channel();
+        let read = |source: Box<dyn std::io::Read + Send>| {
+            let sender = sender.clone();
+            std::thread::spawn(move || {
+                // The program may keep printing after the reader is gone.
+                for line in BufReader::new(source).lines().map_while(Result::ok) {
+                    let _ = sender.send(line);
+                }
+            })
+        };
+        read(Box::new(stdout));
+        read(Box::new(stderr));
+        drop(sender);
+        let running = Self(child);
+        let found = lines
+            .iter()
+            .find_map(|line| Some(line.split_once(beginning)?.1.trim().to_owned()));
+        (
+            running,
+            found.unwrap_or_else(|| panic!("{name} did not say `{beginning}`")),
+        )
+    }
+}
+
+impl Running {
+    /// Suspends the program (SIGSTOP) or resumes it (SIGCONT).
+    fn suspend(&self, on: bool) {
+        let signal = if on { "-STOP" } else { "-CONT" };
+        let pid = self.0.id().to_string();
+        let sent = Command::new("kill").args([signal, &pid]).status();
+        assert!(sent.unwrap().success());
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Takes control, drives with keys and the stick, and stops in an emergency. Then checks the page
+/// when the station is lost, and that the page connects to the next station.
+pub(crate) fn run() {
+    let (vehicle, _) = Running::start(TEST, "jaus", &["vehicle", "--name", "G-Bat"], "Ctrl-C");
+    let (station, address) = Running::start(
+        TEST,
+        "jaus-ocu",
+        &["--listen", "127.0.0.1:0"],
+        "page is at ",
+    );
+    let mut page = Browser::start(None);
+    page.look_on(SCREENS[0]);
+    page.open(&address);
+    page.wait("document.body.dataset.link === 'live'");
+    page.wait("document.querySelector('#vehicle-name').textContent.includes('G-Bat')");
+    take_control(&mut page);
+
+    page.press("[data-show=drive]");
+    page.key_down("ArrowUp", "ArrowUp");
+    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    page.screenshot("by-hand-keys");
+    page.key_up("ArrowUp", "ArrowUp");
+    page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
+
+    page.hold("#stick", (0.0, -0.6));
+    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    page.screenshot("by-hand-stick");
+    page.key_down("Escape", "Escape");
+    page.wait("document.body.dataset.emergency === 'stopped'");
+    page.wait("document.querySelector('#drive-source').textContent === 'Idle'");
+    page.let_go();
+    emergency(&mut page);
+
+    let port = address
+        .trim_end_matches('/')
+        .rsplit(':')
+        .next()
+        .unwrap()
+        .to_owned();
+    drop(station);
+    page.wait("document.body.dataset.link === 'lost'");
+    page.screenshot("by-hand-lost");
+    let (_station, _) = Running::start(
+        TEST,
+        "jaus-ocu",
+        &["--listen", &format!("127.0.0.1:{port}")],
+        "page is at ",
+    );
+    page.wait("document.body.dataset.link === 'live'");
+    take_control(&mut page);
+    refuses_to_drive_without_news(&mut page, &vehicle);
+    names_what_is_gone(&mut page, vehicle);
+    assert!(page.complaints().is_empty(), "{:?}", page.complaints());
+}
+
+/// While the vehicle is suspended, all values on the page are stale: the page says so and does not
+/// drive.
+fn refuses_to_drive_without_news(page: &mut Browser, vehicle: &Running) {
+    page.key_down("ArrowUp", "ArrowUp");
+    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    look_from_all_screens(page, "by-hand-driving");
+    vehicle.suspend(true);
+    page.wait("document.querySelector('#drive-line').textContent.includes('picture is stale')");
+    page.wait("document.querySelector('#drive-source').textContent === 'Idle'");
+    page.key_up("ArrowUp", "ArrowUp");
+    page.key_down("ArrowUp", "ArrowUp");
+    page.key_up("ArrowUp", "ArrowUp");
+    assert_eq!(page.text("#drive-source"), "Idle");
+    page.wait("document.querySelector('#speed').closest('[data-old]')");
+    page.wait("document.querySelector('#state-old').textContent.includes('velocity')");
+    page.wait("document.querySelector('#missing').textContent.includes('silent')");
+    look_from_all_screens(page, "by-hand-stale");
+    vehicle.suspend(false);
+    page.wait("document.querySelector('#missing').hidden");
+    page.wait("document.querySelector('#state-old').textContent === ''");
+}
+
+fn names_what_is_gone(page: &mut Browser, vehicle: Running) {
+    drop(vehicle);
+    page.wait(
+        "/^Primitive Driver [0-9.]+ is gone$/.test(document.querySelector('#missing').textContent)",
+    );
+    page.wait("document.querySelector('#drive-line').textContent.includes('is gone')");
+    look_from_all_screens(page, "by-hand-gone");
+}

@@ -1,0 +1,177 @@
+//! End-to-end tests through the operator's page: real programs as processes on four hosts with two
+//! networks, and a real browser with user input. Screenshots of the page are kept in
+//! `target/e2e-screenshots`.
+//!
+//! They need Chromium and network namespaces. Without these, the tests report this prominently and
+//! pass, but fail if `JAUS_EVIDENCE=required` is set.
+
+mod browser;
+mod by_hand;
+mod fleet;
+mod handover;
+mod steps;
+mod system;
+
+use std::time::Duration;
+
+use jaus_test_kit::evidence::{not_tested, this_test};
+use jaus_test_kit::hosts::on_hosts;
+
+use self::browser::{Browser, SCREENS};
+use self::steps::{emergency, look_from_all_screens, take_control};
+use self::system::{PAGE, System};
+
+#[test]
+fn a_mission_through_the_page_ends_by_the_death_of_the_planner_and_by_a_key() {
+    on_system(|system, page| {
+        look_from_all_screens(page, "1-start");
+
+        take_control(page);
+        plan(page, 4.5, 1.5);
+        look_from_all_screens(page, "2-approval");
+        approve(page);
+        page.wait("+document.querySelector('#progress').ariaValueNow > 5");
+        look_from_all_screens(page, "3-driving");
+
+        says_that_the_planner_is_gone(system, page);
+        take_control(page);
+        plan(page, 4.5, 1.5);
+        approve(page);
+
+        take_over_by_keyboard(page);
+        emergency(page);
+    });
+}
+
+#[test]
+fn a_mission_through_the_page_survives_the_death_of_every_part() {
+    on_system(|system, page| {
+        take_control(page);
+        for program in system.programs() {
+            system.kill(program);
+            if program != "jaus-ocu" {
+                page.wait("!document.querySelector('#missing').hidden");
+            }
+            page.screenshot(&format!("5-without-{program}"));
+            system.start(program);
+            comes_alive(page);
+        }
+        arrive(page);
+        look_from_all_screens(page, "6-arrived");
+    });
+}
+
+#[test]
+fn a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once() {
+    on_a_station(by_hand::run);
+}
+
+#[test]
+fn an_operator_chooses_among_vehicles_and_stops_all_of_them() {
+    on_a_station(fleet::run);
+}
+
+#[test]
+fn control_is_handed_over_between_the_pages_of_two_operators() {
+    on_a_station(handover::run);
+}
+
+/// Runs a test that starts its own vehicles and stations.
+fn on_a_station(body: impl FnOnce()) {
+    if let Some(reason) = browser::missing() {
+        return not_tested(&this_test(), &reason);
+    }
+    if !system::program("jaus-ocu").exists() {
+        return not_tested(&this_test(), "not built: jaus-ocu");
+    }
+    body();
+}
+
+/// Runs the body of a test with a complete system and its operator's page.
+fn on_system(body: impl FnOnce(&System, &mut Browser)) {
+    if let Some(reason) = browser::missing() {
+        return not_tested(&this_test(), &reason);
+    }
+    let missing = system::missing();
+    if !missing.is_empty() {
+        return not_tested(&this_test(), &format!("not built: {}", missing.join(", ")));
+    }
+    on_hosts(System::new, |system| {
+        system.start_all();
+        let mut page = Browser::start(Some(system.operator()));
+        page.look_on(SCREENS[0]);
+        page.open(PAGE);
+        comes_alive(&mut page);
+        body(system, &mut page);
+        assert!(page.complaints().is_empty(), "{:?}", page.complaints());
+    });
+}
+
+/// Waits until the page has connected by itself and shows a complete vehicle.
+fn comes_alive(page: &mut Browser) {
+    page.wait("document.body.dataset.link === 'live'");
+    page.wait("document.querySelectorAll('#parts .part').length >= 4");
+    page.wait("document.querySelector('#north').textContent !== '–'");
+    page.wait("document.querySelector('#map-empty').hidden");
+    page.wait("document.querySelector('#missing').hidden");
+}
+
+/// Touches the map, corrects the destination by hand, and waits for a route.
+fn plan(page: &mut Browser, north: f64, east: f64) {
+    page.press("[data-show=mission]");
+    page.press("#map");
+    page.wait("document.querySelector('#destination-x').value !== ''");
+    page.write("#destination-x", &north.to_string());
+    page.write("#destination-y", &east.to_string());
+    // Right after control is taken the planner may not be ready. The page then says so, and the
+    // operator presses again.
+    let planned = "!document.querySelector('#approve').disabled";
+    page.press("#plan");
+    if !page.holds_within(Duration::from_secs(5), planned) {
+        page.press("#plan");
+    }
+    page.wait(planned);
+}
+
+fn approve(page: &mut Browser) {
+    page.press("#approve");
+    page.wait(
+        "document.querySelector('#stages [aria-current] .stage-name')?.textContent === 'Driving'",
+    );
+}
+
+/// When a planner dies while driving, the page names it and the station stops the vehicle.
+fn says_that_the_planner_is_gone(system: &System, page: &mut Browser) {
+    system.kill("jaus-planner");
+    let line = "document.querySelector('#mission-line').textContent";
+    page.wait(&format!("/planner [0-9.]+ is (gone|silent)/.test({line})"));
+    page.wait(&format!("{line}.includes('was stopped')"));
+    page.wait("document.querySelector('#missing').textContent.includes('Planner')");
+    look_from_all_screens(page, "3-planner-gone");
+    page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
+    system.start("jaus-planner");
+    comes_alive(page);
+}
+
+/// Holding a key drives the vehicle and ends a mission; releasing the key stops it.
+fn take_over_by_keyboard(page: &mut Browser) {
+    page.press("[data-show=drive]");
+    page.key_down("KeyW", "w");
+    page.wait(
+        "document.querySelector('#drive-line').textContent.includes('commands are being sent')",
+    );
+    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    page.screenshot("4-keyboard");
+    page.wait("document.body.dataset.mission === 'over'");
+    page.key_up("KeyW", "w");
+    page.wait("document.querySelector('#drive-source').textContent === 'Idle'");
+    page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
+}
+
+/// Drives a mission to its end.
+fn arrive(page: &mut Browser) {
+    take_control(page);
+    plan(page, -4.5, -1.5);
+    approve(page);
+    page.wait("document.querySelector('#mission-line').dataset.state === 'arrived'");
+}

@@ -1,0 +1,18 @@
+//! The tool `jaus`, run as a process.
+
+mod captures;
+mod damage;
+mod doctor;
+mod doctor_peer;
+mod golden;
+mod interoperability;
+mod jsidl;
+mod jsidl_explain;
+mod jsidl_make;
+mod judge;
+mod monitor;
+mod network;
+mod ping;
+mod record;
+mod vehicle;
+mod watch;
