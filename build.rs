@@ -3,7 +3,14 @@
 
 /// The features, with the modules that each adds and the beginnings of their services' URNs.
 const SETS: &[(&str, &[(&str, &str)])] = &[
-    ("MOBILITY", &[("mobility", "urn:jaus:jss:mobility:")]),
+    (
+        "MOBILITY",
+        &[
+            ("mobility", "urn:jaus:jss:mobility:"),
+            // The elements of lists, which no service of the set declares.
+            ("mobility", "urn:jaus-rs:mobility:"),
+        ],
+    ),
     (
         "EVERY_SET",
         &[

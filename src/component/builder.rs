@@ -1,6 +1,7 @@
 //! The builder of a component: settings, services, and attachment to a node.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicU8;
 
 use tokio::sync::{mpsc, watch};
 
@@ -196,6 +197,7 @@ impl Builder {
             standings,
             changes,
             messages,
+            requests: AtomicU8::new(u8::MAX),
         };
         tokio::spawn(Driver::new(stack, membership, port, inbox, publisher, patience).run());
         Ok(Component::new(shared))

@@ -4,7 +4,7 @@ use std::fmt;
 use std::time::Duration;
 
 use crate::address::JausId;
-use crate::codec::{DecodeError, EncodeError};
+use crate::codec::{DecodeError, EncodeError, OutOfRange};
 use crate::node;
 use crate::service::{
     CannotSubscribe, ControlLost, ControlRefused, NoAnswer, NotPublished, Offer, SessionState,
@@ -221,6 +221,58 @@ pub enum SessionError {
     Undelivered(#[from] DeliverError),
     /// The component has stopped, because its node has.
     #[error("the component stopped with its node and controls no more peers")]
+    Stopped,
+}
+
+/// Why a request to change a list or to run a command has failed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RequestError {
+    /// The wire cannot carry it.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+    /// A value is outside the range of its field.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    /// A list has no numbers for so many elements.
+    #[error("a list has at most 65534 elements, not {0}")]
+    TooManyElements(usize),
+    /// The delivery is not confirmed.
+    #[error(transparent)]
+    Undelivered(#[from] DeliverError),
+    /// A query has no answer.
+    #[error(transparent)]
+    Query(#[from] QueryError),
+    /// The peer does not confirm the request, or does not report the end of the command.
+    #[error("{peer} has not answered {request} within {:.0} s", waited.as_secs_f64())]
+    Unconfirmed {
+        /// The peer.
+        peer: JausId,
+        /// The name of the message.
+        request: &'static str,
+        /// The time limit.
+        waited: Duration,
+    },
+    /// The peer rejects the request.
+    #[error("{peer} rejects {request}: {reason}")]
+    Rejected {
+        /// The peer.
+        peer: JausId,
+        /// The name of the message.
+        request: &'static str,
+        /// The peer's reason.
+        reason: String,
+    },
+    /// The command has ended without success.
+    #[error("{peer} could not complete {command}")]
+    Unsuccessful {
+        /// The peer.
+        peer: JausId,
+        /// The name of the command.
+        command: &'static str,
+    },
+    /// The component has stopped, because its node has.
+    #[error("the component stopped with its node and sends no more requests")]
     Stopped,
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::AtomicU8;
 use std::time::{Duration, Instant, SystemTime};
 
 use tokio::sync::{mpsc, oneshot, watch};
@@ -20,8 +21,8 @@ use crate::endpoint::{Outgoing, Received};
 use crate::messages;
 use crate::node;
 use crate::service::{
-    Change, Condition, Directory, Kind, NodeDirectory, Offer, Publication, QueryOptions, Service,
-    Standing, Topic, UnsafeService, When,
+    Change, Condition, Directory, Kind, LaterAnswer, NodeDirectory, Offer, Publication,
+    QueryOptions, Service, Standing, Topic, UnsafeService, When,
 };
 use crate::wire::Priority;
 
@@ -40,6 +41,8 @@ pub(super) struct Shared {
     pub(super) standings: watch::Receiver<Standing>,
     pub(super) changes: Arc<Outlet<Change>>,
     pub(super) messages: Arc<Outlet<Received>>,
+    /// The number of the next request.
+    pub(super) requests: AtomicU8,
 }
 
 impl Shared {
@@ -211,6 +214,19 @@ impl Component {
             ..Outgoing::new(self.id(), destination, payload)
         };
         Ok(self.shared.sender.deliver(outgoing).await?)
+    }
+
+    /// Answers a query that a service of this component has [put off](crate::service::Call::later).
+    ///
+    /// # Errors
+    /// Those of [`send`](Self::send).
+    pub fn answer<Q: Query>(
+        &self,
+        later: LaterAnswer<Q>,
+        report: Q::Report,
+    ) -> Result<(), SendError> {
+        self.shared.sender.send(later.into_outgoing(report)?)?;
+        Ok(())
     }
 
     /// Sends a query to a component, and waits for its report; repeats the query on timeout, but

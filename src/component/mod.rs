@@ -68,6 +68,7 @@
 
 mod builder;
 mod clients;
+mod command;
 mod control;
 mod directories;
 mod driver;
@@ -75,27 +76,31 @@ mod error;
 mod feed;
 mod group;
 mod handle;
+mod list;
 mod offers;
+mod request;
 mod session;
 mod subscription;
 mod watch;
 
 pub use crate::service::{
-    AccessControl, Audience, CannotSubscribe, Change, Condition, ControlLost, ControlRefused,
-    Directory, EventSettings, Handlers, Identification, Kind, Level, Liveness, Loss, Management,
-    Offer, Outage, Patience, QueryOptions, Rejection, Retake, Scope, Service, SessionLoss,
-    SessionSettings, SessionState, Standing, State, SubscriptionEnd, TargetState, Time, TimeOfDay,
-    Timing, When,
+    AccessControl, Audience, Call, CannotSubscribe, Change, Condition, ControlLost, ControlRefused,
+    Directory, EventSettings, Handlers, Identification, Kind, LaterAnswer, Level, Liveness, Loss,
+    Management, Offer, Outage, Patience, QueryOptions, Rejection, Retake, Scope, Service,
+    SessionLoss, SessionSettings, SessionState, Standing, State, SubscriptionEnd, TargetState,
+    Time, TimeOfDay, Timing, When,
 };
 pub use crate::wire::Priority;
 pub use builder::{AttachError, Builder};
+pub use command::RunningCommand;
 pub use control::Control;
 pub use error::{
-    ControlError, DeliverError, FindError, ManageError, PublishError, QueryError, SendError,
-    SessionError, SubscribeError,
+    ControlError, DeliverError, FindError, ManageError, PublishError, QueryError, RequestError,
+    SendError, SessionError, SubscribeError,
 };
 pub use group::{GroupSubscription, GroupUpdate, Results};
 pub use handle::Component;
+pub use list::List;
 pub use session::Session;
 pub use subscription::{Subscription, Update};
 pub use watch::{Messages, Watch};

@@ -51,6 +51,16 @@ impl<'a> Context<'a> {
         }
     }
 
+    /// The same context, for a shorter time.
+    pub(super) const fn reborrow(&mut self) -> Context<'_> {
+        Context {
+            out: self.out,
+            standing: self.standing,
+            life: self.life,
+            news: self.news,
+        }
+    }
+
     /// The component that the service belongs to.
     #[must_use]
     pub const fn id(&self) -> JausId {

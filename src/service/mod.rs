@@ -14,13 +14,14 @@
 //! | [`Discovery`] | announces this component, finds other components, keeps the [`Directory`] |
 //! | Events ([`EventSettings`]) | sends the report of any query of the component, periodically or on every change |
 //! | [`AccessControl`], [`Management`] | decide which client may command, and stop everything in an emergency |
-//! | [`Handlers`] | the application's own messages, one function per message |
+//! | [`Handlers`] | the application's own services: a function per message, or a type that implements the service's trait |
 //!
 //! A stack is also a client of other components: it [queries](Stack::ask),
 //! [subscribes](Stack::subscribe), [takes control](Stack::request_control) and
 //! [keeps it](Stack::begin_session). It keeps all of them until the application cancels them.
 
 mod audience;
+mod call;
 mod client;
 #[cfg(test)]
 mod contest;
@@ -29,6 +30,7 @@ mod control;
 mod directory;
 mod discovery;
 mod events;
+mod functions;
 mod guard;
 mod handlers;
 mod inquiries;
@@ -56,8 +58,9 @@ use crate::address::JausId;
 use crate::codec::ServiceId;
 use crate::endpoint::Received;
 
-pub use crate::codec::Date;
+pub use crate::codec::{Date, Hazards};
 pub use audience::Audience;
+pub use call::{Call, LaterAnswer};
 pub use client::{
     CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Outage, Rejection,
     Retake, SessionId, SessionLoss, SessionOrder, SessionSettings, SessionState, SubscriptionEnd,
@@ -68,6 +71,7 @@ pub use control::{AccessControl, Condition, Management};
 pub use directory::{Component, Directory, Identification, Kind, Level, Node, Offer, Subsystem};
 pub use discovery::{Change, Discovery, Loss, NodeDirectory, Profile, Refused, Scope, Timing};
 pub use events::EventSettings;
+pub use functions::Functions;
 pub use guard::{MotionGuard, MotionPolicy, StopCause, Validity};
 pub use handlers::Handlers;
 pub use inquiries::{Inquiry, NoAnswer, Patience, QueryOptions};
@@ -76,7 +80,7 @@ pub use list::{ElementList, Elements, ListManager};
 pub use liveness::Liveness;
 pub use outbox::Outbox;
 pub use publication::{NotPublished, Publication};
-pub use safety::{Hazards, UnsafeService};
+pub use safety::UnsafeService;
 pub use stack::{Event, Stack};
 pub use standing::{Controller, Standing, State};
 pub use time::{Time, TimeOfDay};
@@ -141,6 +145,11 @@ pub trait Service: Send {
     /// offer.
     fn hazards(&self) -> Hazards {
         Hazards::default()
+    }
+
+    /// An offered version with a message whose layout nothing handles, and the message's name.
+    fn unhandled_version(&self) -> Option<(ServiceId, &'static str)> {
+        None
     }
 
     /// Whether this service reports the end of commands with this code, with [`Context::ended`]. If

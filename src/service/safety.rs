@@ -2,21 +2,10 @@
 //!
 //! A service that moves something needs a stop action, and Management, so that it acts only for the
 //! client in control of a ready component. A service that clients can configure needs Access
-//! Control.
+//! Control. A service must understand every version that it offers.
 
 use super::{Service, Standing};
 use crate::codec::ServiceId;
-
-/// The guarded commands of a service.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Hazards {
-    /// A command that moves something, such as Set Wrench Effort.
-    pub acts_on: Option<&'static str>,
-    /// A command that configures something, such as Set Local Pose.
-    pub set_up_by: Option<&'static str>,
-    /// Whether [`Service::handle_stop`] stops everything that the commands move.
-    pub stops: bool,
-}
 
 /// Why a component cannot offer a service.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -56,6 +45,17 @@ pub enum UnsafeService {
         /// The command.
         command: &'static str,
     },
+    /// It offers a version of which it understands no layout of a message.
+    #[error(
+        "{service} is offered, but nothing handles its layout of {message}: handle that layout, \
+         too, or do not offer this version"
+    )]
+    VersionNotHandled {
+        /// The service and its version.
+        service: ServiceId,
+        /// The message.
+        message: &'static str,
+    },
 }
 
 /// Checks whether a component with or without Management, and with this standing, may offer a
@@ -68,6 +68,9 @@ pub(super) fn check(
     let Some(id) = service.offers().first().copied() else {
         return Ok(());
     };
+    if let Some((service, message)) = service.unhandled_version() {
+        return Err(UnsafeService::VersionNotHandled { service, message });
+    }
     let hazards = service.hazards();
     match (hazards.acts_on, hazards.set_up_by) {
         (Some(command), _) if !managed => Err(UnsafeService::NoManagement {

@@ -99,6 +99,57 @@ impl Standing {
         self.state == State::Ready && self.obeys(client)
     }
 
+    /// The path of this standing in the state machine of Management (AS5710).
+    pub(super) const fn path(&self) -> &'static [&'static str] {
+        let is_controlled = self.controller.is_some() || !self.exclusive;
+        match (self.state, is_controlled) {
+            (State::Ready, true) => &["Receiving", "Ready", "Controlled", "Available", "Ready"],
+            (State::Standby, true) => &["Receiving", "Ready", "Controlled", "Available", "Standby"],
+            (State::Ready | State::Standby, false) => &[
+                "Receiving",
+                "Ready",
+                "NotControlled",
+                "Available",
+                "Standby",
+            ],
+            (State::Emergency, true) => &[
+                "Receiving",
+                "Ready",
+                "Controlled",
+                "NotAvailable",
+                "Emergency",
+            ],
+            (State::Emergency, false) => &[
+                "Receiving",
+                "Ready",
+                "NotControlled",
+                "NotAvailable",
+                "Emergency",
+            ],
+            (State::Initialize, _) => &[
+                "Receiving",
+                "Ready",
+                "NotControlled",
+                "NotAvailable",
+                "Init",
+            ],
+            (State::Failure, _) => &[
+                "Receiving",
+                "Ready",
+                "NotControlled",
+                "NotAvailable",
+                "Failure",
+            ],
+            (State::Shutdown, _) => &[
+                "Receiving",
+                "Ready",
+                "NotControlled",
+                "NotAvailable",
+                "Shutdown",
+            ],
+        }
+    }
+
     /// Whether a change from `before` to this standing must stop motion: the component may no
     /// longer act, or another client is in control.
     #[must_use]

@@ -23,6 +23,6 @@ macro_rules! constructs {
 }
 
 constructs!(
-    arrays, bits, centred, composites, machines, measures, names, numbers, octets, queries,
-    sections, versions
+    arrays, bits, centred, composites, controlled, machines, measures, names, numbers, octets,
+    queries, sections, versions
 );

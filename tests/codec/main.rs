@@ -12,6 +12,7 @@ mod agreement;
 mod captures;
 mod captures_sent;
 mod constructs;
+mod controlled;
 mod golden;
 mod lua_captures;
 mod roundtrip;

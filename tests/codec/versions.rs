@@ -4,12 +4,13 @@
 use std::time::Duration;
 
 use jaus::codec::{Message, ServiceId};
-use jaus::component::{Component, FindError, Handlers, Kind};
+use jaus::component::{AttachError, Component, FindError, Handlers, Kind};
 use jaus::link::Group;
 use jaus::messages::mobility::local_vector_driver::{V1_0, V1_1};
 use jaus::messages::mobility::{self, v1_0};
 use jaus::messages::registry;
 use jaus::node::{Config, Node};
+use jaus::service::UnsafeService;
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::within_limit;
 use tokio::sync::mpsc;
@@ -110,4 +111,22 @@ fn the_registry_settles_by_service_and_version_where_a_code_is_shared() {
     let octets = older.encode().unwrap();
     assert!((in_version(V1_0).decode)(&octets).is_ok());
     assert!((in_version(V1_1).decode)(&octets).is_err());
+}
+
+#[tokio::test]
+async fn a_version_whose_layout_nothing_handles_cannot_be_offered() {
+    let newest_only =
+        || Handlers::new(V1_1).receive_unguarded(|_: mobility::SetLocalVector, _, _| {});
+    let node = start(own_group(), 101);
+    let rover = || Component::builder(Kind::Vehicle, "Rover");
+    let both = rover().offer(newest_only().and_version(V1_0));
+    let error = both.attach(&node, 1).unwrap_err();
+    assert_eq!(
+        error,
+        AttachError::Unsafe(UnsafeService::VersionNotHandled {
+            service: V1_0,
+            message: "SetLocalVector"
+        })
+    );
+    rover().offer(newest_only()).attach(&node, 1).unwrap();
 }

@@ -15,5 +15,7 @@ mod examples;
 mod groups;
 mod offering;
 mod peers;
+mod requests;
+mod servers;
 #[path = "../support/streams.rs"]
 mod streams;

@@ -9,14 +9,12 @@ use jaus::messages::core::set_time::TimeStamp;
 use jaus::messages::core::{SetElement, SetTime};
 use jaus::messages::mobility::set_velocity_command::CommandType;
 use jaus::messages::mobility::{
-    ExecuteList, ReportLocalPathSegment, SetLocalVector, SetLocalWaypoint, SetTravelSpeed,
-    SetVelocityCommand, SetWrenchEffort,
+    ExecuteList, ReportLocalPathSegment, SetLocalPathSegment, SetLocalVector, SetLocalWaypoint,
+    SetTravelSpeed, SetVelocityCommand, SetWrenchEffort,
 };
 
 use crate::cell::Driver;
 
-/// Set Local Path Segment has the layout of the report.
-const SET_LOCAL_PATH_SEGMENT: u16 = 0x0410;
 /// Metres to the goal: more than the vehicle covers in any run.
 const FAR: f64 = 400.0;
 
@@ -32,7 +30,7 @@ pub(crate) fn motion(driver: Driver) -> Vec<Bytes> {
             vec![encode(&list(elements)), encode(&execute())]
         }
         Driver::Path => {
-            let elements = [0.0, FAR / 2.0].map(|x| set_segment(&segment(x)));
+            let elements = [0.0, FAR / 2.0].map(|x| encode(&segment(x)));
             vec![encode(&list(elements)), encode(&execute())]
         }
     }
@@ -43,7 +41,7 @@ pub(crate) fn motion(driver: Driver) -> Vec<Bytes> {
 pub(crate) fn places_and_speed(driver: Driver) -> Vec<Bytes> {
     let [first, second] = match driver {
         Driver::List => [FAR / 2.0, FAR].map(|x| encode(&waypoint(x))),
-        Driver::Path => [0.0, FAR / 2.0].map(|x| encode(&segment(x))),
+        Driver::Path => [0.0, FAR / 2.0].map(|x| encode(&report(&segment(x)))),
         _ => return motion(driver),
     };
     vec![first, second, encode(&travel_speed())]
@@ -113,8 +111,8 @@ fn execute() -> ExecuteList {
 }
 
 /// A path segment along the X axis, from `x` on.
-fn segment(x: f64) -> ReportLocalPathSegment {
-    let mut path = ReportLocalPathSegment::default();
+fn segment(x: f64) -> SetLocalPathSegment {
+    let mut path = SetLocalPathSegment::default();
     path.set_p1_x_m(x + FAR / 4.0).expect("in range");
     path.set_p1_y_m(0.0).expect("in range");
     path.set_p2_x_m(x + FAR / 2.0).expect("in range");
@@ -123,12 +121,16 @@ fn segment(x: f64) -> ReportLocalPathSegment {
     path
 }
 
-/// Set Local Path Segment.
-fn set_segment(segment: &ReportLocalPathSegment) -> Bytes {
-    let body = encode(segment).slice(2..);
-    [&SET_LOCAL_PATH_SEGMENT.to_le_bytes(), &body[..]]
-        .concat()
-        .into()
+/// The report with the same layout.
+fn report(segment: &SetLocalPathSegment) -> ReportLocalPathSegment {
+    ReportLocalPathSegment {
+        p1_x: segment.p1_x,
+        p1_y: segment.p1_y,
+        p2_x: segment.p2_x,
+        p2_y: segment.p2_y,
+        weighting_factor: segment.weighting_factor,
+        ..ReportLocalPathSegment::default()
+    }
 }
 
 /// A list of two elements.

@@ -29,6 +29,7 @@ mod query;
 mod reader;
 mod registry;
 mod scale;
+mod service;
 mod text;
 #[cfg(feature = "serde")]
 pub mod view;
@@ -47,13 +48,14 @@ pub use fixed::{Count, Fixed};
 #[cfg(not(feature = "serde"))]
 #[doc(hidden)]
 pub use message::View;
-pub use message::{AnyMessage, Message};
+pub use message::{AnyMessage, Message, ServiceId};
 pub use query::{Query, Report, report_code};
 pub use reader::Reader;
 #[doc(hidden)]
 pub use registry::RandomMessage;
-pub use registry::{MessageInfo, Registry, ServiceId, ServiceInfo, ServiceSet};
+pub use registry::{MessageInfo, Registry, ServiceInfo, ServiceSet};
 pub use scale::{OutOfRange, Rounding, Scale, Scaled};
+pub use service::{Call, Hazards, InternalEvent, Provider};
 pub use text::Text;
 pub use writer::Writer;
 

@@ -2,13 +2,30 @@
 //! for types known only by message code.
 
 use std::any::Any;
-use std::fmt::Debug;
+use std::fmt::{self, Debug};
 
 use bytes::Bytes;
 
 use super::error::{DecodeError, EncodeError};
 use super::reader::Reader;
 use super::writer::Writer;
+
+/// Identity of a service: URN and version.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ServiceId {
+    /// For example `urn:jaus:jss:core:Discovery`.
+    pub urn: &'static str,
+    /// Major version, raised by incompatible changes.
+    pub major: u8,
+    /// Minor version, raised by additions.
+    pub minor: u8,
+}
+
+impl fmt::Display for ServiceId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}.{}", self.urn, self.major, self.minor)
+    }
+}
 
 /// A message type. Generated from its definition, never written by hand.
 ///
@@ -25,6 +42,11 @@ pub trait Message: Sized + View + Clone + Debug + PartialEq + Send + Sync + 'sta
     /// client in control may send. Exceptions are Set Emergency and Clear Emergency: Management
     /// accepts them from any client.
     const NEEDS_CONTROL: bool;
+    /// Whether the message is a command of a service that inherits Management: the component obeys
+    /// it only while it is ready, and stops what it has started.
+    const NEEDS_READINESS: bool = false;
+    /// The services and versions that declare the message with another layout.
+    const OTHER_LAYOUTS: &'static [ServiceId] = &[];
 
     /// Size in octets, including the message code.
     fn encoded_len(&self) -> usize;

@@ -5,24 +5,7 @@ use std::fmt;
 use bytes::Bytes;
 
 use super::error::DecodeError;
-use super::message::{AnyMessage, Message};
-
-/// Identity of a service: URN and version.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ServiceId {
-    /// For example `urn:jaus:jss:core:Discovery`.
-    pub urn: &'static str,
-    /// Major version, raised by incompatible changes.
-    pub major: u8,
-    /// Minor version, raised by additions.
-    pub minor: u8,
-}
-
-impl fmt::Display for ServiceId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {}.{}", self.urn, self.major, self.minor)
-    }
-}
+use super::message::{AnyMessage, Message, ServiceId};
 
 /// Definition of a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

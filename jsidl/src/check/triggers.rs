@@ -24,13 +24,12 @@ pub(super) struct Triggers<'a> {
 impl<'a> Triggers<'a> {
     pub(super) fn of(library: &'a Library, service: &'a Service, events: &Events<'_>) -> Self {
         let chain: Vec<_> = library.lineage(service).collect();
-        let mut names = HashSet::new();
+        // A base may use an event of a base of its own that declares none, as the core services do
+        // with `Receive`.
+        let mut names: HashSet<_> = chain.iter().skip(1).flat_map(|it| used(it)).collect();
         let mut lineage = Vec::new();
         for (position, declaring) in chain.iter().enumerate().rev() {
             names.extend(declared(declaring, events));
-            if position > 0 {
-                names.extend(used(declaring));
-            }
             let heir = position.checked_sub(1).map(|heir| chain[heir]);
             let alias = heir.and_then(|heir| heir.inherits_from.as_ref());
             lineage.push((alias.map_or("", |r| r.name.as_str()), names.clone()));

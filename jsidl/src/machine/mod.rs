@@ -146,6 +146,28 @@ impl<'a> Machine<'a> {
         states.map(|(index, state)| (StateIndex(index), state))
     }
 
+    /// All transitions, including the default ones.
+    pub(crate) fn transitions(&self) -> impl Iterator<Item = &Declared<'a, Transition>> {
+        let states = self.states.iter();
+        states.flat_map(|it| it.transitions.iter().chain(&it.default_transitions))
+    }
+
+    /// Whether it has any transition.
+    pub(crate) fn has_transitions(&self) -> bool {
+        self.transitions().next().is_some()
+    }
+
+    /// The machine without the transitions and actions of some services. The states stay.
+    pub(crate) fn without(mut self, left_out: impl Fn(&Service) -> bool) -> Self {
+        for state in &mut self.states {
+            state.entry.retain(|it| !left_out(it.service));
+            state.exit.retain(|it| !left_out(it.service));
+            state.transitions.retain(|it| !left_out(it.service));
+            state.default_transitions.retain(|it| !left_out(it.service));
+        }
+        self
+    }
+
     /// Finds a state by its path, ignoring letter case.
     pub fn find(&self, path: &Name) -> Option<StateIndex> {
         self.paths.get(&key(path)).copied()

@@ -21,6 +21,8 @@ pub(super) struct Plan<'m> {
     pub(super) services: Vec<&'m Id>,
     /// Whether the command requires control.
     pub(super) needs_control: bool,
+    /// Whether the command requires a component that is ready.
+    pub(super) needs_readiness: bool,
 }
 
 impl Plan<'_> {
@@ -54,6 +56,7 @@ pub(super) fn message<'m>(
     out: &mut Writer,
     plan: &Plan<'m>,
     sections: &'m [Item],
+    other_layouts: &[String],
     shared: &mut HashMap<String, String>,
 ) {
     let mut nested = Nested::new(shared, plan.module_path());
@@ -89,6 +92,15 @@ pub(super) fn message<'m>(
         "const NEEDS_CONTROL: bool = {};",
         plan.needs_control
     ));
+    if plan.needs_readiness {
+        out.push("const NEEDS_READINESS: bool = true;");
+    }
+    if !other_layouts.is_empty() {
+        out.push(format!(
+            "const OTHER_LAYOUTS: &'static [codec::ServiceId] = &[{}];",
+            other_layouts.join(", ")
+        ));
+    }
     codec(
         out,
         ident,

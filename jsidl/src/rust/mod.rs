@@ -22,6 +22,7 @@ mod random;
 mod registry;
 mod reports;
 mod selections;
+mod services;
 mod structs;
 mod types;
 mod view;
@@ -32,6 +33,7 @@ use std::collections::{BTreeMap, HashMap};
 use self::ident::{Names, version_module};
 use self::machine::Messages;
 use self::messages::Plan;
+use self::registry::ServicePaths;
 use self::writer::Writer;
 use crate::library::Library;
 use crate::model::{Id, Message, Service, Version};
@@ -63,7 +65,7 @@ pub fn module<'m>(
     };
     let paths = registry::services(&mut out, &versions, messages);
     registry::tables(&mut out, &services, &paths, &plans);
-    write(&mut out, &plans);
+    write(&mut out, &plans, &paths);
     out.finish()
 }
 
@@ -74,8 +76,10 @@ fn plan<'m>(library: &Library, services: &[&'m Service], names: &mut Names) -> V
     for service in services {
         for message in service.messages() {
             let layouts = messages.entry((message.code, &message.name)).or_default();
-            let needs_control = message.is_command && inherits_control(library, service);
-            declare(layouts, message, &service.id, needs_control);
+            let needs = |base| message.is_command && inherits(library, service, base);
+            let layout = declare(layouts, message, &service.id);
+            layout.needs_control |= needs(ACCESS_CONTROL);
+            layout.needs_readiness |= needs(MANAGEMENT);
         }
     }
     let mut plans = Vec::new();
@@ -100,6 +104,7 @@ fn plan<'m>(library: &Library, services: &[&'m Service], names: &mut Names) -> V
                 version,
                 services: layout.services,
                 needs_control: layout.needs_control,
+                needs_readiness: layout.needs_readiness,
             });
         }
     }
@@ -117,6 +122,7 @@ struct Declared<'m> {
     message: &'m Message,
     services: Vec<&'m Id>,
     needs_control: bool,
+    needs_readiness: bool,
 }
 
 impl Declared<'_> {
@@ -126,46 +132,46 @@ impl Declared<'_> {
     }
 }
 
-/// Whether a service is derived from Access Control.
-fn inherits_control(library: &Library, service: &Service) -> bool {
+/// Whether a service is derived from another one.
+fn inherits(library: &Library, service: &Service, urn: &str) -> bool {
     let mut bases = library
         .lineage(service)
         .filter_map(|it| it.inherits_from.as_ref());
-    bases.any(|base| &*base.id.urn == ACCESS_CONTROL)
+    bases.any(|base| &*base.id.urn == urn)
 }
 
 const ACCESS_CONTROL: &str = "urn:jaus:jss:core:AccessControl";
+const MANAGEMENT: &str = "urn:jaus:jss:core:Management";
 
-fn declare<'m>(
-    layouts: &mut Vec<Declared<'m>>,
+/// The layout of a message in a service, which is added if it is new.
+fn declare<'l, 'm>(
+    layouts: &'l mut Vec<Declared<'m>>,
     message: &'m Message,
     service: &'m Id,
-    needs_control: bool,
-) {
+) -> &'l mut Declared<'m> {
     let layout = fingerprint::layout(message);
-    match layouts
-        .iter_mut()
-        .find(|declared| declared.layout == layout)
-    {
-        Some(declared) => {
-            declared.needs_control |= needs_control;
-            if service.version > declared.version() {
-                declared.message = message;
-            }
-            if !declared.services.contains(&service) {
-                declared.services.push(service);
-            }
-        }
-        None => layouts.push(Declared {
+    let known = layouts.iter().position(|it| it.layout == layout);
+    let index = known.unwrap_or(layouts.len());
+    if known.is_none() {
+        layouts.push(Declared {
             layout,
             message,
-            services: vec![service],
-            needs_control,
-        }),
+            services: Vec::new(),
+            needs_control: false,
+            needs_readiness: false,
+        });
     }
+    let declared = &mut layouts[index];
+    if service.version > declared.version() {
+        declared.message = message;
+    }
+    if !declared.services.contains(&service) {
+        declared.services.push(service);
+    }
+    declared
 }
 
-fn write(out: &mut Writer, plans: &[Plan<'_>]) {
+fn write(out: &mut Writer, plans: &[Plan<'_>], paths: &ServicePaths<'_>) {
     let sections: Vec<_> = plans
         .iter()
         .map(|plan| messages::sections(plan.message))
@@ -173,7 +179,8 @@ fn write(out: &mut Writer, plans: &[Plan<'_>]) {
     let all = || plans.iter().zip(&sections);
     let mut shared = HashMap::new();
     for (plan, sections) in all().filter(|(plan, _)| plan.version.is_none()) {
-        messages::message(out, plan, sections, &mut shared);
+        let others = other_layouts(plan, plans, paths);
+        messages::message(out, plan, sections, &others, &mut shared);
         queries::implement(out, plan, plans, &shared);
         reports::implement(out, plan, plans);
     }
@@ -191,10 +198,23 @@ fn write(out: &mut Writer, plans: &[Plan<'_>]) {
         ));
         out.push(format!("pub mod {version} {{\nuse super::codec;"));
         for (plan, sections) in all().filter(|(plan, _)| plan.version.as_ref() == Some(version)) {
-            messages::message(out, plan, sections, &mut shared);
+            let others = other_layouts(plan, plans, paths);
+            messages::message(out, plan, sections, &others, &mut shared);
             queries::implement(out, plan, plans, &shared);
             reports::implement(out, plan, plans);
         }
         out.push("}");
     }
+}
+
+/// The identities of the services that declare a message with another layout.
+fn other_layouts(plan: &Plan<'_>, plans: &[Plan<'_>], paths: &ServicePaths<'_>) -> Vec<String> {
+    let root = plan.version.as_ref().map_or("", |_| "super::");
+    let same = |it: &&Plan<'_>| {
+        (it.message.code, &it.message.name) == (plan.message.code, &plan.message.name)
+    };
+    let others = plans.iter().filter(same);
+    let others = others.flat_map(|it| &it.services);
+    let others = others.filter(|id| !plan.services.contains(id));
+    others.map(|id| format!("{root}{}", paths[*id])).collect()
 }

@@ -74,6 +74,13 @@ pub(super) fn report<'p, 'm>(query: &Plan<'m>, plans: &'p [Plan<'m>]) -> Option<
     })
 }
 
+/// The query that a report answers.
+pub(super) fn query_of<'p, 'm>(report: &Plan<'m>, plans: &'p [Plan<'m>]) -> Option<&'p Plan<'m>> {
+    let answers =
+        |query: &&Plan<'m>| self::report(query, plans).is_some_and(|it| it.path() == report.path());
+    plans.iter().find(answers)
+}
+
 /// As `jaus_codec::report_code`. Services outside of the standard use other codes, too.
 const fn report_code(query: u16) -> Option<u16> {
     match query {

@@ -6,8 +6,9 @@ use super::docs;
 use super::ident::{Names, version_module};
 use super::machine::{self, Messages};
 use super::messages::Plan;
+use super::services::service;
 use super::writer::Writer;
-use crate::model::{Id, Message, Service};
+use crate::model::{Id, Message, Service, Version};
 
 /// Constants of the services: identity to path from the root of the set.
 pub(super) type ServicePaths<'m> = BTreeMap<&'m Id, String>;
@@ -32,7 +33,7 @@ pub(super) fn versions<'m>(services: &[&'m Service], names: &mut Names) -> Vec<V
     named.collect()
 }
 
-/// Writes a module per service, for all versions: constants and state machines.
+/// Writes a module per service, for all versions: constants, state machines, the trait and the server.
 pub(super) fn services<'m>(
     out: &mut Writer,
     all: &[Versions<'m>],
@@ -54,7 +55,7 @@ pub(super) fn services<'m>(
         ));
         for service in services {
             let version = service.id.version;
-            let constant = version_module(version).to_uppercase();
+            let constant = constant(version);
             out.gap();
             out.push(format!("/// Version {version}."));
             out.push(format!(
@@ -67,14 +68,20 @@ pub(super) fn services<'m>(
             paths.insert(&service.id, format!("{module}::{constant}"));
         }
         out.gap();
-        let constant = version_module(newest.id.version).to_uppercase();
+        let constant = constant(newest.id.version);
         out.push(format!(
             "/// The newest version.\npub const LATEST: codec::ServiceId = {constant};"
         ));
         machine::machines(out, messages, services);
+        service(out, messages, services);
         out.push("}");
     }
     paths
+}
+
+/// The constant of a version: `V1_0`.
+pub(super) fn constant(version: Version) -> String {
+    version_module(version).to_uppercase()
 }
 
 /// Writes `SERVICES` and `MESSAGES`.

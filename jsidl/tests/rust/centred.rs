@@ -18,6 +18,47 @@ pub mod centred {
 
     /// The newest version.
     pub const LATEST: codec::ServiceId = V1_0;
+
+    /// The service, as an application implements it. `C` is the type of a call.
+    pub trait Service<C> {
+        /// Handles `SetLean` of the client in control.
+        fn set_lean(&mut self, message: super::SetLean, call: &mut C);
+    }
+
+    /// Passes messages to a [`Service`].
+    #[derive(Debug)]
+    pub struct Server<T> {
+        service: T,
+    }
+
+    impl<T> Server<T> {
+        /// A server of this service.
+        #[must_use]
+        pub const fn new(service: T) -> Self {
+            Self { service }
+        }
+    }
+
+    impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
+        fn offers(&self) -> Vec<codec::ServiceId> {
+            vec![V1_0]
+        }
+
+        fn hazards(&self) -> codec::Hazards {
+            codec::Hazards {
+                acts_on: None,
+                set_up_by: Some("SetLean"),
+                stops: false,
+            }
+        }
+
+        fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
+            Some(match code {
+                0xF0A1 => call.receive(|message: super::SetLean, call| self.service.set_lean(message, call)),
+                _ => return None,
+            })
+        }
+    }
 }
 
 /// The services of the set, by URN and version.

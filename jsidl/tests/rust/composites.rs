@@ -18,6 +18,63 @@ pub mod composites {
 
     /// The newest version.
     pub const LATEST: codec::ServiceId = V1_0;
+
+    /// The service, as an application implements it. `C` is the type of a call.
+    pub trait Service<C> {
+        /// Handles `QueryNothing`.
+        fn query_nothing(&mut self, message: super::QueryNothing, call: &mut C);
+
+        /// Handles `ReportTree`.
+        fn report_tree(&mut self, message: super::ReportTree, call: &mut C);
+
+        /// Handles `ReportListOfLists`.
+        fn report_list_of_lists(&mut self, message: super::ReportListOfLists, call: &mut C);
+
+        /// Handles `SetChoice`.
+        fn set_choice(&mut self, message: super::SetChoice, call: &mut C);
+
+        /// Handles `ReportEmptyVariant`.
+        fn report_empty_variant(&mut self, message: super::ReportEmptyVariant, call: &mut C);
+
+        /// Handles `ReportOptional`.
+        fn report_optional(&mut self, message: super::ReportOptional, call: &mut C);
+
+        /// Handles `ReportManyOptional`.
+        fn report_many_optional(&mut self, message: super::ReportManyOptional, call: &mut C);
+    }
+
+    /// Passes messages to a [`Service`].
+    #[derive(Debug)]
+    pub struct Server<T> {
+        service: T,
+    }
+
+    impl<T> Server<T> {
+        /// A server of this service.
+        #[must_use]
+        pub const fn new(service: T) -> Self {
+            Self { service }
+        }
+    }
+
+    impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
+        fn offers(&self) -> Vec<codec::ServiceId> {
+            vec![V1_0]
+        }
+
+        fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
+            Some(match code {
+                0xF030 => call.receive(|message: super::QueryNothing, call| self.service.query_nothing(message, call)),
+                0xF031 => call.receive(|message: super::ReportTree, call| self.service.report_tree(message, call)),
+                0xF032 => call.receive(|message: super::ReportListOfLists, call| self.service.report_list_of_lists(message, call)),
+                0xF033 => call.receive(|message: super::SetChoice, call| self.service.set_choice(message, call)),
+                0xF034 => call.receive(|message: super::ReportEmptyVariant, call| self.service.report_empty_variant(message, call)),
+                0xF035 => call.receive(|message: super::ReportOptional, call| self.service.report_optional(message, call)),
+                0xF036 => call.receive(|message: super::ReportManyOptional, call| self.service.report_many_optional(message, call)),
+                _ => return None,
+            })
+        }
+    }
 }
 
 /// The services of the set, by URN and version.

@@ -290,6 +290,194 @@ pub mod door {
             }
         }
     }
+
+    /// The service, as an application implements it. `C` is the type of a call.
+    pub trait Service<C> {
+        /// `lightOn`.
+        fn light_on(&mut self, call: &mut C);
+
+        /// `lightOff`.
+        fn light_off(&mut self, call: &mut C);
+
+        /// `isAllowed`.
+        fn is_allowed(&self, message: &super::Open) -> bool;
+
+        /// `isLocked`.
+        fn is_locked(&self) -> bool;
+
+        /// `isLate`.
+        ///
+        /// `text` is one of "night".
+        fn is_late(&self, text: &'static str, call: &C) -> bool;
+
+        /// `remember`.
+        fn remember(&mut self, message: machine::OpenOrClose<'_>, call: &mut C);
+
+        /// `Send ReportDoor`.
+        ///
+        /// `text` is one of "CLOSED", "OPEN".
+        fn send_report_door(&mut self, text: &'static str, call: &mut C) -> super::ReportDoor;
+
+        /// `unlock`.
+        fn unlock(&mut self, message: &[u8], call: &mut C);
+
+        /// `startMotor`.
+        ///
+        /// `text` is one of "down", "up".
+        fn start_motor(&mut self, text: &'static str, call: &mut C);
+
+        /// `steps == 0`.
+        fn steps_0(&self, number: i64) -> bool;
+
+        /// `count`.
+        fn count(&mut self, number: i64, call: &mut C);
+
+        /// `ring`.
+        fn ring(&mut self, call: &mut C);
+    }
+
+    /// Passes to a [`Service`] what its state machine accepts.
+    #[derive(Debug)]
+    pub struct Server<T> {
+        service: T,
+        machine: Option<machine::Machine>,
+    }
+
+    impl<T> Server<T> {
+        /// A server of this service.
+        #[must_use]
+        pub const fn new(service: T) -> Self {
+            Self {
+                service,
+                machine: None,
+            }
+        }
+    }
+
+    /// The events that the service raises itself.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub enum Internal {
+        /// `Timedout`.
+        Timedout,
+    }
+
+    impl codec::InternalEvent for Internal {
+        fn number(self) -> u16 {
+            self as u16
+        }
+    }
+
+    /// A service and a call, as the state machine sees them.
+    struct Step<'a, T, C> {
+        service: &'a mut T,
+        call: &'a mut C,
+    }
+
+    impl<T: Service<C>, C: codec::Call> machine::Behaviour for Step<'_, T, C> {
+        type Envelope = ();
+
+        fn light_on(&mut self) {
+            self.service.light_on(self.call);
+        }
+
+        fn light_off(&mut self) {
+            self.service.light_off(self.call);
+        }
+
+        fn is_allowed(&self, message: &super::Open) -> bool {
+            self.service.is_allowed(message)
+        }
+
+        fn is_locked(&self) -> bool {
+            self.service.is_locked()
+        }
+
+        fn is_late(&self, text: &'static str, _: &Self::Envelope) -> bool {
+            self.service.is_late(text, self.call)
+        }
+
+        fn remember(&mut self, message: machine::OpenOrClose<'_>) {
+            self.service.remember(message, self.call);
+        }
+
+        fn send_report_door(&mut self, text: &'static str, _: &Self::Envelope) {
+            let message = self.service.send_report_door(text, self.call);
+            self.call.send(&message);
+        }
+
+        fn unlock(&mut self, message: &[u8]) {
+            self.service.unlock(message, self.call);
+        }
+
+        fn start_motor(&mut self, text: &'static str) {
+            self.service.start_motor(text, self.call);
+        }
+
+        fn steps_0(&self, number: i64) -> bool {
+            self.service.steps_0(number)
+        }
+
+        fn count(&mut self, number: i64) {
+            self.service.count(number, self.call);
+        }
+
+        fn ring(&mut self) {
+            self.service.ring(self.call);
+        }
+    }
+
+    impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
+        fn offers(&self) -> Vec<codec::ServiceId> {
+            vec![V1_0]
+        }
+
+        fn hazards(&self) -> codec::Hazards {
+            codec::Hazards {
+                acts_on: None,
+                set_up_by: Some("Open"),
+                stops: false,
+            }
+        }
+
+        fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
+            let machine = self.machine.as_mut()?;
+            let service = &mut self.service;
+            Some(match code {
+                0xD001 => call.step(|message: super::Open, call| {
+                    let event = machine::Event::Open(&message, &());
+                    machine.step(event, &mut Step { service, call })
+                }),
+                0xD002 => call.step(|message: super::Close, call| {
+                    let event = machine::Event::Close(&message, &());
+                    machine.step(event, &mut Step { service, call })
+                }),
+                0xD003 => call.step(|message: super::Stop, call| {
+                    let event = machine::Event::Stop(&message);
+                    machine.step(event, &mut Step { service, call })
+                }),
+                _ => return None,
+            })
+        }
+
+        fn handle_event(&mut self, number: u16, call: &mut C) {
+            let Some(machine) = &mut self.machine else {
+                return;
+            };
+            let event = match number {
+                0 => machine::Event::Timedout,
+                _ => return,
+            };
+            let service = &mut self.service;
+            let _ = machine.step(event, &mut Step { service, call });
+        }
+
+        fn follow(&mut self, _path: &[&str], call: &mut C) {
+            let service = &mut self.service;
+            let mut step = Step { service, call };
+            let machine = &mut self.machine;
+            machine.get_or_insert_with(|| machine::Machine::start(&mut step));
+        }
+    }
 }
 
 /// The services of the set, by URN and version.

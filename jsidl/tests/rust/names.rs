@@ -18,6 +18,67 @@ pub mod option {
 
     /// The newest version.
     pub const LATEST: codec::ServiceId = V1_0;
+
+    /// The service, as an application implements it. `C` is the type of a call.
+    pub trait Service<C> {
+        /// Handles `Option`.
+        fn option(&mut self, message: super::Option_, call: &mut C);
+
+        /// Handles `Result`.
+        fn result(&mut self, message: super::Result_, call: &mut C);
+
+        /// Handles `Vec`.
+        fn vec(&mut self, message: super::Vec_, call: &mut C);
+
+        /// Handles `codec`.
+        fn codec(&mut self, message: super::Codec, call: &mut C);
+
+        /// Handles `move`.
+        fn r#move(&mut self, message: super::Move, call: &mut C);
+
+        /// Handles `Move`.
+        fn move_2(&mut self, message: super::Move2, call: &mut C);
+
+        /// Handles `ReportSame`.
+        fn report_same(&mut self, message: super::ReportSame, call: &mut C);
+
+        /// Handles `SameRecAgain`.
+        fn same_rec_again(&mut self, message: super::SameRecAgain, call: &mut C);
+    }
+
+    /// Passes messages to a [`Service`].
+    #[derive(Debug)]
+    pub struct Server<T> {
+        service: T,
+    }
+
+    impl<T> Server<T> {
+        /// A server of this service.
+        #[must_use]
+        pub const fn new(service: T) -> Self {
+            Self { service }
+        }
+    }
+
+    impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
+        fn offers(&self) -> Vec<codec::ServiceId> {
+            vec![V1_0]
+        }
+
+        fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
+            Some(match code {
+                0xF061 => call.receive(|message: super::Option_, call| self.service.option(message, call)),
+                0xF062 => call.receive(|message: super::Result_, call| self.service.result(message, call)),
+                0xF063 => call.receive(|message: super::Vec_, call| self.service.vec(message, call)),
+                0xF064 => call.receive(|message: super::Codec, call| self.service.codec(message, call)),
+                0xF065 => call.receive(|message: super::Move, call| self.service.r#move(message, call)),
+                0xF066 => call.receive(|message: super::Move2, call| self.service.move_2(message, call)),
+                0xF067 => call.receive(|message: super::ReportSame, call| self.service.report_same(message, call)),
+                0xF068 => call.receive(|message: super::SameRecAgain, call| self.service.same_rec_again(message, call)),
+                _ => return None,
+            })
+        }
+    }
 }
 
 /// The services of the set, by URN and version.

@@ -18,6 +18,59 @@ pub mod numbers {
 
     /// The newest version.
     pub const LATEST: codec::ServiceId = V1_0;
+
+    /// The service, as an application implements it. `C` is the type of a call.
+    pub trait Service<C> {
+        /// Handles `ReportNumbers`.
+        fn report_numbers(&mut self, message: super::ReportNumbers, call: &mut C);
+
+        /// Handles `SetScaled` of the client in control.
+        fn set_scaled(&mut self, message: super::SetScaled, call: &mut C);
+
+        /// Handles `SetScaledOptional`.
+        fn set_scaled_optional(&mut self, message: super::SetScaledOptional, call: &mut C);
+
+        /// Handles `ReportNamed`.
+        fn report_named(&mut self, message: super::ReportNamed, call: &mut C);
+    }
+
+    /// Passes messages to a [`Service`].
+    #[derive(Debug)]
+    pub struct Server<T> {
+        service: T,
+    }
+
+    impl<T> Server<T> {
+        /// A server of this service.
+        #[must_use]
+        pub const fn new(service: T) -> Self {
+            Self { service }
+        }
+    }
+
+    impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
+        fn offers(&self) -> Vec<codec::ServiceId> {
+            vec![V1_0]
+        }
+
+        fn hazards(&self) -> codec::Hazards {
+            codec::Hazards {
+                acts_on: None,
+                set_up_by: Some("SetScaled"),
+                stops: false,
+            }
+        }
+
+        fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
+            Some(match code {
+                0xF001 => call.receive(|message: super::ReportNumbers, call| self.service.report_numbers(message, call)),
+                0xF002 => call.receive(|message: super::SetScaled, call| self.service.set_scaled(message, call)),
+                0xF003 => call.receive(|message: super::SetScaledOptional, call| self.service.set_scaled_optional(message, call)),
+                0xF004 => call.receive(|message: super::ReportNamed, call| self.service.report_named(message, call)),
+                _ => return None,
+            })
+        }
+    }
 }
 
 /// The services of the set, by URN and version.

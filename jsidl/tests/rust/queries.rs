@@ -18,6 +18,59 @@ pub mod queries {
 
     /// The newest version.
     pub const LATEST: codec::ServiceId = V1_0;
+
+    /// The service, as an application implements it. `C` is the type of a call.
+    pub trait Service<C> {
+        /// Answers `QueryPlace`; `None` is for no answer, or a later one.
+        fn query_place(&mut self, query: super::QueryPlace, call: &mut C) -> Option<super::ReportPlace>;
+
+        /// Answers `QueryDrive`; `None` is for no answer, or a later one.
+        fn query_drive(&mut self, query: super::QueryDrive, call: &mut C) -> Option<super::ReportDrive>;
+
+        /// Handles `QueryEcho`.
+        fn query_echo(&mut self, message: super::QueryEcho, call: &mut C);
+
+        /// Handles `QueryCodes`.
+        fn query_codes(&mut self, message: super::QueryCodes, call: &mut C);
+
+        /// Answers `QueryMotion`; `None` is for no answer, or a later one.
+        fn query_motion(&mut self, query: super::QueryMotion, call: &mut C) -> Option<super::ReportMotion>;
+
+        /// Answers `QueryCameras`; `None` is for no answer, or a later one.
+        fn query_cameras(&mut self, query: super::QueryCameras, call: &mut C) -> Option<super::ReportCameras>;
+    }
+
+    /// Passes messages to a [`Service`].
+    #[derive(Debug)]
+    pub struct Server<T> {
+        service: T,
+    }
+
+    impl<T> Server<T> {
+        /// A server of this service.
+        #[must_use]
+        pub const fn new(service: T) -> Self {
+            Self { service }
+        }
+    }
+
+    impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
+        fn offers(&self) -> Vec<codec::ServiceId> {
+            vec![V1_0]
+        }
+
+        fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
+            Some(match code {
+                0xE0A1 => call.answer(|query: super::QueryPlace, call| self.service.query_place(query, call)),
+                0xE0A2 => call.answer(|query: super::QueryDrive, call| self.service.query_drive(query, call)),
+                0xE0A3 => call.receive(|message: super::QueryEcho, call| self.service.query_echo(message, call)),
+                0xE0A4 => call.receive(|message: super::QueryCodes, call| self.service.query_codes(message, call)),
+                0xE0A5 => call.answer(|query: super::QueryMotion, call| self.service.query_motion(query, call)),
+                0xE0A6 => call.answer(|query: super::QueryCameras, call| self.service.query_cameras(query, call)),
+                _ => return None,
+            })
+        }
+    }
 }
 
 /// The services of the set, by URN and version.
@@ -477,7 +530,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(QueryMotion);
+    codec::serde_by_view!(QueryMotion);
 }
 
 codec::if_arbitrary! {
@@ -634,7 +687,7 @@ codec::if_serde! {
             Ok(Self { query_camera_list: codec::view::View::from_view(value)? })
         }
     }
-    codec::view::serde_by_view!(QueryCameras);
+    codec::serde_by_view!(QueryCameras);
 }
 
 codec::if_arbitrary! {
@@ -696,7 +749,7 @@ pub mod query_cameras {
                 })
             }
         }
-        codec::view::serde_by_view!(QueryCameraRec);
+        codec::serde_by_view!(QueryCameraRec);
     }
 
     codec::if_arbitrary! {
@@ -1245,7 +1298,7 @@ codec::if_serde! {
             })
         }
     }
-    codec::view::serde_by_view!(ReportMotion);
+    codec::serde_by_view!(ReportMotion);
 }
 
 codec::if_arbitrary! {
@@ -1357,7 +1410,7 @@ pub mod report_motion {
                 })
             }
         }
-        codec::view::serde_by_view!(ForwardRec);
+        codec::serde_by_view!(ForwardRec);
     }
 
     codec::if_arbitrary! {
@@ -1465,7 +1518,7 @@ pub mod report_motion {
                 })
             }
         }
-        codec::view::serde_by_view!(NorthRec);
+        codec::serde_by_view!(NorthRec);
     }
 
     codec::if_arbitrary! {
@@ -1548,7 +1601,7 @@ pub mod report_motion {
                 read.map_err(|error| error.within(name))
             }
         }
-        codec::view::serde_by_view!(VelocityVar);
+        codec::serde_by_view!(VelocityVar);
     }
 
     codec::if_arbitrary! {
@@ -1669,7 +1722,7 @@ pub mod report_motion {
                 })
             }
         }
-        codec::view::serde_by_view!(ReportPoseRec);
+        codec::serde_by_view!(ReportPoseRec);
     }
 
     codec::if_arbitrary! {
@@ -1743,7 +1796,7 @@ codec::if_serde! {
             Ok(Self { camera_list: codec::view::View::from_view(value)? })
         }
     }
-    codec::view::serde_by_view!(ReportCameras);
+    codec::serde_by_view!(ReportCameras);
 }
 
 codec::if_arbitrary! {
@@ -1853,7 +1906,7 @@ pub mod report_cameras {
                 })
             }
         }
-        codec::view::serde_by_view!(CameraRec);
+        codec::serde_by_view!(CameraRec);
     }
 
     codec::if_arbitrary! {

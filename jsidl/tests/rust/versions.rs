@@ -25,6 +25,51 @@ pub mod versions {
 
     /// The newest version.
     pub const LATEST: codec::ServiceId = V1_1;
+
+    /// The service, as an application implements it. `C` is the type of a call.
+    pub trait Service<C> {
+        /// Handles `ReportState`.
+        fn report_state(&mut self, message: super::ReportState, call: &mut C);
+
+        /// Handles `ReportMode`.
+        fn report_mode(&mut self, message: super::ReportMode, call: &mut C);
+
+        /// Answers `QueryState`; `None` is for no answer, or a later one.
+        fn query_state(&mut self, query: super::QueryState, call: &mut C) -> Option<super::ReportState>;
+
+        /// Answers `QueryMode`; `None` is for no answer, or a later one.
+        fn query_mode(&mut self, query: super::QueryMode, call: &mut C) -> Option<super::ReportMode>;
+    }
+
+    /// Passes messages to a [`Service`].
+    #[derive(Debug)]
+    pub struct Server<T> {
+        service: T,
+    }
+
+    impl<T> Server<T> {
+        /// A server of this service.
+        #[must_use]
+        pub const fn new(service: T) -> Self {
+            Self { service }
+        }
+    }
+
+    impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
+        fn offers(&self) -> Vec<codec::ServiceId> {
+            vec![V1_1]
+        }
+
+        fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
+            Some(match code {
+                0xF081 => call.receive(|message: super::ReportState, call| self.service.report_state(message, call)),
+                0xF082 => call.receive(|message: super::ReportMode, call| self.service.report_mode(message, call)),
+                0xE081 => call.answer(|query: super::QueryState, call| self.service.query_state(query, call)),
+                0xE082 => call.answer(|query: super::QueryMode, call| self.service.query_mode(query, call)),
+                _ => return None,
+            })
+        }
+    }
 }
 
 /// The services of the set, by URN and version.
@@ -85,6 +130,7 @@ impl codec::Message for QueryState {
     const NAME: &'static str = "QueryState";
     const IS_COMMAND: bool = false;
     const NEEDS_CONTROL: bool = false;
+    const OTHER_LAYOUTS: &'static [codec::ServiceId] = &[versions::V1_0];
 
     fn encoded_len(&self) -> usize {
         3
@@ -230,6 +276,7 @@ impl codec::Message for ReportState {
     const NAME: &'static str = "ReportState";
     const IS_COMMAND: bool = false;
     const NEEDS_CONTROL: bool = false;
+    const OTHER_LAYOUTS: &'static [codec::ServiceId] = &[versions::V1_0];
 
     fn encoded_len(&self) -> usize {
         7
@@ -410,6 +457,7 @@ pub mod v1_0 {
         const NAME: &'static str = "QueryState";
         const IS_COMMAND: bool = false;
         const NEEDS_CONTROL: bool = false;
+        const OTHER_LAYOUTS: &'static [codec::ServiceId] = &[super::versions::V1_1];
 
         fn encoded_len(&self) -> usize {
             2
@@ -488,6 +536,7 @@ pub mod v1_0 {
         const NAME: &'static str = "ReportState";
         const IS_COMMAND: bool = false;
         const NEEDS_CONTROL: bool = false;
+        const OTHER_LAYOUTS: &'static [codec::ServiceId] = &[super::versions::V1_1];
 
         fn encoded_len(&self) -> usize {
             5

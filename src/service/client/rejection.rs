@@ -19,7 +19,7 @@ pub struct Rejection {
 
 impl Rejection {
     /// Reads the number of the refused request and the reason.
-    pub(super) fn read(payload: &Bytes) -> Option<(u8, Self)> {
+    pub(crate) fn read(payload: &Bytes) -> Option<(u8, Self)> {
         if let Ok(reject) = RejectEventRequest::decode(payload) {
             let text = reject.error_message.as_ref().map(Text::to_string_lossy);
             let text = text.map(|text| text.trim_end_matches(['\0', ' ']).to_owned());

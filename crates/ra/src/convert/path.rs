@@ -12,8 +12,6 @@
 //! Our report is about the current segment; it is queried and reported under the number 0. A limit
 //! of the path is refused in a command and left out in a report.
 
-use bytes::{Bytes, BytesMut};
-
 use super::carry::{Carry, Counterpart, same_fields};
 use super::pair::Pair;
 use super::waypoints::{ONLY, only, unlimited};
@@ -88,8 +86,8 @@ const FROM_THE_FIRST: u16 = 0;
 /// Neighbour id at the ends of the list.
 const NONE: u16 = 0;
 
-/// Converts a segment to a list element, as a message that sets it.
-fn element(number: u16, code: u16, report: &Bytes) -> Result<core::SetElement, Refusal> {
+/// Converts a segment to a list element.
+fn element<M: Message>(number: u16, segment: &M) -> Result<core::SetElement, Refusal> {
     let uid = number.checked_add(1).ok_or(Refusal::UnknownValue {
         field: "PathSegmentNumber",
         value: number.into(),
@@ -99,14 +97,14 @@ fn element(number: u16, code: u16, report: &Bytes) -> Result<core::SetElement, R
             element_uid: uid,
             previous_uid: number,
             next_uid: NONE,
-            element_data: FormattedBlob::new(ElementDataFormat::JAUS_MESSAGE, recode(report, code)),
+            element_data: FormattedBlob::new(ElementDataFormat::JAUS_MESSAGE, segment.encode()?),
         }],
         ..core::SetElement::default()
     })
 }
 
-/// The number and report of the only element, which must follow its predecessor.
-fn segment<Report: Message>(set: &core::SetElement, code: u16) -> Result<(u16, Report), Refusal> {
+/// The number and segment of the only element, which must follow its predecessor.
+fn segment<M: Message>(set: &core::SetElement) -> Result<(u16, M), Refusal> {
     let inexpressible = |field| Err(Refusal::Inexpressible { field });
     let [element] = set.element_list.as_slice() else {
         return inexpressible("ElementList");
@@ -119,27 +117,17 @@ fn segment<Report: Message>(set: &core::SetElement, code: u16) -> Result<(u16, R
     }
     let data = &element.element_data;
     let is_segment = data.format == ElementDataFormat::JAUS_MESSAGE
-        && data.data.starts_with(&code.to_le_bytes());
+        && data.data.starts_with(&M::CODE.to_le_bytes());
     if !is_segment {
         return inexpressible("ElementData");
     }
-    let report = Report::decode(&recode(&data.data, Report::CODE))?;
-    Ok((element.previous_uid, report))
-}
-
-/// Replaces the code: set and report of a segment share a layout, and only the report is defined.
-fn recode(message: &Bytes, code: u16) -> Bytes {
-    let mut recoded = BytesMut::from(message.as_ref());
-    if let Some(place) = recoded.first_chunk_mut() {
-        *place = code.to_le_bytes();
-    }
-    recoded.freeze()
+    Ok((element.previous_uid, M::decode(&data.data)?))
 }
 
 /// Implements set and report of segments.
 macro_rules! segments {
     ($(
-        $set:path, $query:path, $report:path = $our_query:path, $our_report:path, $code:literal
+        $set:path, $query:path, $report:path = $our_query:path, $our_report:path, $our_set:path
             { $($theirs:ident = $ours:ident),* }
     )*) => {$(
         impl Counterpart<$our_report> for $report {
@@ -164,23 +152,23 @@ macro_rules! segments {
 
         impl Counterpart<core::SetElement> for $set {
             fn counterpart(self, _: Context<'_>) -> Result<core::SetElement, Refusal> {
-                type Report = $our_report;
-                let report = Report {
+                type There = $our_set;
+                let segment = There {
                     $($ours: self.$theirs.carry()?,)*
                     path_tolerance: None,
                 };
-                element(self.path_segment_number, $code, &report.encode()?)
+                element(self.path_segment_number, &segment)
             }
         }
 
         impl Counterpart<$set> for core::SetElement {
             fn counterpart(self, _: Context<'_>) -> Result<$set, Refusal> {
                 type There = $set;
-                let (number, report) = segment::<$our_report>(&self, $code)?;
-                unlimited(report.path_tolerance_m())?;
+                let (number, segment) = segment::<$our_set>(&self)?;
+                unlimited(segment.path_tolerance_m())?;
                 Ok(There {
                     path_segment_number: number,
-                    $($theirs: report.$ours.carry()?,)*
+                    $($theirs: segment.$ours.carry()?,)*
                 })
             }
         }
@@ -211,13 +199,15 @@ const HEIGHTS: u8 = 0b11;
 
 segments! {
     ra33::SetGlobalPathSegment, ra33::QueryGlobalPathSegment, ra33::ReportGlobalPathSegment
-        = mobility::QueryGlobalPathSegment, mobility::ReportGlobalPathSegment, 0x040F {
+        = mobility::QueryGlobalPathSegment, mobility::ReportGlobalPathSegment,
+        mobility::SetGlobalPathSegment {
         p1_latitude = p1_latitude, p1_longitude = p1_longitude, p1_altitude = p1_altitude,
         p2_latitude = p2_latitude, p2_longitude = p2_longitude, p2_altitude = p2_altitude,
         weighting_factor = weighting_factor
     }
     ra33::SetLocalPathSegment, ra33::QueryLocalPathSegment, ra33::ReportLocalPathSegment
-        = mobility::QueryLocalPathSegment, mobility::ReportLocalPathSegment, 0x0410 {
+        = mobility::QueryLocalPathSegment, mobility::ReportLocalPathSegment,
+        mobility::SetLocalPathSegment {
         p1x = p1_x, p1y = p1_y, p1z = p1_z, p2x = p2_x, p2y = p2_y, p2z = p2_z,
         weighting_factor = weighting_factor
     }

@@ -1,7 +1,7 @@
 //! A path segment in the local frame or on the globe, as stored in list elements.
 //!
 //! Set Local and Set Global Path Segment (0410h, 04B0h, 040Fh, 04AFh) occur only inside Set
-//! Element. Their layouts are those of the reports and are decoded as such.
+//! Element.
 
 use bytes::Bytes;
 
@@ -13,7 +13,8 @@ use jaus::messages::mobility::report_local_path_segment as local;
 use jaus::messages::mobility::report_local_path_segment_ext as local_ext;
 use jaus::messages::mobility::{
     ReportGlobalPathSegment, ReportGlobalPathSegmentExt, ReportLocalPathSegment,
-    ReportLocalPathSegmentExt,
+    ReportLocalPathSegmentExt, SetGlobalPathSegment, SetGlobalPathSegmentExt, SetLocalPathSegment,
+    SetLocalPathSegmentExt,
 };
 
 /// A curve from the start of the segment to its end, drawn towards a control point.
@@ -29,16 +30,15 @@ pub(super) struct PathSegment {
 }
 
 /// Codes of the messages that set segments in the local frame, versions 1.0 and 1.1.
-pub(super) const LOCAL: [u16; 2] = [0x0410, 0x04B0];
+pub(super) const LOCAL: [u16; 2] = [SetLocalPathSegment::CODE, SetLocalPathSegmentExt::CODE];
 /// Codes of the messages that set segments on the globe, versions 1.0 and 1.1.
-pub(super) const GLOBAL: [u16; 2] = [0x040F, 0x04AF];
+pub(super) const GLOBAL: [u16; 2] = [SetGlobalPathSegment::CODE, SetGlobalPathSegmentExt::CODE];
 
 /// Reads a segment in the local frame from its message.
 pub(super) fn local(code: u16, octets: &Bytes) -> Option<PathSegment> {
-    let [basic, ext] = LOCAL;
     match code {
-        code if code == basic => {
-            let message: ReportLocalPathSegment = read_as(octets)?;
+        SetLocalPathSegment::CODE => {
+            let message = SetLocalPathSegment::decode(octets).ok()?;
             Some(PathSegment {
                 control: (message.p1_x_m(), message.p1_y_m()),
                 end: (message.p2_x_m(), message.p2_y_m()),
@@ -46,8 +46,8 @@ pub(super) fn local(code: u16, octets: &Bytes) -> Option<PathSegment> {
                 path_tolerance: message.path_tolerance_m(),
             })
         }
-        code if code == ext => {
-            let message: ReportLocalPathSegmentExt = read_as(octets)?;
+        SetLocalPathSegmentExt::CODE => {
+            let message = SetLocalPathSegmentExt::decode(octets).ok()?;
             Some(PathSegment {
                 control: (message.p1_x_m(), message.p1_y_m()),
                 end: (message.p2_x_m(), message.p2_y_m()),
@@ -61,10 +61,9 @@ pub(super) fn local(code: u16, octets: &Bytes) -> Option<PathSegment> {
 
 /// Reads a segment on the globe from its message.
 pub(super) fn global(code: u16, octets: &Bytes) -> Option<PathSegment> {
-    let [basic, ext] = GLOBAL;
     match code {
-        code if code == basic => {
-            let message: ReportGlobalPathSegment = read_as(octets)?;
+        SetGlobalPathSegment::CODE => {
+            let message = SetGlobalPathSegment::decode(octets).ok()?;
             Some(PathSegment {
                 control: (message.p1_latitude_deg(), message.p1_longitude_deg()),
                 end: (message.p2_latitude_deg(), message.p2_longitude_deg()),
@@ -72,8 +71,8 @@ pub(super) fn global(code: u16, octets: &Bytes) -> Option<PathSegment> {
                 path_tolerance: message.path_tolerance_m(),
             })
         }
-        code if code == ext => {
-            let message: ReportGlobalPathSegmentExt = read_as(octets)?;
+        SetGlobalPathSegmentExt::CODE => {
+            let message = SetGlobalPathSegmentExt::decode(octets).ok()?;
             Some(PathSegment {
                 control: (message.p1_latitude_deg(), message.p1_longitude_deg()),
                 end: (message.p2_latitude_deg(), message.p2_longitude_deg()),
@@ -83,12 +82,6 @@ pub(super) fn global(code: u16, octets: &Bytes) -> Option<PathSegment> {
         }
         _ => None,
     }
-}
-
-/// Reads a message that has the layout of `M`.
-fn read_as<M: Message>(octets: &Bytes) -> Option<M> {
-    let body = octets.get(2..)?;
-    M::decode(&[&M::CODE.to_le_bytes(), body].concat().into()).ok()
 }
 
 impl PathSegment {

@@ -20,7 +20,7 @@ use jaus::component::{Component, Control, Kind};
 use jaus::link::Group;
 use jaus::messages::core::set_element::{ElementDataFormat, ElementRec, RequestIdRec};
 use jaus::messages::core::{ConfirmElementRequest, SetElement};
-use jaus::messages::mobility::{ExecuteList, QueryLocalPose, ReportLocalPathSegment};
+use jaus::messages::mobility::{ExecuteList, QueryLocalPose, SetLocalPathSegment};
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::LIMIT;
@@ -198,17 +198,15 @@ impl Drop for Scene {
     }
 }
 
-/// Set Local Path Segment (0410h), a straight line. It has the layout of the report.
+/// A straight line.
 fn segment((x, y): (f64, f64)) -> bytes::Bytes {
-    let mut line = ReportLocalPathSegment::default();
+    let mut line = SetLocalPathSegment::default();
     line.set_p1_x_m(x).unwrap();
     line.set_p1_y_m(y).unwrap();
     line.set_p2_x_m(x).unwrap();
     line.set_p2_y_m(y).unwrap();
     line.set_weighting_factor_value(0.0).unwrap();
-    let mut octets = line.encode().unwrap().to_vec();
-    octets[..2].copy_from_slice(&0x0410_u16.to_le_bytes());
-    octets.into()
+    line.encode().unwrap()
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -5,22 +5,27 @@
 //! machine in a module `machine`, several in modules with their names, and those of older versions
 //! in modules of their version.
 
+mod connection;
 mod states;
 mod steps;
 mod vocabulary;
 
 use std::collections::BTreeSet;
 
+pub(super) use self::connection::Connection;
+use self::connection::core_base;
 use self::states::States;
 use self::steps::Steps;
 use self::vocabulary::{Choice, Event, Kind, Method, Vocabulary};
 use super::docs;
 use super::ident::{Names, version_module};
 use super::messages::Plan;
+use super::queries;
+use super::services::is_core;
 use super::writer::Writer;
 use crate::behaviour::TransitionKind;
 use crate::library::Library;
-use crate::machine::{MOST_REMEMBERED, Machine};
+use crate::machine::{MOST_REMEMBERED, Machine, StateIndex};
 use crate::model::{Message, Service};
 
 /// Locations of the message types.
@@ -43,12 +48,19 @@ impl Messages<'_> {
     }
 
     fn declared(&self, service: &Service, message: &Message) -> Option<String> {
+        self.plan(service, message).map(Plan::path)
+    }
+}
+
+impl<'m> Messages<'m> {
+    /// The type of a message that a service declares.
+    pub(super) fn plan(&self, service: &Service, message: &Message) -> Option<&'m Plan<'m>> {
         let same = |plan: &&Plan<'_>| {
             plan.message.code == message.code
                 && plan.message.name == message.name
                 && plan.services.contains(&&service.id)
         };
-        self.plans.iter().find(same).map(Plan::path)
+        self.plans.iter().find(same)
     }
 }
 
@@ -74,8 +86,19 @@ pub(super) fn machines(out: &mut Writer, messages: Messages<'_>, versions: &[&Se
     }
 }
 
+/// The machines of a service. Those of other services than the core ones are without the parts of
+/// the core services, which the component itself handles.
+fn machines_of<'a>(library: &'a Library, service: &'a Service) -> Vec<Machine<'a>> {
+    let machines = library.machines(service);
+    if is_core(service) {
+        return machines;
+    }
+    let own = machines.into_iter().map(|it| it.without(is_core));
+    own.filter(Machine::has_transitions).collect()
+}
+
 fn of_service(out: &mut Writer, messages: Messages<'_>, service: &Service, root: &str) {
-    let machines = messages.library.machines(service);
+    let machines = machines_of(messages.library, service);
     let mut modules = Names::reserving(&["codec"]);
     for machine in &machines {
         let name = match machines.as_slice() {
@@ -114,13 +137,9 @@ impl<'a> Emitter<'a> {
             "Outcome",
             "Memory",
         ]);
-        let mut transitions = machine
-            .states()
-            .flat_map(|(_, state)| state.transitions.iter().chain(&state.default_transitions));
-        let remembers = transitions.any(|declared| {
-            let kind = &declared.item.kind;
-            matches!(kind, TransitionKind::Push(_) | TransitionKind::Pop)
-        });
+        let mut transitions = machine.transitions();
+        let remembers = transitions
+            .any(|it| matches!(it.item.kind, TransitionKind::Push(_) | TransitionKind::Pop));
         Self {
             machine,
             service,
@@ -156,6 +175,30 @@ impl<'a> Emitter<'a> {
         self.struct_(out);
         self.functions(out);
         out.push("}");
+    }
+
+    /// Whether the machine follows the component's control.
+    fn follows(&self) -> bool {
+        !self.inherited().is_empty()
+    }
+
+    /// The innermost states of the component's control.
+    fn inherited(&self) -> Vec<StateIndex> {
+        let base = core_base(self.messages, self.service).filter(|_| !is_core(self.service));
+        let Some(base) = base else {
+            return Vec::new();
+        };
+        let machines = self.messages.library.machines(base);
+        let known = |index: StateIndex| {
+            let path = &self.machine.state(index).path;
+            machines.iter().any(|machine| machine.find(path).is_some())
+        };
+        let innermost = |index: &StateIndex| {
+            let mut children = self.machine.state(*index).children.iter();
+            known(*index) && !children.any(|child| known(*child))
+        };
+        let states = self.machine.states().map(|(index, _)| index);
+        states.filter(innermost).collect()
     }
 
     fn state(&self, out: &mut Writer) {
@@ -302,8 +345,22 @@ impl<'a> Emitter<'a> {
     }
 
     fn method(&self, out: &mut Writer, method: &Method) {
+        let (mut parameters, texts) = self.parameters_of(method);
         let receiver = if method.asks() { "&self" } else { "&mut self" };
-        let mut parameters = vec![receiver.to_owned()];
+        parameters.insert(0, receiver.to_owned());
+        let first = format!("`{}`.", method.name);
+        out.doc([first.as_str(), &texts]);
+        let answer = if method.asks() { " -> bool" } else { "" };
+        out.push(format!(
+            "fn {}({}){answer};",
+            method.ident,
+            parameters.join(", ")
+        ));
+    }
+
+    /// The parameters of a method, and what is known of its texts.
+    fn parameters_of(&self, method: &Method) -> (Vec<String>, String) {
+        let mut parameters = Vec::new();
         let mut names = Names::default();
         let mut texts = Vec::new();
         for (kind, given) in method.parameters() {
@@ -323,14 +380,7 @@ impl<'a> Emitter<'a> {
             }
             parameters.push(format!("{name}: {ty}"));
         }
-        let first = format!("`{}`.", method.name);
-        out.doc([first.as_str(), &texts.join(" ")]);
-        let answer = if method.asks() { " -> bool" } else { "" };
-        out.push(format!(
-            "fn {}({}){answer};",
-            method.ident,
-            parameters.join(", ")
-        ));
+        (parameters, texts.join(" "))
     }
 
     fn parameter_type(&self, method: &Method, events: &BTreeSet<usize>) -> String {
@@ -385,6 +435,10 @@ impl<'a> Emitter<'a> {
         out.push("/// The state that it is in.");
         out.push("#[must_use]\npub const fn state(&self) -> State {\nself.state\n}");
         self.step(out);
+        let inherited = self.inherited();
+        if !inherited.is_empty() {
+            steps.follow(out, &inherited);
+        }
         for event in &self.vocabulary.events {
             steps.handler(out, event, &self.handler_signature(event));
         }

@@ -53,6 +53,57 @@ impl Steps<'_> {
         out.push("}");
     }
 
+    /// Writes the function that follows the component's control through these states.
+    pub(super) fn follow(&self, out: &mut Writer, inherited: &[StateIndex]) {
+        out.gap();
+        out.push("/// Enters the innermost state on this path, unless the machine is in it.");
+        out.push(
+            "pub fn follow<B: Behaviour + ?Sized>(&mut self, path: &[&str], behaviour: &mut B) {",
+        );
+        let branches = inherited.iter().map(|&state| {
+            let path = self.machine.state(state).path.parts();
+            format!(
+                "if path.starts_with(&{path:?}) {{\n{}}}",
+                self.entrance(state)
+            )
+        });
+        out.push(branches.collect::<Vec<_>>().join(" else "));
+        out.push("}");
+    }
+
+    /// Enters a state, unless the machine is in it.
+    fn entrance(&self, state: StateIndex) -> String {
+        let to = self.machine.leaf(state);
+        let mut inside = Vec::new();
+        let mut groups: Vec<Group> = Vec::new();
+        for &leaf in self.states.leaves() {
+            let mut around = std::iter::successors(Some(leaf), |it| self.machine.state(*it).parent);
+            if around.any(|it| it == state) {
+                inside.push(leaf);
+                continue;
+            }
+            let leaving = self.actions(None, self.machine.leaving(leaf, to));
+            let entering = self.actions(None, self.machine.entering(Some(leaf), to));
+            let done = leaving + &entering;
+            match groups.iter_mut().find(|(_, known)| *known == done) {
+                Some((states, _)) => states.push(leaf),
+                None => groups.push((vec![leaf], done)),
+            }
+        }
+        let arms = groups.iter().filter(|(_, done)| !done.is_empty());
+        let arms = arms.map(|(states, done)| format!("{} => {{\n{done}}}\n", self.pattern(states)));
+        let arms: String = arms.collect();
+        let actions = match arms.as_str() {
+            "" => String::new(),
+            arms => format!("match self.state {{\n{arms}_ => {{}}\n}}\n"),
+        };
+        format!(
+            "if !matches!(self.state, {}) {{\n{actions}self.state = {};\n}}\n",
+            self.pattern(&inside),
+            self.state(to)
+        )
+    }
+
     fn pattern(&self, states: &[StateIndex]) -> String {
         let states = states.iter().map(|&state| self.state(state));
         states.collect::<Vec<_>>().join(" | ")

@@ -12,7 +12,7 @@ use crate::ids::RaComponent;
 use jaus::codec::{FormattedBlob, Message};
 use jaus::messages::core::set_element::{ElementDataFormat, ElementRec, RequestIdRec};
 use jaus::messages::core::{DeleteElement, SetElement, delete_element};
-use jaus::messages::mobility::{ExecuteList, SetGlobalWaypoint};
+use jaus::messages::mobility::{ExecuteList, SetGlobalWaypoint, SetLocalPathSegment};
 
 const PATIENCE: Duration = Duration::from_secs(1);
 
@@ -35,11 +35,9 @@ fn segments() -> Places {
 /// A place identified by its number.
 fn element(places: Places, place: u16) -> Element {
     if places.is_path {
-        let mut segment = jaus::messages::mobility::ReportLocalPathSegment::default();
+        let mut segment = SetLocalPathSegment::default();
         segment.set_p2_x_m(place.into()).unwrap();
-        let mut octets = segment.encode().unwrap().to_vec();
-        octets[..2].copy_from_slice(&places.set.to_le_bytes());
-        return FormattedBlob::new(ElementDataFormat::JAUS_MESSAGE, octets);
+        return FormattedBlob::new(ElementDataFormat::JAUS_MESSAGE, segment.encode().unwrap());
     }
     let mut waypoint = SetGlobalWaypoint::default();
     waypoint

@@ -4,19 +4,11 @@ use super::*;
 use jaus::messages::mobility::{
     QueryActiveElement, QueryGlobalPathSegment, QueryLocalPathSegment, QueryLocalPathSegmentExt,
     ReportActiveElement, ReportGlobalPathSegment, ReportLocalPathSegment,
-    ReportLocalPathSegmentExt,
+    ReportLocalPathSegmentExt, SetGlobalPathSegment, SetLocalPathSegment, SetLocalPathSegmentExt,
 };
 
-/// A list element with the layout of a report under another message code.
-fn segment(uid: u16, previous: u16, next: u16, code: u16, layout: &impl Message) -> ElementRec {
-    let mut element = element(uid, previous, next, layout);
-    let body = element.element_data.data.slice(2..);
-    element.element_data.data = [&code.to_le_bytes(), &body[..]].concat().into();
-    element
-}
-
-fn local(control: (f64, f64), end: (f64, f64), weight: f64) -> ReportLocalPathSegment {
-    let mut path = ReportLocalPathSegment::default();
+fn local(control: (f64, f64), end: (f64, f64), weight: f64) -> SetLocalPathSegment {
+    let mut path = SetLocalPathSegment::default();
     path.set_p1_x_m(control.0).unwrap();
     path.set_p1_y_m(control.1).unwrap();
     path.set_p2_x_m(end.0).unwrap();
@@ -31,10 +23,7 @@ fn two_quarters_of_a_circle_are_driven_one_after_the_other() {
     let weight = std::f64::consts::FRAC_1_SQRT_2;
     let first = local((10.0, 0.0), (10.0, 10.0), weight);
     let second = local((10.0, 20.0), (0.0, 20.0), weight);
-    let elements = vec![
-        segment(1, 0, 2, 0x0410, &first),
-        segment(2, 1, 0, 0x0410, &second),
-    ];
+    let elements = vec![element(1, 0, 2, &first), element(2, 1, 0, &second)];
     assert!(set_elements(&mut rig, elements));
     rig.send(CLIENT, &execute(Some(1), 1.0));
     let query = QueryLocalPathSegment::all();
@@ -62,10 +51,7 @@ fn two_quarters_of_a_circle_are_driven_one_after_the_other() {
 fn a_curve_is_gone_on_with_after_a_stop_in_its_middle() {
     let (mut rig, vehicle) = rig();
     let path = local((10.0, 0.0), (10.0, 10.0), 1.0);
-    assert!(set_elements(
-        &mut rig,
-        vec![segment(1, 0, 0, 0x0410, &path)]
-    ));
+    assert!(set_elements(&mut rig, vec![element(1, 0, 0, &path)]));
     rig.send(CLIENT, &execute(Some(1), 1.0));
     rig.run(seconds(6.0));
     rig.send(CLIENT, &execute(None, 0.0));
@@ -86,16 +72,13 @@ fn a_curve_is_gone_on_with_after_a_stop_in_its_middle() {
 #[test]
 fn segments_of_version_1_1_are_driven_as_well() {
     let (mut rig, vehicle) = rig();
-    let mut path = ReportLocalPathSegmentExt::default();
+    let mut path = SetLocalPathSegmentExt::default();
     path.set_p1_x_m(5.0).unwrap();
     path.set_p1_y_m(0.0).unwrap();
     path.set_p2_x_m(10.0).unwrap();
     path.set_p2_y_m(0.0).unwrap();
     path.set_path_tolerance_m(2.0).unwrap();
-    assert!(set_elements(
-        &mut rig,
-        vec![segment(1, 0, 0, 0x04B0, &path)]
-    ));
+    assert!(set_elements(&mut rig, vec![element(1, 0, 0, &path)]));
     rig.send(CLIENT, &execute(Some(1), 2.0));
     let query = QueryLocalPathSegmentExt::all();
     let report: ReportLocalPathSegmentExt = rig.ask(&query).unwrap();
@@ -107,16 +90,13 @@ fn segments_of_version_1_1_are_driven_as_well() {
 #[test]
 fn a_segment_on_the_globe_leads_where_it_says() {
     let (mut rig, vehicle) = rig();
-    let mut path = ReportGlobalPathSegment::default();
+    let mut path = SetGlobalPathSegment::default();
     path.set_p1_latitude_deg(FRAME.0 + 0.0001).unwrap();
     path.set_p1_longitude_deg(FRAME.1).unwrap();
     path.set_p2_latitude_deg(FRAME.0 + 0.0001).unwrap();
     path.set_p2_longitude_deg(FRAME.1 + 0.0002).unwrap();
     path.set_weighting_factor_value(1.0).unwrap();
-    assert!(set_elements(
-        &mut rig,
-        vec![segment(1, 0, 0, 0x040F, &path)]
-    ));
+    assert!(set_elements(&mut rig, vec![element(1, 0, 0, &path)]));
     rig.send(CLIENT, &execute(Some(0), 2.0));
     let query = QueryGlobalPathSegment::none();
     let report: ReportGlobalPathSegment = rig.ask(&query).unwrap();
@@ -131,7 +111,7 @@ fn a_segment_on_the_globe_leads_where_it_says() {
 fn a_segment_that_cannot_be_read_is_refused() {
     let (mut rig, _) = rig();
     let path = local((10.0, 0.0), (10.0, 10.0), 1.0);
-    let mut damaged = segment(1, 0, 0, 0x0410, &path);
+    let mut damaged = element(1, 0, 0, &path);
     damaged.element_data.data.truncate(7);
     assert!(!set_elements(&mut rig, vec![damaged]));
 }

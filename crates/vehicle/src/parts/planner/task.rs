@@ -246,8 +246,7 @@ impl<'a> PlannerTask<'a> {
                 let what = "local path segment driver";
                 let driver = find_soon(&component, &services, what).await?;
                 let session = engage(&component, driver, authority).await?;
-                let messages = component.messages();
-                hand_over::hand_over(messages, &session, driver, &path, speed, tolerance).await?;
+                hand_over::hand_over(&component, &session, &path, speed, tolerance).await?;
                 Ok((session, look(&component).await))
             };
             Done::HandedOver(run, given.await)

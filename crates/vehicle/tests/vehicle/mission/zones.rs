@@ -31,7 +31,7 @@ struct Scene {
 impl Scene {
     async fn new(subsystem: u16) -> Self {
         let directory = Directory::new(&subsystem.to_string());
-        let alone = Alone::start(subsystem, &directory.0).unwrap();
+        let alone = Alone::start(subsystem, &directory.0, None).unwrap();
         let desk = Node::start(Config::loopback(subsystem + 1, 1)).unwrap();
         let operator = Component::builder(Kind::OperatorControlUnit, "Operator");
         let operator = operator.attach(&desk, 1).unwrap();
