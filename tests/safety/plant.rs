@@ -56,8 +56,15 @@ impl Plant {
     /// Slower wheels count as at rest, in metres or radians per second.
     const REST: f64 = 0.005;
 
-    pub(crate) fn new(now: Instant) -> Self {
-        let rover = SkidSteer::new(SkidSteerConfig::default());
+    /// A plant with this least turning radius in metres; 0 turns on the spot.
+    pub(crate) fn new(now: Instant, turning_radius: f64) -> Self {
+        let rover = SkidSteer::new(SkidSteerConfig {
+            limits: Limits {
+                turning_radius,
+                ..Limits::default()
+            },
+            ..SkidSteerConfig::default()
+        });
         Self {
             now,
             sample: rover.motion(),
@@ -176,8 +183,8 @@ fn is_finite(command: &Drive) -> bool {
 }
 
 impl SharedPlant {
-    pub(crate) fn new(now: Instant) -> Self {
-        Self(Arc::new(Mutex::new(Plant::new(now))))
+    pub(crate) fn new(now: Instant, turning_radius: f64) -> Self {
+        Self(Arc::new(Mutex::new(Plant::new(now, turning_radius))))
     }
 
     pub(crate) fn lock(&self) -> MutexGuard<'_, Plant> {
@@ -247,7 +254,7 @@ mod tests {
     )]
     fn left_alone() -> (Plant, Instant, Instant) {
         let start = Instant::now();
-        let mut plant = Plant::new(start);
+        let mut plant = Plant::new(start, 0.0);
         plant.drive(FULL);
         let end = start + Duration::from_secs(1);
         plant.advance(end);

@@ -176,7 +176,9 @@ impl World {
             network.trace().print();
         }
         let now = network.now();
-        let plant = SharedPlant::new(now);
+        // Every other vehicle steers like a car.
+        let turning_radius = if seed.is_multiple_of(2) { 0.0 } else { 1.0 };
+        let plant = SharedPlant::new(now, turning_radius);
         let vehicle = network.join_with(endpoint(VEHICLE), |clock| {
             vehicle(now, cell, &plant, clock, seed)
         });
