@@ -3,7 +3,11 @@
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-use jaus_vehicle::motion::{Drive, Limits, Motion, Platform, Pose, SkidSteer, SkidSteerConfig};
+use jaus_vehicle::motion::{
+    Drive, Fence, Limits, Motion, Platform, Pose, SkidSteer, SkidSteerConfig,
+};
+
+use crate::positioning::Positioning;
 
 /// Wheels, an actuator that stops without orders, and a pose sensor.
 pub(crate) struct Plant {
@@ -20,6 +24,10 @@ pub(crate) struct Plant {
     /// Distance in metres, forward and backward.
     pub(crate) odometer: f64,
     pub(crate) sensor: Sensor,
+    /// What measures the pose on the globe, if the vehicle is driven by it.
+    pub(crate) positioning: Option<Positioning>,
+    /// The operating zones of the vehicle.
+    pub(crate) fence: Fence,
     sample: Motion,
     /// The motors' fault.
     pub(crate) fault: Option<&'static str>,
@@ -76,6 +84,8 @@ impl Plant {
             last_order: now,
             odometer: 0.0,
             sensor: Sensor::Measures,
+            positioning: None,
+            fence: Fence::default(),
             fault: None,
             got_rubbish: false,
         }
@@ -109,6 +119,10 @@ impl Plant {
                 self.rover.drive(Drive::Stop);
             }
         }
+        let truth = self.pose();
+        if let Some(positioning) = &mut self.positioning {
+            positioning.handle_time(now, &truth);
+        }
     }
 
     fn turn_wheels(&mut self, next: Instant) {
@@ -117,6 +131,9 @@ impl Plant {
         self.now = next;
         let velocity = self.rover.motion().velocity;
         self.odometer += velocity.x.abs() * seconds;
+        if let Some(positioning) = &mut self.positioning {
+            positioning.travel(velocity, seconds);
+        }
         self.wheels.moves = velocity.x.abs() > Self::REST || velocity.yaw.abs() > Self::REST;
         self.wheels.moves_until(next);
         self.actuator.moves_until(next);
@@ -140,15 +157,23 @@ impl Plant {
         self.actuator.moves = self.order.moves;
     }
 
-    fn read_sensor(&mut self) {
-        match self.sensor {
-            Sensor::Stalled => {}
-            Sensor::Measures => self.sample = self.rover.motion(),
-            Sensor::Unknown => {
-                self.sample = self.rover.motion();
-                let pose = &mut self.sample.pose;
-                [pose.x, pose.y, pose.yaw] = [f64::NAN; 3];
-            }
+    /// The true pose.
+    pub(crate) fn pose(&self) -> Pose {
+        self.rover.motion().pose
+    }
+
+    fn read_sensor(&mut self, now: Instant) {
+        if self.sensor == Sensor::Stalled {
+            return;
+        }
+        let truth = self.rover.motion();
+        self.sample = match &self.positioning {
+            Some(positioning) => positioning.measure(now, truth),
+            None => truth,
+        };
+        if self.sensor == Sensor::Unknown {
+            let pose = &mut self.sample.pose;
+            [pose.x, pose.y, pose.yaw] = [f64::NAN; 3];
         }
     }
 }
@@ -213,7 +238,7 @@ impl Wheels {
     pub(crate) fn read_sensor(&self, now: Instant) {
         let mut plant = self.0.lock();
         plant.advance(now);
-        plant.read_sensor();
+        plant.read_sensor(now);
     }
 
     pub(crate) fn sample(&self) -> Motion {
