@@ -24,6 +24,10 @@ pub(crate) enum Driver {
     Path,
     /// A service defined by the application, with ten setpoints per second.
     Own,
+    /// Global Vector Driver: one vector.
+    GlobalVector,
+    /// Global Waypoint Driver: one waypoint.
+    GlobalWaypoint,
 }
 
 /// The fault that occurs while the vehicle moves.
@@ -69,6 +73,20 @@ pub(crate) enum Fault {
     VehicleClock,
     /// The wall clock of the controller's host is stepped by an hour, and the controller is killed.
     ControllerClock,
+    /// The GNSS receiver sends nothing.
+    ReceiverSilent,
+    /// The GNSS receiver repeats its last sentences.
+    ReceiverFrozen,
+    /// The sentences of the GNSS receiver are cut, damaged, or noise.
+    ReceiverGarbled,
+    /// The GNSS receiver reports that it has no fix.
+    FixLost,
+    /// The position is wrong by 100 m.
+    PositionJumps,
+    /// The position is very uncertain.
+    PositionVague,
+    /// A keep-out zone is set on top of the vehicle; later the controller is killed.
+    ZoneSet,
 }
 
 /// A kind of driver and a fault.
@@ -79,7 +97,7 @@ pub(crate) struct Cell {
 }
 
 impl Driver {
-    pub(crate) const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 11] = [
         Self::Effort,
         Self::Velocity,
         Self::HeldEffort,
@@ -89,6 +107,8 @@ impl Driver {
         Self::List,
         Self::Path,
         Self::Own,
+        Self::GlobalVector,
+        Self::GlobalWaypoint,
     ];
 
     /// Whether the controller repeats the setpoint.
@@ -106,12 +126,18 @@ impl Driver {
         matches!(self, Self::HeldEffort | Self::HeldVelocity)
     }
 
+    /// Whether the vehicle is driven by its pose on the globe.
+    pub(crate) const fn is_global(self) -> bool {
+        matches!(self, Self::GlobalVector | Self::GlobalWaypoint)
+    }
+
     /// Whether the vehicle needs its pose.
     pub(crate) const fn needs_pose(self) -> bool {
-        matches!(
-            self,
-            Self::Vector | Self::Waypoint | Self::List | Self::Path
-        )
+        self.is_global()
+            || matches!(
+                self,
+                Self::Vector | Self::Waypoint | Self::List | Self::Path
+            )
     }
 
     /// How long the vehicle may continue to move: after the last setpoint if setpoints are
@@ -119,14 +145,14 @@ impl Driver {
     pub(crate) const fn limit(self) -> Duration {
         Duration::from_secs(match self {
             Self::Effort | Self::Velocity | Self::Own => 1,
-            Self::HeldEffort | Self::HeldVelocity | Self::Vector => 2,
-            Self::Waypoint | Self::List | Self::Path => 5,
+            Self::HeldEffort | Self::HeldVelocity | Self::Vector | Self::GlobalVector => 2,
+            Self::Waypoint | Self::List | Self::Path | Self::GlobalWaypoint => 5,
         })
     }
 }
 
 impl Fault {
-    pub(crate) const ALL: [Self; 20] = [
+    pub(crate) const ALL: [Self; 27] = [
         Self::Killed,
         Self::Suspended,
         Self::CutOff,
@@ -147,7 +173,27 @@ impl Fault {
         Self::DiskStall,
         Self::VehicleClock,
         Self::ControllerClock,
+        Self::ReceiverSilent,
+        Self::ReceiverFrozen,
+        Self::ReceiverGarbled,
+        Self::FixLost,
+        Self::PositionJumps,
+        Self::PositionVague,
+        Self::ZoneSet,
     ];
+
+    /// Whether the fault is one of the GNSS receiver.
+    const fn is_of_receiver(self) -> bool {
+        matches!(
+            self,
+            Self::ReceiverSilent
+                | Self::ReceiverFrozen
+                | Self::ReceiverGarbled
+                | Self::FixLost
+                | Self::PositionJumps
+                | Self::PositionVague
+        )
+    }
 
     /// Whether the component ends or hangs.
     pub(crate) const fn ends_component(self) -> bool {
@@ -156,14 +202,30 @@ impl Fault {
 }
 
 impl Cell {
-    /// All cells except the gateway with velocity drivers: the RA has no velocity command to pass
-    /// on.
-    pub(crate) fn all() -> impl Iterator<Item = Self> {
-        let cells = Fault::ALL.iter().flat_map(|&fault| {
+    /// The drivers by hand and in the local frame, with the faults that concern them all. The RA has
+    /// no velocity command for the gateway to pass on.
+    pub(crate) fn of_local_drivers() -> impl Iterator<Item = Self> {
+        Self::all().filter(|cell| {
+            let is_general = !cell.fault.is_of_receiver() && cell.fault != Fault::ZoneSet;
+            let is_possible = cell.fault != Fault::Gateway || !cell.driver.is_velocity();
+            is_general && is_possible && !cell.driver.is_global()
+        })
+    }
+
+    /// The drivers on the globe with all faults but those of the gateway, which the RA addresses
+    /// differently, and all drivers of the library with zones.
+    pub(crate) fn of_the_globe_and_zones() -> impl Iterator<Item = Self> {
+        Self::all().filter(|cell| match cell.fault {
+            Fault::ZoneSet => cell.driver != Driver::Own,
+            fault => fault != Fault::Gateway && cell.driver.is_global(),
+        })
+    }
+
+    fn all() -> impl Iterator<Item = Self> {
+        Fault::ALL.iter().flat_map(|&fault| {
             let cell = move |driver| Self { driver, fault };
             Driver::ALL.into_iter().map(cell)
-        });
-        cells.filter(|cell| cell.fault != Fault::Gateway || !cell.driver.is_velocity())
+        })
     }
 
     /// Whether the fault itself must stop this driver. Otherwise the controller is killed a moment
@@ -171,7 +233,7 @@ impl Cell {
     pub(crate) const fn stops_by_itself(self) -> bool {
         match self.fault {
             Fault::NanPose | Fault::FrozenPose | Fault::DiskStall => self.driver.needs_pose(),
-            Fault::VehicleClock | Fault::ControllerClock => false,
+            Fault::VehicleClock | Fault::ControllerClock | Fault::ZoneSet => false,
             _ => true,
         }
     }
@@ -189,6 +251,8 @@ impl fmt::Display for Driver {
             Self::List => "list",
             Self::Path => "path segment",
             Self::Own => "own service",
+            Self::GlobalVector => "global vector",
+            Self::GlobalWaypoint => "global waypoint",
         })
     }
 }
@@ -216,6 +280,13 @@ impl fmt::Display for Fault {
             Self::DiskStall => "5 s disk stall",
             Self::VehicleClock => "vehicle's clock stepped",
             Self::ControllerClock => "controller's clock stepped",
+            Self::ReceiverSilent => "receiver silent",
+            Self::ReceiverFrozen => "receiver frozen",
+            Self::ReceiverGarbled => "receiver garbled",
+            Self::FixLost => "fix lost",
+            Self::PositionJumps => "position jumps",
+            Self::PositionVague => "position vague",
+            Self::ZoneSet => "zone set",
         })
     }
 }

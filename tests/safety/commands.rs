@@ -9,11 +9,13 @@ use jaus::messages::core::set_time::TimeStamp;
 use jaus::messages::core::{SetElement, SetTime};
 use jaus::messages::mobility::set_velocity_command::CommandType;
 use jaus::messages::mobility::{
-    ExecuteList, ReportLocalPathSegment, SetLocalPathSegment, SetLocalVector, SetLocalWaypoint,
-    SetTravelSpeed, SetVelocityCommand, SetWrenchEffort,
+    ExecuteList, ReportLocalPathSegment, SetGlobalVector, SetGlobalWaypoint, SetLocalPathSegment,
+    SetLocalVector, SetLocalWaypoint, SetTravelSpeed, SetVelocityCommand, SetWrenchEffort,
 };
+use jaus_vehicle::motion::Pose;
 
 use crate::cell::Driver;
+use crate::positioning::FRAME;
 
 /// Metres to the goal: more than the vehicle covers in any run.
 const FAR: f64 = 400.0;
@@ -25,6 +27,8 @@ pub(crate) fn motion(driver: Driver) -> Vec<Bytes> {
         Driver::Velocity | Driver::HeldVelocity => vec![encode(&velocity())],
         Driver::Vector => vec![encode(&vector())],
         Driver::Waypoint => vec![encode(&waypoint(FAR)), encode(&travel_speed())],
+        Driver::GlobalVector => vec![encode(&global_vector())],
+        Driver::GlobalWaypoint => vec![encode(&global_waypoint()), encode(&travel_speed())],
         Driver::List => {
             let elements = [waypoint(FAR / 2.0), waypoint(FAR)].map(|it| encode(&it));
             vec![encode(&list(elements)), encode(&execute())]
@@ -86,6 +90,23 @@ fn vector() -> SetLocalVector {
     vector.set_speed_m_per_s(1.0).expect("in range");
     vector.set_heading_rad(0.5).expect("in range");
     vector
+}
+
+fn global_vector() -> SetGlobalVector {
+    let mut vector = SetGlobalVector::default();
+    vector.set_speed_m_per_s(1.0).expect("in range");
+    vector.set_heading_rad(0.5).expect("in range");
+    vector
+}
+
+fn global_waypoint() -> SetGlobalWaypoint {
+    let place = FRAME.to_global(&Pose::at(FAR, 1.0));
+    let mut waypoint = SetGlobalWaypoint::default();
+    waypoint.set_latitude_deg(place.latitude).expect("in range");
+    waypoint
+        .set_longitude_deg(place.longitude)
+        .expect("in range");
+    waypoint
 }
 
 fn waypoint(x: f64) -> SetLocalWaypoint {

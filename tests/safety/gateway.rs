@@ -262,6 +262,7 @@ fn part(driver: Driver) -> u8 {
         Driver::Waypoint | Driver::List => 46,
         Driver::Path => 48,
         Driver::Velocity | Driver::HeldVelocity => panic!("RA has no velocity command"),
+        Driver::GlobalVector | Driver::GlobalWaypoint => panic!("not driven through the gateway"),
     }
 }
 

@@ -13,6 +13,9 @@
 //! | waypoint, list, path segment | 5 s after the controller's last message |
 //! | any | 5 s after the last Request Control |
 //! | any, its program hung | the actuator's deadline |
+//! | global vector and waypoint, no position | 2.5 s after the receiver's fault |
+//! | global vector and waypoint, a doubtful position | 0.5 s |
+//! | any, a zone set on top of it | a braking distance deeper into the zone |
 //!
 //! Control is free within 5 s of the last Request Control, there is no motion in the next 30 s, and
 //! then a new lease sets the vehicle in motion.
@@ -27,6 +30,7 @@ mod client;
 mod commands;
 mod gateway;
 mod plant;
+mod positioning;
 #[path = "../sim/mod.rs"]
 mod sim;
 mod simulator;
@@ -47,15 +51,53 @@ const FRESH_SEEDS: u64 = 60;
 
 #[test]
 fn every_cell_stops() {
-    let (table, next) = (Table::default(), AtomicU64::new(0));
-    let cells = Cell::all().count() as u64;
+    check_each(
+        "every cell once",
+        "fresh_seeds_stop",
+        Cell::of_local_drivers().collect(),
+    );
+}
+
+#[test]
+fn every_cell_of_the_globe_and_zones_stops() {
+    let test = "fresh_seeds_of_the_globe_and_zones_stop";
+    check_each(
+        "the globe and zones",
+        test,
+        Cell::of_the_globe_and_zones().collect(),
+    );
+}
+
+#[test]
+fn fresh_seeds_stop() {
+    check_fresh_seeds(
+        "fresh_seeds_stop",
+        FRESH_SEEDS,
+        Cell::of_local_drivers().collect(),
+    );
+}
+
+#[test]
+fn fresh_seeds_of_the_globe_and_zones_stop() {
+    let test = "fresh_seeds_of_the_globe_and_zones_stop";
+    check_fresh_seeds(
+        test,
+        FRESH_SEEDS / 3,
+        Cell::of_the_globe_and_zones().collect(),
+    );
+}
+
+/// Runs each cell once. `fresh` is the test that repeats a seed.
+fn check_each(title: &str, fresh: &str, cells: Vec<Cell>) {
+    let (table, next) = (Table::new(cells), AtomicU64::new(0));
     let work = || {
         loop {
             let seed = next.fetch_add(1, Ordering::Relaxed);
-            if seed >= cells {
+            if seed >= table.cells().len() as u64 {
                 return;
             }
-            table.note(trial::cell_of(seed), seed, &trial::run(seed));
+            let cell = cell_of(table.cells(), seed);
+            table.note(cell, seed, &trial::run(cell, seed));
         }
     };
     std::thread::scope(|scope| {
@@ -63,20 +105,20 @@ fn every_cell_stops() {
             scope.spawn(work);
         }
     });
-    table.print("every cell once");
+    table.print(title);
     let broken = table.broken();
     assert!(
         broken.is_empty(),
-        "{} cells of {cells} are broken; to see one again: \
-         JAUS_SEED=… JAUS_TRACE=1 cargo test --test safety fresh_seeds_stop\n{}",
+        "{} cells of {} are broken; to see one again: \
+         JAUS_SEED=… JAUS_TRACE=1 cargo test --test safety {fresh}\n{}",
         broken.len(),
+        table.cells().len(),
         broken.join("\n")
     );
     assert!(table.is_complete(), "not every cell moved before its fault");
 }
 
-#[test]
-fn fresh_seeds_stop() {
+fn check_fresh_seeds(test: &str, usual: u64, cells: Vec<Cell>) {
     /// Also prints the table when a seed fails.
     struct Printed(Table);
     impl Drop for Printed {
@@ -84,10 +126,11 @@ fn fresh_seeds_stop() {
             self.0.print("fresh seeds");
         }
     }
-    let printed = Printed(Table::default());
+    let printed = Printed(Table::new(cells));
     let kept = include_str!("failed_seeds.txt");
-    seeds::for_kept_and_fresh_seeds("fresh_seeds_stop", kept, FRESH_SEEDS, |seed| {
-        let (cell, outcome) = (trial::cell_of(seed), trial::run(seed));
+    seeds::for_kept_and_fresh_seeds(test, kept, usual, |seed| {
+        let cell = cell_of(printed.0.cells(), seed);
+        let outcome = trial::run(cell, seed);
         printed.0.note(cell, seed, &outcome);
         match outcome.broken.first() {
             Some(broken) => Err(format!("{cell}: {broken}")),
@@ -96,10 +139,24 @@ fn fresh_seeds_stop() {
     });
 }
 
+/// The cell of a seed. The first seeds cover each cell once.
+fn cell_of(cells: &[Cell], seed: u64) -> Cell {
+    cells[(seed % cells.len() as u64) as usize]
+}
+
 #[test]
 fn a_seed_gives_the_same_trial_again() {
-    for seed in [0, 13, 58, 100] {
-        let runs = [trial::run(seed), trial::run(seed)];
+    let cells: Vec<_> = Cell::of_local_drivers().collect();
+    let globe: Vec<_> = Cell::of_the_globe_and_zones().collect();
+    for (cells, seed) in [
+        (&cells, 0),
+        (&cells, 13),
+        (&cells, 58),
+        (&cells, 100),
+        (&globe, 41),
+    ] {
+        let cell = cell_of(cells, seed);
+        let runs = [trial::run(cell, seed), trial::run(cell, seed)];
         assert_eq!(runs[0], runs[1], "seed {seed}");
     }
 }

@@ -3,7 +3,11 @@
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-use jaus_vehicle::motion::{Drive, Limits, Motion, Platform, Pose, SkidSteer, SkidSteerConfig};
+use jaus_vehicle::motion::{
+    Drive, Fence, Limits, Motion, Platform, Pose, SkidSteer, SkidSteerConfig,
+};
+
+use crate::positioning::Positioning;
 
 /// Wheels, an actuator that stops without orders, and a pose sensor.
 pub(crate) struct Plant {
@@ -20,6 +24,10 @@ pub(crate) struct Plant {
     /// Distance in metres, forward and backward.
     pub(crate) odometer: f64,
     pub(crate) sensor: Sensor,
+    /// What measures the pose on the globe, if the vehicle is driven by it.
+    pub(crate) positioning: Option<Positioning>,
+    /// The operating zones of the vehicle.
+    pub(crate) fence: Fence,
     sample: Motion,
     /// The motors' fault.
     pub(crate) fault: Option<&'static str>,
@@ -56,8 +64,15 @@ impl Plant {
     /// Slower wheels count as at rest, in metres or radians per second.
     const REST: f64 = 0.005;
 
-    pub(crate) fn new(now: Instant) -> Self {
-        let rover = SkidSteer::new(SkidSteerConfig::default());
+    /// A plant with this least turning radius in metres; 0 turns on the spot.
+    pub(crate) fn new(now: Instant, turning_radius: f64) -> Self {
+        let rover = SkidSteer::new(SkidSteerConfig {
+            limits: Limits {
+                turning_radius,
+                ..Limits::default()
+            },
+            ..SkidSteerConfig::default()
+        });
         Self {
             now,
             sample: rover.motion(),
@@ -69,6 +84,8 @@ impl Plant {
             last_order: now,
             odometer: 0.0,
             sensor: Sensor::Measures,
+            positioning: None,
+            fence: Fence::default(),
             fault: None,
             got_rubbish: false,
         }
@@ -102,6 +119,10 @@ impl Plant {
                 self.rover.drive(Drive::Stop);
             }
         }
+        let truth = self.pose();
+        if let Some(positioning) = &mut self.positioning {
+            positioning.handle_time(now, &truth);
+        }
     }
 
     fn turn_wheels(&mut self, next: Instant) {
@@ -110,6 +131,9 @@ impl Plant {
         self.now = next;
         let velocity = self.rover.motion().velocity;
         self.odometer += velocity.x.abs() * seconds;
+        if let Some(positioning) = &mut self.positioning {
+            positioning.travel(velocity, seconds);
+        }
         self.wheels.moves = velocity.x.abs() > Self::REST || velocity.yaw.abs() > Self::REST;
         self.wheels.moves_until(next);
         self.actuator.moves_until(next);
@@ -133,15 +157,23 @@ impl Plant {
         self.actuator.moves = self.order.moves;
     }
 
-    fn read_sensor(&mut self) {
-        match self.sensor {
-            Sensor::Stalled => {}
-            Sensor::Measures => self.sample = self.rover.motion(),
-            Sensor::Unknown => {
-                self.sample = self.rover.motion();
-                let pose = &mut self.sample.pose;
-                [pose.x, pose.y, pose.yaw] = [f64::NAN; 3];
-            }
+    /// The true pose.
+    pub(crate) fn pose(&self) -> Pose {
+        self.rover.motion().pose
+    }
+
+    fn read_sensor(&mut self, now: Instant) {
+        if self.sensor == Sensor::Stalled {
+            return;
+        }
+        let truth = self.rover.motion();
+        self.sample = match &self.positioning {
+            Some(positioning) => positioning.measure(now, truth),
+            None => truth,
+        };
+        if self.sensor == Sensor::Unknown {
+            let pose = &mut self.sample.pose;
+            [pose.x, pose.y, pose.yaw] = [f64::NAN; 3];
         }
     }
 }
@@ -176,8 +208,8 @@ fn is_finite(command: &Drive) -> bool {
 }
 
 impl SharedPlant {
-    pub(crate) fn new(now: Instant) -> Self {
-        Self(Arc::new(Mutex::new(Plant::new(now))))
+    pub(crate) fn new(now: Instant, turning_radius: f64) -> Self {
+        Self(Arc::new(Mutex::new(Plant::new(now, turning_radius))))
     }
 
     pub(crate) fn lock(&self) -> MutexGuard<'_, Plant> {
@@ -206,7 +238,7 @@ impl Wheels {
     pub(crate) fn read_sensor(&self, now: Instant) {
         let mut plant = self.0.lock();
         plant.advance(now);
-        plant.read_sensor();
+        plant.read_sensor(now);
     }
 
     pub(crate) fn sample(&self) -> Motion {
@@ -247,7 +279,7 @@ mod tests {
     )]
     fn left_alone() -> (Plant, Instant, Instant) {
         let start = Instant::now();
-        let mut plant = Plant::new(start);
+        let mut plant = Plant::new(start, 0.0);
         plant.drive(FULL);
         let end = start + Duration::from_secs(1);
         plant.advance(end);

@@ -9,8 +9,10 @@ use crate::sim::seeds;
 use crate::trial::Outcome;
 
 /// The outcomes of many trials.
-#[derive(Default)]
-pub(crate) struct Table(Mutex<BTreeMap<Cell, Row>>);
+pub(crate) struct Table {
+    cells: Vec<Cell>,
+    rows: Mutex<BTreeMap<Cell, Row>>,
+}
 
 #[derive(Clone, Default)]
 struct Row {
@@ -25,8 +27,18 @@ struct Row {
 }
 
 impl Table {
+    /// A table of these cells.
+    pub(crate) fn new(cells: Vec<Cell>) -> Self {
+        let rows = Mutex::default();
+        Self { cells, rows }
+    }
+
+    pub(crate) fn cells(&self) -> &[Cell] {
+        &self.cells
+    }
+
     pub(crate) fn note(&self, cell: Cell, seed: u64, outcome: &Outcome) {
-        let mut rows = self.0.lock().expect("no panic");
+        let mut rows = self.rows.lock().expect("no panic");
         let row = rows.entry(cell).or_default();
         row.runs += 1;
         row.moved += u32::from(outcome.moved);
@@ -40,7 +52,7 @@ impl Table {
     }
 
     pub(crate) fn print(&self, title: &str) {
-        let rows = self.0.lock().expect("no panic");
+        let rows = self.rows.lock().expect("no panic");
         seeds::announce(&format!(
             "\n{title}\n{:28}{:16}{:>6}{:>7}{:>15}{:>9}{:>10}",
             "fault", "driver", "runs", "moved", "moved again", "stop/s", "way/m"
@@ -65,14 +77,14 @@ impl Table {
 
     /// Whether every cell was run, and moved before the fault in every run.
     pub(crate) fn is_complete(&self) -> bool {
-        let rows = self.0.lock().expect("no panic");
-        let has_moved = |cell| rows.get(&cell).is_some_and(|row| row.moved == row.runs);
-        Cell::all().all(has_moved)
+        let rows = self.rows.lock().expect("no panic");
+        let has_moved = |cell: &Cell| rows.get(cell).is_some_and(|row| row.moved == row.runs);
+        self.cells.iter().all(has_moved)
     }
 
     /// Broken promises, one line per cell.
     pub(crate) fn broken(&self) -> Vec<String> {
-        let rows = self.0.lock().expect("no panic");
+        let rows = self.rows.lock().expect("no panic");
         let broken = rows.iter().filter_map(|(cell, row)| {
             let (seed, what) = row.broken.as_ref()?;
             Some(format!("{cell} (seed {seed}): {what}"))

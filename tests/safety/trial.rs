@@ -3,8 +3,12 @@
 
 use std::time::{Duration, Instant};
 
+use jaus_vehicle::motion::Pose;
+use jaus_vehicle::zones::{Polygon, ZoneId, Zones};
+
 use crate::cell::{Cell, Fault};
 use crate::plant::{Plant, Sensor};
+use crate::positioning::Positioning;
 use crate::sim::{Conditions, Random};
 use crate::world::{CROWD, World};
 
@@ -23,15 +27,9 @@ pub(crate) struct Outcome {
     pub(crate) broken: Vec<String>,
 }
 
-/// The cell of a seed. The first seeds cover each cell once.
-pub(crate) fn cell_of(seed: u64) -> Cell {
-    let cells: Vec<_> = Cell::all().collect();
-    cells[(seed % cells.len() as u64) as usize]
-}
-
-/// Runs the trial of a seed.
-pub(crate) fn run(seed: u64) -> Outcome {
-    let mut trial = Trial::new(cell_of(seed), seed);
+/// Runs the trial of a cell with a seed.
+pub(crate) fn run(cell: Cell, seed: u64) -> Outcome {
+    let mut trial = Trial::new(cell, seed);
     if trial.drive_off() {
         trial.begin_fault();
         trial.run_fault();
@@ -40,6 +38,27 @@ pub(crate) fn run(seed: u64) -> Outcome {
         trial.revive();
     }
     trial.outcome
+}
+
+/// Distance of the vehicle from the nearest edge of a zone that is set on top of it, in metres.
+const ZONE_BEHIND: f64 = 0.5;
+
+/// A zone whose nearest edge is behind a vehicle.
+fn ahead_of(here: &Pose) -> Polygon {
+    let (sin, cos) = here.yaw.sin_cos();
+    let corner = |ahead: f64, right: f64| {
+        (
+            here.x + ahead * cos - right * sin,
+            here.y + ahead * sin + right * cos,
+        )
+    };
+    let corners = [
+        corner(-ZONE_BEHIND, -50.0),
+        corner(100.0, -50.0),
+        corner(100.0, 50.0),
+        corner(-ZONE_BEHIND, 50.0),
+    ];
+    Polygon::new(corners.to_vec()).expect("a rectangle")
 }
 
 struct Trial {
@@ -80,6 +99,8 @@ impl Trial {
     const CONTROL: Duration = Duration::from_secs(5);
     /// Braking time from any speed, with a margin.
     const BRAKES: Duration = Duration::from_millis(1500);
+    /// Braking distance in metres from the speeds in these trials, with the fence's reaction.
+    const BRAKING_DISTANCE: f64 = 1.2;
     /// Tolerance for the end of control after the vehicle notices its cause.
     const AT_ONCE: Duration = Duration::from_millis(100);
 
@@ -118,6 +139,9 @@ impl Trial {
     /// Drives until the vehicle moves properly; false if it does not.
     fn drive_off(&mut self) -> bool {
         self.run_between(100, 1000);
+        if self.cell.driver.is_global() {
+            self.world.run_for(Positioning::START);
+        }
         if self.cell.fault == Fault::DeadIdsBefore {
             self.world.let_crowd_come(&mut self.random, CROWD);
             self.world.network.kill(self.world.crowd);
@@ -166,6 +190,11 @@ impl Trial {
             Fault::MotorFailed => Some(Duration::from_millis(200)),
             Fault::NanPose => Some(Duration::from_millis(200)),
             Fault::FrozenPose | Fault::DiskStall => Some(Duration::from_secs(1)),
+            Fault::ReceiverSilent
+            | Fault::ReceiverFrozen
+            | Fault::ReceiverGarbled
+            | Fault::FixLost => Some(Positioning::OUTAGE + Duration::from_millis(500)),
+            Fault::PositionJumps | Fault::PositionVague => Some(Duration::from_millis(500)),
             _ => None,
         };
         self.sudden = wait
@@ -213,6 +242,13 @@ impl Trial {
             Fault::NanPose => self.spoil_pose(Sensor::Unknown),
             Fault::FrozenPose | Fault::DiskStall => self.spoil_pose(Sensor::Stalled),
             Fault::VehicleClock | Fault::ControllerClock => self.step_clock(),
+            Fault::ReceiverSilent
+            | Fault::ReceiverFrozen
+            | Fault::ReceiverGarbled
+            | Fault::FixLost
+            | Fault::PositionJumps
+            | Fault::PositionVague => self.break_receiver(),
+            Fault::ZoneSet => self.set_zone(),
         }
     }
 
@@ -375,6 +411,40 @@ impl Trial {
         self.kill_later();
         self.run_between(5000, 8000);
         self.world.plant.lock().sensor = Sensor::Measures;
+    }
+
+    fn break_receiver(&mut self) {
+        let set = |plant: &mut Plant, fault| {
+            let positioning = plant.positioning.as_mut();
+            positioning.expect("a driver on the globe").fault = fault;
+        };
+        set(&mut self.world.plant.lock(), Some(self.cell.fault));
+        self.outlast(|plant| set(plant, None));
+    }
+
+    /// Sets a keep-out zone around the vehicle and all that is ahead of it. The vehicle may brake,
+    /// and leave slowly; it must not drive on. Then the controller is killed, and the zone is
+    /// deleted.
+    fn set_zone(&mut self) {
+        let here = self.world.plant.lock().pose();
+        let zone = ahead_of(&here);
+        let mut zones = Zones::default();
+        zones.set(ZoneId::KeepOut(7), zone.clone());
+        let fence = self.world.plant.lock().fence.clone();
+        fence.set_zones(zones);
+        let end = self.world.network.now() + self.between(3000, 8000);
+        while self.world.network.now() < end {
+            self.world.run_for(Duration::from_millis(100));
+            let Pose { x, y, .. } = self.world.plant.lock().pose();
+            let deeper = -zone.signed_distance((x, y)) - ZONE_BEHIND;
+            if deeper > Self::BRAKING_DISTANCE {
+                return self.break_promise(format!("it drove {deeper:.2} m deeper into a zone"));
+            }
+        }
+        self.begin_fault();
+        self.world.network.kill(self.world.controller);
+        self.run_between(0, 3000);
+        fence.set_zones(Zones::default());
     }
 
     fn step_clock(&mut self) {

@@ -11,10 +11,11 @@ use jaus::service::{
     Service, Stack, Standing, State, StopCause, Time, TimeOfDay, Timing,
 };
 use jaus_vehicle::mobility;
-use jaus_vehicle::motion::{Drive, Effort, Frame, Limits, Motion, Pilot, Platform, Pose};
+use jaus_vehicle::motion::{Drive, Effort, Limits, Motion, Pilot, Platform, Pose};
 
 use crate::cell::{Cell, Driver, Fault};
 use crate::plant::{SharedPlant, Wheels};
+use crate::positioning::FRAME;
 use crate::sim::WallClock;
 
 pub(crate) const VEHICLE: JausId = JausId::new(101, 1, 1);
@@ -110,7 +111,7 @@ impl Program {
 /// All drivers on one vehicle. A gateway turns an RA client's waypoints into a list if it can, so a
 /// vehicle for single waypoints offers it no lists.
 fn drivers(plant: &SharedPlant, time: &TimeOfDay, cell: Cell) -> Vec<Box<dyn Service>> {
-    let pilot = Pilot::new(Wheels(plant.clone()), Frame::at(52.5, 13.4));
+    let pilot = Pilot::new(Wheels(plant.clone()), FRAME).with_fence(plant.lock().fence.clone());
     let policy = match cell.driver.is_held() {
         true => MotionPolicy::Hold,
         false => MotionPolicy::default(),
@@ -126,6 +127,10 @@ fn drivers(plant: &SharedPlant, time: &TimeOfDay, cell: Cell) -> Vec<Box<dyn Ser
         Box::new(vehicle.local_vector_driver()),
         Box::new(vehicle.local_waypoint_driver()),
     ];
+    if cell.driver.is_global() {
+        services.push(Box::new(vehicle.global_vector_driver()));
+        services.push(Box::new(vehicle.global_waypoint_driver()));
+    }
     if (cell.fault, cell.driver) != (Fault::Gateway, Driver::Waypoint) {
         services.push(Box::new(vehicle.list_manager()));
         services.push(Box::new(vehicle.local_waypoint_list_driver()));

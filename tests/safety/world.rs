@@ -15,6 +15,7 @@ use crate::client::Client;
 use crate::commands::encode;
 use crate::gateway::{Crossing, OPERATOR_BEHIND_GATEWAY, Operator};
 use crate::plant::SharedPlant;
+use crate::positioning::Positioning;
 use crate::sim::{
     Conditions, Event as EndpointEvent, Host, Network, OwnedEndpoint, Owner, Random, WallClock,
     seeds,
@@ -176,7 +177,10 @@ impl World {
             network.trace().print();
         }
         let now = network.now();
-        let plant = SharedPlant::new(now);
+        // Every other vehicle steers like a car.
+        let turning_radius = if seed.is_multiple_of(2) { 0.0 } else { 1.0 };
+        let plant = SharedPlant::new(now, turning_radius);
+        plant.lock().positioning = cell.driver.is_global().then(|| Positioning::new(now));
         let vehicle = network.join_with(endpoint(VEHICLE), |clock| {
             vehicle(now, cell, &plant, clock, seed)
         });

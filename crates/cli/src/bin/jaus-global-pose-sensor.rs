@@ -11,6 +11,7 @@ use jaus_cli::failure::Failure;
 use jaus_cli::runtime::{between, seconds};
 use jaus_cli::{Ready, launch};
 use jaus_vehicle::motion::wrap;
+use jaus_vehicle::navigation::NavigatorConfig;
 use jaus_vehicle::parts::{GlobalPoseSensor, Gyro, Part};
 
 #[derive(Args)]
@@ -44,6 +45,11 @@ struct Flags {
     #[arg(long, value_name = "SECONDS", default_value = "1.5", value_parser = seconds)]
     silence: Duration,
 
+    /// Stop reporting the pose after this many seconds without an acceptable position, whatever the
+    /// wheels say: they also turn where the vehicle is stuck
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds)]
+    outage: Duration,
+
     /// Stop reporting the pose when the standard error of the position exceeds this, in metres from
     /// 0.01 to 100
     #[arg(long, value_name = "METRES", default_value = "10", value_parser = |text: &str| between(text, 0.01, 100.0))]
@@ -70,10 +76,13 @@ impl Ready for Flags {
                 directory,
                 inverted,
             }),
-            heading: self.heading.map(|degrees| wrap(degrees.to_radians())),
             hz: self.rate,
-            silence: self.silence,
-            max_rms: self.max_rms,
+            navigator: NavigatorConfig {
+                heading: self.heading.map(|degrees| wrap(degrees.to_radians())),
+                silence: self.silence,
+                outage: self.outage,
+                max_rms: self.max_rms,
+            },
         })
     }
 }

@@ -11,7 +11,9 @@ use jaus_cli::runtime::{between, seconds};
 use jaus_cli::{FenceFlags, Ready, launch};
 use jaus_vehicle::actuator::{MotorConfig, ServoConfig, WheelsConfig};
 use jaus_vehicle::motion::{Ackermann, Limits};
-use jaus_vehicle::parts::{self, Motors, Part, PrimitiveDriver, Sabertooth, SteeringGear, Stop};
+use jaus_vehicle::parts::{
+    self, HBridgeMotors, Motors, Part, PrimitiveDriver, Sabertooth, SteeringGear, Stop,
+};
 
 #[derive(Args)]
 struct Flags {
@@ -65,6 +67,13 @@ struct Flags {
     #[command(flatten)]
     controller: Controller,
 
+    #[command(flatten)]
+    bridges: Bridges,
+
+    #[cfg(all(feature = "can", target_os = "linux"))]
+    #[command(flatten)]
+    can: can::Can,
+
     #[cfg(all(feature = "gpio", target_os = "linux"))]
     #[command(flatten)]
     gpio: gpio::Gpio,
@@ -97,7 +106,7 @@ struct Controller {
     /// The serial line of a motor controller with the left motor on output 1 and the right one on
     /// output 2, such as /dev/ttyUSB0. Without encoders, wheel travel is estimated from --speed and
     /// --response [default: simulated motors]
-    #[arg(long, value_name = "DEVICE")]
+    #[arg(long, value_name = "DEVICE", group = "motors")]
     sabertooth: Option<String>,
 
     /// Bits per second of the controller's line
@@ -107,6 +116,41 @@ struct Controller {
     /// The controller's address, from 128 to 135
     #[arg(long, value_name = "ADDRESS", default_value = "128", value_parser = clap::value_parser!(u8).range(128..=135))]
     sabertooth_address: u8,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "H-bridges on PWM outputs")]
+struct Bridges {
+    /// The PWM chip of the motors' H-bridges, such as /sys/class/pwm/pwmchip0. The outputs keep their
+    /// duty cycle if the program is killed: run it with the package's systemd unit, which switches
+    /// them off, and have an emergency stop in hardware [default: simulated motors]
+    #[arg(long, value_name = "CHIP", requires_all = ["pwm_left", "pwm_right"], group = "motors")]
+    pwm: Option<PathBuf>,
+
+    /// The outputs of the left motor's bridge: ahead, back
+    #[arg(long, value_name = "AHEAD,BACK", value_parser = pair, requires = "pwm")]
+    pwm_left: Option<(u32, u32)>,
+
+    /// The outputs of the right motor's bridge: ahead, back; the other way round for a motor that is
+    /// mounted mirrored
+    #[arg(long, value_name = "AHEAD,BACK", value_parser = pair, requires = "pwm")]
+    pwm_right: Option<(u32, u32)>,
+
+    /// Pulses per second, from 50 to 100000
+    #[arg(long, value_name = "HZ", default_value = "20000", value_parser = |text: &str| between(text, 50.0, 1e5))]
+    pwm_frequency: f64,
+}
+
+impl Bridges {
+    fn motors(&self, motor: MotorConfig) -> Option<HBridgeMotors> {
+        Some(HBridgeMotors {
+            chip: self.pwm.clone()?,
+            left: self.pwm_left?,
+            right: self.pwm_right?,
+            period: Duration::from_secs_f64(1.0 / self.pwm_frequency),
+            motor,
+        })
+    }
 }
 
 #[derive(Args)]
@@ -178,6 +222,10 @@ impl Flags {
     }
 
     fn motors(&self) -> Motors {
+        #[cfg(all(feature = "can", target_os = "linux"))]
+        if let Some(motors) = self.can.motors(self.deadline) {
+            return Motors::Can(motors);
+        }
         #[cfg(all(feature = "gpio", target_os = "linux"))]
         if let Some(motors) = self.gpio.motors(self.speed, self.deadline) {
             return Motors::Gpio(motors);
@@ -190,15 +238,20 @@ impl Flags {
             deadline: self.deadline,
             ..MotorConfig::default()
         };
+        // A real motor has its own noise.
+        let real = MotorConfig {
+            noise: 0.0,
+            ..motor
+        };
+        if let Some(motors) = self.bridges.motors(real) {
+            return Motors::HBridges(motors);
+        }
         match &self.controller.sabertooth {
             Some(device) => Motors::Sabertooth(Sabertooth {
                 device: device.clone(),
                 baud: self.controller.sabertooth_baud,
                 address: self.controller.sabertooth_address,
-                motor: MotorConfig {
-                    noise: 0.0,
-                    ..motor
-                },
+                motor: real,
             }),
             None => Motors::Simulated(motor),
         }
@@ -235,6 +288,62 @@ fn chip_and_number(text: &str) -> Result<(PathBuf, u32), String> {
         })
 }
 
+/// Parses two different numbers: `17,27`.
+fn pair(text: &str) -> Result<(u32, u32), String> {
+    let number = |text: &str| text.trim().parse::<u32>().ok();
+    let pair = text.split_once(',');
+    let pair = pair.and_then(|(first, second)| Some((number(first)?, number(second)?)));
+    pair.filter(|(first, second)| first != second)
+        .ok_or_else(|| "write two different numbers such as 17,27".to_owned())
+}
+
+#[cfg(all(feature = "can", target_os = "linux"))]
+mod can {
+    use std::time::Duration;
+
+    use clap::Args;
+    use jaus_cli::runtime::between;
+    use jaus_vehicle::parts::CanMotors;
+
+    #[derive(Args)]
+    #[command(next_help_heading = "VESC motor controllers on a CAN bus")]
+    pub(super) struct Can {
+        /// The network interface of the bus, such as can0 [default: simulated motors]
+        #[arg(
+            long,
+            value_name = "INTERFACE",
+            requires = "can_counts_per_metre",
+            group = "motors"
+        )]
+        can: Option<String>,
+
+        /// Id of the left motor's controller, from 0 to 254
+        #[arg(long, value_name = "ID", default_value = "1", value_parser = clap::value_parser!(u8).range(0..=254))]
+        can_left: u8,
+
+        /// Id of the right motor's controller, from 0 to 254
+        #[arg(long, value_name = "ID", default_value = "2", value_parser = clap::value_parser!(u8).range(0..=254))]
+        can_right: u8,
+
+        /// Counts of a controller's tachometer per metre of travel, from 1 to 1000000: 6 for each pole
+        /// pair, times the reduction of the gear, by the circumference of the wheel in metres
+        #[arg(long, value_name = "COUNTS", value_parser = |text: &str| between(text, 1.0, 1e6), requires = "can")]
+        can_counts_per_metre: Option<f64>,
+    }
+
+    impl Can {
+        pub(super) fn motors(&self, deadline: Duration) -> Option<CanMotors> {
+            Some(CanMotors {
+                interface: self.can.clone()?,
+                left: self.can_left,
+                right: self.can_right,
+                counts_per_metre: self.can_counts_per_metre?,
+                deadline,
+            })
+        }
+    }
+}
+
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 mod gpio {
     use std::path::PathBuf;
@@ -249,15 +358,15 @@ mod gpio {
     #[command(next_help_heading = "Stepper motors on GPIO lines")]
     pub(super) struct Gpio {
         /// The GPIO chip of the motor drivers, such as /dev/gpiochip0 [default: simulated motors]
-        #[arg(long, value_name = "CHIP", requires_all = ["left", "right"])]
+        #[arg(long, value_name = "CHIP", requires_all = ["left", "right"], group = "motors")]
         gpio: Option<PathBuf>,
 
         /// The left motor's lines: step, direction
-        #[arg(long, value_name = "STEP,DIRECTION", value_parser = lines, requires = "gpio")]
+        #[arg(long, value_name = "STEP,DIRECTION", value_parser = super::pair, requires = "gpio")]
         left: Option<(u32, u32)>,
 
         /// The right motor's lines; that motor is mounted mirrored
-        #[arg(long, value_name = "STEP,DIRECTION", value_parser = lines, requires = "gpio")]
+        #[arg(long, value_name = "STEP,DIRECTION", value_parser = super::pair, requires = "gpio")]
         right: Option<(u32, u32)>,
 
         /// A stop input: a normally closed contact between this line and ground, such as
@@ -291,14 +400,6 @@ mod gpio {
                 right: self.right?,
             })
         }
-    }
-
-    fn lines(text: &str) -> Result<(u32, u32), String> {
-        let number = |text: &str| text.trim().parse::<u32>().ok();
-        let pair = text.split_once(',');
-        let pair = pair.and_then(|(step, direction)| Some((number(step)?, number(direction)?)));
-        pair.filter(|(step, direction)| step != direction)
-            .ok_or_else(|| "write two different line numbers such as 17,27".to_owned())
     }
 }
 

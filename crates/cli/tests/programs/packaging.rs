@@ -23,8 +23,9 @@ fn named(folder: &Path, prefix: &str, suffix: &str) -> BTreeSet<String> {
     names.filter_map(middle).collect()
 }
 
-/// The service that joins two networks; it does not belong on a machine that runs a whole system.
-const BETWEEN_NETWORKS: &str = "ra-gateway";
+/// Services that do not belong on a machine that runs a whole system: one joins two networks, the
+/// others need a GNSS receiver.
+const ELSEWHERE: [&str; 3] = ["ra-gateway", "global-pose-sensor", "global-driver"];
 
 /// Names of our programs without `jaus-`.
 fn programs() -> BTreeSet<String> {
@@ -50,12 +51,33 @@ fn the_system_for_one_machine_has_nothing_wrong_and_every_part_that_is_a_service
     let run = run(&["up", system.to_str().unwrap(), "--check"], b"");
     assert_eq!(run.status, 0, "{}", run.stderr);
     let parts = named(&packaging("etc"), "", ".toml");
-    for part in parts.into_iter().filter(|part| part != BETWEEN_NETWORKS) {
+    for part in parts
+        .iter()
+        .filter(|part| !ELSEWHERE.contains(&part.as_str()))
+    {
         let begin = format!("{part}: ");
         let mut lines = run.stdout.lines();
         let line = lines.find(|line| line.starts_with(&begin));
         let line = line.unwrap_or_else(|| panic!("{part} is not in system.toml"));
         assert!(line.contains(&format!("/jaus-{part} ")), "{line}");
+    }
+}
+
+#[test]
+fn the_unit_of_the_motors_reaches_every_kind_of_them() {
+    let unit = "systemd/jaus@primitive-driver.service.d/10-hardware.conf";
+    let unit = std::fs::read_to_string(packaging(unit)).unwrap();
+    for (motors, right) in [
+        ("GPIO lines", "DeviceAllow=char-gpiochip rw"),
+        ("serial lines", "DeviceAllow=char-ttyUSB rw"),
+        ("CAN buses", "RestrictAddressFamilies=AF_CAN"),
+        ("PWM outputs", "ReadWritePaths=-/sys/devices"),
+        (
+            "H-bridges of a killed program",
+            "ExecStopPost=-/bin/sh -c 'for f in /sys/class/pwm/",
+        ),
+    ] {
+        assert!(unit.contains(right), "{motors}: no {right}");
     }
 }
 

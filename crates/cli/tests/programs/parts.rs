@@ -137,3 +137,81 @@ async fn emergencies_and_the_stop_input_are_logged_without_a_flag() {
     assert!(program.child.wait().unwrap().success());
     std::fs::remove_dir_all(directory).unwrap();
 }
+
+#[test]
+fn flags_of_motors_and_receivers_out_of_their_range_are_told_with_the_range() {
+    let tool = std::path::Path::new(env!("CARGO_BIN_EXE_jaus"));
+    let refused = |program: &str, flags: &str, told: &str| {
+        let program = tool.with_file_name(program);
+        let run = Command::new(program)
+            .args(flags.split(' '))
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(
+            run.status.code() == Some(2) && said.contains(told),
+            "{flags}: {said}"
+        );
+    };
+    for (flags, told) in [
+        ("--wheelbase 0", "write a number from 0.05 to 20"),
+        (
+            "--wheelbase 1 --steering-angle 81",
+            "write a number from 1 to 80",
+        ),
+        (
+            "--wheelbase 1 --servo pwmchip0",
+            "/sys/class/pwm/pwmchip0:0",
+        ),
+        ("--servo /sys/class/pwm/pwmchip0:0", "--wheelbase"),
+        (
+            "--sabertooth /dev/null --sabertooth-address 127",
+            "127 is not in 128..=135",
+        ),
+        ("--pwm /sys/class/pwm/pwmchip0", "--pwm-left"),
+        ("--pwm-frequency 49", "write a number from 50 to 100000"),
+        (
+            "--pwm x --pwm-right 2,3 --pwm-left 1,1",
+            "two different numbers",
+        ),
+        #[cfg(feature = "can")]
+        ("--can can0", "--can-counts-per-metre"),
+        #[cfg(feature = "can")]
+        (
+            "--can can0 --can-counts-per-metre 0",
+            "write a number from 1 to 1000000",
+        ),
+        #[cfg(feature = "can")]
+        (
+            "--can can0 --can-counts-per-metre 9 --can-left 255",
+            "255 is not in 0..=254",
+        ),
+        #[cfg(feature = "can")]
+        (
+            "--can can0 --can-counts-per-metre 9 --sabertooth /dev/null",
+            "cannot be used with",
+        ),
+    ] {
+        refused("jaus-primitive-driver", flags, told);
+    }
+    for (flags, told) in [
+        ("--outage 0", "write more than 0"),
+        ("--max-rms 0", "write a number from 0.01 to 100"),
+        ("--gyro-inverted", "--gyro"),
+        ("--baud 1", "1 is not in 300..=4000000"),
+    ] {
+        refused("jaus-global-pose-sensor", flags, told);
+    }
+    refused(
+        "jaus-global-driver",
+        "--turning-radius 101",
+        "write a number from 0 to 100",
+    );
+}
+
+#[cfg(feature = "can")]
+#[test]
+fn a_can_bus_that_does_not_exist_is_told_with_the_remedy() {
+    let program = Program::start(&["--can", "nocan7", "--can-counts-per-metre", "200"], &[]);
+    program.says("bring it up with `ip link set nocan7 up type can bitrate 500000`");
+}

@@ -2,8 +2,9 @@
 //! platforms of them.
 //!
 //! A driver for real hardware implements [`Actuator`] or [`Steering`]. [`SimulatedMotor`] and
-//! [`SimulatedServo`] simulate them; [`PulseMotor`] drives a stepper motor, [`SabertoothMotor`] a
-//! motor controller on a serial line, [`PwmServo`] a steering servo.
+//! [`SimulatedServo`] simulate them; [`PulseMotor`] drives a stepper motor, [`OpenLoopMotor`] one
+//! behind a serial controller or an H-bridge, [`VescMotor`] one behind a controller on a CAN bus,
+//! [`PwmServo`] a steering servo.
 //! [`Wheels`] is the [`Platform`](crate::motion::Platform): [a left and a right drive](SideDrives),
 //! or [one drive and steered front wheels](SteeredDrive). An [`Odometer`] reports the distance that
 //! the wheels of each side have travelled.
@@ -20,32 +21,45 @@
 //! assert_eq!(odometer.count().left, 0.0);
 //! ```
 
+mod can;
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 mod gpio;
+mod h_bridge;
 mod motor;
+mod motor_thread;
 mod pulses;
+mod pwm_output;
 mod pwm_servo;
 mod sabertooth;
 mod side_drives;
+#[cfg(all(feature = "can", target_os = "linux"))]
+mod socket_can;
 mod steered_drive;
 mod steering;
 mod stepper;
 mod stop;
+mod vesc;
 mod wheels;
 
 use std::time::Instant;
 
+pub use can::{CanBus, CanFrame, VirtualBus};
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 pub use gpio::{GpioError, GpioLines, GpioStop};
+pub use h_bridge::HBridge;
 pub use motor::{FaultSwitch, MotorConfig, SimulatedMotor};
+pub use motor_thread::OpenLoopMotor;
 pub use pulses::{Lines, PulseMotor};
-pub use pwm_servo::{PwmError, PwmServo, ServoConfig};
-pub use sabertooth::SabertoothMotor;
+pub use pwm_output::{PwmError, PwmOutput};
+pub use pwm_servo::{PwmServo, ServoConfig};
 pub use side_drives::SideDrives;
+#[cfg(all(feature = "can", target_os = "linux"))]
+pub use socket_can::SocketCan;
 pub use steered_drive::SteeredDrive;
 pub use steering::{SimulatedServo, Steering};
 pub use stepper::{Stepper, StepperConfig, StepperPoll};
 pub use stop::{Interlock, SimulatedStop, StopFile, StopInput};
+pub use vesc::VescMotor;
 pub use wheels::{Drivetrain, Odometer, Wheels, WheelsConfig};
 
 /// One drive: a wheel, or the wheels of one side, with motor and distance counter.

@@ -2,210 +2,72 @@
 //!
 //! A packet has four octets: the controller's address (128 to 135), a command, a value from 0 to
 //! 127, and the sum of these three modulo 128. The controller never answers, so the line shows
-//! neither its faults nor the travel of the wheels: travel is estimated from the commands, with the
-//! lag of a [`SimulatedMotor`].
+//! neither its faults nor the travel of the wheels.
 //!
 //! The controller is told to stop its motors when it receives nothing for 200 ms (its serial
 //! timeout, command 14), so they stop even if the program is killed. It forgets this when its power
 //! fails, so it is told every second.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "writes to the controller in real time, on its own thread"
-)]
 
 use std::io::{self, Write};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::{Actuator, Command, MotorConfig, SimulatedMotor};
-use crate::motion::CommandDeadline;
+use super::motor_thread::MotorLine;
+use super::{MotorConfig, OpenLoopMotor};
 
-/// One of the two motors of a controller. When both are dropped, the controller is commanded to
-/// stop.
-pub struct SabertoothMotor {
-    controller: Arc<Controller>,
-    index: usize,
-    /// Estimates the travel.
-    model: SimulatedMotor,
-}
-
-/// The thread that writes to the line, and what it writes.
-struct Controller {
-    shared: Arc<Shared>,
-    thread: Mutex<Option<JoinHandle<()>>>,
-}
-
-struct Shared {
-    state: Mutex<State>,
-    news: Condvar,
-}
-
-struct State {
-    motors: [Setpoint; 2],
-    fault: Option<String>,
-    /// When the thread last wrote.
-    written_at: Instant,
-    ends: bool,
-}
-
-#[derive(Clone, Copy)]
-struct Setpoint {
-    share: f64,
-    deadline: CommandDeadline,
-}
-
-impl Setpoint {
-    /// The share of full speed in force: 0, if the last command has expired.
-    fn share_at(&mut self, now: Instant) -> f64 {
-        if self.share != 0.0 && self.deadline.has_passed(now) {
-            tracing::warn!("watchdog: the motor stops because its command was not repeated");
-            self.share = 0.0;
-        }
-        self.share
-    }
-}
-
-impl SabertoothMotor {
-    /// Interval between two packets for each motor.
-    const PERIOD: Duration = Duration::from_millis(50);
-    /// Interval between two settings of the serial timeout.
-    const SETUP: Duration = Duration::from_secs(1);
-    /// A thread that has not written for this time is stuck.
-    const STUCK: Duration = Duration::from_millis(500);
-
-    /// Starts motors 1 and 2 of the controller with this address (128 to 135) on a line.
+impl OpenLoopMotor {
+    /// Starts motors 1 and 2 of the Sabertooth controller with this address (128 to 135) on a serial
+    /// line.
     ///
     /// # Errors
     /// If the thread cannot be created.
-    pub fn start(
+    pub fn sabertooth(
         line: impl Write + Send + 'static,
         address: u8,
         config: MotorConfig,
     ) -> io::Result<[Self; 2]> {
-        let setpoint = Setpoint {
-            share: 0.0,
-            deadline: CommandDeadline::new(config.deadline),
+        let sabertooth = Sabertooth {
+            line,
+            address,
+            set_up_at: None,
         };
-        let shared = Arc::new(Shared {
-            state: Mutex::new(State {
-                motors: [setpoint; 2],
-                fault: None,
-                written_at: Instant::now(),
-                ends: false,
-            }),
-            news: Condvar::new(),
-        });
-        let of_thread = Arc::clone(&shared);
-        let thread = std::thread::Builder::new()
-            .name("sabertooth".to_owned())
-            .spawn(move || run(&of_thread, line, address))?;
-        let controller = Arc::new(Controller {
-            shared,
-            thread: Mutex::new(Some(thread)),
-        });
-        Ok([0, 1].map(|index| Self {
-            controller: Arc::clone(&controller),
-            index,
-            model: SimulatedMotor::new(config),
-        }))
+        Self::start(sabertooth, config)
     }
 }
 
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+/// The controller on its line.
+struct Sabertooth<W> {
+    line: W,
+    address: u8,
+    /// When the serial timeout was last set; `None` if it may be lost.
+    set_up_at: Option<Instant>,
 }
 
-impl Actuator for SabertoothMotor {
-    fn handle_time(&mut self, now: Instant) {
-        self.model.handle_time(now);
-    }
+impl<W: Write + Send + 'static> MotorLine for Sabertooth<W> {
+    const NAME: &'static str = "sabertooth";
+    const PERIOD: Duration = Duration::from_millis(50);
 
-    fn command(&mut self, command: Command) {
-        let command = command.or_stop();
-        self.model.command(command);
-        let mut state = self.controller.shared.lock();
-        let setpoint = &mut state.motors[self.index];
-        // At 0 the controller brakes.
-        let share = command.drive.clamp(-1.0, 1.0) * (1.0 - command.brake.clamp(0.0, 1.0));
-        setpoint.deadline.restart(Some(Instant::now()));
-        if setpoint.share != share {
-            setpoint.share = share;
-            self.controller.shared.news.notify_one();
-        }
-    }
-
-    fn travel(&self) -> f64 {
-        self.model.travel()
-    }
-
-    fn fault(&self) -> Option<String> {
-        let state = self.controller.shared.lock();
-        let is_stuck = state.written_at.elapsed() > Self::STUCK;
-        let stuck = || is_stuck.then(|| "the motor controller's line takes no data".to_owned());
-        state.fault.clone().or_else(stuck)
-    }
-}
-
-impl Drop for Controller {
-    fn drop(&mut self) {
-        self.shared.lock().ends = true;
-        self.shared.news.notify_one();
-        let thread = self
-            .thread
-            .get_mut()
-            .unwrap_or_else(PoisonError::into_inner);
-        if let Some(thread) = thread.take() {
-            // Without the thread, the controller's own timeout stops the motors.
-            let _ = thread.join();
-        }
-    }
-}
-
-/// Writes the setpoints until the motors are dropped, and then a stop.
-fn run(shared: &Shared, mut line: impl Write, address: u8) {
-    let mut set_up_at: Option<Instant> = None;
-    loop {
-        let now = Instant::now();
-        let mut state = shared.lock();
-        let ends = state.ends;
-        let shares = match ends {
-            true => [0.0; 2],
-            false => [0, 1].map(|index: usize| state.motors[index].share_at(now)),
-        };
-        drop(state);
+    fn exchange(&mut self, now: Instant, shares: &[f64]) -> Result<(), String> {
+        /// Interval between two settings of the serial timeout.
+        const SETUP: Duration = Duration::from_secs(1);
         let since = |at| now.saturating_duration_since(at);
-        let sets_up = set_up_at.is_none_or(|at| since(at) >= SabertoothMotor::SETUP);
+        let sets_up = self.set_up_at.is_none_or(|at| since(at) >= SETUP);
         let mut octets = Vec::new();
         if sets_up {
-            octets.extend(packet(address, TIMEOUT, 2));
+            octets.extend(packet(self.address, TIMEOUT, 2));
         }
-        for (motor, share) in shares.into_iter().enumerate() {
-            octets.extend(drive(address, motor, share));
+        for (motor, &share) in shares.iter().enumerate() {
+            octets.extend(drive(self.address, motor, share));
         }
-        let written = line.write_all(&octets).and_then(|()| line.flush());
-        if ends {
-            return;
-        }
-        let mut state = shared.lock();
-        match written {
+        let written = self.line.write_all(&octets);
+        match written.and_then(|()| self.line.flush()) {
             Ok(()) => {
-                state.fault = None;
-                if sets_up {
-                    set_up_at = Some(now);
-                }
+                self.set_up_at = if sets_up { Some(now) } else { self.set_up_at };
+                Ok(())
             }
             Err(error) => {
-                state.fault = Some(format!("cannot write to the motor controller: {error}"));
-                set_up_at = None;
+                self.set_up_at = None;
+                Err(format!("cannot write to the motor controller: {error}"))
             }
-        }
-        state.written_at = Instant::now();
-        if !state.ends {
-            let woken = shared.news.wait_timeout(state, SabertoothMotor::PERIOD);
-            drop(woken.unwrap_or_else(PoisonError::into_inner));
         }
     }
 }
@@ -227,8 +89,15 @@ fn drive(address: u8, motor: usize, share: f64) -> [u8; 4] {
 }
 
 #[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the motors are served in real time"
+)]
 mod tests {
     use super::*;
+    use std::sync::{Arc, Mutex};
+
+    use crate::actuator::{Actuator, Command};
 
     /// A line that records the last packet of each command, and can break.
     #[derive(Clone, Default)]
@@ -281,9 +150,9 @@ mod tests {
         }
     }
 
-    fn start() -> (Line, [SabertoothMotor; 2]) {
+    fn start() -> (Line, [OpenLoopMotor; 2]) {
         let line = Line::default();
-        let motors = SabertoothMotor::start(line.clone(), 130, MotorConfig::default()).unwrap();
+        let motors = OpenLoopMotor::sabertooth(line.clone(), 130, MotorConfig::default()).unwrap();
         (line, motors)
     }
 
@@ -319,7 +188,7 @@ mod tests {
     #[test]
     fn a_program_that_hangs_or_ends_stops_both_motors() {
         let (line, [mut left, mut right]) = start();
-        let drive = |left: &mut SabertoothMotor, right: &mut SabertoothMotor| {
+        let drive = |left: &mut OpenLoopMotor, right: &mut OpenLoopMotor| {
             left.command(ahead(1.0));
             right.command(ahead(1.0));
         };

@@ -29,6 +29,8 @@ pub struct Estimate {
     pub heading_rms: f64,
     /// Time of the newest input that determines the position.
     pub sampled_at: Instant,
+    /// Time of the last accepted position.
+    pub fixed_at: Instant,
 }
 
 /// Fuses the inputs. Times are those of the measurements.
@@ -39,8 +41,12 @@ pub struct Estimator {
     rate: Option<(Instant, f64)>,
     /// The last wheel travel.
     travel: Option<(Instant, Gone)>,
+    /// What the wheels have turned since the last turn rate, in radians.
+    unseen_turn: f64,
     /// Time of the last accepted position.
     fixed_at: Option<Instant>,
+    /// Standard deviation of the last accepted position in metres.
+    deviation: f64,
     /// Time of the last position, accepted or not.
     seen_at: Option<Instant>,
     /// Time of the last input that shows the heading.
@@ -129,9 +135,12 @@ impl Estimator {
         if !gone.forward.is_finite() || !gone.turn.is_finite() {
             return;
         }
+        self.unseen_turn += gone.turn;
         if !has_rate {
-            let wander = Self::WANDER.powi(2) * (gone.forward.abs() + gone.turn.abs());
-            state.turn(gone.turn, wander);
+            // Without a gyroscope, or after its last rate: the turn since then counts too.
+            let turn = std::mem::take(&mut self.unseen_turn);
+            let wander = Self::WANDER.powi(2) * (gone.forward.abs() + turn.abs());
+            state.turn(turn, wander);
         }
         state.drive(gone.forward);
     }
@@ -143,6 +152,7 @@ impl Estimator {
         }
         let before = self.rate.replace((now, rate));
         self.turned_at = Some(now);
+        self.unseen_turn = 0.0;
         let Some(seconds) = before
             .map(|(at, _)| now.saturating_duration_since(at))
             .filter(|age| *age <= Self::RATE_AGE)
@@ -172,7 +182,7 @@ impl Estimator {
         self.seen_at = Some(now);
         let Some(state) = &mut self.state else {
             self.state = Some(State::new(fix, variance));
-            self.fixed_at = Some(now);
+            self.accept(now, fix);
             return;
         };
         // Without wheel travel the vehicle may have gone anywhere since.
@@ -184,12 +194,11 @@ impl Estimator {
             if self.positions.reject(now, distance) {
                 tracing::warn!(metres = distance, "the position was wrong; it starts again");
                 state.place((place.x, place.y), variance);
-                self.fixed_at = Some(now);
+                self.accept(now, fix);
             }
             return;
         }
         self.positions = Outliers::default();
-        self.fixed_at = Some(now);
         state.correct(NORTH, missed[0], variance);
         // The first correction also moves the east.
         let east = place.y - state.values[EAST];
@@ -198,6 +207,12 @@ impl Estimator {
             state.frame.altitude = altitude;
         }
         state.move_frame();
+        self.accept(now, fix);
+    }
+
+    fn accept(&mut self, now: Instant, fix: &Fix) {
+        self.fixed_at = Some(now);
+        self.deviation = fix.deviation();
     }
 
     /// Handles a course over ground.
@@ -256,16 +271,20 @@ impl Estimator {
             ..Pose::at(north, east)
         });
         let own = (state.covariance[NORTH][NORTH] + state.covariance[EAST][EAST]).sqrt();
+        // The errors of consecutive positions are alike: no mean of them is better than one.
+        let rms = own.hypot(self.deviation);
         let doubt = self
             .positions
             .since
             .map_or(0.0, |_| self.positions.distance);
         let travelled_at = self.travel.map(|(at, _)| at).filter(|_| state.has_heading);
+        let fixed_at = self.fixed_at?;
         Some(Estimate {
             pose,
-            position_rms: own.max(doubt),
+            position_rms: rms.max(doubt),
             heading_rms: variance.sqrt(),
-            sampled_at: self.fixed_at.max(travelled_at)?,
+            sampled_at: travelled_at.map_or(fixed_at, |at| at.max(fixed_at)),
+            fixed_at,
         })
     }
 

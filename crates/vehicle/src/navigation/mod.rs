@@ -5,15 +5,21 @@
 //! | [`Receiver`] | reads the sentences of a GNSS receiver (NMEA 0183) |
 //! | [`IioGyro`] | reads a gyroscope of Linux's industrial I/O |
 //! | [`Estimator`] | fuses them with wheel odometry, and states its own uncertainty |
+//! | [`SimulatedReceiver`] | writes the sentences of a receiver |
+//! | [`Navigator`] | reads, fuses, and says which pose a vehicle may rely on |
 //!
-//! Receiver and estimator do no I/O and read no clock.
+//! Only the gyroscope does I/O, and none reads a clock.
 
 mod estimator;
 mod gyro;
+mod navigator;
 mod nmea;
+mod simulated_receiver;
 #[cfg(test)]
 mod tests;
 
 pub use estimator::{Estimate, Estimator};
 pub use gyro::{GyroError, IioGyro};
+pub use navigator::{NavigationLoss, Navigator, NavigatorConfig};
 pub use nmea::{Course, Fix, Navigation, Quality, Receiver};
+pub use simulated_receiver::SimulatedReceiver;

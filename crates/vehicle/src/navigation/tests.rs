@@ -179,6 +179,25 @@ fn wheels_and_gyroscope_bridge_a_drop_out_and_the_uncertainty_grows() {
 }
 
 #[test]
+fn a_gyroscope_that_falls_silent_in_a_turn_leaves_the_heading_to_the_wheels() {
+    for seed in 1..=10 {
+        let mut journey = Journey::new(seed);
+        journey.gyro = Some(0.01);
+        journey.drive(0.0, 0.0, 10.0);
+        journey.drive(1.5, 0.0, 20.0);
+        journey.has_gnss = false;
+        journey.drive(1.5, 1.0, 1.0);
+        journey.gyro = None;
+        journey.drive(1.5, 1.0, 1.0);
+        let (_, turned, estimate) = journey.error();
+        assert!(
+            turned < 3.0 * estimate.heading_rms,
+            "{turned}, {estimate:?}"
+        );
+    }
+}
+
+#[test]
 fn without_any_input_the_estimate_does_not_look_fresh() {
     let mut journey = Journey::new(3);
     journey.drive(1.0, 0.0, 20.0);

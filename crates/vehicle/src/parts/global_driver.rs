@@ -5,7 +5,8 @@ use std::convert::Infallible;
 use std::time::Duration;
 
 use super::drivers::{
-    FaultMonitor, Next, RemotePlatform, RemotePlatformSettings, Sense, guard, shut_down,
+    FaultMonitor, GlobalPoses, Next, RemotePlatform, RemotePlatformSettings, Sense, guard,
+    shut_down,
 };
 use super::vector_driver::Efforts;
 use super::{Part, PartError, Slot};
@@ -28,7 +29,8 @@ pub struct GlobalDriver {
     pub stale: Duration,
     /// Dimensions and delays by which it keeps to the operating zones.
     pub fence: FenceConfig,
-    /// Greatest standard error of the position in metres. The vehicle stops when it is exceeded.
+    /// Greatest standard error of the position in metres. The vehicle stops when it is exceeded, and
+    /// when the position jumps by more than twice this.
     pub max_rms: f64,
     /// The authority used to control the primitive driver.
     pub authority: u8,
@@ -88,6 +90,12 @@ impl Part for GlobalDriver {
         let zones = Sense::zones(&component)?;
         let local_poses = Sense::pose(&component, Self::HZ)?;
         let velocities = Sense::velocity(&component, Self::HZ)?;
+        let global = GlobalPoses::new(
+            remote_platform.clone(),
+            vehicle.clone(),
+            self.max_rms,
+            self.limits,
+        );
         let own = component.clone();
         let next = Next {
             component,
@@ -102,7 +110,7 @@ impl Part for GlobalDriver {
             sensors: FaultMonitor::default(),
         };
         tokio::select! {
-            end = poses.steer(&remote_platform, &vehicle, self.max_rms) => end,
+            end = poses.steer(global) => end,
             end = velocities.steer(&remote_platform) => end,
             end = zones.enclose(&fence) => end,
             end = local_poses.locate(&fence) => end,

@@ -11,13 +11,13 @@ use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::drivers::{Freshness, Sense};
+use super::drivers::Sense;
 use super::navigation_inputs::{self, Gyro};
 use super::{Part, PartError, Slot};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::Vehicle;
-use crate::motion::{DeadReckoning, Frame, GlobalPose, Motion, Observed, Pilot, Pose, WheelCount};
-use crate::navigation::{Estimator, Navigation, Receiver};
+use crate::motion::{Frame, GlobalPose, Motion, Observed, Pilot, Pose, WheelCount};
+use crate::navigation::{Navigator, NavigatorConfig};
 use jaus::component::{AccessControl, Component};
 use jaus::messages::mobility::{QueryGlobalPose, QueryGlobalPoseExt};
 
@@ -25,8 +25,8 @@ use jaus::messages::mobility::{QueryGlobalPose, QueryGlobalPoseExt};
 ///
 /// It offers Global Pose Sensor. A client in control may set the heading, which is otherwise unknown
 /// until the vehicle has moved; the position is always measured. It finds Wheel Odometry in its
-/// subsystem; without it, the pose is that of the receiver alone. A pose that is older than
-/// `silence`, or less certain than `max_rms`, is omitted from the reports.
+/// subsystem; without it, the pose is that of the receiver alone. A pose that is too old or too uncertain
+/// (`navigator`) is omitted from the reports.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GlobalPoseSensor {
     /// The serial line of the receiver (NMEA 0183), such as `/dev/ttyUSB0`.
@@ -35,14 +35,10 @@ pub struct GlobalPoseSensor {
     pub baud: u32,
     /// The gyroscope, if there is one.
     pub gyro: Option<Gyro>,
-    /// The heading at the start in radians from north, if it is known.
-    pub heading: Option<f64>,
     /// Report rate requested for the wheels, in hertz.
     pub hz: f64,
-    /// The pose becomes unknown without position or wheel travel for this time.
-    pub silence: Duration,
-    /// The pose becomes unknown at this standard error of the position, in metres.
-    pub max_rms: f64,
+    /// The heading at the start, and when the pose becomes unknown.
+    pub navigator: NavigatorConfig,
 }
 
 /// What a global pose sensor reads.
@@ -60,10 +56,8 @@ impl Default for GlobalPoseSensor {
             receiver: "/dev/ttyACM0".to_owned(),
             baud: 9600,
             gyro: None,
-            heading: None,
             hz: 25.0,
-            silence: Duration::from_millis(1500),
-            max_rms: 10.0,
+            navigator: NavigatorConfig::default(),
         }
     }
 }
@@ -102,40 +96,23 @@ impl GlobalPoseSensor {
         let urn = wheel_odometry::URN;
         let counts = Sense::of(&component, urn, &query, self.hz, "wheel travel")?;
         let sensor = Running {
-            heading: self.heading,
-            settings: self,
             component,
             vehicle,
             observed,
-            estimator: Estimator::default(),
-            decoder: Receiver::default(),
-            fixes: Freshness::default(),
-            wheels: Wheels::default(),
+            navigator: Navigator::new(self.navigator),
+            is_lost: false,
         };
         sensor.work(inputs, counts).await
     }
 }
 
-/// Wheel counts, and when the last one was read.
-#[derive(Default)]
-struct Wheels {
-    reckoning: DeadReckoning,
-    freshness: Freshness,
-    read_at: Option<Instant>,
-}
-
 struct Running {
-    settings: GlobalPoseSensor,
     component: Component,
     vehicle: Vehicle,
     observed: Observed,
-    estimator: Estimator,
-    decoder: Receiver,
-    /// Age of the positions, by the receiver's clock.
-    fixes: Freshness,
-    wheels: Wheels,
-    /// The heading to begin with.
-    heading: Option<f64>,
+    navigator: Navigator,
+    /// Whether the pose was unknown at the last look.
+    is_lost: bool,
 }
 
 impl Running {
@@ -152,73 +129,41 @@ impl Running {
         loop {
             tokio::select! {
                 octets = inputs.receiver.recv() => match octets {
-                    Some(octets) => self.handle_octets(&octets),
+                    Some(octets) => self.navigator.handle_octets(Instant::now(), &octets),
                     None => return Err(PartError::Broken(
                         "the GNSS receiver's input has ended".to_owned(),
                     )),
                 },
                 rate = next(&mut inputs.gyro) => {
-                    self.estimator.handle_rate(Instant::now(), rate);
+                    self.navigator.handle_rate(Instant::now(), rate);
                     continue;
                 }
                 count = counts.next() => {
-                    let was_lost = counts.take_loss();
-                    self.handle_count(&count?, was_lost);
+                    if counts.take_loss() {
+                        self.navigator.forget_wheels();
+                    }
+                    self.navigator.handle_count(Instant::now(), WheelCount::from(&count?));
                 }
                 _ = looks.tick() => {}
             }
             if let Some(pose) = self.observed.take_told_global() {
-                self.estimator.set_heading(pose.yaw);
+                self.navigator.set_heading(pose.yaw);
             }
             self.publish().await;
         }
     }
 
-    fn handle_octets(&mut self, octets: &[u8]) {
+    async fn publish(&mut self) {
         let now = Instant::now();
-        for news in self.decoder.handle_octets(octets) {
-            match news {
-                Navigation::Fix(fix) => {
-                    // A report that waited in a buffer is as old as its fix.
-                    if let Some(at) = self.fixes.handle(now, Some(fix.time)) {
-                        self.estimator.handle_fix(at, &fix);
-                    }
-                    if self.estimator.estimate().is_some()
-                        && let Some(heading) = self.heading.take()
-                    {
-                        self.estimator.set_heading(heading);
-                    }
-                }
-                Navigation::Course(course) => self.estimator.handle_course(now, &course),
-                Navigation::NoFix => tracing::debug!("the receiver has no fix"),
-            }
+        let pose = self.navigator.pose(now);
+        let was_lost = std::mem::replace(&mut self.is_lost, pose.is_err());
+        match &pose {
+            Err(why) if !was_lost => tracing::warn!("the pose is unknown: {why}"),
+            Ok(_) if was_lost => tracing::info!("the pose is known again"),
+            _ => {}
         }
-    }
-
-    fn handle_count(&mut self, report: &ReportWheelOdometry, was_lost: bool) {
-        let count = WheelCount::from(report);
-        let wheels = &mut self.wheels;
-        if was_lost {
-            wheels.freshness = Freshness::default();
-        }
-        let read_at = Duration::from_millis(count.time_ms.into());
-        let at = wheels.freshness.handle(Instant::now(), Some(read_at));
-        let gone = wheels.reckoning.handle_count(count);
-        // Travel counts, even if it is not known when the count was read.
-        wheels.read_at = at.or(wheels.read_at);
-        if let Some(at) = wheels.read_at {
-            self.estimator.handle_travel(at, gone);
-        }
-    }
-
-    async fn publish(&self) {
-        let now = Instant::now();
-        let is_usable = |it: &crate::navigation::Estimate| {
-            now.saturating_duration_since(it.sampled_at) <= self.settings.silence
-                && it.position_rms <= self.settings.max_rms
-        };
-        let motion = match self.estimator.estimate().filter(is_usable) {
-            Some(estimate) => {
+        let motion = match pose {
+            Ok(estimate) => {
                 let GlobalPose {
                     latitude,
                     longitude,
@@ -246,7 +191,7 @@ impl Running {
                     ..Motion::default()
                 }
             }
-            None => unknown(Some(now)),
+            Err(_) => unknown(Some(now)),
         };
         self.observed.set(motion);
         self.component.changed::<QueryGlobalPose>().await;

@@ -9,6 +9,7 @@ mod communicator;
 mod drivers;
 mod global_driver;
 mod global_pose_sensor;
+mod hardware;
 mod keeper;
 mod knowledge_store;
 mod navigation_inputs;
@@ -33,16 +34,19 @@ use jaus::service::TimeOfDay;
 pub use communicator::{Communicator, DEBUG_ADDRESS};
 pub use global_driver::GlobalDriver;
 pub use global_pose_sensor::{GlobalPoseSensor, NavigationInputs};
+#[cfg(all(feature = "can", target_os = "linux"))]
+pub use hardware::CanMotors;
+#[cfg(all(feature = "gpio", target_os = "linux"))]
+pub use hardware::GpioMotors;
+#[cfg(feature = "serial")]
+pub use hardware::Sabertooth;
+pub use hardware::{Drives, HBridgeMotors, Hardware, Motors, Servo, SteeringGear, Stop};
 pub use knowledge_store::{Broken, KnowledgeStore};
 pub use navigation_inputs::Gyro;
 pub use path_driver::PathDriver;
 pub use planner::Planner;
 pub use pose_sensor::PoseSensor;
-#[cfg(all(feature = "gpio", target_os = "linux"))]
-pub use primitive_driver::GpioMotors;
-#[cfg(feature = "serial")]
-pub use primitive_driver::Sabertooth;
-pub use primitive_driver::{Drives, Hardware, Motors, PrimitiveDriver, Servo, SteeringGear, Stop};
+pub use primitive_driver::PrimitiveDriver;
 pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
 

@@ -10,13 +10,13 @@ use std::time::{Duration, Instant};
 
 use tokio::time::timeout;
 
-use super::drivers::{Freshness, Sense};
+use super::drivers::Sense;
 use super::keeper::{Keeper, keeper};
 use super::pose_file::{self, Kept};
 use super::{Part, PartError, Slot};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::Vehicle;
-use crate::motion::{DeadReckoning, Frame, Motion, Observed, Pilot, Pose, WheelCount};
+use crate::motion::{DeadReckoning, Frame, Freshness, Motion, Observed, Pilot, Pose, WheelCount};
 use jaus::component::{AccessControl, Component};
 use jaus::messages::mobility::{QueryLocalPose, QueryLocalPoseExt};
 

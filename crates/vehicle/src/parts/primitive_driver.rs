@@ -12,19 +12,15 @@ use std::time::{Duration, Instant};
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::drivers::{FaultMonitor, Sense, Watchman, guard, shut_down};
+use super::hardware::{Drives, Hardware, Motors, SteeringGear, Stop};
 use super::stop_line::StopLine;
 use super::{Part, PartError, Slot};
-#[cfg(feature = "serial")]
-use crate::actuator::SabertoothMotor;
-use crate::actuator::{
-    Actuator, Interlock, MotorConfig, Odometer, PwmServo, ServoConfig, SimulatedMotor,
-    SimulatedServo, Steering, StopFile, StopInput, Wheels, WheelsConfig,
-};
+use crate::actuator::{Interlock, MotorConfig, Odometer, WheelsConfig};
 use crate::ground::{StageBoard, StageReport, StageState, WheelOdometry};
 use crate::handoff::Handoff;
 use crate::messages::ground::QueryStage;
 use crate::mobility::Vehicle;
-use crate::motion::{Ackermann, Fence, FenceConfig, Frame, Pilot};
+use crate::motion::{Fence, FenceConfig};
 use jaus::component::{Component, Condition, State};
 use jaus::service::{MotionPolicy, StopCause};
 
@@ -58,203 +54,6 @@ pub struct PrimitiveDriver {
     pub control_timeout: u8,
 }
 
-/// The motors of both sides.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum Motors {
-    /// Simulated motors. The right one uses the seed after the left one's.
-    Simulated(MotorConfig),
-    /// The two motors of a Sabertooth motor controller on a serial line.
-    #[cfg(feature = "serial")]
-    Sabertooth(Sabertooth),
-    /// Stepper motors on lines of a GPIO chip.
-    #[cfg(all(feature = "gpio", target_os = "linux"))]
-    Gpio(GpioMotors),
-}
-
-/// Steered front wheels.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SteeringGear {
-    /// Wheelbase and largest steering angle.
-    pub geometry: Ackermann,
-    /// What turns the wheels.
-    pub servo: Servo,
-}
-
-/// A steering servo.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum Servo {
-    /// A simulated servo with this rate in radians per second.
-    Simulated(f64),
-    /// A servo on a PWM output.
-    Pwm {
-        /// The chip, such as `/sys/class/pwm/pwmchip0`.
-        chip: std::path::PathBuf,
-        /// The output of the chip.
-        channel: u32,
-        /// Pulse lengths and rate.
-        config: ServoConfig,
-    },
-}
-
-/// A motor controller on a serial line.
-#[cfg(feature = "serial")]
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sabertooth {
-    /// The serial line, such as `/dev/ttyUSB0`.
-    pub device: String,
-    /// Bits per second of the line.
-    pub baud: u32,
-    /// The controller's address, 128 to 135.
-    pub address: u8,
-    /// Top speed and lag of the motors, from which the travel is estimated, and their deadline.
-    pub motor: MotorConfig,
-}
-
-#[cfg(feature = "serial")]
-impl Sabertooth {
-    fn start(&self) -> Result<[Box<dyn Actuator>; 2], PartError> {
-        let started = serial2::SerialPort::open(&self.device, self.baud)
-            .and_then(|line| SabertoothMotor::start(line, self.address, self.motor));
-        let motors = started.map_err(|error| {
-            PartError::Broken(format!(
-                "cannot use the motor controller on {}: {error}; check the device and the group of \
-                 its file, usually dialout",
-                self.device
-            ))
-        })?;
-        Ok(motors.map(|motor| Box::new(motor) as _))
-    }
-}
-
-impl SteeringGear {
-    /// Simulated steering.
-    #[must_use]
-    pub const fn simulated(geometry: Ackermann) -> Self {
-        Self {
-            geometry,
-            servo: Servo::Simulated(SimulatedServo::RATE),
-        }
-    }
-}
-
-impl Servo {
-    fn start(&self) -> Result<Box<dyn Steering>, PartError> {
-        match self {
-            Self::Simulated(rate) => Ok(Box::new(SimulatedServo::new(*rate))),
-            Self::Pwm {
-                chip,
-                channel,
-                config,
-            } => match PwmServo::open(chip, *channel, *config) {
-                Ok(servo) => Ok(Box::new(servo)),
-                Err(error) => Err(PartError::Broken(error.to_string())),
-            },
-        }
-    }
-}
-
-/// The stop input on the vehicle.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum Stop {
-    /// A simulated input, pressed while a file exists.
-    File(std::path::PathBuf),
-    /// A normally closed contact between a line of a GPIO chip and ground.
-    #[cfg(all(feature = "gpio", target_os = "linux"))]
-    Gpio {
-        /// The chip, such as `/dev/gpiochip0`.
-        chip: std::path::PathBuf,
-        /// The line.
-        line: u32,
-    },
-}
-
-impl Stop {
-    fn open(&self) -> Result<Box<dyn StopInput>, PartError> {
-        match self {
-            Self::File(path) => Ok(Box::new(StopFile(path.clone()))),
-            #[cfg(all(feature = "gpio", target_os = "linux"))]
-            Self::Gpio { chip, line } => match crate::actuator::GpioStop::open(chip, *line) {
-                Ok(input) => Ok(Box::new(input)),
-                Err(error) => Err(PartError::Broken(error.to_string())),
-            },
-        }
-    }
-}
-
-/// The hardware of a primitive driver.
-pub struct Hardware {
-    /// The drives, and the steering if the vehicle has one.
-    pub drives: Drives,
-    /// The stop input, if there is one.
-    pub stop: Option<Box<dyn StopInput>>,
-}
-
-/// The drives of a vehicle.
-pub enum Drives {
-    /// A drive on each side.
-    Sides {
-        /// The drive of the left side.
-        left: Box<dyn Actuator>,
-        /// The drive of the right side.
-        right: Box<dyn Actuator>,
-    },
-    /// One drive and steered front wheels.
-    Steered {
-        /// The drive of the rear axle.
-        drive: Box<dyn Actuator>,
-        /// The steering of the front axle.
-        steering: Box<dyn Steering>,
-        /// Wheelbase and largest steering angle.
-        geometry: Ackermann,
-    },
-}
-
-impl Drives {
-    /// A pilot for these drives.
-    fn pilot(self, config: WheelsConfig, odometer: Odometer, interlock: Interlock) -> Pilot {
-        let frame = Frame::default();
-        match self {
-            Self::Sides { left, right } => {
-                let wheels = Wheels::new(left, right, config, odometer);
-                Pilot::new(wheels.with_interlock(interlock), frame)
-            }
-            Self::Steered {
-                drive,
-                steering,
-                geometry,
-            } => {
-                let wheels = Wheels::steered(drive, steering, config, geometry, odometer);
-                Pilot::new(wheels.with_interlock(interlock), frame)
-            }
-        }
-    }
-}
-
-impl std::fmt::Debug for Hardware {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Hardware")
-            .field("has_stop", &self.stop.is_some())
-            .finish_non_exhaustive()
-    }
-}
-
-/// Two stepper motors on a GPIO chip.
-#[cfg(all(feature = "gpio", target_os = "linux"))]
-#[derive(Debug, Clone, PartialEq)]
-pub struct GpioMotors {
-    /// The chip, such as `/dev/gpiochip0`.
-    pub chip: std::path::PathBuf,
-    /// Parameters of both motors and their wheels.
-    pub stepper: crate::actuator::StepperConfig,
-    /// The lines of the left motor: pulses and direction.
-    pub left: (u32, u32),
-    /// The lines of the right motor, which is mounted in reverse.
-    pub right: (u32, u32),
-}
-
 impl Default for PrimitiveDriver {
     fn default() -> Self {
         Self {
@@ -269,71 +68,9 @@ impl Default for PrimitiveDriver {
     }
 }
 
-impl Motors {
-    /// Starts the motors of both sides.
-    fn start_both(&self) -> Result<[Box<dyn Actuator>; 2], PartError> {
-        match self {
-            #[cfg(feature = "serial")]
-            Self::Sabertooth(controller) => controller.start(),
-            _ => Ok([self.start(Side::Left)?, self.start(Side::Right)?]),
-        }
-    }
-
-    /// Starts the motor of a side. The left one is the first of a controller.
-    fn start(&self, side: Side) -> Result<Box<dyn Actuator>, PartError> {
-        match self {
-            Self::Simulated(config) => {
-                let seed = config.seed.wrapping_add(u64::from(side == Side::Right));
-                Ok(Box::new(SimulatedMotor::new(MotorConfig {
-                    seed,
-                    ..*config
-                })))
-            }
-            #[cfg(feature = "serial")]
-            Self::Sabertooth(controller) => {
-                let [left, right] = controller.start()?;
-                Ok(if side == Side::Left { left } else { right })
-            }
-            #[cfg(all(feature = "gpio", target_os = "linux"))]
-            Self::Gpio(motors) => motors.start(side),
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
-    Left,
-    Right,
-}
-
-#[cfg(all(feature = "gpio", target_os = "linux"))]
-impl GpioMotors {
-    fn start(&self, side: Side) -> Result<Box<dyn Actuator>, PartError> {
-        let broken = |why: String| PartError::Broken(why);
-        let is_right = side == Side::Right;
-        let (step, direction) = if is_right { self.right } else { self.left };
-        let lines = crate::actuator::GpioLines::open(&self.chip, step, direction, is_right);
-        let lines = lines.map_err(|error| broken(error.to_string()))?;
-        let motor = crate::actuator::PulseMotor::start(self.stepper, lines);
-        let motor =
-            motor.map_err(|error| broken(format!("cannot start the pulse thread: {error}")))?;
-        Ok(Box::new(motor))
-    }
-}
-
 impl Part for PrimitiveDriver {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
-        let drives = match &self.steering {
-            None => {
-                let [left, right] = self.motors.start_both()?;
-                Drives::Sides { left, right }
-            }
-            Some(SteeringGear { geometry, servo }) => Drives::Steered {
-                drive: self.motors.start(Side::Left)?,
-                steering: servo.start()?,
-                geometry: *geometry,
-            },
-        };
+        let drives = Drives::start(&self.motors, self.steering.as_ref())?;
         let stop = self.stop.as_ref().map(Stop::open).transpose()?;
         self.run_on(Hardware { drives, stop }, slot).await
     }

@@ -9,11 +9,11 @@ use std::time::{Duration, Instant, SystemTime};
 
 use tokio::time::timeout;
 
-use super::drivers::{Freshness, Sense};
+use super::drivers::Sense;
 use super::{Part, PartError, Slot};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::both_versions;
-use crate::motion::{Speedometer, Velocity, WheelCount};
+use crate::motion::{Freshness, Speedometer, Velocity, WheelCount};
 use jaus::component::Handlers;
 use jaus::messages::mobility::{
     QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, ReportVelocityStateExt,

@@ -162,6 +162,12 @@ async fn a_fault_of_the_steering_stops_the_drive_and_is_a_failure() {
     scene
         .until_state(PRIMITIVE, State::Failure, &control, &effort)
         .await;
+    let before = scene.comes_to_rest().await;
+    switch.mend();
+    scene
+        .until_state(PRIMITIVE, State::Standby, &control, &effort)
+        .await;
+    assert_eq!(scene.wheels().await, before, "not without a new lease");
     running.stop().await;
 }
 

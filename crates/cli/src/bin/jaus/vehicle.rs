@@ -37,6 +37,7 @@ use crate::node;
     jaus vehicle --profile contest        for clients that send once and never renew control\n  \
     jaus vehicle --split                  Platform Management and Navigation as two components\n  \
     jaus vehicle --noise 0.1 --seed 7     with wheels that slip\n  \
+    jaus vehicle --turning-radius 1       steers like a car\n  \
     jaus -v vehicle                       also logs clients' commands")]
 pub(crate) struct VehicleCommand {
     /// End after this time [default: at Ctrl-C]
@@ -104,6 +105,11 @@ struct Simulation {
     /// The maximum turn rate in rad/s, from 0.1 to 10
     #[arg(long, value_name = "RAD/S", default_value = "1.5", value_parser = |text: &str| between(text, 0.1, 10.0))]
     yaw_rate: f64,
+
+    /// The least turning radius in metres, up to 100: a vehicle that steers like a car (Ackermann
+    /// steering); 0 turns on the spot
+    #[arg(long, value_name = "METRES", default_value = "0", value_parser = |text: &str| between(text, 0.0, 100.0))]
+    turning_radius: f64,
 
     /// Wheel slip, as a fraction of the velocity from 0 to 0.5
     #[arg(long, value_name = "SHARE", default_value = "0", value_parser = |text: &str| between(text, 0.0, 0.5))]
@@ -243,7 +249,7 @@ impl Simulation {
             deceleration: 2.0 * self.acceleration,
             yaw_rate: self.yaw_rate,
             yaw_acceleration: 2.0 * self.yaw_rate,
-            turning_radius: 0.0,
+            turning_radius: self.turning_radius,
         };
         let platform = SkidSteer::new(SkidSteerConfig {
             limits,

@@ -75,6 +75,7 @@ fn flags_out_of_their_range_are_told_with_the_range() {
         (["--speed", "0"], "write a number from 0.1 to 50"),
         (["--acceleration", "fast"], "write a number from 0.1 to 20"),
         (["--noise", "NaN"], "write a number from 0 to 0.5"),
+        (["--turning-radius", "101"], "write a number from 0 to 100"),
         (["--at", "91,0"], "the latitude from -85 to 85"),
     ] {
         let run = run(&[&["vehicle"][..], &flags].concat(), b"");

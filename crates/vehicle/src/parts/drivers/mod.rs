@@ -2,14 +2,14 @@
 //! driver.
 
 mod fault_monitor;
-mod freshness;
+mod global_poses;
 mod next;
 mod remote_platform;
 mod senses;
 mod standing;
 
 pub(super) use fault_monitor::FaultMonitor;
-pub(super) use freshness::Freshness;
+pub(super) use global_poses::GlobalPoses;
 pub(super) use next::{Language, Next};
 pub(super) use remote_platform::{Order, RemotePlatform, RemotePlatformSettings};
 pub(super) use senses::Sense;

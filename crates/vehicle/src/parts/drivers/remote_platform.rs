@@ -4,8 +4,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::Freshness;
-use crate::motion::{CommandDeadline, Drive, Limits, Motion, Platform, Pose, Velocity};
+use crate::motion::{CommandDeadline, Drive, Freshness, Limits, Motion, Platform, Pose, Velocity};
 
 /// Motion and orders of a driver. Cheap to clone; all clones share one state.
 #[derive(Debug, Clone)]

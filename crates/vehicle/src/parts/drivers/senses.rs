@@ -3,18 +3,17 @@
 #![expect(clippy::disallowed_methods, reason = "stamps the arrival of reports")]
 
 use std::convert::Infallible;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use super::RemotePlatform;
-use super::freshness::{Freshness, time_in_month};
+use super::{GlobalPoses, RemotePlatform};
 use crate::ground::reported_zones;
-use crate::mobility::Vehicle;
-use crate::motion::{Fence, Frame, GlobalPose, Pose};
+use crate::motion::{Fence, Freshness, Pose};
 use crate::parts::PartError;
 use crate::zones::Zones;
 use jaus::address::JausId;
 use jaus::codec::{Message, Query};
 use jaus::component::{Audience, Component, GroupSubscription, GroupUpdate, When};
+use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::messages::mobility::{
     QueryGlobalPose, QueryLocalOperatingZone, QueryLocalPose, QueryVelocityState, ReportGlobalPose,
     ReportLocalOperatingZone, ReportLocalPose, ReportVelocityState, global_pose_sensor,
@@ -177,9 +176,6 @@ impl Sense<ReportLocalOperatingZone> {
 }
 
 impl Sense<ReportGlobalPose> {
-    /// Distance from the origin in metres up to which a local frame is accurate enough.
-    const REACH: f64 = 5000.0;
-
     /// The pose on the globe, with its standard error.
     pub(in crate::parts) fn global_pose(component: &Component, hz: f64) -> Result<Self, PartError> {
         let query = QueryGlobalPose::none()
@@ -197,40 +193,18 @@ impl Sense<ReportGlobalPose> {
         )
     }
 
-    /// Passes all reports to a remote platform, in the vehicle's local frame. The frame is moved to
-    /// the vehicle when it is far away and at rest. A position with a greater standard error than
-    /// `max_rms` metres is unknown.
+    /// Passes all reports on.
     pub(in crate::parts) async fn steer(
         mut self,
-        remote_platform: &RemotePlatform,
-        vehicle: &Vehicle,
-        max_rms: f64,
+        mut poses: GlobalPoses,
     ) -> Result<Infallible, PartError> {
         loop {
             let report = self.next().await?;
             let now = Instant::now();
             if self.take_loss() {
-                remote_platform.handle_pose(now, None, None);
+                poses.handle_loss(now);
             }
-            let is_certain = report.position_rms_m().is_none_or(|rms| rms <= max_rms);
-            let place = report.latitude_deg().zip(report.longitude_deg());
-            let place = place.zip(report.yaw_rad()).filter(|_| is_certain);
-            let pose = place.map(|((latitude, longitude), yaw)| {
-                let global = GlobalPose {
-                    latitude,
-                    longitude,
-                    yaw,
-                    ..GlobalPose::default()
-                };
-                let mut local = vehicle.frame().to_local(&global);
-                if local.distance(0.0, 0.0) > Self::REACH && !vehicle.is_under_way() {
-                    vehicle.set_frame(Frame::at(latitude, longitude));
-                    local = vehicle.frame().to_local(&global);
-                }
-                (local.x, local.y, local.yaw)
-            });
-            let stamp = report.time_stamp.and_then(time_in_month);
-            remote_platform.handle_pose(now, stamp, pose);
+            poses.handle_report(now, &report);
         }
     }
 }
@@ -266,5 +240,28 @@ impl Sense<ReportVelocityState> {
             let stamp = report.time_stamp.and_then(time_in_month);
             remote_platform.handle_velocity(now, stamp, velocity);
         }
+    }
+}
+
+/// Converts a stamp of version 1.0 reports to the time since the start of its month; `None` for
+/// stamp 0, which sensors without a clock send.
+pub(super) fn time_in_month(stamp: TimeStamp) -> Option<Duration> {
+    let hours = u64::from(stamp.day()) * 24 + u64::from(stamp.hour());
+    let seconds = (hours * 60 + u64::from(stamp.minutes())) * 60 + u64::from(stamp.seconds());
+    let time = Duration::from_millis(seconds * 1000 + u64::from(stamp.milliseconds()));
+    Some(time).filter(|time| !time.is_zero())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_stamp_0_is_none() {
+        assert_eq!(time_in_month(TimeStamp::default()), None);
+        let stamp = TimeStamp::default().with_day(2).unwrap();
+        let stamp = stamp.with_milliseconds(7).unwrap();
+        let time = Duration::from_millis(2 * 86_400_000 + 7);
+        assert_eq!(time_in_month(stamp), Some(time));
     }
 }

@@ -15,4 +15,4 @@
 mod fake;
 mod missions;
 mod whole;
-mod zones;
+pub(crate) mod zones;

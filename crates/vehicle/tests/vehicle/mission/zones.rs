@@ -76,7 +76,7 @@ impl Scene {
     }
 }
 
-fn keep_out(number: u16, vertices: &[Point]) -> SetLocalOperatingZone {
+pub(crate) fn keep_out(number: u16, vertices: &[Point]) -> SetLocalOperatingZone {
     let vertex = |&(x, y): &Point| LocalExclusionZoneSeq {
         local_exclusion_zone_rec: LocalExclusionZoneRec {
             zone_id: delete_zone::ZoneId(number),
@@ -94,7 +94,7 @@ fn keep_out(number: u16, vertices: &[Point]) -> SetLocalOperatingZone {
 }
 
 /// A square around a point.
-fn square((x, y): Point, half: f64) -> [Point; 4] {
+pub(crate) fn square((x, y): Point, half: f64) -> [Point; 4] {
     let (south, north, west, east) = (x - half, x + half, y - half, y + half);
     [(south, west), (north, west), (north, east), (south, east)]
 }

@@ -58,6 +58,15 @@ pub(crate) struct Demo {
     stay: bool,
 }
 
+/// A model car of scale 1:10, which fits through the gaps of the demo's map with its turning radius of
+/// 0.72 m.
+const CAR: Ackermann = Ackermann {
+    wheelbase: 0.32,
+    max_angle: 0.42,
+};
+/// Its width in metres.
+const CAR_WIDTH: f64 = 0.3;
+
 impl Demo {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         runtime::run(async {
@@ -96,7 +105,7 @@ impl Demo {
 
     /// Starts everything; returns the operator's component.
     async fn start(&self, system: &mut System, story: &mut Story) -> Result<Component, Failure> {
-        let geometry = self.ackermann.then(Ackermann::default);
+        let geometry = self.ackermann.then_some(CAR);
         let radius = geometry.map_or(0.0, |it| it.turning_radius());
         let vehicle = system.node(VEHICLE, 1)?;
         start_part(
@@ -157,7 +166,10 @@ impl Demo {
             "vector knowledge store",
             system.store(),
         )?;
-        let planner = Planner::default().turning_radius(radius);
+        let mut planner = Planner::default().turning_radius(radius);
+        if self.ackermann {
+            planner.vehicle.width = CAR_WIDTH;
+        }
         start_part(system, story, &mind, 36, "planner", planner)?;
         let desk = system.node(OPERATOR, 1)?;
         if !self.headless {

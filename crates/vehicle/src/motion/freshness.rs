@@ -2,8 +2,6 @@
 
 use std::time::{Duration, Instant};
 
-use jaus::messages::mobility::report_local_pose::TimeStamp;
-
 /// Estimates the age of samples that carry a time stamp of the sensor's own clock.
 ///
 /// The two clocks are never compared directly. The age of a sample is the time since the last
@@ -12,7 +10,7 @@ use jaus::messages::mobility::report_local_pose::TimeStamp;
 /// waited in a queue. A step of the sensor's clock costs one report, which is ignored. Without
 /// stamps the age is that of the message.
 #[derive(Debug, Clone, Default)]
-pub(in crate::parts) struct Freshness {
+pub(crate) struct Freshness {
     /// Stamp of the last report.
     stamp: Option<Duration>,
     /// Arrival time minus stamp of the promptest report, and when it arrived.
@@ -32,11 +30,7 @@ impl Freshness {
 
     /// Handles a report received at `now`. Returns the sample time by the local clock; `None` if
     /// the report is ignored.
-    pub(in crate::parts) fn handle(
-        &mut self,
-        now: Instant,
-        stamp: Option<Duration>,
-    ) -> Option<Instant> {
+    pub(crate) fn handle(&mut self, now: Instant, stamp: Option<Duration>) -> Option<Instant> {
         let Some(stamp) = stamp else {
             *self = Self {
                 sampled_at: Some(now),
@@ -69,23 +63,14 @@ impl Freshness {
     }
 
     /// Discards all state, because the sensor has lost its measurement or was replaced.
-    pub(in crate::parts) fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         *self = Self::default();
     }
 
     /// The age of the last sample; `None` without a sample.
-    pub(in crate::parts) fn age(&self, now: Instant) -> Option<Duration> {
+    pub(crate) fn age(&self, now: Instant) -> Option<Duration> {
         Some(now.saturating_duration_since(self.sampled_at?))
     }
-}
-
-/// Converts a stamp of version 1.0 reports to the time since the start of its month; `None` for
-/// stamp 0, which sensors without a clock send.
-pub(in crate::parts) fn time_in_month(stamp: TimeStamp) -> Option<Duration> {
-    let hours = u64::from(stamp.day()) * 24 + u64::from(stamp.hour());
-    let seconds = (hours * 60 + u64::from(stamp.minutes())) * 60 + u64::from(stamp.seconds());
-    let time = Duration::from_millis(seconds * 1000 + u64::from(stamp.milliseconds()));
-    Some(time).filter(|time| !time.is_zero())
 }
 
 #[cfg(test)]
@@ -239,14 +224,5 @@ mod tests {
         }
         let age = freshness.age(now).unwrap();
         assert!(age < Duration::from_millis(2), "after an hour: {age:?}");
-    }
-
-    #[test]
-    fn the_stamp_0_is_none() {
-        assert_eq!(time_in_month(TimeStamp::default()), None);
-        let stamp = TimeStamp::default().with_day(2).unwrap();
-        let stamp = stamp.with_milliseconds(7).unwrap();
-        let time = Duration::from_millis(2 * 86_400_000 + 7);
-        assert_eq!(time_in_month(stamp), Some(time));
     }
 }
