@@ -25,7 +25,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
         .attach(&node, 43)?;
     println!("{} is up; Ctrl-C ends it", rover.id());
     let mut receiver = Receiver::default();
-    for octet in std::io::stdin().bytes() {
+    for octet in std::io::stdin().lock().bytes() {
         for news in receiver.handle_octets(&[octet?]) {
             // What is unknown is not reported: the attitude, and the position without a fix.
             let mut pose = ReportGlobalPose::default();
