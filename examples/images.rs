@@ -28,8 +28,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let camera = viewer.find(still_image::URN).await?;
     let query = QueryStillImageData::default();
     let images = viewer.subscribe(camera, &query, When::OnChange).await?;
-    // A depth of 1 drops the images that the viewer is too slow for. The receivers of the channel
-    // share the latest one.
+    // With a depth of 1, a slow viewer gets the latest image. The receivers of the channel share it.
     let (mut images, (share, _shared)) = (images.depth(1), watch::channel(None));
     while let Some(report) = images.report().await {
         let frames = report.still_image_data_list.iter();
