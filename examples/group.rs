@@ -1,7 +1,7 @@
-//! Watches the speed of all velocity sensors, and stops all vehicles in an emergency. Start and
+//! Watches the speeds of all vehicles, and stops all vehicles if one of them is too fast. Start and
 //! stop `cargo run --example sensor` and `cargo run --example driver` beside it.
 
-use jaus::component::{Audience, Component, GroupUpdate, Kind, When};
+use jaus::component::{Audience, Component, GroupUpdate, Kind, Priority, When};
 use jaus::messages::core::{ClearEmergency, SetEmergency, management};
 use jaus::messages::mobility::{QueryVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
@@ -27,7 +27,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let speed = report.velocity_x_m_per_s().unwrap_or_default();
                 if speed > TOO_FAST {
                     println!("{sensor} drives at {speed:.2} m/s: stopping all vehicles");
-                    stop_everybody(&watch).await;
+                    stop_all(&watch).await;
                 }
             }
         }
@@ -36,22 +36,23 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Stops every component with Management, and lists those that did not acknowledge.
-async fn stop_everybody(watch: &Component) {
+async fn stop_all(watch: &Component) {
     let vehicles = Audience::providers(management::URN);
     let stop = SetEmergency {
         emergency_code: 1.into(),
     };
-    let told = watch.deliver_all(&vehicles, &stop).await;
-    for (vehicle, _) in told.successes() {
+    let urgent = Priority::SafetyCritical;
+    let results = watch.deliver_all_with(urgent, &vehicles, &stop).await;
+    for (vehicle, _) in results.successes() {
         println!("{vehicle} acknowledged the stop");
     }
-    for (vehicle, why) in told.failures() {
+    for (vehicle, why) in results.failures() {
         println!("{vehicle} did not acknowledge: {why}");
     }
-    let go_on = ClearEmergency {
+    let stopped = ClearEmergency {
         emergency_code: 1.into(),
     };
-    if let Err(error) = watch.send_all(&vehicles, &go_on) {
+    if let Err(error) = watch.send_all(&vehicles, &stopped) {
         println!("the emergency is not cleared: {error}");
     }
 }

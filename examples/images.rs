@@ -1,37 +1,38 @@
 //! A camera that publishes images of 1 MiB at 10 Hz, and a slow viewer that gets the latest one each
-//! time. Run it with `--features every-set`.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "an application has clocks and tasks"
-)]
+//! time, with its age and what was lost. `cargo run --features every-set --example images`
+#![expect(clippy::disallowed_methods, reason = "an application has a clock")]
 
 use std::time::{Duration, SystemTime};
 
 use jaus::codec::FormattedBlob;
 use jaus::component::{Component, Handlers, Kind, PublishError, When};
-use jaus::messages::environment_sensing::report_still_image_data::{ImageFrameFormat as Format, *};
-use jaus::messages::environment_sensing::{QueryStillImageData, ReportStillImageData, still_image};
+use jaus::messages::environment_sensing::report_still_image_data::*;
+use jaus::messages::environment_sensing::*;
 use jaus::node::{Config, Node};
 use tokio::{sync::watch, time::sleep};
 
 #[tokio::main]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let vehicle = Node::start(Config::loopback(104, 1))?;
+    let images = Handlers::new(still_image::V1_0)
+        .publishes::<QueryStillImageData>()
+        .publishes::<QueryStillImageSensorCapabilities>()
+        .publishes::<QueryStillImageSensorConfiguration>();
     let camera = Component::builder(Kind::Vehicle, "Camera")
-        .offer(Handlers::new(still_image::LATEST).publishes::<QueryStillImageData>())
+        .offer(images)
         .attach(&vehicle, 33)?;
     tokio::spawn(async move { record(&camera).await });
 
-    let station = Node::start(Config::loopback(44, 1))?;
+    let station = Node::start(Config::loopback(46, 1))?;
     let viewer = Component::builder(Kind::OperatorControlUnit, "Viewer").attach(&station, 1)?;
     let camera = viewer.find(still_image::URN).await?;
     let query = QueryStillImageData::default();
     let images = viewer.subscribe(camera, &query, When::OnChange).await?;
-    // A depth of 1 drops the images that the viewer is too slow for. The receivers of the channel
-    // share the latest one.
+    // With a depth of 1, a slow viewer gets the latest image. The receivers of the channel share it.
     let (mut images, (share, _shared)) = (images.depth(1), watch::channel(None));
     while let Some(report) = images.report().await {
-        let octets = report.still_image_data_list[0].image_frame.data.len();
+        let frames = report.still_image_data_list.iter();
+        let octets: usize = frames.map(|it| it.image_frame.data.len()).sum();
         let (lost, missed) = (images.lost(), images.missed());
         let age = images.age().unwrap_or_default();
         println!("{octets} octets, {age:.1?} old, {lost} lost, {missed} missed");
@@ -44,7 +45,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
 async fn record(camera: &Component) -> Result<(), PublishError> {
     for shade in (0..=u8::MAX).cycle() {
         let image = StillImageDataRec {
-            image_frame: FormattedBlob::new(Format::JPEG, vec![shade; 1 << 20]),
+            image_frame: FormattedBlob::new(ImageFrameFormat::JPEG, vec![shade; 1 << 20]),
             ..StillImageDataRec::default()
         };
         let still_image_data_list = vec![image];

@@ -1,5 +1,5 @@
-//! Takes control of `cargo run --example driver`, makes it ready, drives for a moment, and gives
-//! control back, which stops it.
+//! Takes control of `cargo run --example driver`, makes it ready, drives until Ctrl-C, and releases
+//! control, which stops it.
 
 use std::time::Duration;
 
@@ -20,9 +20,13 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut ahead = SetWrenchEffort::default();
     ahead.set_propulsive_linear_effort_x_percent(40.0)?;
     let mut beat = tokio::time::interval(Duration::from_millis(100));
-    for _ in 0..10 {
-        beat.tick().await;
-        control.send(&ahead)?; // fails once control is lost
+    let end = tokio::signal::ctrl_c();
+    tokio::pin!(end);
+    loop {
+        tokio::select! {
+            _ = &mut end => break,
+            _ = beat.tick() => control.send(&ahead)?, // fails once control is lost
+        }
     }
     control.release().await;
     println!("{rover} is free again");

@@ -9,7 +9,7 @@ use jaus::node::{Config, Node};
 
 #[tokio::main(flavor = "current_thread")]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let node = Node::start(Config::loopback(44, 1))?;
+    let node = Node::start(Config::loopback(45, 1))?;
     let operator = Component::builder(Kind::OperatorControlUnit, "Operator").attach(&node, 1)?;
     tokio::select! {
         ended = drive(&operator, 102) => ended?,

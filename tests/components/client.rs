@@ -465,6 +465,19 @@ async fn control_can_be_asked_for_again_as_soon_as_it_is_dropped() {
 }
 
 #[tokio::test]
+async fn releasing_lost_control_ends_at_once_and_leaves_the_control_that_came_after_it() {
+    let mut scene = Scene::new();
+    let mut lost = scene.controlled().await;
+    scene.peer.say(&RejectControl::default());
+    within_limit(lost.lost()).await;
+    let next = scene.controlled().await;
+    within_limit(lost.release()).await;
+    next.send(&Resume {}).unwrap();
+    within_limit(scene.peer.expect::<Resume>()).await;
+    assert!(next.is_held());
+}
+
+#[tokio::test]
 async fn an_emergency_is_sent_with_safety_critical_priority() {
     let mut scene = Scene::new();
     let (operator, id) = (scene.operator.clone(), scene.peer.id());

@@ -2,14 +2,16 @@
 //!
 //! `cargo test` builds them; to run this test alone, run `cargo build --examples` first.
 
-use std::io::{BufRead, BufReader};
-use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::UNIX_EPOCH;
 
-use jaus_test_kit::waiting::LIMIT;
+use jaus::component::{Component, Kind, Subscription, When};
+use jaus::messages::mobility::{
+    QueryGlobalPose, QueryGlobalPoseExt, ReportGlobalPoseExt, global_pose_sensor,
+};
+use jaus::node::{Config, Node};
+use jaus_test_kit::example::Example;
+use jaus_test_kit::waiting::within_limit;
 
 /// Held by each test that runs a driver: the group example stops every driver on this host.
 static DRIVER: Mutex<()> = Mutex::new(());
@@ -17,74 +19,6 @@ static DRIVER: Mutex<()> = Mutex::new(());
 fn alone_with_a_driver() -> MutexGuard<'static, ()> {
     // The state after a failed test does not matter here.
     DRIVER.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// An example that runs until it is dropped.
-struct Example {
-    name: &'static str,
-    program: Child,
-    lines: Receiver<String>,
-    seen: Vec<String>,
-}
-
-impl Example {
-    fn start(name: &'static str) -> Self {
-        Self::start_with(name, &[])
-    }
-
-    fn start_with(name: &'static str, arguments: &[&str]) -> Self {
-        let mut program = Command::new(path(name))
-            .args(arguments)
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap_or_else(|error| panic!("{name}: {error}; run cargo build --examples"));
-        let output = BufReader::new(program.stdout.take().unwrap());
-        let (sender, lines) = channel();
-        std::thread::spawn(move || {
-            for line in output.lines().map_while(Result::ok) {
-                // The test may be over.
-                let _ = sender.send(line);
-            }
-        });
-        Self {
-            name,
-            program,
-            lines,
-            seen: Vec::new(),
-        }
-    }
-
-    /// Waits until it prints a line that contains this text.
-    fn expect(&mut self, wanted: &str) {
-        self.expect_line(wanted, |line| line.contains(wanted));
-    }
-
-    /// Waits until it prints a line of which this is true.
-    fn expect_line(&mut self, wanted: &str, is_wanted: impl Fn(&str) -> bool) {
-        let end = Instant::now() + LIMIT;
-        while self.seen.last().is_none_or(|line| !is_wanted(line)) {
-            let left = end.saturating_duration_since(Instant::now());
-            match self.lines.recv_timeout(left) {
-                Ok(line) => self.seen.push(line),
-                Err(_) => panic!("{} did not print {wanted:?}: {:#?}", self.name, self.seen),
-            }
-        }
-    }
-}
-
-impl Drop for Example {
-    fn drop(&mut self) {
-        // It may have exited already.
-        let _ = self.program.kill();
-        let _ = self.program.wait();
-    }
-}
-
-fn path(name: &str) -> PathBuf {
-    let test = std::env::current_exe().unwrap();
-    let profile = test.parent().and_then(|deps| deps.parent()).unwrap();
-    let file = format!("{name}{}", std::env::consts::EXE_SUFFIX);
-    profile.join("examples").join(file)
 }
 
 #[test]
@@ -101,6 +35,56 @@ fn the_client_listens_to_the_sensor_and_notices_that_it_restarts() {
     client.expect("m/s");
 }
 
+#[tokio::test]
+async fn the_gnss_sensor_publishes_each_fix_with_the_time_of_its_measurement() {
+    let mut sensor = Example::start("gnss");
+    sensor.expect("105.1.43 is up");
+    let node = Node::start(Config::loopback(47, 1)).unwrap();
+    let client = Component::builder(Kind::OperatorControlUnit, "Test");
+    let client = client.attach(&node, 1).unwrap();
+    let peer = within_limit(client.find(global_pose_sensor::URN)).await;
+    let (peer, query) = (peer.unwrap(), QueryGlobalPoseExt::all());
+    let poses = client.subscribe(peer, &query, When::OnChange);
+    let mut poses = within_limit(poses).await.unwrap();
+    let first = until(&mut poses, |_| true).await;
+    assert!(first.latitude.is_none(), "before the first fix: {first:?}");
+
+    sensor.feed(b"$GPGGA,123519.25,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*6E\r\n");
+    let fix = until(&mut poses, |report| report.latitude.is_some()).await;
+    assert!((fix.latitude_deg().unwrap() - 48.1173).abs() < 1e-6);
+    assert!((fix.longitude_deg().unwrap() - 11.516_667).abs() < 1e-6);
+    assert!((fix.xy_position_rms_m().unwrap() - 3.18).abs() < 0.01);
+    assert!(fix.heading.is_none(), "a receiver measures no heading");
+    let (seconds, nanoseconds) = (fix.time_seconds.unwrap(), fix.time_nano_seconds.unwrap());
+    let of_day = 12 * 3600 + 35 * 60 + 19;
+    assert_eq!((seconds % 86_400, nanoseconds), (of_day, 250_000_000));
+    let now = UNIX_EPOCH.elapsed().unwrap().as_secs();
+    assert!(now.abs_diff(seconds.into()) <= 43_200, "the date is wrong");
+
+    let older = within_limit(client.query(peer, &QueryGlobalPose::all())).await;
+    let stamp = older.unwrap().time_stamp.unwrap();
+    assert_eq!(
+        (stamp.hour(), stamp.minutes(), stamp.milliseconds()),
+        (12, 35, 250)
+    );
+    sensor.feed(b"$GPGSA,A,1,,,,,,,,,,,,,,,*1E\r\n");
+    let lost = until(&mut poses, |report| report.latitude.is_none()).await;
+    assert!(lost.time_seconds.is_some(), "{lost:?}");
+}
+
+/// The next report of which this is true.
+async fn until(
+    poses: &mut Subscription<ReportGlobalPoseExt>,
+    is_wanted: impl Fn(&ReportGlobalPoseExt) -> bool,
+) -> ReportGlobalPoseExt {
+    loop {
+        let report = within_limit(poses.report()).await.unwrap();
+        if is_wanted(&report) {
+            return report;
+        }
+    }
+}
+
 #[test]
 fn the_operator_drives_the_driver_and_lets_it_go() {
     let _alone = alone_with_a_driver();
@@ -109,49 +93,70 @@ fn the_operator_drives_the_driver_and_lets_it_go() {
     let mut operator = Example::start("operator");
     driver.expect("ready now, controlled by Some");
     driver.expect("43.1.1 drives with 40 %");
+    assert!(operator.interrupt().success());
     operator.expect("102.1.33 is free again");
     driver.expect("standby now, controlled by None");
-    assert!(operator.program.wait().unwrap().success());
 }
 
 #[test]
 fn two_vehicles_are_commanded_through_their_restarts() {
     let _alone = alone_with_a_driver();
-    let first = Example::start_with("driver", &["102"]);
-    let mut second = Example::start_with("driver", &["103"]);
+    let mut vehicles = ["102", "103"].map(|it| Example::start_with("driver", &[it]));
     let mut operator = Example::start("two_vehicles");
-    operator.expect("102.1.33 is ready");
-    second.expect("44.1.1 drives with 20 %");
-    drop(first);
-    operator.expect("no control of 102.1.33");
-    let mut first = Example::start_with("driver", &["102"]);
-    first.expect("44.1.1 drives with 20 %");
-    operator.expect("102.1.33 is ready");
-    assert!(
-        !operator
-            .seen
-            .iter()
-            .any(|line| line.contains("no control of 103.1.33"))
-    );
+    for vehicle in &mut vehicles {
+        vehicle.expect("45.1.1 drives with 20 %");
+    }
+    // One at a time, and then both.
+    let [first, second] = vehicles;
+    let first = restarted("102", first, &mut operator);
+    let second = restarted("103", second, &mut operator);
+    drop([first, second]);
+    let vehicles = ["102", "103"].map(|it| Example::start_with("driver", &[it]));
+    for mut vehicle in vehicles {
+        vehicle.expect("45.1.1 drives with 20 %");
+    }
+}
+
+/// Stops a driver, and starts it again; the operator must notice the loss, and drive it again.
+fn restarted(subsystem: &'static str, driver: Example, operator: &mut Example) -> Example {
+    let lines = operator.seen().len();
+    drop(driver);
+    operator.expect(&format!("no control of {subsystem}.1.33"));
+    let mut driver = Example::start_with("driver", &[subsystem]);
+    driver.expect("45.1.1 drives with 20 %");
+    operator.expect(&format!("{subsystem}.1.33 is ready"));
+    let other = if subsystem == "102" { "103" } else { "102" };
+    let loses_other = |line: &String| line.contains(&format!("no control of {other}.1.33"));
+    let seen = &operator.seen()[lines..];
+    assert!(!seen.iter().any(loses_other), "{seen:#?}");
+    driver
 }
 
 #[test]
-fn the_group_stops_everybody_when_one_is_too_fast() {
+fn the_group_stops_all_vehicles_when_one_is_too_fast() {
     let _alone = alone_with_a_driver();
+    let mut vehicles = ["102", "103"].map(|it| Example::start_with("driver", &[it]));
+    let _operator = Example::start("two_vehicles");
+    for vehicle in &mut vehicles {
+        vehicle.expect("45.1.1 drives with 20 %");
+    }
     let _sensor = Example::start("sensor");
-    let mut driver = Example::start("driver");
-    driver.expect("102.1.33 is up");
     let mut group = Example::start("group");
     group.expect("101.1.33 reports its speed");
     group.expect("stopping all vehicles");
+    for vehicle in &mut vehicles {
+        vehicle.expect("emergency now");
+    }
     group.expect("102.1.33 acknowledged the stop");
+    group.expect("103.1.33 acknowledged the stop");
 }
 
 #[cfg(feature = "every-set")]
 #[test]
 fn a_slow_viewer_gets_the_latest_of_large_images() {
     let mut images = Example::start("images");
-    images.expect("1048576 octets");
+    images.expect("1048576 octets, ");
+    images.expect(" old, 0 lost, ");
     images.expect_line("that the viewer missed images", |line| {
         !line.ends_with(" 0 missed")
     });

@@ -123,6 +123,23 @@ async fn a_message_to_a_subsystem_a_node_or_providers_reaches_those_and_nobody_e
 }
 
 #[tokio::test]
+async fn an_urgent_message_reaches_every_member_with_its_priority() {
+    let network = Network::new();
+    let sensors = [101, 102].map(|subsystem| network.sensor(subsystem, 1.0));
+    let mut received = sensors.each_ref().map(Component::messages);
+    let operator = network.operator();
+    let audience = Audience::providers(velocity_state_sensor::URN);
+    gathered(&operator, &audience, 2).await;
+    let urgent = Priority::SafetyCritical;
+    let results = operator.deliver_all_with(urgent, &audience, &ReportHeartbeatPulse {});
+    assert!(within_limit(results).await.is_complete());
+    for messages in &mut received {
+        let message = within_limit(messages.next()).await.unwrap();
+        assert_eq!(message.priority, urgent);
+    }
+}
+
+#[tokio::test]
 async fn everybody_who_acknowledged_or_answered_is_told_apart_from_who_did_not() {
     let network = Network::new();
     let operator = network.operator();

@@ -9,7 +9,7 @@ use jaus::component::{
     QueryError, SendError,
 };
 use jaus::link::Group;
-use jaus::messages::core::{QueryHeartbeatPulse, QueryStatus, ReportStatus, liveness};
+use jaus::messages::core::{QueryHeartbeatPulse, QueryStatus, ReportStatus, liveness, management};
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
@@ -76,6 +76,17 @@ async fn who_does_not_answer_is_named_with_what_was_asked_and_for_how_long() {
         told.starts_with("101.1.33 did not answer QueryStatus with ReportStatus: 2 attempts"),
         "{told}"
     );
+}
+
+#[tokio::test]
+async fn a_query_of_a_service_that_the_peer_does_not_list_fails_with_the_name_of_the_service() {
+    let (rover, operator) = rover_and_operator();
+    let found = within_limit(operator.find(velocity_state_sensor::URN)).await;
+    let asked = operator.query(found.unwrap(), &QueryStatus {});
+    let error = within_limit(asked).await.unwrap_err();
+    assert!(matches!(error, QueryError::NotOffered { .. }), "{error}");
+    assert!(error.to_string().contains(management::URN), "{error}");
+    drop(rover);
 }
 
 #[tokio::test]
@@ -148,7 +159,7 @@ async fn a_message_that_no_service_handles_goes_to_the_application() {
 async fn a_service_can_be_offered_and_withdrawn_while_the_component_runs() {
     let (rover, operator) = rover_and_operator();
     let ask = || operator.query(rover.id(), &QueryStatus {});
-    let id = jaus::messages::core::management::LATEST;
+    let id = management::LATEST;
     rover
         .offer(Handlers::new(id).answer(|_: QueryStatus| ReportStatus::default()))
         .await

@@ -11,6 +11,7 @@
 )]
 
 pub mod evidence;
+pub mod example;
 pub mod group;
 #[cfg(target_os = "linux")]
 pub mod hosts;

@@ -13,6 +13,7 @@ use crate::address::JausId;
 use crate::codec::{Message, Query};
 use crate::endpoint::Outgoing;
 use crate::service::{Audience, CannotSubscribe, QueryOptions, Topic, When};
+use crate::wire::Priority;
 
 pub use reports::{GroupSubscription, GroupUpdate};
 pub use results::Results;
@@ -70,8 +71,20 @@ impl Component {
         audience: impl Into<Audience>,
         message: &M,
     ) -> Results<(), DeliverError> {
+        self.deliver_all_with(Priority::Standard, audience, message)
+            .await
+    }
+
+    /// Like [`deliver_all`](Self::deliver_all), with a priority.
+    pub async fn deliver_all_with<M: Message>(
+        &self,
+        priority: Priority,
+        audience: impl Into<Audience>,
+        message: &M,
+    ) -> Results<(), DeliverError> {
         let members = self.members(audience);
-        results::of_each(members, AT_ONCE, |member| self.deliver(member, message)).await
+        let deliver = |member| self.deliver_with(priority, member, message);
+        results::of_each(members, AT_ONCE, deliver).await
     }
 
     /// Queries each member of an audience, and waits until each has answered or timed out.

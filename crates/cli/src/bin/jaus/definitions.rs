@@ -6,15 +6,22 @@ use clap::Args;
 use jaus_cli::failure::Failure;
 use jaus_cli::output::say;
 use jaus_view::Dictionary;
+use jsidl::{Library, Loader};
 
 #[derive(Args)]
-pub(crate) struct Definitions {
+pub(crate) struct OwnDefinitions {
     /// Add the service definitions of a JSIDL file or directory (repeatable)
     ///
     /// They take precedence over the built-in ones. Errors are reported on standard error;
     /// definitions without errors are used.
     #[arg(long, value_name = "PATH")]
     jsidl: Vec<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct Definitions {
+    #[command(flatten)]
+    own: OwnDefinitions,
 
     /// The service to prefer where several define the same message code (repeatable)
     ///
@@ -33,8 +40,7 @@ pub(crate) fn built_in() -> Dictionary {
 impl Definitions {
     /// Loads the built-in definitions and those of `--jsidl`.
     pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
-        let mut dictionary = built_in();
-        self.add(&mut dictionary)?;
+        let mut dictionary = self.own.load()?;
         for service in &self.service {
             service
                 .parse()
@@ -43,17 +49,21 @@ impl Definitions {
         }
         Ok(dictionary)
     }
+}
 
-    fn add(&self, dictionary: &mut Dictionary) -> Result<(), Failure> {
+impl OwnDefinitions {
+    /// The messages of the built-in definitions and of `--jsidl`.
+    pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
+        let mut dictionary = built_in();
         if self.jsidl.is_empty() {
-            return Ok(());
+            return Ok(dictionary);
         }
         let added = dictionary.load(&self.jsidl);
         for diagnostic in added.diagnostics.errors() {
             say(diagnostic);
         }
         if added.messages > 0 {
-            return Ok(());
+            return Ok(dictionary);
         }
         let paths = self.jsidl.iter().map(|path| path.display().to_string());
         let paths: Vec<_> = paths.collect();
@@ -61,5 +71,16 @@ impl Definitions {
             "no message definition could be loaded from {}",
             paths.join(", ")
         )))
+    }
+
+    /// The services of the built-in definitions and of `--jsidl`. [`load`](Self::load) reports what
+    /// is wrong with them.
+    pub(crate) fn services(&self) -> Library {
+        let mut loader = Loader::new();
+        for path in &self.jsidl {
+            loader.path(path);
+        }
+        loader.catalogue();
+        loader.load().library
     }
 }

@@ -25,13 +25,14 @@ use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::output::{Output, say};
 use jaus_cli::runtime;
-use jaus_vehicle::messages::registry;
-use jaus_view::Dictionary;
+use jsidl::Library;
 
+use crate::definitions::OwnDefinitions;
 use judge_nodes::JudgeNodes;
 use outputs::Outputs;
 use recording::Recording;
 use runner::Runner;
+use script::service::Services;
 use step::{Form, Name, Step};
 use subject::Subject;
 
@@ -82,8 +83,11 @@ pub(crate) struct Judge {
     /// state, from the client in control and from another one, with the required answers and the
     /// state afterwards. Services that inherit from them share these states. Steps B3 to B10 test
     /// the transitions of Events.
-    #[arg(long, value_name = "URN", value_parser = script::service::known, conflicts_with = "only")]
-    service: Vec<&'static str>,
+    #[arg(long, value_name = "URN", conflicts_with = "only")]
+    service: Vec<String>,
+
+    #[command(flatten)]
+    own: OwnDefinitions,
 
     /// Query by multicast only [default: first by multicast, then by unicast]
     #[arg(long, conflicts_with = "unicast")]
@@ -157,36 +161,37 @@ impl FromStr for Span {
 
 impl Judge {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        let services = self.services()?;
         if self.list {
-            return self.list();
+            return self.list(&services);
         }
         let Some(address) = self.address.filter(|address| address.is_unicast()) else {
             return Err(Failure::new(
                 "the judge tests one component at a time: choose one that `jaus discover` lists",
             ));
         };
-        runtime::run(self.judge(address))
+        runtime::run(self.judge(address, &services))
+    }
+
+    /// The services of `--service`.
+    fn services(&self) -> Result<Services, Failure> {
+        let library = match self.service.is_empty() {
+            true => Library::default(),
+            false => self.own.services(),
+        };
+        Services::choose(library, &self.service)
+            .map_err(|error| Failure::new(format!("--service: {error}")))
     }
 
     /// The selected steps.
-    fn steps(&self, subject: Option<&Subject>) -> Vec<Step> {
+    fn steps(&self, services: &Services, subject: Option<&Subject>) -> Vec<Step> {
         if !self.service.is_empty() {
-            let version = |urn: &str| subject.and_then(|subject| subject.version(urn));
-            return script::service::steps(&self.service, version);
+            return services.steps(|urn| subject?.version(urn));
         }
         let spans = &self.only;
         let in_span = |name: Name, span: &Span| (span.first..=span.last).contains(&name);
         let chosen = |name| spans.is_empty() || spans.iter().any(|span| in_span(name, span));
         script::selected(script::steps(), chosen)
-    }
-
-    /// Origin of the steps, as text.
-    fn against(&self) -> String {
-        if self.service.is_empty() {
-            "the contests' script".to_owned()
-        } else {
-            self.service.join(", ")
-        }
     }
 
     fn forms(&self) -> Vec<Form> {
@@ -198,9 +203,9 @@ impl Judge {
         wanted.map(|(form, _)| form).collect()
     }
 
-    fn list(&self) -> Result<Outcome, Failure> {
+    fn list(&self, services: &Services) -> Result<Outcome, Failure> {
         let mut output = Output::new();
-        for step in self.steps(None) {
+        for step in self.steps(services, None) {
             let names = step.needs.iter().filter_map(|urn| urn.rsplit(':').next());
             let needs = names.collect::<Vec<_>>().join(", ");
             output.line(format_args!("{:<3}  {}  ({needs})", step.name, step.title))?;
@@ -208,11 +213,11 @@ impl Judge {
         Ok(Outcome::Done)
     }
 
-    async fn judge(&self, address: JausId) -> Result<Outcome, Failure> {
+    async fn judge(&self, address: JausId, services: &Services) -> Result<Outcome, Failure> {
         let (id, config) = self.network.for_own_node_as(MAIN, "jaus judge")?;
         let recording = self.record.as_deref().map(Recording::create).transpose()?;
-        let dictionary = Dictionary::of(registry());
-        let mut outputs = Outputs::open(self, &dictionary)?;
+        let dictionary = self.own.load()?;
+        let mut outputs = Outputs::open(self, services, &dictionary)?;
         let mut judge_nodes = JudgeNodes::start(id, config, address, recording)?;
         let Some(subject) = Subject::meet(&mut judge_nodes, address, self.limit).await? else {
             judge_nodes.end().await?;
@@ -229,7 +234,7 @@ impl Judge {
         tokio::pin!(end);
         let finished = tokio::select! {
             () = &mut end => false,
-            result = self.carry_out(&mut runner, &subject, &mut outputs) => { result?; true }
+            result = self.carry_out(services, &mut runner, &subject, &mut outputs) => { result?; true }
         };
         if !finished {
             runner.tidy().await?;
@@ -242,11 +247,12 @@ impl Judge {
     /// Runs all steps in all forms.
     async fn carry_out(
         &self,
+        services: &Services,
         runner: &mut Runner,
         subject: &Subject,
         outputs: &mut Outputs<'_>,
     ) -> Result<(), Failure> {
-        let steps = self.steps(Some(subject));
+        let steps = self.steps(services, Some(subject));
         for form in self.forms() {
             outputs.form(form)?;
             runner.begin(form);

@@ -10,6 +10,7 @@ use jaus_cli::runtime::Clock;
 use jaus_view::Dictionary;
 
 use super::report::Report;
+use super::script::service::Services;
 use super::step::{Form, Step};
 use super::subject::Subject;
 use super::verdict::{StepResult, Tally};
@@ -35,7 +36,11 @@ pub(super) struct Outputs<'d> {
 }
 
 impl<'d> Outputs<'d> {
-    pub(super) fn open(judge: &Judge, dictionary: &'d Dictionary) -> Result<Self, Failure> {
+    pub(super) fn open(
+        judge: &Judge,
+        services: &Services,
+        dictionary: &'d Dictionary,
+    ) -> Result<Self, Failure> {
         let to_stdout = judge.json.as_deref() == Some(Path::new("-"));
         let json = judge.json.as_deref().filter(|_| !to_stdout);
         let create = |path: &Path| match File::create(path) {
@@ -54,7 +59,7 @@ impl<'d> Outputs<'d> {
             everything: judge.all,
             json,
             junit: judge.junit.clone(),
-            against: judge.against(),
+            against: services.origin(),
             clock: Clock::start(),
             tally: Tally::default(),
             results: Vec::new(),

@@ -196,12 +196,17 @@ pub(super) fn in_words(dictionary: &Dictionary, octets: &Bytes) -> String {
     let mut shown = String::from(name);
     if content != "{}" && content != "null" {
         shown.push(' ');
-        shown.extend(content.chars().take(LONGEST));
-    }
-    if content.chars().count() > LONGEST {
-        shown.push('…');
+        shown.push_str(&shortened(content));
     }
     shown
+}
+
+/// The beginning of a long text.
+pub(super) fn shortened(text: String) -> String {
+    let Some((end, _)) = text.char_indices().nth(LONGEST) else {
+        return text;
+    };
+    format!("{}…", &text[..end])
 }
 
 /// Milliseconds, to a hundredth.

@@ -371,7 +371,7 @@ impl Runner {
 
     /// Explains why no received message is acceptable.
     fn silence(&self, missing: &Expectation, proceeding: &Proceeding) -> String {
-        let (name, to) = (missing.name, self.memory.id(missing.to));
+        let (name, to) = (&missing.name, self.memory.id(missing.to));
         let limit = self.limit.as_secs_f64();
         let instead = proceeding.received.iter();
         let instead = instead.map(|said| format!("{} to {}", name_of(&said.octets), said.to));

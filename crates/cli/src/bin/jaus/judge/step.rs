@@ -31,7 +31,7 @@ pub(super) enum Part {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Name {
     pub(super) part: Part,
-    pub(super) number: u8,
+    pub(super) number: u16,
 }
 
 impl fmt::Display for Name {
@@ -89,10 +89,10 @@ pub(super) struct Step {
     pub(super) name: Name,
     pub(super) title: Cow<'static, str>,
     /// URNs of the services that the step requires.
-    pub(super) needs: Vec<&'static str>,
+    pub(super) needs: Vec<Cow<'static, str>>,
     /// The steps of the same part that must run before, because they set the state that this one
     /// expects.
-    pub(super) rests_on: &'static [u8],
+    pub(super) rests_on: &'static [u16],
     /// Whether the contests' tool sends this by unicast only.
     pub(super) by_unicast_only: bool,
     pub(super) acts: Vec<Act>,
@@ -156,7 +156,7 @@ pub(super) enum Reach {
 pub(super) struct Expectation {
     pub(super) to: Speaker,
     pub(super) code: u16,
-    pub(super) name: &'static str,
+    pub(super) name: Cow<'static, str>,
     /// Its required content, as text.
     pub(super) words: Cow<'static, str>,
     pub(super) check: Look,
@@ -200,7 +200,7 @@ pub(super) struct Throughout {
 }
 
 /// Creates a step.
-pub(super) fn step(part: Part, number: u8, title: impl Into<Cow<'static, str>>) -> Step {
+pub(super) fn step(part: Part, number: u16, title: impl Into<Cow<'static, str>>) -> Step {
     Step {
         name: Name { part, number },
         title: title.into(),
@@ -214,11 +214,11 @@ pub(super) fn step(part: Part, number: u8, title: impl Into<Cow<'static, str>>) 
 
 impl Step {
     pub(super) fn needs(mut self, urns: &[&'static str]) -> Self {
-        self.needs = urns.to_vec();
+        self.needs = urns.iter().copied().map(Cow::Borrowed).collect();
         self
     }
 
-    pub(super) fn rests_on(mut self, numbers: &'static [u8]) -> Self {
+    pub(super) fn rests_on(mut self, numbers: &'static [u16]) -> Self {
         self.rests_on = numbers;
         self
     }
@@ -355,7 +355,7 @@ impl Expectation {
         Self {
             to,
             code: R::CODE,
-            name: R::NAME,
+            name: R::NAME.into(),
             words: words.into(),
             check: Box::new(check),
             is_optional: false,

@@ -1,6 +1,7 @@
 //! The component under test: presence and offered services.
 #![expect(clippy::disallowed_methods, reason = "the judge runs in real time")]
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -73,9 +74,9 @@ impl Subject {
     }
 
     /// The first of these services that is not offered.
-    pub(super) fn lacks(&self, urns: &[&'static str]) -> Option<&'static str> {
+    pub(super) fn lacks<'a>(&self, urns: &'a [Cow<'static, str>]) -> Option<&'a str> {
         let services = self.services.as_ref()?;
-        let mut urns = urns.iter().copied();
+        let mut urns = urns.iter().map(AsRef::as_ref);
         urns.find(|urn| !services.contains_key(*urn))
     }
 }

@@ -1,5 +1,6 @@
 //! `jaus judge` against correct, faulty, slow and silent peers.
 
+mod examples;
 mod outputs;
 mod peer;
 mod replay;

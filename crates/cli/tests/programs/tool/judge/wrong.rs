@@ -196,7 +196,7 @@ fn obedient() -> Peer {
         report
     };
     let mut peer = Peer::offering(&[primitive_driver::URN]);
-    for report in [0.0, 0.0, 0.0, 25.0].map(effort) {
+    for report in [0.0, 0.0, 0.0, 0.0, 25.0].map(effort) {
         peer = peer.answers::<QueryWrenchEffort>(&report);
     }
     peer

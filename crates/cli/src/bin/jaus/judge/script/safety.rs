@@ -61,7 +61,7 @@ pub(super) fn steps() -> Vec<Step> {
     ]
 }
 
-fn safety(number: u8, title: &'static str) -> Step {
+fn safety(number: u16, title: &'static str) -> Step {
     step(Part::C, number, title).needs(&[
         ACCESS_CONTROL,
         MANAGEMENT,
@@ -71,7 +71,7 @@ fn safety(number: u8, title: &'static str) -> Step {
 }
 
 /// A step that starts in control, and ends without control, in standby.
-fn in_control(number: u8, title: &'static str) -> Step {
+fn in_control(number: u16, title: &'static str) -> Step {
     safety(number, title)
         .ask::<ConfirmControl>(Main, request_control(), "control accepted", accepted)
         .finally(Exchange::new(Main, Standby))
@@ -79,7 +79,7 @@ fn in_control(number: u8, title: &'static str) -> Step {
 }
 
 /// A step that starts with a moving vehicle.
-fn driving(number: u8, title: &'static str) -> Step {
+fn driving(number: u16, title: &'static str) -> Step {
     let mut step = in_control(number, title).tell(Main, Resume);
     step.acts.push(Act::Until(Until {
         words: "the vehicle moves",

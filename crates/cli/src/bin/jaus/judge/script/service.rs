@@ -1,11 +1,10 @@
 //! Generates steps from a service's definition: its queries, and its commands without control.
 
-use std::borrow::Cow;
-use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
-use jaus::codec::{Message, MessageInfo, ServiceInfo, report_code};
+use jaus::codec::{Message as _, report_code};
 use jaus::messages::core::{
     CancelEvent, ClearEmergency, CreateCommandEvent, CreateEvent, QueryElement, RegisterServices,
     ReleaseControl, RequestControl, SetEmergency, UpdateEvent, access_control,
@@ -15,10 +14,12 @@ use jaus::messages::mobility::{
     QueryLocalPathSegment, QueryLocalPathSegmentExt, QueryLocalWaypoint, QueryLocalWaypointExt,
 };
 use jaus_vehicle::messages::handoff::{RemoveHandoffRequest, RequestHandoff};
-use jaus_vehicle::messages::registry;
+use jsidl::model::{Message, Service, Version};
+use jsidl::{Library, dynamic};
 use serde_json::Value as Json;
 
 use super::super::memory::Memory;
+use super::super::report::shortened;
 use super::super::step::{
     Act, Check, Exchange, Expectation, Part,
     Speaker::{Main, Second},
@@ -60,124 +61,138 @@ const OF_SOMETHING: [u16; 9] = [
     QueryGlobalPathSegmentExt::CODE,
 ];
 
-/// The URN of a service, from its URN or name.
-pub(in super::super) fn known(text: &str) -> Result<&'static str, String> {
-    let is_it = |info: &&ServiceInfo| info.id.urn == text || info.name == text;
-    if let Some(info) = registry().services().find(is_it) {
-        return Ok(info.id.urn);
+/// The services to be tested, and the definitions that say how.
+pub(in super::super) struct Services {
+    library: Library,
+    chosen: Vec<Arc<str>>,
+}
+
+impl Services {
+    /// Chooses services by URN or name.
+    pub(in super::super) fn choose(library: Library, texts: &[String]) -> Result<Self, String> {
+        let chosen = texts.iter().map(|text| urn(&library, text));
+        let chosen = chosen.collect::<Result<_, _>>()?;
+        Ok(Self { library, chosen })
     }
-    let names: BTreeSet<_> = registry().services().map(|info| info.name).collect();
-    let names: Vec<_> = names.into_iter().collect();
+
+    /// Origin of the steps, as text.
+    pub(in super::super) fn origin(&self) -> String {
+        match &*self.chosen {
+            [] => "the contests' script".to_owned(),
+            urns => urns.join(", "),
+        }
+    }
+
+    /// Steps for the services, each in the offered version, or else the newest.
+    pub(in super::super) fn steps(&self, offered: impl Fn(&str) -> Option<(u8, u8)>) -> Vec<Step> {
+        let mut numbers = 1..=u16::MAX;
+        let mut steps = Vec::new();
+        for urn in &self.chosen {
+            let version = offered(urn).map(|(major, minor)| Version { major, minor });
+            let versions = || self.library.versions(urn);
+            let is_offered = |service: &&Arc<Service>| Some(service.id.version) == version;
+            let Some(service) = versions().find(is_offered).or_else(|| versions().last()) else {
+                continue;
+            };
+            let of_messages = walk(&self.library, service).into_iter();
+            let of_messages = of_messages.map(|(title, acts)| (title, acts, Vec::new()));
+            let of_states = transitions::walk(&self.library, service).into_iter();
+            let of_states = of_states.map(|(title, acts)| (title, acts, transitions::afterwards()));
+            for ((title, acts, afterwards), number) in
+                of_messages.chain(of_states).zip(&mut numbers)
+            {
+                let mut step = step(Part::S, number, title);
+                step.needs.push(urn.to_string().into());
+                step.acts = acts;
+                step.afterwards = afterwards;
+                steps.push(step);
+            }
+        }
+        steps
+    }
+}
+
+/// The URN of a service, from its URN or name.
+fn urn(library: &Library, text: &str) -> Result<Arc<str>, String> {
+    let is_it = |service: &&Arc<Service>| &*service.id.urn == text || service.name == text;
+    if let Some(service) = library.services().find(is_it) {
+        return Ok(service.id.urn.clone());
+    }
+    let names = library.services().flat_map(|it| [&*it.id.urn, &*it.name]);
+    let alike = names.map(|name| (strsim::jaro_winkler(text, name), name));
+    let nearest = alike.max_by(|(one, _), (other, _)| one.total_cmp(other));
+    let nearest = nearest.map_or("", |(_, name)| name);
     Err(format!(
-        "there is no service {text}; the services are {}",
-        names.join(", ")
+        "there is no service {text}; did you mean {nearest}? Load the definition of your own service \
+         with --jsidl"
     ))
 }
 
-/// Steps for services, each in the offered version, or else the newest.
-pub(in super::super) fn steps(
-    urns: &[&'static str],
-    offered: impl Fn(&str) -> Option<(u8, u8)>,
-) -> Vec<Step> {
-    let mut numbers = 1_u8..;
-    let mut steps = Vec::new();
-    for urn in urns {
-        let version = offered(urn);
-        let of_urn = || registry().services().filter(|info| info.id.urn == *urn);
-        let is_offered = |info: &&ServiceInfo| version == Some((info.id.major, info.id.minor));
-        let newest = || of_urn().max_by_key(|info| (info.id.major, info.id.minor));
-        let Some(service) = of_urn().find(is_offered).or_else(newest) else {
-            continue;
-        };
-        for (title, acts) in walk(service) {
-            // No service has more than 255 messages.
-            let Some(number) = numbers.next() else { break };
-            let mut step = step(Part::S, number, title).needs(&[urn]);
-            step.acts = acts;
-            steps.push(step);
-        }
-        for (title, acts) in transitions::walk(service.id) {
-            let Some(number) = numbers.next() else { break };
-            let mut step = step(Part::S, number, title).needs(&[urn]);
-            step.acts = acts;
-            step.afterwards = transitions::afterwards();
-            steps.push(step);
-        }
-    }
-    steps
-}
-
-/// Titles and acts of the steps of one service.
-fn walk(service: &ServiceInfo) -> Vec<(Cow<'static, str>, Vec<Act>)> {
-    let inputs = service.inputs.iter();
-    let inputs: Vec<_> = inputs
-        .filter_map(|&code| registry().in_service(service.id, code))
-        .collect();
-    let queries = inputs.iter().filter(|info| report_of(info).is_some());
-    let queries: Vec<_> = queries.copied().collect();
+/// Titles and acts of the steps of one service's messages.
+fn walk(library: &Library, service: &Service) -> Vec<(String, Vec<Act>)> {
+    let queries = service.inputs.iter();
+    let queries = queries.filter_map(|query| Some((query, report_of(library, service, query)?)));
+    let queries: Vec<Query<'_>> = queries.collect();
     let mut steps = Vec::new();
     for query in &queries {
-        let is_of_something = OF_SOMETHING.contains(&query.code);
+        let is_of_something = OF_SOMETHING.contains(&query.0.code);
         let condition = if is_of_something {
             " if there is something to report"
         } else {
             ""
         };
-        let title = format!("{} is answered{condition}", query.name).into();
+        let title = format!("{} is answered{condition}", query.0.name);
         let act = asked(query, takes_report, is_of_something).map(Act::Exchange);
         steps.push((title, act.into_iter().collect()));
         let cut = cut(query, is_of_something);
         if !cut.is_empty() {
-            let title = format!("{} cut short is ignored", query.name).into();
-            steps.push((title, cut));
+            steps.push((format!("{} cut short is ignored", query.0.name), cut));
         }
     }
-    if !is_controlled(service) {
+    let mut lineage = library.lineage(service);
+    if !lineage.any(|it| &*it.id.urn == access_control::URN) {
         return steps;
     }
-    let commands = inputs.iter();
-    let commands = commands.filter(|info| info.is_command && !ANYBODYS.contains(&info.code));
+    let commands = service.inputs.iter();
+    let commands = commands.filter(|it| it.is_command && !ANYBODYS.contains(&it.code));
     for command in commands {
-        let title = format!("{} without control is ignored", command.name).into();
+        let title = format!("{} without control is ignored", command.name);
         steps.push((title, without_control(command, &queries)));
     }
     steps
 }
 
-/// Whether the service is or inherits Access Control.
-fn is_controlled(service: &ServiceInfo) -> bool {
-    if service.id.urn == access_control::URN {
-        return true;
-    }
-    let parent = service.inherits_from;
-    let parent = parent.and_then(|id| registry().services().find(|info| info.id == id));
-    parent.is_some_and(is_controlled)
-}
+/// Checks the report with this code.
+type Look = fn(u16, &Json, &mut Memory) -> Check;
+/// A query, and the report that answers it.
+type Query<'a> = (&'a Arc<Message>, &'a Arc<Message>);
 
-/// The type of the report that answers a query.
-fn report_of(query: &MessageInfo) -> Option<&'static MessageInfo> {
-    registry().by_code(report_code(query.code)?).next()
+/// The report that answers a query.
+fn report_of<'a>(
+    library: &'a Library,
+    service: &'a Service,
+    query: &Message,
+) -> Option<&'a Arc<Message>> {
+    let code = report_code(query.code)?;
+    let mut vocabulary = library.vocabulary(service);
+    vocabulary.find_map(|(_, message)| (message.code == code).then_some(message))
 }
 
 /// Sends a query that may remain unanswered: another step checks that.
-fn perhaps(query: &MessageInfo, look: fn(u16, &Json, &mut Memory) -> Check) -> Option<Act> {
+fn perhaps(query: &Query<'_>, look: Look) -> Option<Act> {
     asked(query, look, true).map(Act::Exchange)
 }
 
 /// Sends a query in its shortest form, and checks the report if it is readable.
-fn asked(
-    query: &MessageInfo,
-    look: fn(u16, &Json, &mut Memory) -> Check,
-    is_optional: bool,
-) -> Option<Exchange> {
-    let report = report_of(query)?;
+fn asked((query, report): &Query<'_>, look: Look, is_optional: bool) -> Option<Exchange> {
+    let report = Arc::clone(report);
     let mut exchange = Exchange::octets(Main, specimen::shortest(query)?);
     exchange.expects.push(Expectation {
         to: Main,
         code: report.code,
-        name: report.name,
+        name: report.name.clone().into(),
         words: "as defined".into(),
-        check: Box::new(move |octets, memory| look(report.code, &read(octets)?, memory)),
+        check: Box::new(move |octets, memory| look(report.code, &read(&report, octets)?, memory)),
         is_optional,
         in_parts: false,
     });
@@ -186,8 +201,8 @@ fn asked(
 
 /// Sends a query without its last octet, if it has a body, and then the whole query, which must
 /// still be answered.
-fn cut(query: &MessageInfo, is_optional: bool) -> Vec<Act> {
-    let Some(octets) = specimen::shortest(query).filter(|octets| octets.len() > 2) else {
+fn cut(query: &Query<'_>, is_optional: bool) -> Vec<Act> {
+    let Some(octets) = specimen::shortest(query.0).filter(|octets| octets.len() > 2) else {
         return Vec::new();
     };
     let ignored = Act::Ignored {
@@ -195,40 +210,48 @@ fn cut(query: &MessageInfo, is_optional: bool) -> Vec<Act> {
         lasting: IGNORED,
     };
     let whole = asked(query, takes_report, is_optional).map(Act::Exchange);
-    std::iter::once(ignored).chain(whole).collect()
+    // The answer of the step before may have more parts.
+    [Act::Pause(IGNORED), ignored]
+        .into_iter()
+        .chain(whole)
+        .collect()
 }
 
-/// Sends a command without control. The reports before and after must be equal.
-fn without_control(command: &MessageInfo, queries: &[&MessageInfo]) -> Vec<Act> {
-    let before = queries
-        .iter()
-        .filter_map(|query| perhaps(query, takes_report));
-    let mut acts: Vec<Act> = before.collect();
+/// Sends a command without control. The reports before and after must be equal, except for those
+/// that change without a command, such as images.
+fn without_control(command: &Message, queries: &[Query<'_>]) -> Vec<Act> {
+    let ask = |look| queries.iter().filter_map(move |query| perhaps(query, look));
+    let mut acts: Vec<Act> = ask(takes_report as Look).collect();
+    if !acts.is_empty() {
+        acts.push(Act::Pause(IGNORED));
+        acts.extend(ask(forgets_if_changed));
+    }
     if let Some(octets) = specimen::telling(command) {
         acts.push(Act::Ignored {
             exchange: Exchange::octets(Second, octets),
             lasting: IGNORED,
         });
     }
-    acts.extend(
-        queries
-            .iter()
-            .filter_map(|query| perhaps(query, is_unchanged)),
-    );
+    acts.extend(ask(is_unchanged));
     acts
 }
 
 /// The JSON view of a report.
-fn read(octets: &Bytes) -> Result<Json, String> {
-    let message = registry()
-        .decode(octets)
-        .ok_or("it is not a known message")?;
-    let message = message.map_err(|error| error.to_string())?;
-    serde_json::to_value(message.view()).map_err(|error| error.to_string())
+fn read(report: &Message, octets: &Bytes) -> Result<Json, String> {
+    let value = dynamic::decode(report, octets).map_err(|error| error.to_string())?;
+    dynamic::to_json(report, &value).map_err(|error| error.to_string())
 }
 
 fn takes_report(code: u16, report: &Json, memory: &mut Memory) -> Check {
     memory.reports.insert(code, report.clone());
+    Ok(())
+}
+
+fn forgets_if_changed(code: u16, report: &Json, memory: &mut Memory) -> Check {
+    let before = memory.reports.get(&code);
+    if before.is_some_and(|before| !is_same(before, report)) {
+        memory.reports.remove(&code);
+    }
     Ok(())
 }
 
@@ -238,7 +261,12 @@ fn is_unchanged(code: u16, report: &Json, memory: &mut Memory) -> Check {
     if is_same(before, report) {
         return Ok(());
     }
-    Err(format!("it was {before}, and is now {report}"))
+    let text = |report: &Json| shortened(report.to_string());
+    Err(format!(
+        "it was {}, and is now {}",
+        text(before),
+        text(report)
+    ))
 }
 
 /// Whether two reports are equal, except for time stamps and tolerated drift.
@@ -269,10 +297,19 @@ fn is_same(one: &Json, other: &Json) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
+    fn library() -> Library {
+        let mut loader = jsidl::Loader::new();
+        loader.catalogue();
+        loader.load().library
+    }
+
     fn titles(name: &str) -> Vec<String> {
-        let steps = steps(&[known(name).unwrap()], |_| None);
+        let services = Services::choose(library(), &[name.to_owned()]).unwrap();
+        let steps = services.steps(|_| None);
         steps.iter().map(|step| step.title.to_string()).collect()
     }
 
@@ -319,24 +356,30 @@ mod tests {
 
     #[test]
     fn every_service_can_be_walked_through() {
-        for service in registry().services() {
-            let steps = steps(&[service.id.urn], |_| {
-                Some((service.id.major, service.id.minor))
-            });
-            let has_steps = !steps.is_empty() || service.inputs.is_empty();
-            // No code of these is a query whose report follows from the code.
-            let exempt = ["Transport", "EnhancedAccessControl", "HandoffController"];
-            assert!(
-                has_steps || exempt.contains(&service.name),
-                "{}",
-                service.id
-            );
-        }
+        let library = library();
+        let has_steps = |service: &Service| {
+            !walk(&library, service).is_empty() || !transitions::walk(&library, service).is_empty()
+        };
+        // The codes of these services do not tell which report answers a query.
+        let exempt = [
+            "EnhancedAccessControl",
+            "HandoffController",
+            "MeasurementSensor",
+            "PathReporter",
+        ];
+        let without = library
+            .services()
+            .filter(|it| !it.inputs.is_empty() && !has_steps(it));
+        let names: BTreeSet<_> = without.map(|it| &*it.name).collect();
+        assert_eq!(names, BTreeSet::from(exempt));
     }
 
     #[test]
-    fn an_unknown_service_is_refused_with_those_that_are_known() {
-        let refused = known("urn:jaus:jss:core:Livness").unwrap_err();
-        assert!(refused.contains("Liveness"), "{refused}");
+    fn an_unknown_service_is_refused_with_the_name_that_is_most_like_it() {
+        for wrong in ["Livness", "urn:jaus:jss:core:Livness"] {
+            let refused = urn(&library(), wrong).unwrap_err();
+            let right = wrong.replace("Livness", "Liveness");
+            assert!(refused.contains(&format!("mean {right}?")), "{refused}");
+        }
     }
 }

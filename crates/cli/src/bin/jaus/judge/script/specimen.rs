@@ -1,9 +1,11 @@
-//! Generates a valid message of each type with nothing but its decoder.
+//! Generates a valid message with nothing but a decoder for its definition.
 
 use bytes::Bytes;
-use jaus::codec::{Message, MessageInfo};
+use jaus::codec::Message as _;
 use jaus::messages::core::{QueryConfiguration, QueryIdentification};
 use jaus::messages::mobility::QueryAccelerationLimit;
+use jsidl::dynamic;
+use jsidl::model::Message;
 
 /// Maximum octets of a body.
 const LONGEST: usize = 96;
@@ -18,15 +20,15 @@ const NOT_ZERO: [(u16, u8); 3] = [
 ];
 
 /// The shortest message of this type, all zeros if possible.
-pub(super) fn shortest(info: &MessageInfo) -> Option<Bytes> {
-    let mut octets = info.code.to_le_bytes().to_vec();
-    while !is_valid(info, &octets) {
+pub(super) fn shortest(message: &Message) -> Option<Bytes> {
+    let mut octets = message.code.to_le_bytes().to_vec();
+    while !is_valid(message, &octets) {
         if octets.len() > LONGEST {
             return None;
         }
         octets.push(0);
     }
-    let meant = NOT_ZERO.iter().find(|(code, _)| *code == info.code);
+    let meant = NOT_ZERO.iter().find(|(code, _)| *code == message.code);
     if let (Some(&(_, meant)), Some(last)) = (meant, octets.last_mut()) {
         *last = meant;
     }
@@ -35,21 +37,21 @@ pub(super) fn shortest(info: &MessageInfo) -> Option<Bytes> {
 
 /// A message of this type with an effect: with its first optional field, if its fields are
 /// optional, and with nonzero values.
-pub(super) fn telling(info: &MessageInfo) -> Option<Bytes> {
-    let mut octets = shortest(info)?.to_vec();
+pub(super) fn telling(message: &Message) -> Option<Bytes> {
+    let mut octets = shortest(message)?.to_vec();
     if octets.len() > 2 {
-        octets = with_first_field(info, &octets).unwrap_or(octets);
+        octets = with_first_field(message, &octets).unwrap_or(octets);
     }
     // The first octet of the body may be a presence vector, which is set already.
     for at in 3..octets.len() {
         let before = std::mem::replace(&mut octets[at], FILLING);
-        if !is_valid(info, &octets) {
+        if !is_valid(message, &octets) {
             octets[at] = before;
         }
     }
     if octets.len() == 3 {
         let filled = [octets[0], octets[1], FILLING];
-        if is_valid(info, &filled) {
+        if is_valid(message, &filled) {
             octets = filled.to_vec();
         }
     }
@@ -57,17 +59,17 @@ pub(super) fn telling(info: &MessageInfo) -> Option<Bytes> {
 }
 
 /// The same message with the first field of its presence vector, if it begins with one.
-fn with_first_field(info: &MessageInfo, octets: &[u8]) -> Option<Vec<u8>> {
+fn with_first_field(message: &Message, octets: &[u8]) -> Option<Vec<u8>> {
     (1..=8).find_map(|extra| {
         let mut longer = octets.to_vec();
         longer[2] |= 1;
         longer.resize(octets.len() + extra, FILLING);
-        is_valid(info, &longer).then_some(longer)
+        is_valid(message, &longer).then_some(longer)
     })
 }
 
-fn is_valid(info: &MessageInfo, octets: &[u8]) -> bool {
-    (info.decode)(&Bytes::copy_from_slice(octets)).is_ok()
+fn is_valid(message: &Message, octets: &[u8]) -> bool {
+    dynamic::decode(message, octets).is_ok()
 }
 
 #[cfg(test)]
@@ -76,10 +78,15 @@ mod tests {
 
     #[test]
     fn there_is_a_specimen_of_every_message() {
-        for info in jaus_vehicle::messages::registry().iter() {
-            for specimen in [shortest(info), telling(info)] {
-                let specimen = specimen.unwrap_or_else(|| panic!("no specimen of {info:?}"));
-                assert!(is_valid(info, &specimen), "{info:?}: {specimen:02X?}");
+        let mut loader = jsidl::Loader::new();
+        loader.catalogue();
+        for service in loader.load().library.services() {
+            for message in service.messages() {
+                for specimen in [shortest(message), telling(message)] {
+                    let name = &message.name;
+                    let specimen = specimen.unwrap_or_else(|| panic!("no specimen of {name}"));
+                    assert!(is_valid(message, &specimen), "{name}: {specimen:02X?}");
+                }
             }
         }
     }

@@ -6,20 +6,19 @@
 //! path.
 
 use std::collections::VecDeque;
-use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use bytes::Bytes;
-use jaus::codec::{Message, ServiceId};
+use jaus::codec::Message;
 use jaus::messages::core::{
     ClearEmergency, QueryControl, QueryStatus, RejectControl, ReleaseControl, ReportControl,
     ReportStatus, RequestControl, Reset, Resume, SetAuthority, SetEmergency, Standby,
     clear_emergency, management, set_emergency,
 };
+use jsidl::Library;
 use jsidl::behaviour::{Action, Guard, Transition, TransitionKind};
 use jsidl::machine::{Machine, StateIndex, Stimulus};
-use jsidl::model::{Id, Service};
-use jsidl::{Library, Loader};
+use jsidl::model::Service;
 
 use super::super::memory::Memory;
 use super::super::step::{
@@ -125,24 +124,15 @@ struct Answer {
 
 /// Titles and acts of the steps of a service's machine; none if the service declares no states of
 /// its own and leaves them to its bases, which can be tested separately.
-pub(super) fn walk(service: ServiceId) -> Vec<(String, Vec<Act>)> {
-    /// The built-in definitions, which take longer to load than to walk.
-    static CATALOGUE: LazyLock<Library> = LazyLock::new(|| {
-        let mut loader = Loader::new();
-        loader.catalogue();
-        loader.load().library
-    });
-    let mut versions = CATALOGUE.versions(service.urn);
-    let is_it = |id: &Id| id.version.to_string() == format!("{}.{}", service.major, service.minor);
-    let has_its_own = |it: &&Arc<Service>| is_it(&it.id) && !it.behaviour.is_empty();
-    let Some(definition) = versions.find(has_its_own) else {
+pub(super) fn walk(library: &Library, service: &Service) -> Vec<(String, Vec<Act>)> {
+    if service.behaviour.is_empty() {
         return Vec::new();
-    };
-    let machines = CATALOGUE.machines(definition);
+    }
+    let machines = library.machines(service);
     let Some(machine) = machines.iter().find(|it| is_about_control(it)) else {
         return Vec::new();
     };
-    let mut lineage = CATALOGUE.lineage(definition);
+    let mut lineage = library.lineage(service);
     let tells_status = lineage.any(|it| &*it.id.urn == management::URN);
     steps(machine, tells_status)
 }
@@ -304,7 +294,7 @@ fn expectation(answer: &Answer) -> Expectation {
     Expectation {
         to: answer.to,
         code: number,
-        name,
+        name: name.into(),
         words: answer.code.to_lowercase().replace('_', " ").into(),
         check: Box::new(move |octets: &Bytes, _| {
             let is = octets.get(2).copied().unwrap_or(u8::MAX);
