@@ -181,6 +181,13 @@ impl Definition {
         }
     }
 
+    pub(super) fn is_command(&self) -> bool {
+        match self.info() {
+            Ok(info) => info.is_command,
+            Err(message) => message.is_command,
+        }
+    }
+
     pub(super) fn decode(&self, octets: &Bytes) -> Result<Body, Unreadable> {
         match &self.codec {
             Codec::Generated(info, decode) => decode(info, octets)
