@@ -13,12 +13,16 @@ mod doctor;
 mod encode;
 mod jsidl;
 mod judge;
+mod lease;
 mod monitor;
 mod node;
 mod ping;
+mod queries;
 mod query;
 mod record;
 mod replay;
+mod send;
+mod subscribe;
 #[cfg(target_os = "linux")]
 mod up;
 mod vehicle;
@@ -68,6 +72,8 @@ enum Command {
     Ping(ping::Ping),
     Judge(judge::Judge),
     Query(query::Query),
+    Subscribe(subscribe::Subscribe),
+    Send(send::Send),
     Record(record::Record),
     Replay(replay::Replay),
     Decode(decode::Decode),
@@ -94,6 +100,8 @@ impl Command {
             Self::Ping(ping) => ping.run(),
             Self::Judge(judge) => judge.run(),
             Self::Query(query) => query.run(),
+            Self::Subscribe(subscribe) => subscribe.run(),
+            Self::Send(send) => send.run(),
             Self::Record(record) => record.run(),
             Self::Replay(replay) => replay.run(),
             Self::Decode(decode) => decode.run(),
@@ -109,11 +117,12 @@ fn main() -> ExitCode {
     let ended = cli.logging.start("warn").and_then(|()| cli.command.run());
     match ended {
         Ok(status) => status,
-        // The reader has closed our output early, as `head` does.
-        Err(Failure::OutputClosed) => ExitCode::SUCCESS,
         Err(failure) => {
-            output::say(failure);
-            ExitCode::from(2)
+            // Otherwise the reader has closed our output early, as `head` does.
+            if !matches!(failure, Failure::OutputClosed) {
+                output::say(&failure);
+            }
+            failure.status()
         }
     }
 }

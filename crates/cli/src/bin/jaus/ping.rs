@@ -19,7 +19,7 @@ use jaus::messages::core::{
 };
 use jaus::node::Port;
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::network::Network;
+use jaus_cli::network::{self, Network};
 use jaus_cli::output::{Output, say};
 use jaus_cli::runtime;
 use tokio::time::{Instant, sleep_until, timeout_at};
@@ -37,23 +37,24 @@ const PADDING: u16 = 0xD7F0;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus ping 101.1.33\n  \
-    jaus ping 101.1.33 --count 10 --interval 0.1\n  \
+    jaus ping 101.1.33 --count 10 --interval 100ms\n  \
     jaus ping 101.1.33 --with acknowledgement --size 65536\n  \
     jaus ping 101.1.33 --peer 192.168.7.2      for a host that multicast does not reach")]
 pub(crate) struct Ping {
     /// The component to query: SUBSYSTEM.NODE.COMPONENT
+    #[arg(value_name = "ID", value_parser = network::one_component)]
     address: JausId,
 
     /// The number of queries [default: until Ctrl-C]
     #[arg(long, short, value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
 
-    /// The interval between queries, in seconds
-    #[arg(long, short, default_value = "1", value_parser = runtime::seconds)]
+    /// The interval between queries
+    #[arg(long, short, default_value = "1s", value_parser = runtime::duration)]
     interval: Duration,
 
-    /// The answer timeout, in seconds
-    #[arg(long, short, default_value = "1", value_parser = runtime::seconds)]
+    /// How long to wait for each answer
+    #[arg(long, short, default_value = "1s", value_parser = runtime::duration)]
     timeout: Duration,
 
     /// What to send [default: the first that the component answers]
@@ -109,12 +110,6 @@ struct Tally {
 
 impl Ping {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        if !self.address.is_unicast() {
-            return Err(Failure::new(format!(
-                "{} is not a single component: choose one that `jaus discover` lists",
-                self.address
-            )));
-        }
         if self.size.is_some()
             && self
                 .with
@@ -147,9 +142,9 @@ impl Ping {
         output.line(format_args!("\n{}: {tally}", self.address))?;
         if tally.times.is_empty() && tally.asked > 0 {
             say(format_args!(
-                "{} did not answer. List components with `jaus discover`, choose the network with \
-                 --interface, or name a host that multicast does not reach with --peer",
-                self.address
+                "{} did not answer. {}",
+                self.address,
+                network::REMEDY
             ));
         }
         Ok(Outcome::complete_if(!tally.times.is_empty()))

@@ -17,7 +17,7 @@ use jaus::service::{MotionPolicy, StopCause};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::output::Output;
-use jaus_cli::runtime::{self, Clock, between};
+use jaus_cli::runtime::{self, Clock, RunFor, between};
 use jaus_cli::tree;
 use jaus_vehicle::handoff::Handoff;
 use jaus_vehicle::mobility::Vehicle;
@@ -39,9 +39,8 @@ use crate::node;
     jaus vehicle --noise 0.1 --seed 7     with wheels that slip\n  \
     jaus -v vehicle                       also logs clients' commands")]
 pub(crate) struct VehicleCommand {
-    /// End after this time [default: at Ctrl-C]
-    #[arg(long, value_parser = runtime::seconds)]
-    seconds: Option<Duration>,
+    #[command(flatten)]
+    run_for: RunFor,
 
     /// The vehicle's name [default: Rover]
     #[arg(long)]
@@ -201,7 +200,7 @@ impl VehicleCommand {
         let mut standings = component.watch_standing();
         let mut standing = Standing::default();
         standings.mark_changed();
-        let end = runtime::end(self.seconds);
+        let end = self.run_for.end();
         tokio::pin!(end);
         let clock = Clock::start();
         let mut looks = interval(LOOK);

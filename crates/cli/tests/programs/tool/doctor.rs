@@ -15,10 +15,7 @@ fn of<'j>(report: &'j Json, check: &str) -> Vec<&'j Json> {
 }
 
 fn examine(flags: &[&str]) -> (i32, Json) {
-    let run = run(
-        &[&["doctor", "--json", "--seconds", "2"], flags].concat(),
-        b"",
-    );
+    let run = run(&[&["doctor", "--json", "--for", "2s"], flags].concat(), b"");
     (run.status, run.only_line())
 }
 

@@ -90,7 +90,7 @@ fn who_says_nothing_is_waited_for_as_long_as_is_said() {
         .unwrap();
     let address = silent.local_addr().unwrap().to_string();
     let network = ["--loopback", "--port", "0", "--group", "off"].map(str::to_owned);
-    let (status, report) = examine(&address, &network, &["--seconds", "0.3"]);
+    let (status, report) = examine(&address, &network, &["--for", "300ms"]);
     assert_eq!(
         (status, &report["first_failure"]),
         (2, &"any answer".into())

@@ -14,5 +14,7 @@ mod monitor;
 mod network;
 mod ping;
 mod record;
+mod send;
+mod subscribe;
 mod vehicle;
 mod watch;

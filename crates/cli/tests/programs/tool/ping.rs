@@ -15,9 +15,9 @@ fn a_component_that_is_there_answers_and_its_round_trips_are_summed_up() {
             "--count",
             "3",
             "--interval",
-            "0.01",
+            "10ms",
             "--timeout",
-            "5",
+            "5s",
         ];
         run(&[&fixed, flags, &*network].concat(), b"")
     };
@@ -49,7 +49,7 @@ fn a_component_that_is_there_answers_and_its_round_trips_are_summed_up() {
 fn silence_is_told_with_what_to_do_about_it() {
     let group = own_group();
     let network: Vec<&str> = group.iter().map(String::as_str).collect();
-    let flags = ["ping", "103.1.99", "--count", "1", "--timeout", "0.05"];
+    let flags = ["ping", "103.1.99", "--count", "1", "--timeout", "50ms"];
     let asked = run(&[&flags, &*network].concat(), b"");
     assert!(
         asked.stdout.contains("1 queries, 0 answers, 100 % lost"),

@@ -38,7 +38,7 @@ use jaus_cli::runtime;
     jaus doctor\n  \
     jaus doctor --config node.toml        with the settings of a node\n  \
     jaus doctor --id 101.1.1              and whether that id is taken\n  \
-    jaus doctor --interface eth0 --seconds 10\n  \
+    jaus doctor --interface eth0 --for 10s\n  \
     jaus doctor --peer 192.168.7.2        tests the exchanges with that peer\n  \
     jaus doctor --peer 77.1.1             the same, found by its id\n  \
     jaus doctor --json | jq '.findings[] | select(.mark != \"ok\")'")]
@@ -53,9 +53,9 @@ pub(crate) struct Doctor {
     #[arg(long, requires = "examined")]
     control: bool,
 
-    /// How long to listen to the network [default: 3; with --peer 6 at most]
-    #[arg(long, value_parser = runtime::seconds)]
-    seconds: Option<Duration>,
+    /// How long to listen to the network [default: 3s; with --peer 6s at most]
+    #[arg(long = "for", value_name = "DURATION", value_parser = runtime::duration)]
+    duration: Option<Duration>,
 
     /// Print the findings as one JSON object
     #[arg(long)]
@@ -74,7 +74,7 @@ impl Doctor {
             let (id, config) = self.network.for_examination()?;
             let options = Options {
                 target,
-                listen: self.seconds,
+                listen: self.duration,
                 control: self.control,
                 json: self.json,
                 colours: colours_wanted(&std::io::stdout()),
@@ -104,7 +104,7 @@ impl Doctor {
         }
         report.add_all(ways(&config))?;
         report.add_all(port::check_tcp(&config))?;
-        let listen = self.seconds.unwrap_or(LISTEN);
+        let listen = self.duration.unwrap_or(LISTEN);
         if !self.json {
             let seconds = listen.as_secs_f64();
             say(format_args!("listening on the network for {seconds} s …"));

@@ -95,8 +95,8 @@ pub(crate) struct Watch {
     stats: bool,
 
     /// End after this time [default: at Ctrl-C, or at the end of the files]
-    #[arg(long, value_parser = runtime::seconds)]
-    seconds: Option<Duration>,
+    #[arg(long = "for", value_name = "DURATION", value_parser = runtime::duration)]
+    duration: Option<Duration>,
 }
 
 impl Watch {
@@ -113,7 +113,7 @@ impl Watch {
             },
         };
         let outcome = if self.files.is_empty() {
-            live::watch(&self.at, &filter, self.seconds, &mut printer)?
+            live::watch(&self.at, &filter, self.duration, &mut printer)?
         } else {
             let dictionary = definitions::built_in();
             files::watch(&self.files, &filter, &dictionary, &mut printer)?
