@@ -341,6 +341,15 @@ impl Dictionary {
             .any(|definition| definition.name() == message)
     }
 
+    /// The definitions in the library of the messages that a request may mean, best first.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn models(&self, request: &Request) -> Result<Vec<&Message>, Unreadable> {
+        let requested = self.requested(request)?;
+        Ok(requested.iter().filter_map(|it| self.model(it)).collect())
+    }
+
     /// Whether the message is a command: components obey it only from the client in control.
     pub fn is_command(&self, octets: &[u8]) -> bool {
         let code = octets.first_chunk().map(|&code| u16::from_le_bytes(code));

@@ -34,7 +34,7 @@ pub use journal::{
 pub use line::{Content, Envelope, Header, Line};
 pub use log::MessageLog;
 pub use network::{Counts, Datagram, JAUS_PORT, Network, udp_packet};
-pub use query::{EncodedQuery, is_same_name};
+pub use query::{EncodedQuery, is_part_of_name, is_same_name};
 pub use request::Request;
 pub use stream::Links;
 pub use stream::{Entry, Filter, FilterError, MessageStream};

@@ -147,6 +147,12 @@ pub fn is_same_name(one: &str, other: &str) -> bool {
     plain(one) == plain(other)
 }
 
+/// Whether a name contains a text, both without case, underscores and spaces.
+#[must_use]
+pub fn is_part_of_name(text: &str, name: &str) -> bool {
+    plain(name).contains(&plain(text))
+}
+
 /// A name without case, underscores and spaces.
 pub(super) fn plain(name: &str) -> String {
     let letters = name.chars().filter(|c| c.is_alphanumeric());

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use jaus_cli::failure::Failure;
 use jaus_cli::output::say;
-use jaus_view::Dictionary;
+use jaus_view::{Dictionary, ServiceName};
+use jsidl::model::Id;
 
 #[derive(Args)]
 pub(crate) struct Definitions {
@@ -42,6 +43,15 @@ impl Definitions {
                 .map_err(|error| Failure::new(format!("--service {service}: {error}")))?;
         }
         Ok(dictionary)
+    }
+
+    /// Whether `--service` names this service, or nothing.
+    pub(crate) fn chooses(&self, service: &Id) -> bool {
+        let names = |name: &String| {
+            name.parse()
+                .is_ok_and(|it: ServiceName| it.matches(service))
+        };
+        self.service.is_empty() || self.service.iter().any(names)
     }
 
     fn add(&self, dictionary: &mut Dictionary) -> Result<(), Failure> {

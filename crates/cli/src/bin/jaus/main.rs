@@ -5,15 +5,19 @@
     reason = "they panic when the reader is gone; see `output`"
 )]
 
+mod control;
 mod decode;
 mod definitions;
 mod demo;
 mod discover;
 mod doctor;
+#[cfg(target_os = "linux")]
+mod drive;
 mod encode;
 mod jsidl;
 mod judge;
 mod lease;
+mod list;
 mod monitor;
 mod node;
 mod ping;
@@ -71,9 +75,13 @@ enum Command {
     Doctor(doctor::Doctor),
     Ping(ping::Ping),
     Judge(judge::Judge),
+    List(list::List),
     Query(query::Query),
     Subscribe(subscribe::Subscribe),
     Send(send::Send),
+    Control(control::ControlCommand),
+    #[cfg(target_os = "linux")]
+    Drive(drive::Drive),
     Record(record::Record),
     Replay(replay::Replay),
     Decode(decode::Decode),
@@ -99,9 +107,13 @@ impl Command {
             Self::Doctor(doctor) => doctor.run(),
             Self::Ping(ping) => ping.run(),
             Self::Judge(judge) => judge.run(),
+            Self::List(list) => list.run(),
             Self::Query(query) => query.run(),
             Self::Subscribe(subscribe) => subscribe.run(),
             Self::Send(send) => send.run(),
+            Self::Control(control) => control.run(),
+            #[cfg(target_os = "linux")]
+            Self::Drive(drive) => drive.run(),
             Self::Record(record) => record.run(),
             Self::Replay(replay) => replay.run(),
             Self::Decode(decode) => decode.run(),

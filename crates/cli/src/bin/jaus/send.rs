@@ -33,7 +33,7 @@ use crate::queries::Named;
 #[command(after_help = "Examples:\n  \
     jaus send 101.2.33 SetWrenchEffort '{\"PropulsiveLinearEffortX\":30}' --control 127 --hz 10 \
     --for 2s\n  \
-    jaus send 101.1.40 SetLamp '{\"Brightness\":80,\"Mode\":\"BLINK\"}' --jsidl services\n  \
+    jaus send 101.1.40 SetLamp '{\"Brightness\":80}' --jsidl services\n  \
     jaus send 65535.255.255 QueryIdentification '{\"QueryType\":2}'\n\n\
     Enumerated values may be given by name. `jaus list fields MESSAGE` shows the fields, their units \
     and values. An effort or a velocity holds for half a second: repeat it with --hz.")]

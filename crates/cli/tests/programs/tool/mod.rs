@@ -1,15 +1,19 @@
 //! The tool `jaus`, run as a process.
 
 mod captures;
+mod control;
 mod damage;
 mod doctor;
 mod doctor_peer;
+#[cfg(target_os = "linux")]
+mod drive;
 mod golden;
 mod interoperability;
 mod jsidl;
 mod jsidl_explain;
 mod jsidl_make;
 mod judge;
+mod list;
 mod monitor;
 mod network;
 mod ping;
