@@ -13,8 +13,6 @@ pub enum Outcome {
     Done,
     /// Some input was unreadable or unanswered: exit status 1.
     Incomplete,
-    /// An examined item does not work: exit status 2.
-    Broken,
 }
 
 impl Outcome {
@@ -33,7 +31,6 @@ impl From<Outcome> for ExitCode {
         match outcome {
             Outcome::Done => Self::SUCCESS,
             Outcome::Incomplete => Self::from(1),
-            Outcome::Broken => Self::from(2),
         }
     }
 }

@@ -88,7 +88,6 @@ fn end<F: Ready>(outcome: Result<Outcome, Failure>) -> ExitCode {
     match outcome {
         Ok(Outcome::Done) | Err(Failure::OutputClosed) => ExitCode::SUCCESS,
         Ok(Outcome::Incomplete) => ExitCode::from(1),
-        Ok(Outcome::Broken) => ExitCode::from(2),
         Err(failure) => {
             output::say_as(F::PROGRAM, &failure);
             failure.status()

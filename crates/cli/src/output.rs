@@ -54,6 +54,29 @@ impl Output {
     }
 }
 
+/// Wraps text into lines of 80 columns; all but the first start with this indentation.
+pub fn wrapped(text: &str, indent: usize) -> String {
+    let mut lines = String::new();
+    let mut column = indent;
+    // Non-breaking spaces keep phrases together.
+    for word in text.split_ascii_whitespace() {
+        let length = word.chars().count();
+        if column > indent && column + 1 + length > WIDTH {
+            lines.push_str(&format!("\n{:indent$}", ""));
+            column = indent;
+        } else if column > indent {
+            lines.push(' ');
+            column += 1;
+        }
+        lines.push_str(word);
+        column += length;
+    }
+    lines.replace('\u{a0}', " ")
+}
+
+/// Default width of a terminal, in columns.
+const WIDTH: usize = 80;
+
 /// Prints a message on standard error. Errors are ignored.
 pub fn say(words: impl Display) {
     say_as("jaus", words);

@@ -4,9 +4,9 @@ mod captures;
 mod control;
 mod damage;
 mod doctor;
-mod doctor_peer;
 #[cfg(target_os = "linux")]
 mod drive;
+mod examine;
 mod golden;
 mod interoperability;
 mod jsidl;
@@ -14,6 +14,7 @@ mod jsidl_explain;
 mod jsidl_make;
 mod judge;
 mod list;
+mod manual;
 mod monitor;
 mod network;
 mod ping;
