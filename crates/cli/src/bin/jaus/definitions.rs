@@ -8,14 +8,22 @@ use jaus_cli::output::say;
 use jaus_view::{Dictionary, ServiceName};
 use jsidl::model::Id;
 
+/// `--jsidl`
 #[derive(Args)]
-pub(crate) struct Definitions {
+pub(crate) struct Jsidl {
     /// Add the service definitions of a JSIDL file or directory (repeatable)
     ///
     /// They take precedence over the built-in ones. Errors are reported on standard error;
     /// definitions without errors are used.
     #[arg(long, value_name = "PATH")]
     jsidl: Vec<PathBuf>,
+}
+
+/// `--jsidl` and `--service`
+#[derive(Args)]
+pub(crate) struct Definitions {
+    #[command(flatten)]
+    jsidl: Jsidl,
 
     /// The service to prefer where several define the same message code (repeatable)
     ///
@@ -25,7 +33,7 @@ pub(crate) struct Definitions {
 }
 
 /// All built-in message definitions.
-pub(crate) fn built_in() -> Dictionary {
+fn built_in() -> Dictionary {
     Dictionary::of(jaus_vehicle::messages::registry())
         .with_reference_architecture(jaus_ra::messages::registry(), jaus_ra::forgiving::decode)
         .with_catalogue()
@@ -34,8 +42,7 @@ pub(crate) fn built_in() -> Dictionary {
 impl Definitions {
     /// Loads the built-in definitions and those of `--jsidl`.
     pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
-        let mut dictionary = built_in();
-        self.add(&mut dictionary)?;
+        let mut dictionary = self.jsidl.load()?;
         for service in &self.service {
             service
                 .parse()
@@ -52,6 +59,15 @@ impl Definitions {
                 .is_ok_and(|it: ServiceName| it.matches(service))
         };
         self.service.is_empty() || self.service.iter().any(names)
+    }
+}
+
+impl Jsidl {
+    /// Loads the built-in definitions and those of `--jsidl`.
+    pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
+        let mut dictionary = built_in();
+        self.add(&mut dictionary)?;
+        Ok(dictionary)
     }
 
     fn add(&self, dictionary: &mut Dictionary) -> Result<(), Failure> {

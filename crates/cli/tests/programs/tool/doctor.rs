@@ -26,9 +26,9 @@ fn a_sound_network_is_found_sound_and_the_neighbours_are_named() {
     let mut node = Running::node(&[&["--id", "107.1.9", "--name", "Mule"], &*network].concat());
     node.read_until("Ctrl-C");
     let (status, report) = examine(&[&*network, &["--id", "108.1.1"]].concat());
-    assert_eq!(report["problems"], 0, "{report}");
+    assert_eq!(report["failures"], 0, "{report}");
     assert_ne!(status, 2);
-    assert_eq!(of(&report, "multicast")[0]["mark"], "ok", "{report}");
+    assert_eq!(of(&report, "multicast")[0]["verdict"], "ok", "{report}");
     let neighbours = of(&report, "neighbours");
     assert!(
         neighbours[0]["what"]
@@ -94,8 +94,8 @@ fn two_nodes_with_one_id_are_found() {
     let (status, report) = examine(&[&*network, &["--id", "109.1.1"]].concat());
     let ids = of(&report, "ids");
     assert_eq!(
-        (status, &ids[0]["mark"]),
-        (1, &"problem".into()),
+        (status, &ids[0]["verdict"]),
+        (1, &"failed".into()),
         "{report}"
     );
     assert!(
@@ -127,7 +127,7 @@ fn a_port_that_is_taken_is_told_with_who_has_it() {
     let (status, report) = examine(&flags);
     assert_eq!(status, 1, "{report}");
     let ports = of(&report, "port");
-    assert_eq!(ports[0]["mark"], "warning", "{report}");
+    assert_eq!(ports[0]["verdict"], "warning", "{report}");
     let what = ports[0]["what"].as_str().unwrap();
     assert!(
         what.starts_with(&format!("UDP 127.0.0.1:{port} is taken")),
@@ -165,7 +165,7 @@ fn mistakes_in_the_settings_are_findings() {
     let run = run(&["doctor", "--config", file.to_str().unwrap()], b"");
     std::fs::remove_file(&file).unwrap();
     let words = run.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(words.starts_with("problem settings"), "{words}");
+    assert!(words.starts_with("failed settings"), "{words}");
     assert!(words.contains(":2: `prot = 3794`:"), "{words}");
     assert!(words.contains("did you mean `port`?"), "{words}");
     assert_eq!(run.status, 1);

@@ -27,7 +27,7 @@ fn examine(peer: &str, network: &[String], more: &[&str]) -> (i32, Json) {
 /// The names of the exchanges with this result.
 fn with_result<'j>(report: &'j Json, result: &str) -> Vec<&'j str> {
     let all = report["exchanges"].as_array().unwrap().iter();
-    let of_it = all.filter(|exchange| exchange["result"] == result);
+    let of_it = all.filter(|exchange| exchange["verdict"] == result);
     of_it
         .map(|exchange| exchange["exchange"].as_str().unwrap())
         .collect()

@@ -91,6 +91,21 @@ fn a_node_is_discovered_queried_and_ends_cleanly() {
 }
 
 #[test]
+fn a_name_from_the_network_cannot_reprogram_the_terminal() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let name = "\x1b]0;PWN\x07\x1b[2J\r\nfake line";
+    let mut node = Running::node(&[&["--id", "103.1.8", "--name", name], &*network].concat());
+    let introduction = node.read_until("Ctrl-C");
+    let found = run(&[&["discover", "--for", "2s"], &*network].concat(), b"");
+    for text in [introduction, found.stdout] {
+        assert!(!text.contains(['\x1b', '\x07', '\r']), "{text:?}");
+        let escaped = r#""\u{1b}]0;PWN\u{7}\u{1b}[2J\r\nfake line""#;
+        assert!(text.contains(escaped), "{text}");
+    }
+}
+
+#[test]
 fn whoever_comes_is_watched() {
     let group = own_group();
     let network: Vec<&str> = group.iter().map(String::as_str).collect();

@@ -33,6 +33,16 @@ fn a_component_that_is_there_answers_and_its_round_trips_are_summed_up() {
         "{asked:?}"
     );
     assert_eq!((asked.status, &*asked.stderr), (0, ""));
+    let lines = ping(&["--json"]).json();
+    assert_eq!(
+        (&lines[0]["query"], &lines[0]["with"]),
+        (&1.into(), &"heartbeat".into())
+    );
+    assert!(
+        lines[0]["ms"].as_f64() >= lines[3]["min_ms"].as_f64(),
+        "{lines:?}"
+    );
+    assert_eq!(lines[3]["answers"], 3);
     let large = ping(&["--size", "100000"]);
     assert!(
         large.stdout.contains("   3  acknowledgement: "),

@@ -64,7 +64,14 @@ fn a_split_vehicle_has_two_components_and_only_the_second_drives() {
         let mobility = "urn:jaus:jss:mobility:PrimitiveDriver";
         assert_eq!(services.contains(mobility), drives, "{services}");
     }
-    let judge = ["judge", "106.1.2", "--only", "A2,B2,B11", "--limit", "30"];
+    let judge = [
+        "judge",
+        "106.1.2",
+        "--only",
+        "A2,B2,B11",
+        "--timeout",
+        "30s",
+    ];
     let judged = run(&[&judge, &*network].concat(), b"");
     assert_eq!(judged.status, 0, "{}", judged.stdout);
 }

@@ -18,7 +18,7 @@ impl Mark {
         match self {
             Self::Ok => "ok",
             Self::Warning => "warning",
-            Self::Problem => "problem",
+            Self::Problem => "failed",
         }
     }
 
@@ -94,7 +94,7 @@ impl Finding {
 
     pub(super) fn to_json(&self) -> Json {
         json!({
-            "mark": self.mark.name(),
+            "verdict": self.mark.name(),
             "check": self.check,
             "what": self.what,
             "advice": self.advice,

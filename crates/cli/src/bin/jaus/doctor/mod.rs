@@ -32,7 +32,7 @@ use jaus_cli::runtime;
     jaus doctor --config node.toml        with the settings of a node\n  \
     jaus doctor --id 101.1.1              and whether that id is taken\n  \
     jaus doctor --interface eth0 --for 10s\n  \
-    jaus doctor --json | jq '.findings[] | select(.mark != \"ok\")'")]
+    jaus doctor --json | jq '.findings[] | select(.verdict != \"ok\")'")]
 pub(crate) struct Doctor {
     /// How long to listen to the network
     #[arg(long = "for", value_name = "DURATION", default_value = "3s", value_parser = runtime::duration)]
@@ -124,7 +124,7 @@ impl Report {
         if self.json {
             let findings: Vec<_> = self.findings.iter().map(Finding::to_json).collect();
             self.output.line(json!({
-                "problems": problems,
+                "failures": problems,
                 "warnings": warnings,
                 "findings": findings,
             }))?;
@@ -133,7 +133,7 @@ impl Report {
                 (0, 0) => "\nAll is well.".to_owned(),
                 _ => format!(
                     "\n{}, {}.",
-                    counted(problems, "problem"),
+                    counted(problems, "failure"),
                     counted(warnings, "warning")
                 ),
             })?;

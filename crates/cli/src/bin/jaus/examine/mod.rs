@@ -52,7 +52,7 @@ use self::target::Target;
     jaus examine 192.168.7.2\n  \
     jaus examine 77.1.1                   the same, found by its id\n  \
     jaus examine 77.1.1 --control         takes control and releases it, too\n  \
-    jaus examine 77.1.1 --json | jq '.exchanges[] | select(.result == \"failed\")'")]
+    jaus examine 77.1.1 --json | jq '.exchanges[] | select(.verdict == \"failed\")'")]
 pub(crate) struct Examine {
     /// The peer: an id (77.1.1), an address (192.168.7.2 or 192.168.7.2:3795), or both
     /// (77.1.1@192.168.7.2)
