@@ -86,6 +86,7 @@ impl ControlCommand {
                 command: self,
                 component,
                 session: None,
+                told: None,
                 output: Output::new(),
                 clock: Clock::start(),
             };
@@ -106,6 +107,8 @@ struct Operator<'c> {
     command: &'c ControlCommand,
     component: Component,
     session: Option<Session>,
+    /// The last printed state.
+    told: Option<SessionState>,
     output: Output,
     clock: Clock,
 }
@@ -148,8 +151,8 @@ impl Operator<'_> {
     async fn clear(&mut self) -> Result<(), Failure> {
         let peer = self.command.address;
         for is_in_control in [false, true] {
-            if is_in_control {
-                self.take().await?;
+            if is_in_control && self.take().await.is_err() {
+                break;
             }
             let cleared = self.component.clear_emergency(peer).await;
             cleared.map_err(Failure::negative)?;
@@ -160,8 +163,8 @@ impl Operator<'_> {
             }
         }
         Err(Failure::negative(format_args!(
-            "{peer} is still in emergency: the client that has set it must clear it (with its --id), \
-             or be gone for 4 s"
+            "{peer} is still in emergency: clear it as the client that has set it (--id), or once that \
+             client has been gone for 4 s"
         )))
     }
 
@@ -247,6 +250,9 @@ impl Operator<'_> {
     }
 
     fn tell_state(&mut self, state: SessionState) -> Result<(), Failure> {
+        if self.told.replace(state) == Some(state) {
+            return Ok(());
+        }
         let name = match state {
             SessionState::Seeking | SessionState::Requesting(_) => "requesting",
             SessionState::Preparing(_) => "preparing",

@@ -56,14 +56,15 @@ pub(crate) struct VehicleCommand {
     authority: u8,
 
     /// The expected clients: `standard` clients renew control and repeat efforts; those of the
-    /// public contests do neither, so `contest` implies --timeout 0 and --hold
+    /// public contests do neither, so `contest` implies --control-timeout 0 and
+    /// --hold
     #[arg(long, value_enum, default_value_t)]
     profile: Profile,
 
     /// Control timeout in seconds: control ends unless the client renews it, plus a grace of a
     /// quarter; 0 for never [default: 4]
     #[arg(long, value_name = "SECONDS")]
-    timeout: Option<u8>,
+    control_timeout: Option<u8>,
 
     /// Keep an effort or velocity while its client sends anything at least once per second, instead
     /// of for half a second
@@ -131,7 +132,7 @@ impl VehicleCommand {
             let vehicle = vehicle.motion_policy(self.motion_policy());
             let control = AccessControl::new()
                 .authority(self.authority)
-                .timeout(self.timeout());
+                .timeout(self.control_timeout());
             let manager = Component::builder(Kind::Vehicle, name.clone()).access_control(control);
             let driver = Component::builder(Kind::Vehicle, name).component_name("Navigation");
             let driver = drivable(driver, &vehicle, control, time);
@@ -162,8 +163,8 @@ impl VehicleCommand {
         })
     }
 
-    fn timeout(&self) -> u8 {
-        self.timeout.unwrap_or(match self.profile {
+    fn control_timeout(&self) -> u8 {
+        self.control_timeout.unwrap_or(match self.profile {
             Profile::Standard => AccessControl::TIMEOUT,
             Profile::Contest => 0,
         })
