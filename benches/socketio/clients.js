@@ -1,5 +1,5 @@
 // Some of the clients: each sends to its partner, acknowledges what it receives, and measures the
-// time until its own messages are acknowledged. The schedule is that of `jaus-tester load`.
+// time until its own messages are acknowledged. The schedule is that of `jaus load`.
 "use strict";
 const { io } = require("socket.io-client");
 

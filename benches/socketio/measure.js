@@ -1,5 +1,5 @@
-// Measures the schedule of `jaus-tester load` through the relay. Prints the same table, and writes
-// the same JSON, which `jaus-tester load --beside` reads.
+// Measures the schedule of `jaus load` through the relay. Prints the same table, and writes
+// the same JSON, which `jaus load --beside` reads.
 "use strict";
 const { fork } = require("node:child_process");
 const { once } = require("node:events");

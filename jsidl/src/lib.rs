@@ -37,6 +37,7 @@ mod loader;
 pub mod lua;
 pub mod machine;
 pub mod model;
+pub mod presence;
 mod resolve;
 pub mod rust;
 #[cfg(feature = "json")]

@@ -12,8 +12,8 @@ use super::driver::{Answer, Ask, Command};
 use super::offers::missing_for;
 use super::watch::Outlet;
 use super::{
-    Builder, Control, ControlError, DeliverError, FindError, Messages, PublishError, QueryError,
-    SendError, SubscribeError, Subscription, Watch,
+    Builder, Control, ControlError, DeliverError, FindError, FromReport, Messages, PublishError,
+    QueryError, SendError, SubscribeError, Subscription, Undecoded, Watch,
 };
 use crate::address::JausId;
 use crate::codec::{Message, Query, Report, ServiceId};
@@ -22,7 +22,7 @@ use crate::messages;
 use crate::node;
 use crate::service::{
     Change, Condition, Directory, Kind, LaterAnswer, NodeDirectory, Offer, Publication,
-    QueryOptions, Service, Standing, Topic, UnsafeService, When,
+    QueryOptions, Service, Standing, Topic, UnsafeService, When, code_of,
 };
 use crate::wire::Priority;
 
@@ -344,8 +344,23 @@ impl Component {
         self.subscribe_to(topic, Q::NAME).await
     }
 
+    /// Subscribes to a topic whose messages need no types, and yields its reports
+    /// [undecoded](Undecoded): for programs that read definitions at run time.
+    ///
+    /// # Errors
+    /// Those of [`subscribe`](Self::subscribe).
+    pub async fn subscribe_undecoded(
+        &self,
+        topic: Topic,
+    ) -> Result<Subscription<Undecoded>, SubscribeError> {
+        let code = code_of(&topic.query).unwrap_or_default();
+        let known = messages::registry().by_code(code).next();
+        let query = known.map_or("the query", |info| info.name);
+        self.subscribe_to(topic, query).await
+    }
+
     /// Subscribes to a topic; `query` is the name of its query.
-    pub(super) async fn subscribe_to<R: Message>(
+    pub(super) async fn subscribe_to<R: FromReport>(
         &self,
         topic: Topic,
         query: &'static str,

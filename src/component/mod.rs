@@ -102,5 +102,5 @@ pub use group::{GroupSubscription, GroupUpdate, Results};
 pub use handle::Component;
 pub use list::List;
 pub use session::Session;
-pub use subscription::{Subscription, Update};
+pub use subscription::{FromReport, Subscription, Undecoded, Update};
 pub use watch::{Messages, Watch};

@@ -7,13 +7,14 @@ use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::{Duration, Instant};
 
+use bytes::Bytes;
 use futures_core::Stream;
 
 use super::Component;
 use super::clients::Ticket;
 use super::feed::{Feed, Item};
 use crate::address::JausId;
-use crate::codec::Message;
+use crate::codec::{DecodeError, Message};
 use crate::service::{Outage, SubscriptionEnd};
 
 /// The stream of one peer's reports. Created by [`Component::subscribe`]; dropping it ends the
@@ -68,7 +69,41 @@ pub enum Update<R> {
     Up,
 }
 
+/// What a [`Subscription`] yields: a type of message, or [`Undecoded`] reports.
+pub trait FromReport: Sized {
+    /// Reads a report, from its message code.
+    ///
+    /// # Errors
+    /// If the octets do not match the definition.
+    fn from_report(octets: &Bytes) -> Result<Self, DecodeError>;
+}
+
+impl<R: Message> FromReport for R {
+    fn from_report(octets: &Bytes) -> Result<Self, DecodeError> {
+        R::decode(octets)
+    }
+}
+
+/// A report as it arrived, from its message code: for programs that read definitions at run time.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Undecoded(pub Bytes);
+
+impl FromReport for Undecoded {
+    fn from_report(octets: &Bytes) -> Result<Self, DecodeError> {
+        Ok(Self(octets.clone()))
+    }
+}
+
 impl<R: Message> Subscription<R> {
+    /// Reads the reports in the layout of another version, from a peer that offers only that.
+    #[must_use]
+    pub fn with_layout<L: Message>(self) -> Subscription<L> {
+        const { assert!(L::CODE == R::CODE, "this is a layout of another report") }
+        Subscription::new(self._ticket, self._component, self.peer, self.feed)
+    }
+}
+
+impl<R: FromReport> Subscription<R> {
     pub(super) const fn new(
         ticket: Ticket,
         component: Component,
@@ -83,13 +118,6 @@ impl<R: Message> Subscription<R> {
             arrived: None,
             report: PhantomData,
         }
-    }
-
-    /// Reads the reports in the layout of another version, from a peer that offers only that.
-    #[must_use]
-    pub fn with_layout<L: Message>(self) -> Subscription<L> {
-        const { assert!(L::CODE == R::CODE, "this is a layout of another report") }
-        Subscription::new(self._ticket, self._component, self.peer, self.feed)
     }
 
     /// Waits for the next update. `None` at the end, because the component has stopped or for the
@@ -110,7 +138,7 @@ impl<R: Message> Subscription<R> {
     }
 }
 
-impl<R: Message> Stream for Subscription<R> {
+impl<R: FromReport> Stream for Subscription<R> {
     type Item = Update<R>;
 
     fn poll_next(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Update<R>>> {
@@ -121,7 +149,7 @@ impl<R: Message> Stream for Subscription<R> {
             let update = match item {
                 Item::Up => Update::Up,
                 Item::Down { since, why } => Update::Down { since, why },
-                Item::Report { octets, arrived } => match R::decode(&octets) {
+                Item::Report { octets, arrived } => match R::from_report(&octets) {
                     Ok(report) => {
                         self.arrived = Some(arrived);
                         Update::Report(report)

@@ -13,8 +13,6 @@ pub enum Outcome {
     Done,
     /// Some input was unreadable or unanswered: exit status 1.
     Incomplete,
-    /// An examined item does not work: exit status 2.
-    Broken,
 }
 
 impl Outcome {
@@ -33,24 +31,39 @@ impl From<Outcome> for ExitCode {
         match outcome {
             Outcome::Done => Self::SUCCESS,
             Outcome::Incomplete => Self::from(1),
-            Outcome::Broken => Self::from(2),
         }
     }
 }
 
-/// Reason why a run was not possible: exit status 2.
+/// Reason why a run has ended early.
 #[derive(Debug)]
 pub enum Failure {
-    /// Standard output is closed; no message is printed.
+    /// Standard output is closed; no message is printed. Exit status 0.
     OutputClosed,
-    /// The mistake and its remedy.
+    /// The run was not possible: the mistake and its remedy. Exit status 2.
     Message(String),
+    /// The result is negative, such as control that is not granted. Exit status 1.
+    Negative(String),
 }
 
 impl Failure {
     /// A sentence for the user.
     pub fn new(message: impl Into<String>) -> Self {
         Self::Message(message.into())
+    }
+
+    /// A sentence about a negative result.
+    pub fn negative(message: impl fmt::Display) -> Self {
+        Self::Negative(message.to_string())
+    }
+
+    /// The exit status of the program.
+    pub fn status(&self) -> ExitCode {
+        match self {
+            Self::OutputClosed => ExitCode::SUCCESS,
+            Self::Negative(_) => ExitCode::from(1),
+            Self::Message(_) => ExitCode::from(2),
+        }
     }
 
     /// An error of the library, with its causes. Its messages are written for users, and many name
@@ -78,7 +91,7 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::OutputClosed => f.write_str("standard output was closed"),
-            Self::Message(message) => f.write_str(message),
+            Self::Message(message) | Self::Negative(message) => f.write_str(message),
         }
     }
 }

@@ -4,13 +4,13 @@ use std::convert::Infallible;
 use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
-use std::time::Duration;
 
 use clap::{ArgMatches, Args, Command, CommandFactory, FromArgMatches, Parser};
 
 use super::failure::{Failure, Outcome};
 use super::logging::Logging;
 use super::network::Network;
+use super::runtime::RunFor;
 use super::systemd::Systemd;
 use super::{output, runtime, settings};
 use jaus::address::JausId;
@@ -55,9 +55,8 @@ struct Program<F: Args> {
     #[arg(long)]
     name: Option<String>,
 
-    /// End after this time [default: at Ctrl-C]
-    #[arg(long, value_parser = runtime::seconds)]
-    seconds: Option<Duration>,
+    #[command(flatten)]
+    run_for: RunFor,
 
     #[command(flatten)]
     network: Network,
@@ -89,10 +88,9 @@ fn end<F: Ready>(outcome: Result<Outcome, Failure>) -> ExitCode {
     match outcome {
         Ok(Outcome::Done) | Err(Failure::OutputClosed) => ExitCode::SUCCESS,
         Ok(Outcome::Incomplete) => ExitCode::from(1),
-        Ok(Outcome::Broken) => ExitCode::from(2),
         Err(failure) => {
-            output::say_as(F::PROGRAM, failure);
-            ExitCode::from(2)
+            output::say_as(F::PROGRAM, &failure);
+            failure.status()
         }
     }
 }
@@ -103,7 +101,7 @@ impl<F: Ready> Program<F> {
         let part = self.flags.part()?;
         runtime::run(async {
             let place = self.network.join(F::ID, for_node);
-            let until = runtime::end(self.seconds);
+            let until = self.run_for.end();
             tokio::pin!(until);
             let place = tokio::select! {
                 place = place => place?,
@@ -215,7 +213,7 @@ const FILE_EXAMPLE: &str = r#"For example:
 
   [component]                     # the flags above, by their long names
   attach = true
-  seconds = 60"#;
+  for = "1h""#;
 
 fn parse<F: Ready>(matches: &ArgMatches) -> Program<F> {
     // The matches belong to this command, so only a mistake in its definition can fail.

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 use jaus::address::JausId;
+use jaus::component::{Component, Kind};
 #[cfg(unix)]
 use jaus::link::junior::DEFAULT_FOLDER;
 use jaus::link::local::record::Reason;
@@ -226,6 +227,25 @@ impl Network {
         Ok((port, stay))
     }
 
+    /// Starts the component of a short-lived command, which only asks others.
+    ///
+    /// # Errors
+    /// As [`join_for_a_moment`](Self::join_for_a_moment).
+    pub async fn component_for_a_moment(
+        &self,
+        command: &str,
+    ) -> Result<(Component, Sender, Stay), Failure> {
+        let (port, stay) = self.join_for_a_moment().await?;
+        let sender = port.sender();
+        // On the host's node it names only itself, not the subsystem.
+        let subsystem = if stay.is_guest() { "" } else { command };
+        let component = Component::builder(Kind::OtherSubsystem, subsystem)
+            .component_name(command)
+            .live_on(port)
+            .map_err(Failure::of)?;
+        Ok((component, sender, stay))
+    }
+
     /// The settings of the file, or the defaults.
     fn settings(&self) -> Result<(Identity, Config), Failure> {
         match &self.config {
@@ -257,6 +277,21 @@ impl Network {
         }
         node.validate().map_err(Failure::of)?;
         Ok(node)
+    }
+}
+
+/// What a user can do when a component does not answer.
+pub const REMEDY: &str = "List components with `jaus discover`, choose the network with \
+    --interface, or name a host that multicast does not reach with --peer";
+
+/// Parses the id of a single component.
+pub fn one_component(text: &str) -> Result<JausId, String> {
+    let id: JausId = text.parse().map_err(|error| format!("{error}"))?;
+    match id.is_unicast() {
+        true => Ok(id),
+        false => Err(format!(
+            "{id} is not a single component: choose one that `jaus discover` lists"
+        )),
     }
 }
 

@@ -17,6 +17,8 @@ pub fn counted(count: usize, what: &str) -> String {
 /// Standard output. Every line is flushed when [`line`](Self::line) returns.
 pub struct Output {
     out: StdoutLock<'static>,
+    /// Whether [`line`](Self::line) replaces control characters.
+    is_terminal: bool,
 }
 
 impl Default for Output {
@@ -30,6 +32,7 @@ impl Output {
     pub fn new() -> Self {
         Self {
             out: io::stdout().lock(),
+            is_terminal: io::stdout().is_terminal(),
         }
     }
 
@@ -38,8 +41,11 @@ impl Output {
         self.write(format_args!("{text}"))
     }
 
-    /// Prints a line.
+    /// Prints a line. On a terminal, control characters from the network have no effect.
     pub fn line(&mut self, text: impl Display) -> Result<(), Failure> {
+        if self.is_terminal {
+            return self.write(format_args!("{}\n", harmless(&text.to_string())));
+        }
         self.write(format_args!("{text}\n"))
     }
 
@@ -54,6 +60,29 @@ impl Output {
     }
 }
 
+/// Wraps text into lines of 80 columns; all but the first start with this indentation.
+pub fn wrapped(text: &str, indent: usize) -> String {
+    let mut lines = String::new();
+    let mut column = indent;
+    // Non-breaking spaces keep phrases together.
+    for word in text.split_ascii_whitespace() {
+        let length = word.chars().count();
+        if column > indent && column + 1 + length > WIDTH {
+            lines.push_str(&format!("\n{:indent$}", ""));
+            column = indent;
+        } else if column > indent {
+            lines.push(' ');
+            column += 1;
+        }
+        lines.push_str(word);
+        column += length;
+    }
+    lines.replace('\u{a0}', " ")
+}
+
+/// Default width of a terminal, in columns.
+const WIDTH: usize = 80;
+
 /// Prints a message on standard error. Errors are ignored.
 pub fn say(words: impl Display) {
     say_as("jaus", words);
@@ -61,10 +90,64 @@ pub fn say(words: impl Display) {
 
 /// The same, for a program other than `jaus`.
 pub fn say_as(program: &str, words: impl Display) {
+    let words = harmless(&words.to_string());
     let _ = writeln!(io::stderr().lock(), "{program}: {words}");
+}
+
+/// Replaces control characters by `·`, except for line ends, tabs and colours.
+fn harmless(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(first) = rest.chars().next() {
+        let colour = colour_at(rest);
+        let is_harmless = matches!(first, '\n' | '\t') || !(first.is_control() || reorders(first));
+        match colour {
+            Some(sequence) => shown.push_str(sequence),
+            None if is_harmless => shown.push(first),
+            None => shown.push('·'),
+        }
+        rest = &rest[colour.map_or(first.len_utf8(), str::len)..];
+    }
+    shown
+}
+
+/// The sequence for a colour at the beginning of a text, such as `ESC [ 3 1 m`.
+fn colour_at(text: &str) -> Option<&str> {
+    let parameters = text.strip_prefix("\x1b[")?;
+    let end = parameters.find(|c: char| !c.is_ascii_digit() && c != ';')?;
+    let is_colour = parameters[end..].starts_with('m');
+    is_colour.then(|| &text[..text.len() - parameters.len() + end + 1])
+}
+
+/// Whether a character changes the direction of the text after it.
+const fn reorders(c: char) -> bool {
+    matches!(c, '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
 }
 
 /// Whether to use colours: on a terminal, unless NO_COLOR (<https://no-color.org>) is set.
 pub fn colours_wanted(stream: &impl IsTerminal) -> bool {
     stream.is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_colours_reach_the_terminal_as_control_sequences() {
+        for (text, shown) in [
+            (
+                "\x1b[31mred\x1b[0m\tand\nnext",
+                "\x1b[31mred\x1b[0m\tand\nnext",
+            ),
+            ("\x1b]0;title\x07", "·]0;title·"),
+            ("\x1b[2Jclear\r", "·[2Jclear·"),
+            ("\u{9b}31m \u{7f} \u{202e}gpj.exe", "·31m · ·gpj.exe"),
+            ("\x1b", "·"),
+            ("\x1b[1", "·[1"),
+            ("Müller · 5 µs", "Müller · 5 µs"),
+        ] {
+            assert_eq!(harmless(text), shown, "{text:?}");
+        }
+    }
 }

@@ -8,6 +8,8 @@ use std::fmt;
 use std::future::Future;
 use std::time::{Duration, Instant};
 
+use clap::Args;
+use jaus::node::units;
 use tokio::runtime::Builder;
 
 use super::failure::Failure;
@@ -33,6 +35,30 @@ pub async fn end(limit: Option<Duration>) {
         () = limit => {}
         () = interrupt() => {}
         () = termination() => {}
+    }
+}
+
+// The flag `--for`: how long a command runs.
+#[derive(Args, Debug, Clone, Copy)]
+#[expect(
+    missing_docs,
+    reason = "it would become the help text of the struct that flattens it"
+)]
+pub struct RunFor {
+    /// End after this time, such as 10s [default: at Ctrl-C]
+    #[arg(long = "for", value_name = "DURATION", value_parser = duration)]
+    duration: Option<Duration>,
+}
+
+impl RunFor {
+    /// The time limit, if there is one.
+    pub const fn limit(self) -> Option<Duration> {
+        self.duration
+    }
+
+    /// As [`end`], with this time limit.
+    pub async fn end(self) {
+        end(self.duration).await;
     }
 }
 
@@ -72,6 +98,22 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
 }
 
 const MOST: Duration = Duration::from_secs(365 * 86_400);
+
+/// Parses a flag's duration with its unit, such as `10s`, `500ms` or `2 min`; more than 0.
+pub fn duration(text: &str) -> Result<Duration, String> {
+    match units::duration(text) {
+        Ok(Duration::ZERO) => Err("write more than 0".to_owned()),
+        result => result.map_err(|error| error.to_string()),
+    }
+}
+
+/// Formats a duration as [`duration`] reads it.
+pub fn in_words(duration: Duration) -> String {
+    match duration.as_secs_f64() {
+        seconds if seconds < 1.0 => format!("{} ms", duration.as_millis()),
+        seconds => format!("{seconds} s"),
+    }
+}
 
 /// Parses a flag's number within bounds.
 pub fn between(text: &str, least: f64, most: f64) -> Result<f64, String> {

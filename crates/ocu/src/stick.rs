@@ -3,6 +3,9 @@
 
 use std::time::{Duration, Instant};
 
+use jaus::codec::OutOfRange;
+use jaus::messages::mobility::SetWrenchEffort;
+
 /// Identifies one page connection, for example the one that holds the stick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PageId(pub u64);
@@ -65,6 +68,21 @@ impl Push {
     #[must_use]
     pub const fn turn(self) -> f64 {
         self.turn
+    }
+
+    /// The command to a primitive driver. A released stick brakes, because a vehicle without
+    /// effort may roll on.
+    ///
+    /// # Errors
+    /// None for a valid push: every field takes -100 to 100 %.
+    pub fn effort(self) -> Result<SetWrenchEffort, OutOfRange> {
+        let brake = if self == Self::NONE { 100.0 } else { 0.0 };
+        let mut effort = SetWrenchEffort::default();
+        effort.set_propulsive_linear_effort_x_percent(100.0 * self.forward)?;
+        effort.set_propulsive_rotational_effort_z_percent(100.0 * self.turn)?;
+        effort.set_resistive_linear_effort_x_percent(brake)?;
+        effort.set_resistive_rotational_effort_z_percent(brake)?;
+        Ok(effort)
     }
 }
 

@@ -78,7 +78,9 @@ pub struct ServiceName {
 }
 
 impl ServiceName {
-    pub(super) fn matches(&self, service: &Id) -> bool {
+    /// Whether a service has this name, and the version if one is given.
+    #[must_use]
+    pub fn matches(&self, service: &Id) -> bool {
         *self.urn == *service.urn
             && self
                 .version
@@ -178,6 +180,13 @@ impl Definition {
         match self.info() {
             Ok(info) => info.code,
             Err(message) => message.code,
+        }
+    }
+
+    pub(super) fn is_command(&self) -> bool {
+        match self.info() {
+            Ok(info) => info.is_command,
+            Err(message) => message.is_command,
         }
     }
 

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use bytes::Bytes;
-use jsidl::model::{Id, Service, Version};
-use jsidl::{Diagnostics, Loaded, Loader};
+use jsidl::model::{Id, Message, Service, Version};
+use jsidl::{Diagnostics, Library, Loaded, Loader};
 
 use super::definition::{Body, Decode, Definition, ServiceName, Unreadable};
 use super::request::Request;
@@ -35,6 +35,10 @@ pub struct Dictionary {
     preferred: Vec<ServiceName>,
     /// Whether all of `ra` is preferred.
     prefers_ra: bool,
+    /// The services that were read from their definitions, with all details of their messages.
+    library: Library,
+    /// Those of them that do not come with this crate.
+    added: Vec<Id>,
 }
 
 /// How much of a name must be right for it to be taken for a slip: 1 is all of it.
@@ -89,6 +93,8 @@ impl Dictionary {
             ra: BTreeMap::new(),
             preferred: Vec::new(),
             prefers_ra: false,
+            library: Library::default(),
+            added: Vec::new(),
         }
     }
 
@@ -125,10 +131,14 @@ impl Dictionary {
             library,
             diagnostics,
         } = loader.load();
+        for service in library.services() {
+            self.library.insert(service.clone());
+        }
         let (mut ours, theirs): (Vec<_>, Vec<_>) =
             library.services().partition(|it| comes_with_us(it));
         for service in &theirs {
             self.add(service);
+            self.added.push(service.id.clone());
         }
         ours.retain(|service| !self.knows(&service.id));
         ours.sort_by_key(|service| Reverse(service.id.version));
@@ -141,8 +151,24 @@ impl Dictionary {
         }
     }
 
+    /// The services that [`load`](Self::load) and [`with_catalogue`](Self::with_catalogue) have
+    /// read.
+    #[must_use]
+    pub const fn library(&self) -> &Library {
+        &self.library
+    }
+
+    /// The message as its service defines it, if the service is in the library.
+    pub(super) fn model(&self, definition: &Definition) -> Option<&Message> {
+        let mut services = definition.services.iter();
+        let service = services.find_map(|id| self.library.service(id))?;
+        let mut messages = service.messages();
+        let it = messages.find(|it| it.code == definition.code() && it.name == definition.name());
+        it.map(AsRef::as_ref)
+    }
+
     fn knows(&self, service: &Id) -> bool {
-        let mut services = self.by_code.values().flatten().flat_map(|d| &d.services);
+        let mut services = self.definitions().flat_map(|d| &d.services);
         services.any(|known| known == service)
     }
 
@@ -178,7 +204,7 @@ impl Dictionary {
     /// # Errors
     /// If no definition here belongs to such a service.
     pub fn prefer(&mut self, service: ServiceName) -> Result<(), Unreadable> {
-        let definitions = || self.by_code.values().flatten().chain(self.ra.values());
+        let definitions = || self.definitions().chain(self.ra.values());
         let all = || definitions().flat_map(|d| &d.services);
         if all().any(|known| service.matches(known)) {
             self.preferred.push(service);
@@ -289,13 +315,18 @@ impl Dictionary {
     }
 
     /// The definitions to try for a code, best first.
-    fn candidates(&self, code: u16) -> impl Iterator<Item = &Definition> {
+    pub(super) fn candidates(&self, code: u16) -> impl Iterator<Item = &Definition> {
         let definitions = self.by_code.get(&code).map_or(&[][..], Vec::as_slice);
         let preferred = |d: &Definition| d.services.iter().any(|s| self.is_preferred(s));
         let some_preferred = definitions.iter().any(preferred);
         definitions
             .iter()
             .filter(move |definition| !some_preferred || preferred(definition))
+    }
+
+    /// All definitions but those of the Reference Architecture, by code.
+    pub(super) fn definitions(&self) -> impl Iterator<Item = &Definition> {
+        self.by_code.values().flatten()
     }
 
     fn is_preferred(&self, service: &Id) -> bool {
@@ -306,8 +337,23 @@ impl Dictionary {
 impl Dictionary {
     /// Whether a message of this name is defined.
     pub fn defines(&self, message: &str) -> bool {
-        let mut all = self.by_code.values().flatten();
-        all.any(|definition| definition.name() == message)
+        self.definitions()
+            .any(|definition| definition.name() == message)
+    }
+
+    /// The definitions in the library of the messages that a request may mean, best first.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn models(&self, request: &Request) -> Result<Vec<&Message>, Unreadable> {
+        let requested = self.requested(request)?;
+        Ok(requested.iter().filter_map(|it| self.model(it)).collect())
+    }
+
+    /// Whether the message is a command: components obey it only from the client in control.
+    pub fn is_command(&self, octets: &[u8]) -> bool {
+        let code = octets.first_chunk().map(|&code| u16::from_le_bytes(code));
+        code.is_some_and(|code| self.candidates(code).any(Definition::is_command))
     }
 
     /// Makes the octets of a message out of what people write.
@@ -328,8 +374,8 @@ impl Dictionary {
         Err(Unreadable::new(problem, 0))
     }
 
-    /// The definitions that a request may mean, best first; at least one.
-    fn requested(&self, request: &Request) -> Result<Vec<&Definition>, Unreadable> {
+    /// The definitions that a request may mean, best first; at least one, and all with one code.
+    pub(super) fn requested(&self, request: &Request) -> Result<Vec<&Definition>, Unreadable> {
         if let Some(of_ra) = self.requested_of_ra(request) {
             return Ok(vec![of_ra]);
         }
@@ -351,7 +397,7 @@ impl Dictionary {
             return Err(Unreadable::new(self.advice(request), 0));
         }
         let Some(service) = &request.service else {
-            return Ok(of_name);
+            return self.of_one_code(request, of_name);
         };
         let of_service = of_name.iter().copied().filter(|d| d.belongs_to(service));
         let of_service: Vec<_> = of_service.collect();
@@ -367,6 +413,41 @@ impl Dictionary {
             return Err(Unreadable::new(problem, 0));
         }
         Ok(of_service)
+    }
+
+    /// Those of a preferred service if it defines the message, else those of an added one.
+    ///
+    /// Services may give one name to messages with different codes.
+    fn of_one_code<'d>(
+        &self,
+        request: &Request,
+        mut known: Vec<&'d Definition>,
+    ) -> Result<Vec<&'d Definition>, Unreadable> {
+        let is_added = |it: &Id| self.added.contains(it);
+        let is_preferred = |it: &Id| self.is_preferred(it);
+        let ranks: [&dyn Fn(&Id) -> bool; 2] = [&is_preferred, &is_added];
+        for counts in ranks {
+            let counts = |it: &&Definition| it.services.iter().any(counts);
+            if known.iter().any(counts) {
+                known.retain(counts);
+                break;
+            }
+        }
+        let first = known.first().map(|it| it.code());
+        if known.iter().all(|it| Some(it.code()) == first) {
+            return Ok(known);
+        }
+        known.dedup_by_key(|it| it.code());
+        let choices = known.iter().filter_map(|it| {
+            let service = it.services.first()?;
+            Some(format!("{:04X}h of {}", it.code(), service.urn))
+        });
+        let choices: Vec<_> = choices.collect();
+        let problem = format!(
+            "{request} is several messages, {}: choose with the service (--service URN)",
+            choices.join(" or ")
+        );
+        Err(Unreadable::new(problem, 0))
     }
 
     /// The definition of the Reference Architecture that a request means: it names the service, or
@@ -388,7 +469,7 @@ impl Dictionary {
 
     /// What to say about a message that is not here.
     fn advice(&self, request: &Request) -> String {
-        let all = || self.by_code.values().flatten();
+        let all = || self.definitions();
         let Some(name) = request.message.as_deref() else {
             return format!("no loaded definition has {request}");
         };
@@ -406,7 +487,7 @@ impl Dictionary {
             Some((_, similar)) => format!("there is no message {name}; did you mean {similar}?"),
             None => format!(
                 "there is no message {name}; if your own service defines it, load that definition \
-                 too"
+                 too (--jsidl PATH)"
             ),
         }
     }

@@ -17,10 +17,12 @@ mod large;
 mod line;
 mod log;
 mod network;
+mod query;
 mod request;
 mod stream;
 mod time;
 pub mod tree;
+mod words;
 
 pub use capture::{Capture, CaptureError, CaptureWriter, Frame, InterfaceNumber, LinkType};
 pub use definition::{Body, Decode, ServiceName, Unreadable};
@@ -32,7 +34,9 @@ pub use journal::{
 pub use line::{Content, Envelope, Header, Line};
 pub use log::MessageLog;
 pub use network::{Counts, Datagram, JAUS_PORT, Network, udp_packet};
+pub use query::{EncodedQuery, is_part_of_name, is_same_name};
 pub use request::Request;
 pub use stream::Links;
 pub use stream::{Entry, Filter, FilterError, MessageStream};
 pub use time::{InvalidTime, Timestamp};
+pub use words::{FieldText, symbol};

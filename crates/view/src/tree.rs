@@ -49,17 +49,17 @@ fn naming(identification: Option<&Identification>) -> String {
     };
     match (kind, name.as_str()) {
         (Kind::Node | Kind::Component, "") => String::new(),
-        (Kind::Node | Kind::Component, name) => format!("  \"{name}\""),
+        (Kind::Node | Kind::Component, name) => format!("  {name:?}"),
         (kind, "") => format!("  {kind}"),
-        (kind, name) => format!("  {kind} \"{name}\""),
+        (kind, name) => format!("  {kind} {name:?}"),
     }
 }
 
 /// Formats an identification, such as `the vehicle "Rover"` or `called "Camera"`.
 pub fn introduction(Identification { kind, name }: &Identification) -> String {
     match kind {
-        Kind::Vehicle | Kind::OperatorControlUnit => format!("the {kind} \"{name}\""),
-        _ => format!("called \"{name}\""),
+        Kind::Vehicle | Kind::OperatorControlUnit => format!("the {kind} {name:?}"),
+        _ => format!("called {name:?}"),
     }
 }
 

@@ -22,6 +22,7 @@ mod layout;
 mod machine;
 mod markdown;
 pub(crate) mod names;
+mod plain;
 mod service;
 mod values;
 
@@ -29,6 +30,7 @@ use std::collections::BTreeSet;
 
 use crate::library::Library;
 use crate::model::Service;
+pub use plain::{LayoutRow, layout_rows};
 
 /// Output format of pages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

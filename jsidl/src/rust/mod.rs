@@ -21,7 +21,7 @@ mod queries;
 mod random;
 mod registry;
 mod reports;
-mod selections;
+pub(crate) mod selections;
 mod services;
 mod structs;
 mod types;

@@ -17,10 +17,12 @@
 
 use super::layout::{Layout, unsigned_bits};
 use super::types::{Field, Kind, Type};
-use crate::model::Unsigned;
+use crate::model::{Message, Unsigned};
 
 /// A presence vector of a query, and the fields of the report that it requests.
-pub(super) struct Selection<'m> {
+pub(crate) struct Selection<'m> {
+    /// The vector's name in the definition.
+    pub(crate) name: &'m str,
     /// The query's member.
     pub(super) vector: String,
     /// The part of the report in the vector's name; empty if it is the whole report.
@@ -51,6 +53,14 @@ pub(super) enum Step {
     Alternative { path: String, is_only: bool },
 }
 
+/// The selections by the presence vectors of a query; none if they are in a list.
+pub(crate) fn of_messages<'m>(query: &'m Message, report: &'m Message) -> Vec<Selection<'m>> {
+    let layouts = Layout::of(query).zip(Layout::of(report));
+    layouts.map_or_else(Vec::new, |(query, report)| {
+        selections(&query.fields, &report)
+    })
+}
+
 /// The selections by the presence vectors among some fields of a query.
 pub(super) fn selections<'m>(query: &[Field<'m>], report: &Layout<'m>) -> Vec<Selection<'m>> {
     let of_vector = |field: &Field<'m>| {
@@ -60,6 +70,7 @@ pub(super) fn selections<'m>(query: &[Field<'m>], report: &Layout<'m>) -> Vec<Se
         let records = requested(report, stem)?;
         let fits = |it: &Record<'_>| (1..=bits).contains(&it.fields.len());
         records.iter().all(fits).then(|| Selection {
+            name: &field.item.name,
             vector: field.ident.clone(),
             stem: stem.to_owned(),
             records,
@@ -70,7 +81,7 @@ pub(super) fn selections<'m>(query: &[Field<'m>], report: &Layout<'m>) -> Vec<Se
 
 impl<'m> Selection<'m> {
     /// The requestable fields by name, with their bits.
-    pub(super) fn fields(&self) -> Vec<(&'m str, usize)> {
+    pub(crate) fn fields(&self) -> Vec<(&'m str, usize)> {
         let mut fields: Vec<(&str, usize)> = Vec::new();
         for record in &self.records {
             let numbered = record.fields.iter().zip(0..);
@@ -118,6 +129,7 @@ fn requested<'m>(report: &Layout<'m>, stem: &str) -> Option<Vec<Record<'m>>> {
         .collect();
     let records = if always.is_empty() { found } else { always };
     let selection = Selection {
+        name: "",
         vector: String::new(),
         stem: String::new(),
         records,

@@ -1,4 +1,4 @@
-//! `jaus-tester load` with few components: every message is acknowledged, and nothing remains after
+//! `jaus load` with few components: every message is acknowledged, and nothing remains after
 //! it ends or is killed.
 
 use std::fs;
@@ -18,7 +18,7 @@ fn directory(name: &str) -> PathBuf {
 }
 
 fn load(directory: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_jaus-tester"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_jaus"));
     command
         .args(["load", "--components", "24", "--processes", "2"])
         .args(arguments)
@@ -45,7 +45,7 @@ fn sockets(directory: &Path) -> usize {
 fn every_message_is_acknowledged_by_its_receiver() {
     let directory = directory("tester-load");
     for who in ["component", "node"] {
-        let schedule = ["--rates", "200,max", "--seconds", "0.3", "--burst", "2"];
+        let schedule = ["--rates", "200,max", "--for", "300ms", "--burst", "2"];
         let output = load(&directory, &schedule)
             .args([
                 "--acknowledged-by",
@@ -81,7 +81,7 @@ fn every_message_is_acknowledged_by_its_receiver() {
 #[test]
 fn a_killed_load_leaves_neither_processes_nor_sockets() {
     let directory = directory("tester-load-killed");
-    let mut parent = load(&directory, &["--rates", "10", "--seconds", "60"])
+    let mut parent = load(&directory, &["--rates", "10", "--for", "60s"])
         .spawn()
         .unwrap();
     // Two of components, four of nodes.
@@ -108,9 +108,9 @@ fn settings_that_cannot_be_are_refused_with_a_reason() {
         ),
         ("--rates 0", "from 1 to 10000000, or max"),
         ("--beside missing.json", "missing.json"),
-        ("--seconds 4000", "write at most one hour"),
+        ("--for 4000s", "write at most one hour"),
     ] {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_jaus-tester"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_jaus"));
         command.arg("load").args(arguments.split(' '));
         let output = command.current_dir(&directory).output().unwrap();
         let error = String::from_utf8(output.stderr).unwrap();

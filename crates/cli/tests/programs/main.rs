@@ -1,4 +1,4 @@
-//! Programs as processes: the tool `jaus`, components, `jaus-tester load`, whole systems up to the
+//! Programs as processes: the tool `jaus`, components, whole systems up to the
 //! operator's page, and the package.
 #![allow(
     clippy::disallowed_methods,

@@ -55,7 +55,7 @@ fn ended(file: &Path, flags: &[&str]) -> (Option<i32>, String) {
 
 fn ask(network: &[&str], query: &str, body: &serde_json::Value) -> serde_json::Value {
     let body = body.to_string();
-    let arguments = ["query", "101.61.61", query, &body, "--seconds", "30"];
+    let arguments = ["query", "101.61.61", query, &body, "--timeout", "30s"];
     let answer = run(&[&arguments, network].concat(), b"");
     assert_eq!(answer.status, 0, "{answer:?}");
     answer.only_line()["body"].take()
@@ -68,7 +68,7 @@ fn what_it_has_told_is_there_after_a_kill_and_the_next_start() {
     let group = own_group();
     let network: Vec<&str> = group.iter().map(String::as_str).collect();
     let start = |flags: &[&str]| {
-        let flags = [&network, flags, &["--seconds", "60"]].concat();
+        let flags = [&network, flags, &["--for", "60s"]].concat();
         let mut command = store(&file, &flags);
         Running(
             command
@@ -105,7 +105,7 @@ fn a_damaged_file_is_told_of_and_set_aside_only_if_that_is_wanted() {
     let directory = Directory::new("damaged");
     let file = directory.file("world.redb");
     std::fs::write(&file, "no store").unwrap();
-    let flags = ["--loopback", "--port", "0", "--seconds", "0.2"];
+    let flags = ["--loopback", "--port", "0", "--for", "200ms"];
     let (status, told) = ended(&file, &flags);
     assert_eq!(status, Some(1), "{told}");
     for part in ["world.redb", "damaged", "--set-broken-aside"] {

@@ -49,7 +49,7 @@ struct System {
 impl System {
     fn start(file: &str, flags: &[&str]) -> Self {
         let mut process = jaus()
-            .args(["up", file, "--seconds", "60"])
+            .args(["up", file, "--for", "60s"])
             .args(flags)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -204,7 +204,7 @@ fn parts_end_in_reverse_order_with_what_they_have_started_and_who_will_not_is_ki
     };
     let deaf = "trap '' TERM; sleep 300 & echo child $!; while :; do sleep 0.05; done";
     let file = folder.system(&(polite("one") + &shell("two", deaf, "") + &polite("three")));
-    let mut system = System::start(&file, &["--grace", "0.5"]);
+    let mut system = System::start(&file, &["--grace", "500ms"]);
     let mut child = None;
     let mut stay = 0;
     while child.is_none() || stay < 2 {
@@ -233,7 +233,7 @@ fn nothing_survives_when_jaus_up_itself_is_killed() {
     let deaf = "trap '' TERM; sleep 300 & echo left $!; echo deaf $$; while :; do sleep 0.05; done";
     let file = folder
         .system(&(shell("deaf", deaf, "") + &shell("plain", "echo plain $$; exec sleep 300", "")));
-    let mut system = System::start(&file, &["--grace", "0.5"]);
+    let mut system = System::start(&file, &["--grace", "500ms"]);
     let mut processes = Vec::new();
     while processes.len() < 3 {
         let line = system.expect("| ");
@@ -259,7 +259,7 @@ fn a_warden_that_is_killed_is_replaced() {
         "trap '' TERM; sleep 300 & echo left $!; wait",
         "",
     ));
-    let mut system = System::start(&file, &["--grace", "0.5"]);
+    let mut system = System::start(&file, &["--grace", "500ms"]);
     let left = system.number("left ");
     let warden = |system: &System| {
         let parent = system.process.id().to_string();

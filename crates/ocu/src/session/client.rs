@@ -11,12 +11,11 @@ use super::Reply;
 use crate::state::Edition;
 use crate::stick::Push;
 use jaus::address::JausId;
-use jaus::codec::{Message, OutOfRange};
+use jaus::codec::Message;
 use jaus::component::{
     Component, DeliverError, Retake, Session, SessionError, SessionSettings, TargetState,
 };
 use jaus::messages::core::{QueryStatus, ReportStatus};
-use jaus::messages::mobility::SetWrenchEffort;
 
 /// Completion of a job.
 pub(super) enum Finished {
@@ -142,7 +141,7 @@ impl Client {
         driver: Option<Arc<Session>>,
         sessions: Vec<Arc<Session>>,
     ) {
-        let stop = effort(Push::NONE).ok();
+        let stop = Push::NONE.effort().ok();
         self.jobs.spawn(async move {
             let stopped = async {
                 if let Some((driver, stop)) = driver.zip(stop) {
@@ -170,7 +169,7 @@ impl Client {
             }
             effort.job.abort();
         }
-        let Ok(message) = effort(push) else {
+        let Ok(message) = push.effort() else {
             // Cannot happen: a push is within the range of the message.
             return;
         };
@@ -255,18 +254,6 @@ mod emergency {
             component.deliver_with(PRIORITY, peer, &CLEAR).await
         }
     }
-}
-
-/// Converts a push to efforts. A released stick brakes, because a vehicle without effort may roll
-/// on.
-fn effort(push: Push) -> Result<SetWrenchEffort, OutOfRange> {
-    let brake = if push == Push::NONE { 100.0 } else { 0.0 };
-    let mut effort = SetWrenchEffort::default();
-    effort.set_propulsive_linear_effort_x_percent(100.0 * push.forward())?;
-    effort.set_propulsive_rotational_effort_z_percent(100.0 * push.turn())?;
-    effort.set_resistive_linear_effort_x_percent(brake)?;
-    effort.set_resistive_rotational_effort_z_percent(brake)?;
-    Ok(effort)
 }
 
 /// Releases these parts and waits for the confirmations. If a job still uses a session, that job

@@ -1,4 +1,4 @@
-//! The tester behind the program `jaus-tester`: a mission through the whole chain, checked message
+//! The tester behind `jaus test`: a mission through the whole chain, checked message
 //! by message, and charts of load measurements.
 
 mod alone;

@@ -2,6 +2,8 @@
 
 use serde_json::{Map, Value as Json};
 
+use crate::query::plain;
+
 /// A term such as `Pose.X>=1.5`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Field {
@@ -134,10 +136,4 @@ impl Field {
             (value, None) => self.comparison.holds(value, &self.wanted),
         }
     }
-}
-
-/// Normalises a name by removing case, underscores and spaces.
-fn plain(name: &str) -> String {
-    let letters = name.chars().filter(|c| c.is_alphanumeric());
-    letters.flat_map(char::to_lowercase).collect()
 }

@@ -5,11 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 use jaus_cli::failure::Failure;
 use jaus_cli::output::say;
-use jaus_view::Dictionary;
+use jaus_view::{Dictionary, ServiceName};
+use jsidl::model::Id;
 use jsidl::{Library, Loader};
 
+/// `--jsidl`
 #[derive(Args)]
-pub(crate) struct OwnDefinitions {
+pub(crate) struct Jsidl {
     /// Add the service definitions of a JSIDL file or directory (repeatable)
     ///
     /// They take precedence over the built-in ones. Errors are reported on standard error;
@@ -18,10 +20,11 @@ pub(crate) struct OwnDefinitions {
     jsidl: Vec<PathBuf>,
 }
 
+/// `--jsidl` and `--service`
 #[derive(Args)]
 pub(crate) struct Definitions {
     #[command(flatten)]
-    own: OwnDefinitions,
+    jsidl: Jsidl,
 
     /// The service to prefer where several define the same message code (repeatable)
     ///
@@ -31,7 +34,7 @@ pub(crate) struct Definitions {
 }
 
 /// All built-in message definitions.
-pub(crate) fn built_in() -> Dictionary {
+fn built_in() -> Dictionary {
     Dictionary::of(jaus_vehicle::messages::registry())
         .with_reference_architecture(jaus_ra::messages::registry(), jaus_ra::forgiving::decode)
         .with_catalogue()
@@ -40,7 +43,7 @@ pub(crate) fn built_in() -> Dictionary {
 impl Definitions {
     /// Loads the built-in definitions and those of `--jsidl`.
     pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
-        let mut dictionary = self.own.load()?;
+        let mut dictionary = self.jsidl.load()?;
         for service in &self.service {
             service
                 .parse()
@@ -49,9 +52,18 @@ impl Definitions {
         }
         Ok(dictionary)
     }
+
+    /// Whether `--service` names this service, or nothing.
+    pub(crate) fn chooses(&self, service: &Id) -> bool {
+        let names = |name: &String| {
+            name.parse()
+                .is_ok_and(|it: ServiceName| it.matches(service))
+        };
+        self.service.is_empty() || self.service.iter().any(names)
+    }
 }
 
-impl OwnDefinitions {
+impl Jsidl {
     /// The messages of the built-in definitions and of `--jsidl`.
     pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
         let mut dictionary = built_in();

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::Args;
-use jaus::component::{Component, Kind};
+use jaus::component::Component;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::output::{Output, say};
@@ -18,7 +18,7 @@ use jaus_cli::tree;
 #[command(after_help = "Examples:\n  \
     jaus discover\n  \
     jaus discover --watch\n  \
-    jaus discover --interface eth0 --seconds 10 --json | jq\n  \
+    jaus discover --interface eth0 --for 10s --json | jq\n  \
     jaus discover --peer 192.168.7.2      for a host that multicast does not reach\n  \
     jaus discover --attach                as a component on this host's node\n  \
     jaus discover --loopback              finds `jaus demo` in another terminal")]
@@ -31,9 +31,9 @@ pub(crate) struct Discover {
     #[arg(long)]
     json: bool,
 
-    /// How long to search [default: 3; with --watch until Ctrl-C]
-    #[arg(long, value_parser = runtime::seconds)]
-    seconds: Option<Duration>,
+    /// How long to search [default: 3s; with --watch until Ctrl-C]
+    #[arg(long = "for", value_name = "DURATION", value_parser = runtime::duration)]
+    duration: Option<Duration>,
 
     #[command(flatten)]
     network: Network,
@@ -45,17 +45,12 @@ const LOOK: Duration = Duration::from_secs(3);
 impl Discover {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         runtime::run(async {
-            let (port, stay) = self.network.join_for_a_moment().await?;
-            // On the host's node it names only itself, not the subsystem.
-            let subsystem = if stay.is_guest() { "" } else { "jaus discover" };
-            let component = Component::builder(Kind::OtherSubsystem, subsystem)
-                .component_name("jaus discover")
-                .live_on(port)
-                .map_err(Failure::of)?;
+            let joined = self.network.component_for_a_moment("jaus discover");
+            let (component, _, stay) = joined.await?;
             let outcome = if self.watch {
                 self.watch(&component).await
             } else {
-                runtime::end(Some(self.seconds.unwrap_or(LOOK))).await;
+                runtime::end(Some(self.duration.unwrap_or(LOOK))).await;
                 self.print_tree(&component)
             };
             drop(component);
@@ -74,10 +69,10 @@ impl Discover {
             lines.iter().try_for_each(|line| output.line(line))?;
         }
         if lines.is_empty() {
-            let seconds = self.seconds.unwrap_or(LOOK).as_secs_f64();
+            let searched = runtime::in_words(self.duration.unwrap_or(LOOK));
             say(format_args!(
-                "no answer within {seconds} s. Choose the network with --interface, name a host \
-                 that multicast does not reach with --peer, or search longer with --seconds"
+                "no answer within {searched}. Choose the network with --interface, name a host \
+                 that multicast does not reach with --peer, or search longer with --for"
             ));
         }
         Ok(Outcome::complete_if(!lines.is_empty()))
@@ -86,7 +81,7 @@ impl Discover {
     async fn watch(&self, component: &Component) -> Result<Outcome, Failure> {
         let mut output = Output::new();
         let mut changes = component.watch();
-        let end = runtime::end(self.seconds);
+        let end = runtime::end(self.duration);
         tokio::pin!(end);
         let clock = Clock::start();
         loop {

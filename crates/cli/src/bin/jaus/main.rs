@@ -5,20 +5,32 @@
     reason = "they panic when the reader is gone; see `output`"
 )]
 
+mod control;
 mod decode;
 mod definitions;
 mod demo;
 mod discover;
 mod doctor;
+#[cfg(target_os = "linux")]
+mod drive;
 mod encode;
+mod examine;
 mod jsidl;
 mod judge;
+mod lease;
+mod list;
+mod load;
+mod manual;
 mod monitor;
 mod node;
 mod ping;
+mod queries;
 mod query;
 mod record;
 mod replay;
+mod send;
+mod subscribe;
+mod test;
 #[cfg(target_os = "linux")]
 mod up;
 mod vehicle;
@@ -26,7 +38,7 @@ mod watch;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use jaus_cli::failure::Failure;
 use jaus_cli::logging::Logging;
 use jaus_cli::output;
@@ -38,8 +50,8 @@ use jaus_cli::output;
     version,
     after_help = "Start with `jaus demo`: it needs no network, configuration or second \
         terminal.\n\n\
-        Exit status: 0 success; 1 it ran, but something could not be decoded or did not answer; 2 \
-        it could not run (wrong flag, missing file, port in use …)."
+        Exit status: 0 success; 1 a negative result: no answer, control not granted, a failed check, \
+        unreadable input; 2 it could not run: wrong flag, missing file, port in use."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -65,14 +77,27 @@ enum Command {
     Watch(watch::Watch),
     Discover(discover::Discover),
     Doctor(doctor::Doctor),
+    Examine(examine::Examine),
     Ping(ping::Ping),
     Judge(judge::Judge),
+    Test(test::TestCommand),
+    Load(load::LoadCommand),
+    #[command(name = load::SUBCOMMAND, hide = true)]
+    LoadChild(load::LoadChild),
+    List(list::List),
     Query(query::Query),
+    Subscribe(subscribe::Subscribe),
+    Send(send::Send),
+    Control(control::ControlCommand),
+    #[cfg(target_os = "linux")]
+    Drive(drive::Drive),
     Record(record::Record),
     Replay(replay::Replay),
     Decode(decode::Decode),
     Encode(encode::Encode),
     Jsidl(jsidl::Jsidl),
+    Completions(manual::Completions),
+    Man(manual::Man),
 }
 
 impl Command {
@@ -91,14 +116,26 @@ impl Command {
             Self::Watch(watch) => watch.run(),
             Self::Discover(discover) => discover.run(),
             Self::Doctor(doctor) => doctor.run(),
+            Self::Examine(examine) => examine.run(),
             Self::Ping(ping) => ping.run(),
             Self::Judge(judge) => judge.run(),
+            Self::Test(test) => test.run(),
+            Self::Load(load) => load.run(),
+            Self::LoadChild(child) => child.run(),
+            Self::List(list) => list.run(),
             Self::Query(query) => query.run(),
+            Self::Subscribe(subscribe) => subscribe.run(),
+            Self::Send(send) => send.run(),
+            Self::Control(control) => control.run(),
+            #[cfg(target_os = "linux")]
+            Self::Drive(drive) => drive.run(),
             Self::Record(record) => record.run(),
             Self::Replay(replay) => replay.run(),
             Self::Decode(decode) => decode.run(),
             Self::Encode(encode) => encode.run(),
             Self::Jsidl(jsidl) => return jsidl.run(),
+            Self::Completions(completions) => completions.run(Cli::command()),
+            Self::Man(man) => man.run(Cli::command()),
         };
         outcome.map(ExitCode::from)
     }
@@ -109,11 +146,12 @@ fn main() -> ExitCode {
     let ended = cli.logging.start("warn").and_then(|()| cli.command.run());
     match ended {
         Ok(status) => status,
-        // The reader has closed our output early, as `head` does.
-        Err(Failure::OutputClosed) => ExitCode::SUCCESS,
         Err(failure) => {
-            output::say(failure);
-            ExitCode::from(2)
+            // Otherwise the reader has closed our output early, as `head` does.
+            if !matches!(failure, Failure::OutputClosed) {
+                output::say(&failure);
+            }
+            failure.status()
         }
     }
 }

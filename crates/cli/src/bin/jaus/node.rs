@@ -11,7 +11,7 @@ use jaus::node::{ComponentEvents, Events, Local, Node, units};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::{Network, SubsystemKind};
 use jaus_cli::output::Output;
-use jaus_cli::runtime::{self, Clock};
+use jaus_cli::runtime::{self, Clock, RunFor};
 use jaus_cli::statistics::{self, DropWatch};
 use jaus_cli::tree;
 use tokio::time::{MissedTickBehavior, interval};
@@ -41,9 +41,8 @@ pub(crate) struct NodeCommand {
     )]
     stats: Option<Duration>,
 
-    /// End after this time [default: at Ctrl-C]
-    #[arg(long, value_parser = runtime::seconds)]
-    seconds: Option<Duration>,
+    #[command(flatten)]
+    run_for: RunFor,
 
     /// Our subsystem's name [default: jaus node]
     #[arg(long)]
@@ -105,7 +104,7 @@ impl NodeCommand {
         output: &mut Output,
     ) -> Result<Outcome, Failure> {
         let mut changes = component.watch();
-        let end = runtime::end(self.seconds);
+        let end = self.run_for.end();
         tokio::pin!(end);
         let clock = Clock::start();
         // Every message of the other component repeats the conflict; report it once.

@@ -19,9 +19,10 @@ use jaus::messages::core::{
 };
 use jaus::node::Port;
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::network::Network;
+use jaus_cli::network::{self, Network};
 use jaus_cli::output::{Output, say};
 use jaus_cli::runtime;
+use serde_json::{Value as Json, json};
 use tokio::time::{Instant, sleep_until, timeout_at};
 
 /// The code of the padded message of `--size`: user-defined (AS5710 leaves D000h and above to
@@ -37,23 +38,25 @@ const PADDING: u16 = 0xD7F0;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus ping 101.1.33\n  \
-    jaus ping 101.1.33 --count 10 --interval 0.1\n  \
+    jaus ping 101.1.33 --count 10 --interval 100ms\n  \
+    jaus ping 101.1.33 --json | jq .ms\n  \
     jaus ping 101.1.33 --with acknowledgement --size 65536\n  \
     jaus ping 101.1.33 --peer 192.168.7.2      for a host that multicast does not reach")]
 pub(crate) struct Ping {
     /// The component to query: SUBSYSTEM.NODE.COMPONENT
+    #[arg(value_name = "ID", value_parser = network::one_component)]
     address: JausId,
 
     /// The number of queries [default: until Ctrl-C]
     #[arg(long, short, value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
 
-    /// The interval between queries, in seconds
-    #[arg(long, short, default_value = "1", value_parser = runtime::seconds)]
+    /// The interval between queries
+    #[arg(long, short, default_value = "1s", value_parser = runtime::duration)]
     interval: Duration,
 
-    /// The answer timeout, in seconds
-    #[arg(long, short, default_value = "1", value_parser = runtime::seconds)]
+    /// How long to wait for each answer
+    #[arg(long, short, default_value = "1s", value_parser = runtime::duration)]
     timeout: Duration,
 
     /// What to send [default: the first that the component answers]
@@ -64,6 +67,10 @@ pub(crate) struct Ping {
     /// acknowledgement
     #[arg(long, value_parser = clap::value_parser!(u32).range(2..=16 << 20))]
     size: Option<u32>,
+
+    /// Print JSON: one object for each query, and the summary
+    #[arg(long)]
+    json: bool,
 
     #[command(flatten)]
     network: Network,
@@ -109,12 +116,6 @@ struct Tally {
 
 impl Ping {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        if !self.address.is_unicast() {
-            return Err(Failure::new(format!(
-                "{} is not a single component: choose one that `jaus discover` lists",
-                self.address
-            )));
-        }
         if self.size.is_some()
             && self
                 .with
@@ -144,12 +145,15 @@ impl Ping {
             () = &mut end => {}
             result = self.ask_again_and_again(port, &mut tally, &mut output) => result?,
         }
-        output.line(format_args!("\n{}: {tally}", self.address))?;
+        match self.json {
+            true => output.line(tally.to_json())?,
+            false => output.line(format_args!("\n{}: {tally}", self.address))?,
+        }
         if tally.times.is_empty() && tally.asked > 0 {
             say(format_args!(
-                "{} did not answer. List components with `jaus discover`, choose the network with \
-                 --interface, or name a host that multicast does not reach with --peer",
-                self.address
+                "{} did not answer. {}",
+                self.address,
+                network::REMEDY
             ));
         }
         Ok(Outcome::complete_if(!tally.times.is_empty()))
@@ -169,15 +173,13 @@ impl Ping {
             let questions = usual.map_or(Question::ALL.to_vec(), |usual| vec![usual]);
             let answer = self.ask_in_turn(port, &questions).await?;
             let number = tally.asked;
-            match answer {
-                Some((question, answer)) => {
-                    usual = Some(question);
-                    tally.times.push(answer.time);
-                    let whence = answer.path.map(|path| format!(" from {}", path.peer));
-                    let (whence, time) = (whence.unwrap_or_default(), millis(answer.time));
-                    output.line(format_args!("{number:>4}  {question}{whence}: {time} ms"))?;
-                }
-                None => output.line(format_args!("{number:>4}  no answer"))?,
+            if let Some((question, answer)) = &answer {
+                usual = Some(*question);
+                tally.times.push(answer.time);
+            }
+            match self.json {
+                true => output.line(json_line(number, answer.as_ref()))?,
+                false => output.line(words(number, answer.as_ref()))?,
             }
             if self.count.is_none_or(|count| tally.asked < count) {
                 sleep_until(next).await;
@@ -275,7 +277,48 @@ impl fmt::Display for Tally {
     }
 }
 
+impl Tally {
+    fn to_json(&self) -> Json {
+        let mut times = self.times.clone();
+        times.sort_unstable();
+        let at = |place: usize| times.get(place).map(|&time| number(time));
+        json!({
+            "queries": self.asked,
+            "answers": times.len(),
+            "min_ms": at(0),
+            "median_ms": at(times.len() / 2),
+            "max_ms": at(times.len().saturating_sub(1)),
+        })
+    }
+}
+
+/// A line for one query, for people.
+fn words(number: u64, answer: Option<&(Question, Answer)>) -> String {
+    let Some((question, answer)) = answer else {
+        return format!("{number:>4}  no answer");
+    };
+    let from = answer.path.map(|path| format!(" from {}", path.peer));
+    let (from, time) = (from.unwrap_or_default(), millis(answer.time));
+    format!("{number:>4}  {question}{from}: {time} ms")
+}
+
+/// The same as an object.
+fn json_line(number: u64, answer: Option<&(Question, Answer)>) -> Json {
+    let (question, answer) = answer.map(|(question, answer)| (question, answer)).unzip();
+    json!({
+        "query": number,
+        "with": question.map(Question::to_string),
+        "from": answer.and_then(|it| it.path).map(|path| path.peer.to_string()),
+        "ms": answer.map(|it| self::number(it.time)),
+    })
+}
+
 /// Milliseconds, to the microsecond.
+fn number(time: Duration) -> f64 {
+    (time.as_secs_f64() * 1e6).round() / 1e3
+}
+
+/// Milliseconds, to the microsecond, as text.
 fn millis(time: Duration) -> String {
     format!("{:.3}", time.as_secs_f64() * 1e3)
 }

@@ -7,21 +7,20 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use bytes::Bytes;
 use clap::Args;
 use jaus::address::JausId;
-use jaus::codec::report_code;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::node::Port;
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::network::Network;
+use jaus_cli::network::{self, Network};
 use jaus_cli::output::{Output, say};
 use jaus_cli::runtime;
-use jaus_view::{Dictionary, Line, Request};
+use jaus_view::{Dictionary, EncodedQuery, Line};
 use serde::Serialize;
 use tokio::time::{Instant, timeout_at};
 
 use crate::definitions::Definitions;
+use crate::queries::{Fields, Named};
 
 /// Interval of repeated queries without an answer.
 const AGAIN: Duration = Duration::from_millis(500);
@@ -34,10 +33,12 @@ const AGAIN: Duration = Duration::from_millis(500);
 #[command(after_help = "Examples:\n  \
     jaus query 101.1.1 QueryIdentification '{\"QueryType\":2}'\n  \
     jaus query 101.1.1 QueryHeartbeatPulse\n  \
-    jaus query 65535.255.255 QueryIdentification '{\"QueryType\":2}' --seconds 1\n  \
+    jaus query 101.1.33 QueryVelocityState --fields Velocity_X,Yaw_Rate\n  \
+    jaus query 65535.255.255 QueryIdentification '{\"QueryType\":2}' --timeout 1s\n  \
     jaus query 101.1.1 QueryHeartbeatPulse --peer 192.168.7.2")]
 pub(crate) struct Query {
     /// The component to query: SUBSYSTEM.NODE.COMPONENT
+    #[arg(value_name = "ID")]
     address: JausId,
 
     /// The query's name
@@ -46,9 +47,12 @@ pub(crate) struct Query {
     /// The query's fields, as `jaus decode` prints a body
     json: Option<String>,
 
-    /// The answer timeout
-    #[arg(long, default_value = "2", value_parser = runtime::seconds)]
-    seconds: Duration,
+    #[command(flatten)]
+    fields: Fields,
+
+    /// How long to wait for an answer, and with a wildcard for further ones
+    #[arg(long, default_value = "2s", value_parser = runtime::duration)]
+    timeout: Duration,
 
     #[command(flatten)]
     definitions: Definitions,
@@ -60,35 +64,17 @@ pub(crate) struct Query {
 impl Query {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         let dictionary = self.definitions.load()?;
-        let query = self.octets(&dictionary)?;
-        let report = report_to(&query).ok_or_else(|| {
-            Failure::new(format!(
-                "{} is not a query: choose a message with a code from 2000h to 2FFFh",
-                self.message
-            ))
-        })?;
+        let query = Named {
+            message: &self.message,
+            json: self.json.as_deref(),
+        };
+        let mut queries = self.fields.encode(&dictionary, &[query])?;
+        let query = queries.remove(0);
         runtime::run(async {
             let (port, stay) = self.network.join_for_a_moment().await?;
-            let outcome = self.ask(port, &query, report, &dictionary).await;
+            let outcome = self.ask(port, &query, &dictionary).await;
             stay.end().await;
             outcome
-        })
-    }
-
-    fn octets(&self, dictionary: &Dictionary) -> Result<Bytes, Failure> {
-        let json = self.json.as_deref().unwrap_or("{}");
-        let body = serde_json::from_str(json).map_err(|error| {
-            Failure::new(format!("the query's fields are not JSON: {error}: {json}"))
-        })?;
-        let written = dictionary.write(&Request::new(&self.message, body));
-        written.map_err(|error| {
-            if self.json.is_none() && dictionary.defines(&self.message) {
-                return Failure::new(format!(
-                    "{error}. Give the fields as JSON after the name, as in QueryIdentification \
-                     '{{\"QueryType\":2}}'"
-                ));
-            }
-            Failure::of(error)
         })
     }
 
@@ -96,20 +82,19 @@ impl Query {
     async fn ask(
         &self,
         mut port: Port,
-        query: &Bytes,
-        report: u16,
+        query: &EncodedQuery,
         dictionary: &Dictionary,
     ) -> Result<Outcome, Failure> {
         let mut output = Output::new();
         let mut answered = BTreeSet::new();
         let mut complete = true;
-        let end = Instant::now() + self.seconds;
+        let end = Instant::now() + self.timeout;
         while Instant::now() < end {
-            let outgoing = Outgoing::new(port.id(), self.address, query.clone());
+            let outgoing = Outgoing::new(port.id(), self.address, query.octets.clone());
             port.send(outgoing).map_err(Failure::of)?;
             let again = end.min(Instant::now() + AGAIN);
             while let Ok(Some(received)) = timeout_at(again, port.recv()).await {
-                if !self.is_answer(&received, report) || !answered.insert(received.source) {
+                if !self.is_answer(&received, query.report) || !answered.insert(received.source) {
                     continue;
                 }
                 let line = dictionary.line(&received.payload);
@@ -133,16 +118,13 @@ impl Query {
     /// The message after a timeout.
     fn silence(&self) -> String {
         let (address, message) = (self.address, &self.message);
-        let seconds = self.seconds.as_secs_f64();
         let who = if address.has_wildcard() {
             format!("no component in {address} answered")
         } else {
             format!("{address} did not answer")
         };
-        format!(
-            "{who} {message} within {seconds} s. List components with `jaus discover`, choose the \
-             network with --interface, or name a host that multicast does not reach with --peer"
-        )
+        let waited = runtime::in_words(self.timeout);
+        format!("{who} {message} within {waited}. {}", network::REMEDY)
     }
 }
 
@@ -157,9 +139,4 @@ struct Answer<'d> {
 fn answer(source: JausId, line: Line<'_>) -> Result<String, Failure> {
     let source = source.to_string();
     serde_json::to_string(&Answer { source, line }).map_err(Failure::of)
-}
-
-/// The code of the report for a query, if the message is one.
-fn report_to(query: &[u8]) -> Option<u16> {
-    report_code(u16::from_le_bytes(*query.first_chunk()?))
 }

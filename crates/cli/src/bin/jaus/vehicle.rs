@@ -17,7 +17,7 @@ use jaus::service::{MotionPolicy, StopCause};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::output::Output;
-use jaus_cli::runtime::{self, Clock, between};
+use jaus_cli::runtime::{self, Clock, RunFor, between};
 use jaus_cli::tree;
 use jaus_vehicle::handoff::Handoff;
 use jaus_vehicle::mobility::Vehicle;
@@ -40,9 +40,8 @@ use crate::node;
     jaus vehicle --turning-radius 1       steers like a car\n  \
     jaus -v vehicle                       also logs clients' commands")]
 pub(crate) struct VehicleCommand {
-    /// End after this time [default: at Ctrl-C]
-    #[arg(long, value_parser = runtime::seconds)]
-    seconds: Option<Duration>,
+    #[command(flatten)]
+    run_for: RunFor,
 
     /// The vehicle's name [default: Rover]
     #[arg(long)]
@@ -58,14 +57,15 @@ pub(crate) struct VehicleCommand {
     authority: u8,
 
     /// The expected clients: `standard` clients renew control and repeat efforts; those of the
-    /// public contests do neither, so `contest` implies --timeout 0 and --hold
+    /// public contests do neither, so `contest` implies --control-timeout 0 and
+    /// --hold
     #[arg(long, value_enum, default_value_t)]
     profile: Profile,
 
     /// Control timeout in seconds: control ends unless the client renews it, plus a grace of a
     /// quarter; 0 for never [default: 4]
     #[arg(long, value_name = "SECONDS")]
-    timeout: Option<u8>,
+    control_timeout: Option<u8>,
 
     /// Keep an effort or velocity while its client sends anything at least once per second, instead
     /// of for half a second
@@ -138,7 +138,7 @@ impl VehicleCommand {
             let vehicle = vehicle.motion_policy(self.motion_policy());
             let control = AccessControl::new()
                 .authority(self.authority)
-                .timeout(self.timeout());
+                .timeout(self.control_timeout());
             let manager = Component::builder(Kind::Vehicle, name.clone()).access_control(control);
             let driver = Component::builder(Kind::Vehicle, name).component_name("Navigation");
             let driver = drivable(driver, &vehicle, control, time);
@@ -169,8 +169,8 @@ impl VehicleCommand {
         })
     }
 
-    fn timeout(&self) -> u8 {
-        self.timeout.unwrap_or(match self.profile {
+    fn control_timeout(&self) -> u8 {
+        self.control_timeout.unwrap_or(match self.profile {
             Profile::Standard => AccessControl::TIMEOUT,
             Profile::Contest => 0,
         })
@@ -207,7 +207,7 @@ impl VehicleCommand {
         let mut standings = component.watch_standing();
         let mut standing = Standing::default();
         standings.mark_changed();
-        let end = runtime::end(self.seconds);
+        let end = self.run_for.end();
         tokio::pin!(end);
         let clock = Clock::start();
         let mut looks = interval(LOOK);

@@ -17,7 +17,7 @@ const ENOUGH: usize = 3;
 /// Pause between two attempts of a scenario that may be retried.
 const PAUSE: Duration = Duration::from_millis(300);
 /// Size limit of a recording, so that long runs do not fill the disk.
-const MEGABYTES: &str = "100";
+const LARGEST_RECORDING: &str = "100MB";
 
 /// Two parties on their hosts.
 struct Encounter<'a> {
@@ -124,8 +124,8 @@ impl Encounter<'_> {
             "--quiet",
             "--interface",
             Hosts::observed(),
-            "--megabytes",
-            MEGABYTES,
+            "--size",
+            LARGEST_RECORDING,
         ];
         let log: PathBuf = self.directory.join("observer.log");
         // The recording is optional.

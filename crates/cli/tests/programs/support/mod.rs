@@ -98,7 +98,7 @@ impl Running {
         let mut child = jaus()
             .arg(name)
             .args(flags)
-            .args(["--seconds", "60"])
+            .args(["--for", "60s"])
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
@@ -120,10 +120,16 @@ impl Running {
         read
     }
 
+    /// Sends a signal, such as `-TERM`.
+    pub fn signal(&self, signal: &str) {
+        let pid = self.child.id().to_string();
+        let kill = Command::new("kill").args([signal, &pid]).status();
+        assert!(kill.unwrap().success());
+    }
+
     /// Asks it to terminate, and returns the exit status.
     pub fn terminate(mut self) -> Option<i32> {
-        let pid = self.child.id().to_string();
-        assert!(Command::new("kill").arg(pid).status().unwrap().success());
+        self.signal("-TERM");
         self.child.wait().unwrap().code()
     }
 }

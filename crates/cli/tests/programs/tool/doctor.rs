@@ -15,10 +15,7 @@ fn of<'j>(report: &'j Json, check: &str) -> Vec<&'j Json> {
 }
 
 fn examine(flags: &[&str]) -> (i32, Json) {
-    let run = run(
-        &[&["doctor", "--json", "--seconds", "2"], flags].concat(),
-        b"",
-    );
+    let run = run(&[&["doctor", "--json", "--for", "2s"], flags].concat(), b"");
     (run.status, run.only_line())
 }
 
@@ -29,9 +26,9 @@ fn a_sound_network_is_found_sound_and_the_neighbours_are_named() {
     let mut node = Running::node(&[&["--id", "107.1.9", "--name", "Mule"], &*network].concat());
     node.read_until("Ctrl-C");
     let (status, report) = examine(&[&*network, &["--id", "108.1.1"]].concat());
-    assert_eq!(report["problems"], 0, "{report}");
+    assert_eq!(report["failures"], 0, "{report}");
     assert_ne!(status, 2);
-    assert_eq!(of(&report, "multicast")[0]["mark"], "ok", "{report}");
+    assert_eq!(of(&report, "multicast")[0]["verdict"], "ok", "{report}");
     let neighbours = of(&report, "neighbours");
     assert!(
         neighbours[0]["what"]
@@ -97,8 +94,8 @@ fn two_nodes_with_one_id_are_found() {
     let (status, report) = examine(&[&*network, &["--id", "109.1.1"]].concat());
     let ids = of(&report, "ids");
     assert_eq!(
-        (status, &ids[0]["mark"]),
-        (2, &"problem".into()),
+        (status, &ids[0]["verdict"]),
+        (1, &"failed".into()),
         "{report}"
     );
     assert!(
@@ -130,7 +127,7 @@ fn a_port_that_is_taken_is_told_with_who_has_it() {
     let (status, report) = examine(&flags);
     assert_eq!(status, 1, "{report}");
     let ports = of(&report, "port");
-    assert_eq!(ports[0]["mark"], "warning", "{report}");
+    assert_eq!(ports[0]["verdict"], "warning", "{report}");
     let what = ports[0]["what"].as_str().unwrap();
     assert!(
         what.starts_with(&format!("UDP 127.0.0.1:{port} is taken")),
@@ -147,7 +144,7 @@ fn a_program_that_keeps_the_group_for_itself_is_a_problem() {
     let port = selfish.local_addr().unwrap().port();
     let group = format!("239.255.77.1:{port}");
     let (status, report) = examine(&["--loopback", "--group", &group]);
-    assert_eq!(status, 2, "{report}");
+    assert_eq!(status, 1, "{report}");
     let ports = of(&report, "port");
     let what = ports[0]["what"].as_str().unwrap();
     assert!(
@@ -168,10 +165,10 @@ fn mistakes_in_the_settings_are_findings() {
     let run = run(&["doctor", "--config", file.to_str().unwrap()], b"");
     std::fs::remove_file(&file).unwrap();
     let words = run.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(words.starts_with("problem settings"), "{words}");
+    assert!(words.starts_with("failed settings"), "{words}");
     assert!(words.contains(":2: `prot = 3794`:"), "{words}");
     assert!(words.contains("did you mean `port`?"), "{words}");
-    assert_eq!(run.status, 2);
+    assert_eq!(run.status, 1);
     assert!(
         run.stdout
             .lines()

@@ -1,18 +1,25 @@
 //! The tool `jaus`, run as a process.
 
 mod captures;
+mod control;
 mod damage;
 mod doctor;
-mod doctor_peer;
+#[cfg(target_os = "linux")]
+mod drive;
+mod examine;
 mod golden;
 mod interoperability;
 mod jsidl;
 mod jsidl_explain;
 mod jsidl_make;
 mod judge;
+mod list;
+mod manual;
 mod monitor;
 mod network;
 mod ping;
 mod record;
+mod send;
+mod subscribe;
 mod vehicle;
 mod watch;

@@ -12,10 +12,10 @@ fn a_neighbour_is_shown_with_its_name_rates_and_round_trip() {
         "monitor",
         "--json",
         "--probe",
-        "--seconds",
-        "3",
+        "--for",
+        "3s",
         "--interval",
-        "0.5",
+        "500ms",
     ];
     let watched = run(&[&flags, &*network].concat(), b"");
     let views = watched.json();
@@ -45,7 +45,7 @@ fn a_neighbour_is_shown_with_its_name_rates_and_round_trip() {
 fn one_table_fits_a_terminal_and_says_whether_somebody_is_there() {
     let group = own_group();
     let network: Vec<&str> = group.iter().map(String::as_str).collect();
-    let once = [&["monitor", "--once", "--interval", "0.3"], &*network].concat();
+    let once = [&["monitor", "--once", "--interval", "300ms"], &*network].concat();
     let alone = run(&once, b"");
     assert!(alone.stdout.contains("no peers yet"), "{alone:?}");
     assert_eq!(alone.status, 1);
@@ -58,7 +58,7 @@ fn one_table_fits_a_terminal_and_says_whether_somebody_is_there() {
         .concat(),
     );
     node.read_until("Ctrl-C");
-    let once = [&["monitor", "--once", "--interval", "2"], &*network].concat();
+    let once = [&["monitor", "--once", "--interval", "2s"], &*network].concat();
     let seen = run(&once, b"");
     assert!(
         seen.stdout.contains("112.1.1      A very … 127.0.0.1:"),

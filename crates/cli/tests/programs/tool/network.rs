@@ -63,7 +63,7 @@ fn a_node_is_discovered_queried_and_ends_cleanly() {
     );
     assert!(introduction.contains("UDP 127.0.0.1:"), "{introduction}");
 
-    let found = run(&[&["discover", "--seconds", "2"], &*network].concat(), b"");
+    let found = run(&[&["discover", "--for", "2s"], &*network].concat(), b"");
     assert!(
         found.stdout.contains("    103.1.7  \"Mule\"\n"),
         "{found:?}"
@@ -75,7 +75,7 @@ fn a_node_is_discovered_queried_and_ends_cleanly() {
     assert_eq!(found.status, 0);
 
     let found = run(
-        &[&["discover", "--json", "--seconds", "2"], &*network].concat(),
+        &[&["discover", "--json", "--for", "2s"], &*network].concat(),
         b"",
     );
     let tree = &found.only_line()["subsystems"][0];
@@ -104,6 +104,21 @@ fn a_node_is_discovered_queried_and_ends_cleanly() {
 }
 
 #[test]
+fn a_name_from_the_network_cannot_reprogram_the_terminal() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let name = "\x1b]0;PWN\x07\x1b[2J\r\nfake line";
+    let mut node = Running::node(&[&["--id", "103.1.8", "--name", name], &*network].concat());
+    let introduction = node.read_until("Ctrl-C");
+    let found = run(&[&["discover", "--for", "2s"], &*network].concat(), b"");
+    for text in [introduction, found.stdout] {
+        assert!(!text.contains(['\x1b', '\x07', '\r']), "{text:?}");
+        let escaped = r#""\u{1b}]0;PWN\u{7}\u{1b}[2J\r\nfake line""#;
+        assert!(text.contains(escaped), "{text}");
+    }
+}
+
+#[test]
 fn whoever_comes_is_watched() {
     let group = own_group();
     let network: Vec<&str> = group.iter().map(String::as_str).collect();
@@ -119,22 +134,28 @@ fn whoever_comes_is_watched() {
 fn silence_is_told_with_who_did_not_answer_and_what_to_do() {
     let group = own_group();
     let network: Vec<&str> = group.iter().map(String::as_str).collect();
-    let query = ["query", "9.1.1", "QueryHeartbeatPulse", "--seconds", "0.2"];
+    let query = [
+        "query",
+        "9.1.1",
+        "QueryHeartbeatPulse",
+        "--timeout",
+        "200ms",
+    ];
     let asked = run(&[&query, &*network].concat(), b"");
     assert!(
         asked
             .stderr
-            .contains("9.1.1 did not answer QueryHeartbeatPulse within 0.2 s"),
+            .contains("9.1.1 did not answer QueryHeartbeatPulse within 200 ms"),
         "{asked:?}"
     );
     assert!(asked.stderr.contains("--peer"), "{asked:?}");
     assert_eq!(asked.status, 1);
 
-    let found = run(
-        &[&["discover", "--seconds", "0.2"], &*network].concat(),
-        b"",
+    let found = run(&[&["discover", "--for", "200ms"], &*network].concat(), b"");
+    assert!(
+        found.stderr.contains("no answer within 200 ms"),
+        "{found:?}"
     );
-    assert!(found.stderr.contains("no answer within 0.2 s"), "{found:?}");
     assert_eq!((found.status, &*found.stdout), (1, ""));
 }
 

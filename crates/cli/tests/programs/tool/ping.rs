@@ -15,9 +15,9 @@ fn a_component_that_is_there_answers_and_its_round_trips_are_summed_up() {
             "--count",
             "3",
             "--interval",
-            "0.01",
+            "10ms",
             "--timeout",
-            "5",
+            "5s",
         ];
         run(&[&fixed, flags, &*network].concat(), b"")
     };
@@ -33,6 +33,16 @@ fn a_component_that_is_there_answers_and_its_round_trips_are_summed_up() {
         "{asked:?}"
     );
     assert_eq!((asked.status, &*asked.stderr), (0, ""));
+    let lines = ping(&["--json"]).json();
+    assert_eq!(
+        (&lines[0]["query"], &lines[0]["with"]),
+        (&1.into(), &"heartbeat".into())
+    );
+    assert!(
+        lines[0]["ms"].as_f64() >= lines[3]["min_ms"].as_f64(),
+        "{lines:?}"
+    );
+    assert_eq!(lines[3]["answers"], 3);
     let large = ping(&["--size", "100000"]);
     assert!(
         large.stdout.contains("   3  acknowledgement: "),
@@ -49,7 +59,7 @@ fn a_component_that_is_there_answers_and_its_round_trips_are_summed_up() {
 fn silence_is_told_with_what_to_do_about_it() {
     let group = own_group();
     let network: Vec<&str> = group.iter().map(String::as_str).collect();
-    let flags = ["ping", "103.1.99", "--count", "1", "--timeout", "0.05"];
+    let flags = ["ping", "103.1.99", "--count", "1", "--timeout", "50ms"];
     let asked = run(&[&flags, &*network].concat(), b"");
     assert!(
         asked.stdout.contains("1 queries, 0 answers, 100 % lost"),

@@ -43,8 +43,8 @@ fn what_goes_to_the_group_is_recorded_and_can_be_decoded() {
         network[4],
         "--port",
         port,
-        "--seconds",
-        "3",
+        "--for",
+        "3s",
     ];
     let recording: Vec<_> = recording.iter().map(|&flag| flag.to_owned()).collect();
     let recorder = std::thread::spawn(move || {
@@ -53,10 +53,7 @@ fn what_goes_to_the_group_is_recorded_and_can_be_decoded() {
     });
     // Any traffic during the recording will do; a node sends discovery queries when it starts.
     while !recorder.is_finished() {
-        run(
-            &[&["discover", "--seconds", "0.3"], &*network].concat(),
-            b"",
-        );
+        run(&[&["discover", "--for", "300ms"], &*network].concat(), b"");
     }
     let recorded = recorder.join().unwrap();
     assert_eq!(recorded.status, 0, "{recorded:?}");
@@ -77,14 +74,7 @@ fn an_existing_file_is_not_written_over_unless_told_so() {
     let file = File::new("precious");
     fs::write(file.path(), "precious").unwrap();
     let refused = run(
-        &[
-            "record",
-            file.path(),
-            "--interface",
-            "lo",
-            "--seconds",
-            "0.1",
-        ],
+        &["record", file.path(), "--interface", "lo", "--for", "100ms"],
         b"",
     );
     assert!(refused.stderr.contains("add --overwrite"), "{refused:?}");

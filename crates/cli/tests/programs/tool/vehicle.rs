@@ -45,7 +45,7 @@ fn a_split_vehicle_has_two_components_and_only_the_second_drives() {
     vehicle.read_until("106.1.1 is Platform Management, 106.1.2 Navigation");
     vehicle.read_until("Ctrl-C");
     let ask = |component: &str, query: &str, body: &str| {
-        let arguments = ["query", component, query, body, "--seconds", "30"];
+        let arguments = ["query", component, query, body, "--timeout", "30s"];
         run(&[&arguments, &*network].concat(), b"").only_line()["body"].to_string()
     };
     for (component, name, drives) in [
@@ -64,7 +64,14 @@ fn a_split_vehicle_has_two_components_and_only_the_second_drives() {
         let mobility = "urn:jaus:jss:mobility:PrimitiveDriver";
         assert_eq!(services.contains(mobility), drives, "{services}");
     }
-    let judge = ["judge", "106.1.2", "--only", "A2,B2,B11", "--limit", "30"];
+    let judge = [
+        "judge",
+        "106.1.2",
+        "--only",
+        "A2,B2,B11",
+        "--timeout",
+        "30s",
+    ];
     let judged = run(&[&judge, &*network].concat(), b"");
     assert_eq!(judged.status, 0, "{}", judged.stdout);
 }

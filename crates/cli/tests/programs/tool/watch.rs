@@ -345,7 +345,7 @@ async fn jaus_watch_shows_what_passes_a_communicator_process() {
         probe.local_addr().unwrap().to_string()
     };
     let mut communicator = Command::new(env!("CARGO_BIN_EXE_jaus-communicator"))
-        .args(["--loopback", "--seconds", "60", "--group", &at.to_string()])
+        .args(["--loopback", "--for", "60s", "--group", &at.to_string()])
         .args(["--debug", &debug])
         .stderr(Stdio::null())
         .spawn()
@@ -367,8 +367,8 @@ async fn jaus_watch_shows_what_passes_a_communicator_process() {
                 &debug,
                 "--message",
                 "QueryHeartbeat*",
-                "--seconds",
-                "3",
+                "--for",
+                "3s",
             ],
             b"",
         )

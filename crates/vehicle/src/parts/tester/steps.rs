@@ -28,13 +28,13 @@ pub struct Step {
 impl Display for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (word, detail) = match &self.verdict {
-            Verdict::Pass(detail) => ("pass", detail.as_str()),
-            Verdict::Fail(detail) => ("FAIL", detail.as_str()),
-            Verdict::Skipped => ("skip", ""),
+            Verdict::Pass(detail) => ("ok", detail.as_str()),
+            Verdict::Fail(detail) => ("failed", detail.as_str()),
+            Verdict::Skipped => ("skipped", ""),
         };
         let milliseconds = self.took.as_secs_f64() * 1e3;
         let name = &self.name;
-        write!(f, "{word}  {milliseconds:>9.1} ms  {name:<44} {detail}")
+        write!(f, "{word:7}  {milliseconds:>9.1} ms  {name:<44} {detail}")
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 
+use jaus_cli::output::wrapped;
 use serde_json::{Value as Json, json};
 
 /// Severity of a finding.
@@ -17,7 +18,7 @@ impl Mark {
         match self {
             Self::Ok => "ok",
             Self::Warning => "warning",
-            Self::Problem => "problem",
+            Self::Problem => "failed",
         }
     }
 
@@ -42,8 +43,6 @@ pub(super) struct Finding {
     advice: Option<String>,
 }
 
-/// Default width of a terminal, in columns.
-const WIDTH: usize = 80;
 /// Columns before the text: mark and check.
 const INDENT: usize = 21;
 
@@ -95,32 +94,12 @@ impl Finding {
 
     pub(super) fn to_json(&self) -> Json {
         json!({
-            "mark": self.mark.name(),
+            "verdict": self.mark.name(),
             "check": self.check,
             "what": self.what,
             "advice": self.advice,
         })
     }
-}
-
-/// Wraps text into lines with this indentation.
-pub(super) fn wrapped(text: &str, indent: usize) -> String {
-    let mut lines = String::new();
-    let mut column = indent;
-    // Non-breaking spaces keep phrases together.
-    for word in text.split_ascii_whitespace() {
-        let length = word.chars().count();
-        if column > indent && column + 1 + length > WIDTH {
-            lines.push_str(&format!("\n{:indent$}", ""));
-            column = indent;
-        } else if column > indent {
-            lines.push(' ');
-            column += 1;
-        }
-        lines.push_str(word);
-        column += length;
-    }
-    lines.replace('\u{a0}', " ")
 }
 
 #[cfg(test)]
@@ -136,7 +115,7 @@ mod tests {
             "{text}"
         );
         assert!(
-            text.lines().all(|line| line.chars().count() <= WIDTH),
+            text.lines().all(|line| line.chars().count() <= 80),
             "{text}"
         );
         assert!(

@@ -5,7 +5,6 @@
 mod finding;
 mod host;
 mod neighbours;
-mod peer;
 mod port;
 mod ra;
 
@@ -15,7 +14,6 @@ use clap::Args;
 use serde_json::json;
 
 use self::finding::{Finding, Mark};
-use self::peer::{Options, Target};
 use jaus::node::Config;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
@@ -26,36 +24,19 @@ use jaus_cli::runtime;
 ///
 /// Checks this host's interfaces, port, buffers and clock, then listens on the network: does
 /// multicast loop back, which nodes are there, do two of them share an id? Needs no privileges.
-/// Give it the flags or the settings file of the node that does not work. Exit status: 0 all is
-/// well, 1 there are warnings, 2 there are problems.
-///
-/// With --peer it examines one peer: it recognises the stack and tries each exchange in the order
-/// in which integrations fail. It sends no commands. Exit status: 0 all exchanges passed, 1 some
-/// failed, 2 no exchange is possible.
+/// Give it the flags or the settings file of the node that does not work. Exit
+/// status 1 means that there are warnings or failures. `jaus examine` examines one peer.
 #[derive(Args)]
-#[command(mut_arg("peer", |peer| peer.long("unicast")))]
 #[command(after_help = "Examples:\n  \
     jaus doctor\n  \
     jaus doctor --config node.toml        with the settings of a node\n  \
     jaus doctor --id 101.1.1              and whether that id is taken\n  \
-    jaus doctor --interface eth0 --seconds 10\n  \
-    jaus doctor --peer 192.168.7.2        tests the exchanges with that peer\n  \
-    jaus doctor --peer 77.1.1             the same, found by its id\n  \
-    jaus doctor --json | jq '.findings[] | select(.mark != \"ok\")'")]
+    jaus doctor --interface eth0 --for 10s\n  \
+    jaus doctor --json | jq '.findings[] | select(.verdict != \"ok\")'")]
 pub(crate) struct Doctor {
-    /// Examine this peer: an id (77.1.1), an address (192.168.7.2 or 192.168.7.2:3795), or both
-    /// (77.1.1@192.168.7.2)
-    // The network's flag for peers has this one's usual id.
-    #[arg(id = "examined", long = "peer", value_name = "ADDRESS")]
-    examined: Option<Target>,
-
-    /// Take control of the peer and release it, unless another client has control
-    #[arg(long, requires = "examined")]
-    control: bool,
-
-    /// How long to listen to the network [default: 3; with --peer 6 at most]
-    #[arg(long, value_parser = runtime::seconds)]
-    seconds: Option<Duration>,
+    /// How long to listen to the network
+    #[arg(long = "for", value_name = "DURATION", default_value = "3s", value_parser = runtime::duration)]
+    duration: Duration,
 
     /// Print the findings as one JSON object
     #[arg(long)]
@@ -65,22 +46,8 @@ pub(crate) struct Doctor {
     network: Network,
 }
 
-/// Default listening time.
-const LISTEN: Duration = Duration::from_secs(3);
-
 impl Doctor {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        if let Some(target) = self.examined {
-            let (id, config) = self.network.for_examination()?;
-            let options = Options {
-                target,
-                listen: self.seconds,
-                control: self.control,
-                json: self.json,
-                colours: colours_wanted(&std::io::stdout()),
-            };
-            return runtime::run(peer::examine(options, id, config));
-        }
         let mut report = Report {
             output: Output::new(),
             colours: colours_wanted(&std::io::stdout()),
@@ -104,7 +71,7 @@ impl Doctor {
         }
         report.add_all(ways(&config))?;
         report.add_all(port::check_tcp(&config))?;
-        let listen = self.seconds.unwrap_or(LISTEN);
+        let listen = self.duration;
         if !self.json {
             let seconds = listen.as_secs_f64();
             say(format_args!("listening on the network for {seconds} s …"));
@@ -157,7 +124,7 @@ impl Report {
         if self.json {
             let findings: Vec<_> = self.findings.iter().map(Finding::to_json).collect();
             self.output.line(json!({
-                "problems": problems,
+                "failures": problems,
                 "warnings": warnings,
                 "findings": findings,
             }))?;
@@ -166,15 +133,14 @@ impl Report {
                 (0, 0) => "\nAll is well.".to_owned(),
                 _ => format!(
                     "\n{}, {}.",
-                    counted(problems, "problem"),
+                    counted(problems, "failure"),
                     counted(warnings, "warning")
                 ),
             })?;
         }
         Ok(match (problems, warnings) {
             (0, 0) => Outcome::Done,
-            (0, _) => Outcome::Incomplete,
-            _ => Outcome::Broken,
+            _ => Outcome::Incomplete,
         })
     }
 }

@@ -92,7 +92,7 @@ fn who(peers: &[Peer], directory: &Directory) -> Vec<Finding> {
         return vec![Finding::ok(CHECK, "no other node was found").advice(
             "if a node should be there: is it on the same network and group, does its firewall \
              accept UDP 3794, does the switch or access point forward multicast (IGMP snooping \
-             without a querier does not)? `jaus doctor --peer ADDRESS` examines one host, even \
+             without a querier does not)? `jaus examine ADDRESS` examines one host, even \
              one that answers no multicast (Junior)",
         )];
     }

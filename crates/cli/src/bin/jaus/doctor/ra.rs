@@ -13,7 +13,7 @@ use jaus::wire::judp;
 use jaus::wire::ra::RaId;
 
 use super::finding::Finding;
-use super::peer::RA_GROUP;
+use crate::examine::RA_GROUP;
 
 /// Maximum number of subsystems that are named one by one.
 const MOST: usize = 12;

@@ -48,7 +48,7 @@ struct End<'a> {
     subject: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     name: Option<&'a str>,
-    passed: usize,
+    ok: usize,
     failed: usize,
     skipped: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -80,7 +80,7 @@ pub(super) fn end(subject: &Subject, tally: &Tally, against: &str) -> String {
     to_line(&End {
         subject: subject.id.to_string(),
         name: subject.name.as_deref(),
-        passed: tally.passed,
+        ok: tally.passed,
         failed: tally.failed,
         skipped: tally.skipped,
         latency_median_ms: latency.map(|(median, _)| millis(median)),

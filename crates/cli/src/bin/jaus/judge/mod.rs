@@ -27,7 +27,7 @@ use jaus_cli::output::{Output, say};
 use jaus_cli::runtime;
 use jsidl::Library;
 
-use crate::definitions::OwnDefinitions;
+use crate::definitions::Jsidl;
 use judge_nodes::JudgeNodes;
 use outputs::Outputs;
 use recording::Recording;
@@ -66,9 +66,9 @@ pub(crate) struct Judge {
     #[arg(required_unless_present = "list")]
     address: Option<JausId>,
 
-    /// How long an answer may take, in seconds
-    #[arg(long, default_value = "1.5", value_parser = runtime::seconds)]
-    limit: Duration,
+    /// How long to wait for each answer
+    #[arg(long, default_value = "1500ms", value_parser = runtime::duration)]
+    timeout: Duration,
 
     /// Run only these steps and those they depend on, such as A1,B14-B19
     #[arg(long, value_name = "STEPS", value_delimiter = ',')]
@@ -86,9 +86,6 @@ pub(crate) struct Judge {
     #[arg(long, value_name = "URN", conflicts_with = "only")]
     service: Vec<String>,
 
-    #[command(flatten)]
-    own: OwnDefinitions,
-
     /// Query by multicast only [default: first by multicast, then by unicast]
     #[arg(long, conflicts_with = "unicast")]
     multicast: bool,
@@ -96,6 +93,9 @@ pub(crate) struct Judge {
     /// Query by unicast only, where multicast does not reach
     #[arg(long)]
     unicast: bool,
+
+    #[command(flatten)]
+    jsidl: Jsidl,
 
     /// Show the messages of passed steps too
     #[arg(long)]
@@ -177,7 +177,7 @@ impl Judge {
     fn services(&self) -> Result<Services, Failure> {
         let library = match self.service.is_empty() {
             true => Library::default(),
-            false => self.own.services(),
+            false => self.jsidl.services(),
         };
         Services::choose(library, &self.service)
             .map_err(|error| Failure::new(format!("--service: {error}")))
@@ -216,10 +216,10 @@ impl Judge {
     async fn judge(&self, address: JausId, services: &Services) -> Result<Outcome, Failure> {
         let (id, config) = self.network.for_own_node_as(MAIN, "jaus judge")?;
         let recording = self.record.as_deref().map(Recording::create).transpose()?;
-        let dictionary = self.own.load()?;
+        let dictionary = self.jsidl.load()?;
         let mut outputs = Outputs::open(self, services, &dictionary)?;
         let mut judge_nodes = JudgeNodes::start(id, config, address, recording)?;
-        let Some(subject) = Subject::meet(&mut judge_nodes, address, self.limit).await? else {
+        let Some(subject) = Subject::meet(&mut judge_nodes, address, self.timeout).await? else {
             judge_nodes.end().await?;
             say(format_args!(
                 "{address} did not answer, so nothing was judged. List components with `jaus \
@@ -229,7 +229,7 @@ impl Judge {
             return Ok(Outcome::Incomplete);
         };
         outputs.begin(&subject)?;
-        let mut runner = Runner::new(judge_nodes, &subject, self.limit);
+        let mut runner = Runner::new(judge_nodes, &subject, self.timeout);
         let end = runtime::end(None);
         tokio::pin!(end);
         let finished = tokio::select! {

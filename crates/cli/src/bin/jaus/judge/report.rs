@@ -59,8 +59,8 @@ impl<'d> Report<'d> {
     /// One step: a line, and its messages if it failed or if all are wanted.
     pub(super) fn step(&self, result: &StepResult, everything: bool) -> Vec<String> {
         let verdict = match result.verdict {
-            Verdict::Passed => self.coloured(GREEN, "passed "),
-            Verdict::Failed(_) => self.coloured(RED, "FAILED "),
+            Verdict::Passed => self.coloured(GREEN, "ok     "),
+            Verdict::Failed(_) => self.coloured(RED, "failed "),
             Verdict::Skipped(_) => self.coloured(GREY, "skipped"),
         };
         let latencies = result.proceedings.iter().filter_map(|one| one.latency);
@@ -138,7 +138,7 @@ impl<'d> Report<'d> {
         let took = took.as_secs_f64();
         let mut lines = vec![String::new()];
         lines.push(format!(
-            "{steps} steps in {took:.0} s: {passed} passed, {failed} failed, {skipped} skipped"
+            "{steps} steps in {took:.0} s: {passed} ok, {failed} failed, {skipped} skipped"
         ));
         if let Some((median, most)) = tally.latency() {
             let (median, most) = (millis(median), millis(most));

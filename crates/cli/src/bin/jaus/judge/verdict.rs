@@ -20,7 +20,7 @@ pub(super) enum Verdict {
 impl Verdict {
     pub(super) const fn name(&self) -> &'static str {
         match self {
-            Self::Passed => "passed",
+            Self::Passed => "ok",
             Self::Failed(_) => "failed",
             Self::Skipped(_) => "skipped",
         }

@@ -15,7 +15,7 @@ use jaus::messages::core::QueryHeartbeatPulse;
 use jaus::node::{Node, Sender};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
-use jaus_cli::runtime;
+use jaus_cli::runtime::{self, RunFor};
 use tokio::time::{MissedTickBehavior, interval};
 
 use self::sample::{Sample, View};
@@ -30,7 +30,7 @@ use self::table::Screen;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus monitor\n  \
-    jaus monitor --sort received --interval 5\n  \
+    jaus monitor --sort received --interval 5s\n  \
     jaus monitor --probe                  measures round trips\n  \
     jaus monitor --once --json | jq '.peers[].id'\n  \
     jaus monitor --peer 192.168.7.2       for a host that multicast does not reach\n\n\
@@ -38,8 +38,8 @@ use self::table::Screen;
     (not acknowledged); rep (duplicates received); round trip (--probe) in ms; seconds since its \
     last message.")]
 pub(crate) struct Monitor {
-    /// The interval between tables, in seconds
-    #[arg(long, short, default_value = "1", value_parser = runtime::seconds)]
+    /// The interval between tables
+    #[arg(long, short, default_value = "1s", value_parser = runtime::duration)]
     interval: Duration,
 
     /// Print one table after the first interval and exit; exit status 1 means that there are no
@@ -63,9 +63,8 @@ pub(crate) struct Monitor {
     #[arg(long)]
     probe: bool,
 
-    /// End after this time [default: at Ctrl-C]
-    #[arg(long, value_parser = runtime::seconds)]
-    seconds: Option<Duration>,
+    #[command(flatten)]
+    run_for: RunFor,
 
     #[command(flatten)]
     network: Network,
@@ -117,7 +116,7 @@ impl Monitor {
         probe: &mut Option<Probe>,
         screen: &mut Screen,
     ) -> Result<Outcome, Failure> {
-        let end = runtime::end(self.seconds);
+        let end = self.run_for.end();
         tokio::pin!(end);
         let mut turns = interval(self.interval);
         turns.set_missed_tick_behavior(MissedTickBehavior::Delay);

@@ -18,9 +18,10 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use bytes::Bytes;
 use clap::Args;
 use jaus::link::{Group, Interfaces};
+use jaus::node::units;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::say;
-use jaus_cli::runtime;
+use jaus_cli::runtime::{self, RunFor};
 use jaus_view::{CaptureWriter, InterfaceNumber, JAUS_PORT, LinkType, Timestamp};
 use tokio::time::{MissedTickBehavior, interval};
 
@@ -35,8 +36,8 @@ use filter::Filter;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus record drive.pcapng\n  \
-    jaus record drive.pcapng --interface eth0 --seconds 60\n  \
-    jaus record drive.pcapng --megabytes 500 --quiet &\n  \
+    jaus record drive.pcapng --interface eth0 --for 1min\n  \
+    jaus record drive.pcapng --size 500MB --quiet &\n  \
     jaus decode drive.pcapng")]
 pub(crate) struct Record {
     /// The file to write (pcapng); it must not exist without --overwrite
@@ -59,13 +60,12 @@ pub(crate) struct Record {
     #[arg(long, value_name = "ADDRESS", default_value_t)]
     group: Group,
 
-    /// End after this time [default: at Ctrl-C]
-    #[arg(long, value_parser = runtime::seconds)]
-    seconds: Option<Duration>,
+    #[command(flatten)]
+    run_for: RunFor,
 
-    /// End when the file reaches this size, in megabytes
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
-    megabytes: Option<u64>,
+    /// End when the file reaches this size, such as 500MB
+    #[arg(long, value_name = "SIZE", value_parser = units::size)]
+    size: Option<usize>,
 
     /// Print no progress
     #[arg(long, short)]
@@ -137,7 +137,7 @@ impl Record {
     }
 
     async fn record(&self, source: &mut Source, recording: &mut Recording) -> Result<(), Failure> {
-        let end = runtime::end(self.seconds);
+        let end = self.run_for.end();
         tokio::pin!(end);
         let mut second = interval(Duration::from_secs(1));
         second.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -156,7 +156,7 @@ impl Record {
                     packets?.iter().try_for_each(|packet| recording.take(packet))?;
                 }
             }
-            let limit = self.megabytes.map(|megabytes| megabytes * 1_000_000);
+            let limit = self.size.map(|size| size as u64);
             if limit.is_some_and(|limit| recording.writer.written() >= limit) {
                 return Ok(());
             }

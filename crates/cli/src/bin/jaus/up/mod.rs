@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use clap::Args;
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::runtime;
+use jaus_cli::runtime::{self, RunFor};
 
 use programs::Programs;
 use system::System;
@@ -47,17 +47,16 @@ pub(crate) struct Up {
     #[arg(long, value_name = "PARTS", value_delimiter = ',')]
     only: Vec<String>,
 
-    /// Seconds a part may take to end before it is killed
-    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = runtime::seconds)]
+    /// How long a part may take to end before it is killed
+    #[arg(long, value_name = "DURATION", default_value = "5s", value_parser = runtime::duration)]
     grace: Duration,
 
     /// Write the state of the parts to this file, as JSON
     #[arg(long, value_name = "FILE")]
     status: Option<PathBuf>,
 
-    /// End after this time [default: at Ctrl-C]
-    #[arg(long, value_parser = runtime::seconds)]
-    seconds: Option<Duration>,
+    #[command(flatten)]
+    run_for: RunFor,
 }
 
 const FILE_HELP: &str = r#"Examples:

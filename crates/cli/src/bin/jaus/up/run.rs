@@ -68,7 +68,7 @@ impl Shutdown {
             listen(SignalKind::terminate())?,
             listen(SignalKind::hangup())?,
         ];
-        let limit = flags.seconds.map(|limit| Instant::now() + limit);
+        let limit = flags.run_for.limit().map(|limit| Instant::now() + limit);
         Ok(Self { signals, limit })
     }
 

@@ -25,7 +25,7 @@ pub(crate) const NAME: &str = "up-warden";
 #[derive(Args)]
 pub(crate) struct Warden {
     /// The time limit before they are killed
-    #[arg(value_parser = runtime::seconds)]
+    #[arg(value_parser = runtime::duration)]
     grace: Duration,
 }
 

@@ -13,7 +13,7 @@ use jaus_cli::output::{Output, colours_wanted};
 use jaus_cli::runtime;
 use jaus_view::{Entry, Filter};
 
-use crate::definitions;
+use crate::definitions::Jsidl;
 use tally::Tally;
 
 /// Show the messages that pass through a node, live or from files, reassembled and without
@@ -94,9 +94,12 @@ pub(crate) struct Watch {
     #[arg(long)]
     stats: bool,
 
+    #[command(flatten)]
+    jsidl: Jsidl,
+
     /// End after this time [default: at Ctrl-C, or at the end of the files]
-    #[arg(long, value_parser = runtime::seconds)]
-    seconds: Option<Duration>,
+    #[arg(long = "for", value_name = "DURATION", value_parser = runtime::duration)]
+    duration: Option<Duration>,
 }
 
 impl Watch {
@@ -113,9 +116,9 @@ impl Watch {
             },
         };
         let outcome = if self.files.is_empty() {
-            live::watch(&self.at, &filter, self.seconds, &mut printer)?
+            live::watch(&self.at, &filter, self.duration, &mut printer)?
         } else {
-            let dictionary = definitions::built_in();
+            let dictionary = self.jsidl.load()?;
             files::watch(&self.files, &filter, &dictionary, &mut printer)?
         };
         if let Form::Tally(tally) = &printer.form {

@@ -42,11 +42,11 @@ fn what_is_not_offered_is_skipped_and_counted_and_the_rest_conforms_as_tested() 
         "105.1.1 \"Puppet\" offers",
         "    urn:jaus:jss:core:Liveness 1.1",
         "by multicast, to all components of the node",
-        "  passed   A2   Capabilities discovery",
+        "  ok       A2   Capabilities discovery",
         "  skipped  A3   System management  (AccessControl is not offered)",
         "by unicast, to the component",
-        "  passed   B6   Query Heartbeat Pulse during the event",
-        "8 passed, 0 failed, 10 skipped",
+        "  ok       B6   Query Heartbeat Pulse during the event",
+        "8 ok, 0 failed, 10 skipped",
         "105.1.1 conforms to the contests' script as tested: 8 steps passed; 10 steps did not apply",
     ] {
         assert!(run.stdout.contains(part), "no `{part}` in {}", run.stdout);
@@ -67,8 +67,8 @@ fn a_run_is_written_down_in_every_form_that_is_asked_for() {
         "judge",
         "105.1.1",
         "--multicast",
-        "--limit",
-        "0.2s",
+        "--timeout",
+        "200ms",
         "--only",
         "B3,B6,B13",
         &json_flag,
@@ -149,7 +149,7 @@ fn a_run_is_written_down_in_every_form_that_is_asked_for() {
 fn a_peer_that_is_not_there_is_told_with_what_to_do() {
     let flags = network();
     let network: Vec<&str> = flags.iter().map(String::as_str).collect();
-    let judge = ["judge", "9.1.1", "--limit", "0.1"];
+    let judge = ["judge", "9.1.1", "--timeout", "100ms"];
     let run = run(&[&judge, &*network].concat(), b"");
     assert!(run.stderr.contains("9.1.1 did not answer"), "{run:?}");
     assert!(run.stderr.contains("--peer"), "{run:?}");
@@ -174,10 +174,7 @@ fn a_wrong_flag_is_refused_with_what_would_be_right() {
             "there is no step B37",
         ),
         (&["judge", "105.1.1", "--only", "B9-B3"], "write B3-B9"),
-        (
-            &["judge", "105.1.1", "--limit", "soon"],
-            "number of seconds",
-        ),
+        (&["judge", "105.1.1", "--timeout", "soon"], "is not a time"),
         (
             &["judge", "105.1.1", "--unicast", "--multicast"],
             "cannot be used with",

@@ -168,7 +168,7 @@ fn fails_in(ignores: Ignores, steps: &[usize]) {
             if steps.contains(&step) {
                 "failed"
             } else {
-                "passed"
+                "ok"
             }
         };
         let expected: Vec<_> = (1..=5).map(expected).collect();

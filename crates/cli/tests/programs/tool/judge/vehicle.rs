@@ -24,7 +24,7 @@ fn passes_every_step(by: &str, passed: u32) {
         "{}",
         judged.stdout
     );
-    let all = format!("{passed} passed, 0 failed, 0 skipped");
+    let all = format!("{passed} ok, 0 failed, 0 skipped");
     assert!(judged.stdout.contains(&all), "{}", judged.stdout);
 }
 

@@ -34,7 +34,7 @@ fn reason_with(steps: &[&str], step: &str, peer: Peer) -> String {
     let flags = network();
     let _peer = peer.start(&flags);
     let network: Vec<&str> = flags.iter().map(String::as_str).collect();
-    let judge = ["judge", "105.1.1", "--unicast", "--limit", "1", "--json"];
+    let judge = ["judge", "105.1.1", "--unicast", "--timeout", "1s", "--json"];
     let run = run(&[&judge, steps, &*network].concat(), b"");
     assert_eq!(run.status, 1, "{run:?}");
     let lines = run.json();

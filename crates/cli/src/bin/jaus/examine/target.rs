@@ -9,7 +9,7 @@ use jaus::node;
 
 /// `77.1.1`, `10.0.0.2`, `10.0.0.2:3795` or `77.1.1@10.0.0.2:3795`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::doctor) struct Target {
+pub(crate) struct Target {
     /// Its id, if given.
     pub(super) id: Option<JausId>,
     place: Option<node::Peer>,

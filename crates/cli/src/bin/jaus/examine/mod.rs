@@ -1,4 +1,4 @@
-//! `jaus doctor --peer`: recognises one peer and tries the exchanges with it one by one, to name
+//! `jaus examine`: recognises one peer and tries the exchanges with it one by one, to name
 //! the first failure with its likely cause.
 //!
 //! [`examiner`] decides what to send and evaluates the answers, without sockets and clock;
@@ -27,72 +27,96 @@ mod transfer;
 
 use std::time::Duration;
 
+use clap::Args;
 use jaus::address::JausId;
 use jaus::link::{Interface, Interfaces, interface};
 use jaus::node::Config;
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::output::{Output, say};
+use jaus_cli::network::Network;
+use jaus_cli::output::{Output, colours_wanted, say};
 use jaus_cli::runtime;
 use tokio::time::{Instant, sleep_until};
 
 use self::case::Settings;
 use self::examiner::Examiner;
-pub(super) use self::sockets::RA_GROUP;
+pub(crate) use self::sockets::RA_GROUP;
 use self::sockets::{Happening, Sockets};
-pub(super) use self::target::Target;
+use self::target::Target;
 
-/// Default timeout of the first sign of life: JAUS++ multicasts every 5 s.
-const LISTEN: Duration = Duration::from_secs(6);
+/// Recognise a peer's stack and try each exchange with it
+///
+/// Tries the exchanges in the order in which integrations fail, and names the first failure with
+/// its likely cause. It sends no commands. Exit status 1 means that some exchange failed.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus examine 192.168.7.2\n  \
+    jaus examine 77.1.1                   the same, found by its id\n  \
+    jaus examine 77.1.1 --control         takes control and releases it, too\n  \
+    jaus examine 77.1.1 --json | jq '.exchanges[] | select(.verdict == \"failed\")'")]
+pub(crate) struct Examine {
+    /// The peer: an id (77.1.1), an address (192.168.7.2 or 192.168.7.2:3795), or both
+    /// (77.1.1@192.168.7.2)
+    #[arg(value_name = "PEER")]
+    target: Target,
 
-/// Options of an examination and its report.
-pub(super) struct Options {
-    pub(super) target: Target,
-    /// Timeout of the first sign of life.
-    pub(super) listen: Option<Duration>,
-    /// Whether the examination may take control.
-    pub(super) control: bool,
-    pub(super) json: bool,
-    pub(super) colours: bool,
+    /// Take control of the peer and release it, unless another client has control
+    #[arg(long)]
+    control: bool,
+
+    /// How long to wait for the first sign of life; JAUS++ multicasts every 5 s
+    #[arg(long, default_value = "6s", value_parser = runtime::duration)]
+    timeout: Duration,
+
+    /// Print the report as one JSON object
+    #[arg(long)]
+    json: bool,
+
+    #[command(flatten)]
+    network: Network,
 }
 
-/// Examines the peer. `wanted` is the intended id of our node.
-pub(super) async fn examine(
-    options: Options,
-    wanted: Option<JausId>,
-    config: Config,
-) -> Result<Outcome, Failure> {
-    let config = config.or_any_free_port();
-    let mut sockets = Sockets::open(interfaces(&config, options.target)?, &config)?;
-    let local = sockets.local();
-    let settings = Settings {
-        target: options.target,
-        own: JausId::new(config.subsystem, config.node, 1),
-        wanted,
-        port: local.map_or(0, |local| local.port()),
-        no_group: sockets.no_group.take(),
-        listen: options.listen.unwrap_or(LISTEN),
-        control: options.control,
-        payload_limit: config.payload_limit,
-    };
-    if !options.json {
-        let from = local.map_or_else(String::new, |local| format!(" at {local}"));
-        let on = sockets.names();
-        say(format_args!(
-            "asking {} as {}{from} on {on} …",
-            options.target, settings.own
-        ));
+impl Examine {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        let (wanted, config) = self.network.for_examination()?;
+        runtime::run(self.examine(wanted, config))
     }
-    let mut output = Output::new();
-    let mut examiner = Examiner::new(settings);
-    let whole = go_on(&mut examiner, &mut sockets, &options, &mut output).await?;
-    let case = examiner.case();
-    if options.json {
-        output.line(report::to_json(case, whole))?;
-    } else {
-        output.line(report::profile(case))?;
-        output.line(format_args!("\n{}", report::conclusion(case, whole)))?;
+
+    /// Examines the peer. `wanted` is the intended id of our node.
+    async fn examine(&self, wanted: Option<JausId>, config: Config) -> Result<Outcome, Failure> {
+        let config = config.or_any_free_port();
+        let mut sockets = Sockets::open(interfaces(&config, self.target)?, &config)?;
+        let local = sockets.local();
+        let settings = Settings {
+            target: self.target,
+            own: JausId::new(config.subsystem, config.node, 1),
+            wanted,
+            port: local.map_or(0, |local| local.port()),
+            no_group: sockets.no_group.take(),
+            listen: self.timeout,
+            control: self.control,
+            payload_limit: config.payload_limit,
+        };
+        if !self.json {
+            let from = local.map_or_else(String::new, |local| format!(" at {local}"));
+            let on = sockets.names();
+            say(format_args!(
+                "asking {} as {}{from} on {on} …",
+                self.target, settings.own
+            ));
+        }
+        let mut output = Output::new();
+        let mut examiner = Examiner::new(settings);
+        let colours = (!self.json).then(|| colours_wanted(&std::io::stdout()));
+        let whole = go_on(&mut examiner, &mut sockets, colours, &mut output).await?;
+        let case = examiner.case();
+        if self.json {
+            output.line(report::to_json(case, whole))?;
+        } else {
+            output.line(report::profile(case))?;
+            output.line(format_args!("\n{}", report::conclusion(case, whole)))?;
+        }
+        Ok(report::outcome(case, whole))
     }
-    Ok(report::outcome(case, whole))
 }
 
 /// The interfaces of the peer: the one that leads to its address, or all chosen ones.
@@ -126,7 +150,8 @@ fn interfaces(config: &Config, target: Target) -> Result<Vec<Interface>, Failure
     })
 }
 
-/// Runs the examination; returns whether it was completed.
+/// Runs the examination, and prints each trial, unless `colours` is `None`; returns whether it was
+/// completed.
 #[expect(
     clippy::disallowed_methods,
     reason = "the examination runs in real time"
@@ -134,7 +159,7 @@ fn interfaces(config: &Config, target: Target) -> Result<Vec<Interface>, Failure
 async fn go_on(
     examiner: &mut Examiner,
     sockets: &mut Sockets,
-    options: &Options,
+    colours: Option<bool>,
     output: &mut Output,
 ) -> Result<bool, Failure> {
     let begun = Instant::now();
@@ -144,10 +169,8 @@ async fn go_on(
     loop {
         send(examiner, sockets, begun);
         while let Some((trial, before)) = examiner.poll_trial() {
-            let line = report::line(trial, before, options.colours);
-            if let Some(line) = line.filter(|_| !options.json) {
-                output.line(line)?;
-            }
+            let line = colours.and_then(|colours| report::line(trial, before, colours));
+            line.map_or(Ok(()), |line| output.line(line))?;
         }
         let Some(timeout) = examiner.poll_timeout().filter(|_| !examiner.is_done()) else {
             return Ok(true);

@@ -71,7 +71,7 @@ fn check(name: &str, settings: Settings, peer: &mut dyn air::Scripted) -> Outcom
 #[track_caller]
 fn check_text(name: &str, text: &str) {
     let file = format!(
-        "{}/src/bin/jaus/doctor/peer/tests/{name}.txt",
+        "{}/src/bin/jaus/examine/tests/{name}.txt",
         env!("CARGO_MANIFEST_DIR")
     );
     if std::env::var_os("JAUS_BLESS").is_some() {
@@ -107,13 +107,13 @@ fn a_peer_is_found_by_its_id_alone() {
 #[test]
 fn somebody_else_with_another_id_is_named() {
     let outcome = check("another-id", settings("78.1.1"), &mut Vehicle::sound());
-    assert_eq!(outcome, Outcome::Broken);
+    assert_eq!(outcome, Outcome::Incomplete);
 }
 
 #[test]
 fn a_silent_host_and_a_closed_port_are_told_apart() {
     let outcome = check("silent", settings("10.0.0.2"), &mut Silent::default());
-    assert_eq!(outcome, Outcome::Broken);
+    assert_eq!(outcome, Outcome::Incomplete);
     let mut gone = Silent {
         gone: true,
         ..Silent::default()
@@ -127,14 +127,14 @@ fn a_silent_host_and_a_closed_port_are_told_apart() {
     };
     assert_eq!(
         check("closed", settings("10.0.0.2"), &mut closed),
-        Outcome::Broken
+        Outcome::Incomplete
     );
 }
 
 #[test]
 fn a_peer_of_the_reference_architecture_is_named_and_sent_to_the_gateway() {
     let outcome = check("ra", settings("10.0.0.2"), &mut Ra::default());
-    assert_eq!(outcome, Outcome::Broken);
+    assert_eq!(outcome, Outcome::Incomplete);
     let mut elsewhere = settings("10.0.0.2");
     elsewhere.port = 40_000;
     let (text, _) = words(elsewhere, &mut Ra::astray());
@@ -168,16 +168,19 @@ fn a_wrong_port_is_told_with_the_right_one() {
     peer.address.set_port(3795);
     peer.speaks_from = 3795;
     let (text, outcome) = words(settings("10.0.0.2"), &mut peer);
-    assert_eq!(outcome, Outcome::Broken);
-    assert!(text.contains("use that: --peer 10.0.0.2:3795"), "{text}");
+    assert_eq!(outcome, Outcome::Incomplete);
+    assert!(
+        text.contains("use that: jaus examine 10.0.0.2:3795"),
+        "{text}"
+    );
 }
 
 #[test]
 fn a_wrong_id_is_told_with_the_right_one() {
     let (text, outcome) = words(settings("78.1.1@10.0.0.2"), &mut Vehicle::sound());
-    assert_eq!(outcome, Outcome::Broken);
+    assert_eq!(outcome, Outcome::Incomplete);
     assert!(
-        text.contains("use that: --peer 77.1.1@10.0.0.2:3794"),
+        text.contains("use that: jaus examine 77.1.1@10.0.0.2:3794"),
         "{text}"
     );
 }
@@ -187,7 +190,7 @@ fn a_firewall_before_a_peer_that_speaks_is_suspected() {
     let mut peer = Vehicle::sound();
     peer.hears_unicast = false;
     let (text, outcome) = words(settings("10.0.0.2"), &mut peer);
-    assert_eq!(outcome, Outcome::Broken);
+    assert_eq!(outcome, Outcome::Incomplete);
     assert!(text.contains("its firewall blocks incoming UDP"), "{text}");
 }
 

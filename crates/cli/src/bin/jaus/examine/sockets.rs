@@ -29,7 +29,7 @@ use super::case::Send;
 use super::seen::{Arrival, Listener, Refusal, TcpAnswer};
 
 /// Multicast group of the Reference Architecture.
-pub(in crate::doctor) const RA_GROUP: SocketAddrV4 =
+pub(crate) const RA_GROUP: SocketAddrV4 =
     SocketAddrV4::new(Ipv4Addr::new(224, 1, 0, 1), judp::PORT);
 
 /// A network event.

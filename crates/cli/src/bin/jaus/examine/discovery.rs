@@ -57,7 +57,7 @@ pub(super) fn not_identified(case: &Case, mark: usize) -> Verdict {
         return Verdict::failed(
             format!("{id} was queried, but {other} answers"),
             "another component answers for the node, or the id is wrong",
-            format!("examine that one: --peer {other}@{}", heard.from),
+            format!("examine that one: jaus examine {other}@{}", heard.from),
         );
     }
     let what = format!("{id} does not answer Query Identification");
@@ -180,7 +180,7 @@ pub(super) fn heard_by_multicast(case: &mut Case) -> Judgement {
 pub(super) fn nothing_by_multicast(case: &Case) -> Verdict {
     let seconds = case.settings.listen.as_secs_f64();
     Verdict::skipped(format!("it sent no multicast within {seconds} s"))
-        .advice("if it should (JAUS++ sends every 5 s), listen longer: --seconds 15")
+        .advice("if it should (JAUS++ sends every 5 s), listen longer: --timeout 15s")
 }
 
 pub(super) fn configuration(case: &mut Case) -> Begin {

@@ -19,7 +19,7 @@ use super::process::{Answer, NodeOrder, Order};
 /// Subsystem of the load test.
 const SUBSYSTEM: u16 = 101;
 
-/// Serves the `jaus-tester load` that started it.
+/// Serves the `jaus load` that started it.
 #[derive(Args)]
 pub(crate) struct LoadChild {}
 
@@ -84,7 +84,7 @@ impl Running {
                 let mut ports = Vec::with_capacity(places.len());
                 for (address, number) in places {
                     let address = address.parse::<Address>().map_err(Failure::of)?;
-                    let host = Host::at(address).name("jaus-tester");
+                    let host = Host::at(address).name("jaus load");
                     ports.push(host.attach(number).await.map_err(Failure::of)?);
                 }
                 let ids = ports.iter().map(jaus::node::Port::id).collect();

@@ -310,7 +310,7 @@ impl Case {
         let known = self.id.is_some() && self.address.is_some();
         (!known).then(|| {
             Verdict::skipped("no component id is known at that address")
-                .advice("give id and address: --peer 77.1.1@10.0.0.2")
+                .advice("give id and address: jaus examine 77.1.1@10.0.0.2")
         })
     }
 

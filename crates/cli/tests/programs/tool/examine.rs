@@ -1,4 +1,4 @@
-//! `jaus doctor --peer` as a process, with our own vehicle and with scripted sockets.
+//! `jaus examine` as a process, with our own vehicle and with scripted sockets.
 
 use std::net::UdpSocket;
 use std::time::Duration;
@@ -19,7 +19,7 @@ fn vehicle() -> (Running, Vec<String>) {
 
 fn examine(peer: &str, network: &[String], more: &[&str]) -> (i32, Json) {
     let network: Vec<&str> = network.iter().map(String::as_str).collect();
-    let flags = ["doctor", "--json", "--peer", peer];
+    let flags = ["examine", peer, "--json"];
     let run = run(&[&flags, &*network, more].concat(), b"");
     (run.status, run.only_line())
 }
@@ -27,7 +27,7 @@ fn examine(peer: &str, network: &[String], more: &[&str]) -> (i32, Json) {
 /// The names of the exchanges with this result.
 fn with_result<'j>(report: &'j Json, result: &str) -> Vec<&'j str> {
     let all = report["exchanges"].as_array().unwrap().iter();
-    let of_it = all.filter(|exchange| exchange["result"] == result);
+    let of_it = all.filter(|exchange| exchange["verdict"] == result);
     of_it
         .map(|exchange| exchange["exchange"].as_str().unwrap())
         .collect()
@@ -55,17 +55,9 @@ fn a_port_at_which_nobody_listens_is_told_at_once() {
         .unwrap()
         .local_addr()
         .unwrap();
-    let flags = [
-        "doctor",
-        "--loopback",
-        "--port",
-        "0",
-        "--group",
-        "off",
-        "--peer",
-    ];
+    let flags = ["examine", "--loopback", "--port", "0", "--group", "off"];
     let run = run(&[&flags[..], &[&free.to_string()]].concat(), b"");
-    assert_eq!(run.status, 2, "{run:?}");
+    assert_eq!(run.status, 1, "{run:?}");
     let words = run.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
     let port = free.port();
     let told = format!("127.0.0.1 reports UDP port {port} as closed");
@@ -90,10 +82,10 @@ fn who_says_nothing_is_waited_for_as_long_as_is_said() {
         .unwrap();
     let address = silent.local_addr().unwrap().to_string();
     let network = ["--loopback", "--port", "0", "--group", "off"].map(str::to_owned);
-    let (status, report) = examine(&address, &network, &["--seconds", "0.3"]);
+    let (status, report) = examine(&address, &network, &["--timeout", "300ms"]);
     assert_eq!(
         (status, &report["first_failure"]),
-        (2, &"any answer".into())
+        (1, &"any answer".into())
     );
     assert_eq!(report["profile"], Json::Null, "{report:#}");
     let mut heard = [0; 100];
@@ -107,7 +99,7 @@ fn who_says_nothing_is_waited_for_as_long_as_is_said() {
 
 #[test]
 fn an_address_that_is_none_is_refused_with_what_would_be_one() {
-    let run = run(&["doctor", "--peer", "rover"], b"");
+    let run = run(&["examine", "rover"], b"");
     assert_eq!(run.status, 2);
     assert!(
         run.stderr

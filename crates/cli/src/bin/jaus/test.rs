@@ -1,4 +1,4 @@
-//! `jaus-tester mission`: a mission through all components, checked step by step.
+//! `jaus test`: a mission through all components, checked step by step.
 #![expect(
     clippy::disallowed_methods,
     reason = "traffic is printed with the time since the start"
@@ -25,12 +25,12 @@ use tokio::sync::mpsc;
 /// status 1 means that a step has failed.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    jaus-tester mission --loopback                 a vehicle on this computer\n  \
-    jaus-tester mission --to 4,-2.5 --junit mission.xml\n  \
-    jaus-tester mission --subsystem 105 --quiet    only the steps")]
-pub(crate) struct MissionCommand {
+    jaus test --loopback                 the vehicle 101 on this computer\n  \
+    jaus test 101 --to 4,-2.5 --junit mission.xml\n  \
+    jaus test 105 --quiet                only the steps")]
+pub(crate) struct TestCommand {
     /// The vehicle's subsystem
-    #[arg(long, value_name = "NUMBER", default_value = "101", value_parser = clap::value_parser!(u16).range(1..=65534))]
+    #[arg(default_value = "101", value_parser = clap::value_parser!(u16).range(1..=65534))]
     subsystem: u16,
 
     /// The destination X,Y in the local frame in metres [default: about four metres away]
@@ -41,16 +41,16 @@ pub(crate) struct MissionCommand {
     #[arg(long, value_name = "M/S", default_value = "1", value_parser = speed)]
     speed: f32,
 
-    /// The authority used to control the planner
-    #[arg(long, value_name = "CODE", default_value = "200")]
+    /// The authority used to control the planner, from 0 to 255
+    #[arg(long, default_value = "200")]
     authority: u8,
 
-    /// The time limit of a step, except the drive
-    #[arg(long, value_name = "SECONDS", default_value = "15", value_parser = runtime::seconds)]
-    patience: Duration,
+    /// How long to wait for a step, except the drive
+    #[arg(long, default_value = "15s", value_parser = runtime::duration)]
+    timeout: Duration,
 
-    /// The time limit of the drive
-    #[arg(long, value_name = "SECONDS", default_value = "120", value_parser = runtime::seconds)]
+    /// How long to wait for the end of the drive
+    #[arg(long, value_name = "DURATION", default_value = "2min", value_parser = runtime::duration)]
     drive: Duration,
 
     /// Write the steps to this file as a JUnit report
@@ -72,11 +72,11 @@ pub(crate) struct MissionCommand {
 /// Maximum number of messages queued for display.
 const WAITING: usize = 4096;
 
-impl MissionCommand {
+impl TestCommand {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         let steps = runtime::run(self.drive())?;
         if let Some(file) = &self.junit {
-            let report = steps::junit("jaus-tester mission", &steps);
+            let report = steps::junit("jaus test", &steps);
             std::fs::write(file, report).map_err(|error| Failure::file(file, &error))?;
         }
         Ok(Outcome::complete_if(steps::all_pass(&steps)))
@@ -107,7 +107,7 @@ impl MissionCommand {
             to: self.to,
             speed: self.speed,
             authority: self.authority,
-            patience: self.patience,
+            patience: self.timeout,
             drive: self.drive,
         };
         let until = runtime::end(None);

@@ -1,4 +1,4 @@
-//! `jaus-tester load`: measures round trips of acknowledged messages between many components on
+//! `jaus load`: measures round trips of acknowledged messages between many components on
 //! several nodes, at increasing rates.
 
 mod child;
@@ -39,10 +39,10 @@ const MOST_IN_PROCESS: u16 = 1000;
 /// status 1 means that messages were lost or refused.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    jaus-tester load\n  \
-    jaus-tester load --rates 9000,max --seconds 10 --json load.json --svg load.svg\n  \
-    jaus-tester load --components 50 --attach     on a running `jaus-communicator --local`\n  \
-    jaus-tester load --beside socketio.json --svg both.svg\n\n\
+    jaus load\n  \
+    jaus load --rates 9000,max --for 10s --json load.json --svg load.svg\n  \
+    jaus load --components 50 --attach     on a running `jaus-communicator --local`\n  \
+    jaus load --beside socketio.json --svg both.svg\n\n\
     Columns: messages per second, offered and acknowledged; messages sent, lost (not acknowledged \
     within 2 s) and refused (by the sender's connection); round-trip times in milliseconds; CPU \
     time of all processes per acknowledged message in microseconds (Linux). Each row starts with \
@@ -81,8 +81,8 @@ pub(crate) struct LoadCommand {
     burst: u32,
 
     /// How long to measure each row, at most an hour
-    #[arg(long, default_value = "5", value_parser = row_time)]
-    seconds: Duration,
+    #[arg(long = "for", value_name = "DURATION", default_value = "5s", value_parser = row_time)]
+    duration: Duration,
 
     /// Octets of a message, from 14 to 1400
     #[arg(long, value_name = "OCTETS", default_value = "170",
@@ -132,7 +132,7 @@ impl FromStr for Rate {
 }
 
 fn row_time(text: &str) -> Result<Duration, String> {
-    let time = runtime::seconds(text)?;
+    let time = runtime::duration(text)?;
     let is_bounded = time <= Duration::from_secs(3600);
     is_bounded
         .then_some(time)
@@ -152,7 +152,7 @@ impl LoadCommand {
             octets: self.size,
             window: self.window,
             burst: self.burst,
-            seconds: self.seconds.as_secs_f64(),
+            seconds: self.duration.as_secs_f64(),
             rows,
         };
         if let Some(file) = &self.json {
@@ -211,7 +211,7 @@ impl LoadCommand {
             },
             self.size,
             self.burst,
-            self.seconds.as_secs_f64()
+            self.duration.as_secs_f64()
         ))?;
         output.line(Row::HEAD)?;
         let mut rows = Vec::with_capacity(self.rates.len());
@@ -220,7 +220,7 @@ impl LoadCommand {
                 number,
                 pace,
                 burst: self.burst,
-                time: self.seconds,
+                time: self.duration,
                 size: self.size.into(),
                 acknowledged_by: self.acknowledged_by,
             };
@@ -234,5 +234,5 @@ impl LoadCommand {
 
 /// Prints progress on standard error.
 fn progress(words: impl std::fmt::Display) {
-    output::say_as("jaus-tester", words);
+    output::say(words);
 }

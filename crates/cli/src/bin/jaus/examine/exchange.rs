@@ -237,7 +237,7 @@ impl Trial {
     pub(super) fn to_json(&self) -> Json {
         json!({
             "exchange": self.exchange.name(),
-            "result": self.verdict.mark.name(),
+            "verdict": self.verdict.mark.name(),
             "what": self.verdict.what,
             "cause": self.verdict.cause,
             "remedy": self.verdict.remedy,

@@ -37,7 +37,7 @@ pub(super) fn find(case: &mut Case) -> Begin {
         return Begin::Over(Verdict::failed(
             format!("there is no multicast group to locate {id}"),
             why.clone(),
-            "give the address too: --peer ID@ADDRESS",
+            "give the address too: jaus examine ID@ADDRESS",
         ));
     }
     // A peer without Discovery acknowledges at least.
@@ -68,7 +68,7 @@ pub(super) fn not_found(case: &Case) -> Verdict {
         return Verdict::failed(
             format!("neither {id} nor any other node was found in {seconds} s"),
             "multicast does not pass between the hosts, or the peer is not running",
-            "give its address: --peer ID@ADDRESS; `jaus doctor` without --peer checks multicast \
+            "give its address: jaus examine ID@ADDRESS; `jaus doctor` checks multicast \
              here",
         );
     }
@@ -78,7 +78,7 @@ pub(super) fn not_found(case: &Case) -> Verdict {
             others.join(", ")
         ),
         "it has another id, or is not running",
-        "take the id from its settings, or give its address: --peer ADDRESS",
+        "take the id from its settings, or give its address: jaus examine ADDRESS",
     )
 }
 
@@ -159,7 +159,7 @@ fn refused(case: &Case, address: SocketAddr, refusal: Refusal) -> Verdict {
         return Verdict::failed(
             format!("{ip} reports UDP port {port} as closed, but {other} sends"),
             "the peer has another port",
-            format!("use that: --peer {other}"),
+            format!("use that: jaus examine {other}"),
         );
     }
     Verdict::failed(
@@ -308,7 +308,7 @@ fn heard_only(case: &mut Case, address: SocketAddr, heard: &Heard) -> Verdict {
         return Verdict::failed(
             format!("{named} does not answer there, but {id} sends from {from}"),
             "the peer has another id",
-            format!("use that: --peer {id}@{from}"),
+            format!("use that: jaus examine {id}@{from}"),
         );
     }
     case.id = case.id.or(Some(id));
@@ -316,7 +316,7 @@ fn heard_only(case: &mut Case, address: SocketAddr, heard: &Heard) -> Verdict {
         return Verdict::failed(
             format!("{id} sends from {from}, and {address} does not answer"),
             "the peer has another port",
-            format!("use that: --peer {from}"),
+            format!("use that: jaus examine {from}"),
         );
     }
     Verdict::failed(
@@ -341,7 +341,7 @@ fn silent(case: &Case, address: SocketAddr, seconds: f64) -> Verdict {
         return Verdict::failed(
             format!("{address} is silent, but {id} sends from {from}"),
             "the peer has another address",
-            format!("use that: --peer {id}@{from}"),
+            format!("use that: jaus examine {id}@{from}"),
         );
     }
     let others = others(case);
@@ -356,11 +356,10 @@ fn silent(case: &Case, address: SocketAddr, seconds: f64) -> Verdict {
         );
     }
     let remedy = if case.settings.target.id.is_some() {
-        "check both firewalls, and run `jaus doctor` without --peer; omit the id (--peer ADDRESS) \
+        "check both firewalls, and run `jaus doctor`; omit the id (jaus examine ADDRESS) \
          to query any component there"
     } else {
-        "give its id too (--peer ID@ADDRESS), check both firewalls, and run `jaus doctor` without \
-         --peer"
+        "give its id too (jaus examine ID@ADDRESS), check both firewalls, and run `jaus doctor`"
     };
     Verdict::failed(
         format!("{address} was silent for {seconds} s, and no other node was found"),
@@ -424,7 +423,7 @@ fn other_address(address: SocketAddr, from: SocketAddr, id: JausId) -> Verdict {
         format!("{id} is queried at {address} and answers from {from}"),
         "its host has several addresses, and the peer's socket is unbound or bound to another one",
         format!(
-            "use the one it answers from (--peer {id}@{from}), or bind the peer to one address"
+            "use the one it answers from (jaus examine {id}@{from}), or bind the peer to one address"
         ),
     )
 }
@@ -444,7 +443,7 @@ pub(super) fn asked_at_its_source(case: &mut Case, mark: usize) -> Judgement {
             from.port()
         ),
         "something on the path translates ports (NAT, a container), or it uses two sockets",
-        format!("messages reach it at both; use the one it sends from: --peer {id}@{from}"),
+        format!("messages reach it at both; use the one it sends from: jaus examine {id}@{from}"),
     ))
 }
 
