@@ -92,7 +92,7 @@ impl Guard {
         let (reader, pipe) = io::pipe()?;
         let process = Command::new(leash::PROGRAM)
             .arg0("jaus")
-            .args([NAME, &grace.as_secs_f64().to_string()])
+            .args([NAME, &format!("{}s", grace.as_secs_f64())])
             .stdin(reader)
             .stdout(Stdio::null())
             .stderr(Stdio::null())

@@ -43,7 +43,7 @@ async fn every_example_passes_every_step_about_each_service_that_it_offers() {
 fn the_sensor_passes_the_contests() {
     let _sensor = Example::start("sensor");
     let judged = judge(JausId::new(101, 1, 33), &["--only", "A4,B33"]);
-    assert!(judged.stdout.contains("2 passed"), "{judged:?}");
+    assert!(judged.stdout.contains("2 ok"), "{judged:?}");
 }
 
 async fn images_pass(finder: &Component) {
