@@ -60,6 +60,13 @@ fn the_system_for_one_machine_has_nothing_wrong_and_every_part_that_is_a_service
 }
 
 #[test]
+fn a_simulated_range_sensor_is_no_service_of_a_board() {
+    // Drivers would take its empty surroundings for free ground.
+    assert!(programs().contains("range-sensor"));
+    assert!(!named(&packaging("etc"), "", ".toml").contains("range-sensor"));
+}
+
+#[test]
 fn every_settings_file_is_understood_by_its_program() {
     for part in named(&packaging("etc"), "", ".toml") {
         let file = packaging(&format!("etc/{part}.toml"));

@@ -17,6 +17,7 @@ mod planner;
 mod pose_file;
 mod pose_sensor;
 mod primitive_driver;
+mod range_sensor;
 mod stop_line;
 pub mod tester;
 mod vector_driver;
@@ -43,6 +44,7 @@ pub use primitive_driver::GpioMotors;
 #[cfg(feature = "serial")]
 pub use primitive_driver::Sabertooth;
 pub use primitive_driver::{Drives, Hardware, Motors, PrimitiveDriver, Servo, SteeringGear, Stop};
+pub use range_sensor::RangeSensor;
 pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
 

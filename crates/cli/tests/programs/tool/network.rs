@@ -7,8 +7,8 @@ use crate::support::{Running, jaus, own_group, run};
 #[test]
 fn the_demo_drives_a_mission_to_its_end_or_says_why_it_can_not() {
     let demo = |to| run(&["demo", "--headless", "--seconds", "60", "--to", to], b"");
-    let run = demo("0,2");
-    let mut rest = &*run.stdout;
+    let there = demo("0,2");
+    let mut rest = &*there.stdout;
     for part in [
         "system    starts 101.1.35, the communicator",
         "starts 101.3.36, the planner",
@@ -21,11 +21,11 @@ fn the_demo_drives_a_mission_to_its_end_or_says_why_it_can_not() {
     ] {
         let place = rest
             .find(part)
-            .unwrap_or_else(|| panic!("no `{part}` in {}", run.stdout));
+            .unwrap_or_else(|| panic!("no `{part}` in {}", there.stdout));
         rest = &rest[place + part.len()..];
     }
-    assert!(!run.stdout.contains('\x1b'), "colours are for terminals");
-    assert_eq!((run.status, &*run.stderr), (0, ""));
+    assert!(!there.stdout.contains('\x1b'), "colours are for terminals");
+    assert_eq!((there.status, &*there.stderr), (0, ""));
 
     // Afterwards, because both have the same ids on the same loopback interface.
     let outside = demo("200,0");
@@ -33,6 +33,24 @@ fn the_demo_drives_a_mission_to_its_end_or_says_why_it_can_not() {
     assert!(said.contains("planner   gives up ("), "{said}");
     assert!(said.contains("has not arrived"), "{said}");
     assert_eq!(outside.status, 1);
+
+    for steering in [None, Some("--ackermann")] {
+        let mut flags = vec!["demo", "--headless", "--seconds", "90"];
+        flags.extend(steering);
+        let round = run(&flags, b"");
+        let mut said = &*round.stdout;
+        for part in [
+            "system    an obstacle appears on the path",
+            // Seen by the planner, or by the drivers that stop before it.
+            "an obstacle",
+            "planner   arrived",
+        ] {
+            let place = said.find(part);
+            let place = place.unwrap_or_else(|| panic!("no `{part}` in {}", round.stdout));
+            said = &said[place + part.len()..];
+        }
+        assert_eq!((round.status, &*round.stderr), (0, ""));
+    }
 }
 
 #[test]
