@@ -5,51 +5,56 @@ use std::fs;
 use crate::support::{Running, jaus, own_group, run};
 
 #[test]
-fn the_demo_drives_a_mission_to_its_end_or_says_why_it_can_not() {
-    let demo = |to| run(&["demo", "--headless", "--seconds", "60", "--to", to], b"");
-    let there = demo("0,2");
-    let mut rest = &*there.stdout;
-    for part in [
-        "system    starts 101.1.35, the communicator",
-        "starts 101.3.36, the planner",
-        "operator  takes control of the planner 101.3.36 with authority 150",
-        "operator  sets the destination x 0 m, y 2 m",
-        "planner   all stages are ready: under way",
-        "planner   arrived",
-        "vehicle   at x",
-        "the vehicle has arrived",
-    ] {
-        let place = rest
-            .find(part)
-            .unwrap_or_else(|| panic!("no `{part}` in {}", there.stdout));
-        rest = &rest[place + part.len()..];
-    }
+fn the_demo_drives_a_mission_round_an_obstacle_or_says_why_it_can_not() {
+    let demo = |flags: &[&str]| {
+        run(
+            &[&["demo", "--headless", "--seconds", "90"], flags].concat(),
+            b"",
+        )
+    };
+    let there = demo(&["--to", "0,2"]);
+    in_order(
+        &there.stdout,
+        &[
+            "system    starts 101.1.35, the communicator",
+            "starts 101.3.36, the planner",
+            "operator  takes control of the planner 101.3.36 with authority 150",
+            "operator  sets the destination x 0 m, y 2 m",
+            "planner   all stages are ready: under way",
+            "planner   arrived",
+            "vehicle   at x",
+            "the vehicle has arrived",
+        ],
+    );
     assert!(!there.stdout.contains('\x1b'), "colours are for terminals");
     assert_eq!((there.status, &*there.stderr), (0, ""));
 
-    // Afterwards, because both have the same ids on the same loopback interface.
-    let outside = demo("200,0");
-    let said = &outside.stdout;
-    assert!(said.contains("planner   gives up ("), "{said}");
-    assert!(said.contains("has not arrived"), "{said}");
+    // Afterwards, because all have the same ids on the same loopback interface.
+    let outside = demo(&["--to", "200,0"]);
+    in_order(
+        &outside.stdout,
+        &["planner   gives up (", "has not arrived"],
+    );
     assert_eq!(outside.status, 1);
 
-    for steering in [None, Some("--ackermann")] {
-        let mut flags = vec!["demo", "--headless", "--seconds", "90"];
-        flags.extend(steering);
-        let round = run(&flags, b"");
-        let mut said = &*round.stdout;
-        for part in [
+    for steering in [&[][..], &["--ackermann"]] {
+        let round = demo(steering);
+        let told = [
             "system    an obstacle appears on the path",
-            // Seen by the planner, or by the drivers that stop before it.
-            "an obstacle",
             "planner   arrived",
-        ] {
-            let place = said.find(part);
-            let place = place.unwrap_or_else(|| panic!("no `{part}` in {}", round.stdout));
-            said = &said[place + part.len()..];
-        }
+        ];
+        in_order(&round.stdout, &told);
         assert_eq!((round.status, &*round.stderr), (0, ""));
+    }
+}
+
+/// Checks that the parts are in a text, one after the other.
+fn in_order(text: &str, parts: &[&str]) {
+    let mut rest = text;
+    for part in parts {
+        let place = rest.find(part);
+        let place = place.unwrap_or_else(|| panic!("no `{part}` in {text}"));
+        rest = &rest[place + part.len()..];
     }
 }
 

@@ -176,7 +176,12 @@ impl<'s> Operator<'s> {
         };
         let path: Vec<_> = path.point_list.iter().map(|it| (it.x, it.y)).collect();
         let here = pose.x_m().zip(pose.y_m());
-        let Some((x, y)) = here.and_then(|here| surprise.put(&path, here)) else {
+        let Some(here) = here else {
+            return Ok(());
+        };
+        // It plans many paths; the parts of the vehicle must go on meanwhile.
+        let putting = tokio::task::spawn_blocking(move || surprise.put(&path, here));
+        let Ok(Some((x, y))) = putting.await else {
             return Ok(());
         };
         self.tell(
