@@ -82,6 +82,11 @@ impl Service {
     pub fn messages(&self) -> impl Iterator<Item = &Arc<Message>> {
         self.inputs.iter().chain(&self.outputs)
     }
+
+    /// Whether it is a service of the core set (AS5710), which components implement themselves.
+    pub(crate) fn is_core(&self) -> bool {
+        self.id.urn.starts_with("urn:jaus:jss:core:")
+    }
 }
 
 /// A `message_def`.

@@ -198,8 +198,12 @@ impl<Q: Query> LaterAnswer<Q> {
         &self.query
     }
 
-    /// The outgoing message with the report.
-    pub(crate) fn into_outgoing(self, mut report: Q::Report) -> Result<Outgoing, EncodeError> {
+    /// The message that answers with this report, without what the query did not request. A
+    /// component sends it with `Component::answer`.
+    ///
+    /// # Errors
+    /// If the report cannot be encoded.
+    pub fn into_outgoing(self, mut report: Q::Report) -> Result<Outgoing, EncodeError> {
         let Received {
             source,
             destination,

@@ -71,9 +71,10 @@ use crate::endpoint::Received;
 /// | [`receive`](Self::receive) | do neither | anyone |
 ///
 /// A command that moves something needs a stop action, [`on_stop`](Self::on_stop). It is called
-/// when the command is not repeated within 500 ms (or as set by [`Validity`] and [`MotionPolicy`]),
-/// when control or readiness is lost, in an emergency, and when the component ends. Attaching a
-/// command fails if the component has no Management or the handlers have no stop action.
+/// when the command is not repeated within 500 ms (or as set by [`Validity`](super::Validity) and
+/// [`MotionPolicy`]), when control or readiness is lost, in an emergency, and when the component
+/// ends. Attaching a command fails if the component has no Management or the handlers have no stop
+/// action.
 ///
 /// A command of a service that inherits Access Control cannot be accepted from anyone by mistake:
 ///

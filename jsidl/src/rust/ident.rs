@@ -134,6 +134,11 @@ pub(super) fn version_module(version: crate::model::Version) -> String {
     format!("v{}_{}", version.major, version.minor)
 }
 
+/// The constant of a version: `V1_0`.
+pub(super) fn version_constant(version: crate::model::Version) -> String {
+    version_module(version).to_uppercase()
+}
+
 /// The suffix of accessors in engineering units: `latitude_deg`.
 pub(super) fn unit_suffix(unit: &str) -> String {
     let words = match unit {

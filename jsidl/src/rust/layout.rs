@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use super::messages;
 use super::types::{Field, Kind, Nested, Type};
-use crate::model::{Message, Shape, Unsigned};
+use crate::model::{Item, Meaning, Message, Number, Scalar, Shape, Unsigned};
 
 /// The fields of a message, and all types inside it by their names in the message's module.
 pub(super) struct Layout<'m> {
@@ -46,5 +46,21 @@ impl<'m> Layout<'m> {
             }
             _ => None,
         }
+    }
+}
+
+/// The bits of a field that is a plain unsigned integer.
+pub(super) fn unsigned_bits(item: &Item) -> Option<usize> {
+    match &item.shape {
+        Shape::Scalar(Scalar {
+            number: Number::Unsigned(unsigned),
+            meaning,
+            ..
+        }) => match meaning {
+            Meaning::Values(set) if !set.values.is_empty() => None,
+            Meaning::Scaled(_) => None,
+            _ => Some(8 * unsigned.size()),
+        },
+        _ => None,
     }
 }

@@ -9,7 +9,7 @@ use super::messages::Plan;
 use super::selections::{Record, Selection, Step, selections};
 use super::types::{Field, Kind, Type, shared_key};
 use super::writer::Writer;
-use crate::model::{Item, Meaning, Number, Scalar, Shape};
+use crate::model::Item;
 
 /// Implements `Query` if the message is a query with a report in the set. `shared` has the types
 /// that are defined so far, with their paths.
@@ -339,21 +339,5 @@ impl<'s, 'm> Builder<'s, 'm> {
             out.push(format!("{}: {:#06x},", selection.vector, value(selection)));
         }
         out.push(format!("{rest}}}\n}}"));
-    }
-}
-
-/// The bits of a field that is a plain unsigned integer.
-pub(super) fn unsigned_bits(item: &Item) -> Option<usize> {
-    match &item.shape {
-        Shape::Scalar(Scalar {
-            number: Number::Unsigned(unsigned),
-            meaning,
-            ..
-        }) => match meaning {
-            Meaning::Values(set) if !set.values.is_empty() => None,
-            Meaning::Scaled(_) => None,
-            _ => Some(8 * unsigned.size()),
-        },
-        _ => None,
     }
 }

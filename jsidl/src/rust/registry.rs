@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use super::docs;
-use super::ident::{Names, version_module};
+use super::ident::{Names, version_constant};
 use super::machine::{self, Messages};
 use super::messages::Plan;
 use super::services::service;
 use super::writer::Writer;
-use crate::model::{Id, Message, Service, Version};
+use crate::model::{Id, Message, Service};
 
 /// Constants of the services: identity to path from the root of the set.
 pub(super) type ServicePaths<'m> = BTreeMap<&'m Id, String>;
@@ -55,7 +55,7 @@ pub(super) fn services<'m>(
         ));
         for service in services {
             let version = service.id.version;
-            let constant = constant(version);
+            let constant = version_constant(version);
             out.gap();
             out.push(format!("/// Version {version}."));
             out.push(format!(
@@ -68,7 +68,7 @@ pub(super) fn services<'m>(
             paths.insert(&service.id, format!("{module}::{constant}"));
         }
         out.gap();
-        let constant = constant(newest.id.version);
+        let constant = version_constant(newest.id.version);
         out.push(format!(
             "/// The newest version.\npub const LATEST: codec::ServiceId = {constant};"
         ));
@@ -77,11 +77,6 @@ pub(super) fn services<'m>(
         out.push("}");
     }
     paths
-}
-
-/// The constant of a version: `V1_0`.
-pub(super) fn constant(version: Version) -> String {
-    version_module(version).to_uppercase()
 }
 
 /// Writes `SERVICES` and `MESSAGES`.

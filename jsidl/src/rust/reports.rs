@@ -1,9 +1,9 @@
 //! Generates the trait of reports: the time of the sample, and the report without values.
 
-use super::layout::Layout;
+use super::layout::{Layout, unsigned_bits};
 use super::messages::Plan;
 use super::newtypes::is_time_stamp;
-use super::queries::{report, unsigned_bits};
+use super::queries::report;
 use super::types::{Field, Kind, Type};
 use super::writer::Writer;
 use crate::model::Shape;

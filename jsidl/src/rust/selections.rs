@@ -15,8 +15,7 @@
 //! Other vectors remain plain numbers: those for several records of a report, signed ones, and those
 //! in a list whose record another query uses, too.
 
-use super::layout::Layout;
-use super::queries::unsigned_bits;
+use super::layout::{Layout, unsigned_bits};
 use super::types::{Field, Kind, Type};
 use crate::model::Unsigned;
 

@@ -4,7 +4,7 @@
 //! Both are generated for the newest version of a service. The component itself implements the core
 //! services, and a service inherits their messages only to name them, so neither has a place here.
 
-use super::ident::Names;
+use super::ident::{Names, version_constant};
 use super::machine::{Connection, Messages};
 use super::messages::Plan;
 use super::queries;
@@ -22,7 +22,7 @@ struct Input<'a> {
 /// Writes the trait and the server of a service, given all its versions, the newest first.
 pub(super) fn service(out: &mut Writer, messages: Messages<'_>, versions: &[&Service]) {
     let service = versions[0];
-    if service.inputs.is_empty() || is_core(service) {
+    if service.inputs.is_empty() || service.is_core() {
         return;
     }
     let Ok(connection) = Connection::of(service, messages) else {
@@ -36,11 +36,6 @@ pub(super) fn service(out: &mut Writer, messages: Messages<'_>, versions: &[&Ser
         connection,
     };
     generator.with_inputs().write(out);
-}
-
-/// Whether the component itself implements the service.
-pub(super) fn is_core(service: &Service) -> bool {
-    service.id.urn.starts_with("urn:jaus:jss:core:")
 }
 
 struct Generator<'a> {
@@ -233,7 +228,7 @@ impl<'a> Generator<'a> {
             })
         };
         let understood = self.versions.iter().filter(understood);
-        let constants = understood.map(|it| super::registry::constant(it.id.version));
+        let constants = understood.map(|it| version_constant(it.id.version));
         constants.collect()
     }
 }

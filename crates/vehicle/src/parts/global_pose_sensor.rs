@@ -70,7 +70,7 @@ impl Default for GlobalPoseSensor {
 
 impl Part for GlobalPoseSensor {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
-        let (line, receiver) = navigation_inputs::receiver(self.receiver.clone(), self.baud)?;
+        let (line, receiver) = navigation_inputs::receiver(&self.receiver, self.baud)?;
         let gyro = self.gyro.as_ref().map(Gyro::start).transpose()?;
         let inputs = NavigationInputs { receiver, gyro };
         tokio::select! {

@@ -65,18 +65,25 @@ type Octets = mpsc::Receiver<Vec<u8>>;
 /// Opens the serial line of a receiver. The future reads it, and opens it again when it was gone.
 #[cfg(feature = "serial")]
 pub(super) fn receiver(
-    device: String,
+    device: &str,
     baud: u32,
-) -> Result<(impl Future<Output = Result<Infallible, PartError>>, Octets), PartError> {
+) -> Result<
+    (
+        impl Future<Output = Result<Infallible, PartError>> + use<>,
+        Octets,
+    ),
+    PartError,
+> {
     /// Pause before a lost line is opened again.
     const PAUSE: Duration = Duration::from_secs(1);
-    let mut line = serial2_tokio::SerialPort::open(&device, baud).map_err(|error| {
+    let mut line = serial2_tokio::SerialPort::open(device, baud).map_err(|error| {
         PartError::Broken(format!(
             "cannot open the GNSS receiver's line {device}: {error}; check the device and the \
              group of its file, usually dialout"
         ))
     })?;
     let (tell, octets) = mpsc::channel(16);
+    let device = device.to_owned();
     let reading = async move {
         let mut buffer = [0; 1024];
         loop {
@@ -106,7 +113,7 @@ pub(super) fn receiver(
 /// Without serial lines.
 #[cfg(not(feature = "serial"))]
 pub(super) fn receiver(
-    device: String,
+    device: &str,
     _baud: u32,
 ) -> Result<(std::future::Pending<Result<Infallible, PartError>>, Octets), PartError> {
     Err(PartError::Broken(format!(

@@ -2,7 +2,6 @@
 //! messages, and the machine's actions and guards are methods of the trait.
 
 use super::super::ident::Names;
-use super::super::services::is_core;
 use super::{Emitter, Event, Kind, Messages, Method, Writer, machines_of, queries};
 use crate::machine::Machine;
 use crate::model::{Message, Service};
@@ -306,5 +305,5 @@ fn name_of(parameter: &str) -> &str {
 /// Whether the machine can follow the component's control: it extends that of a core service.
 pub(super) fn core_base<'a>(messages: Messages<'a>, service: &'a Service) -> Option<&'a Service> {
     let mut bases = messages.library.lineage(service).skip(1);
-    bases.find(|base| is_core(base))
+    bases.find(|base| base.is_core())
 }

@@ -21,7 +21,6 @@ use super::docs;
 use super::ident::{Names, version_module};
 use super::messages::Plan;
 use super::queries;
-use super::services::is_core;
 use super::writer::Writer;
 use crate::behaviour::TransitionKind;
 use crate::library::Library;
@@ -90,10 +89,10 @@ pub(super) fn machines(out: &mut Writer, messages: Messages<'_>, versions: &[&Se
 /// the core services, which the component itself handles.
 fn machines_of<'a>(library: &'a Library, service: &'a Service) -> Vec<Machine<'a>> {
     let machines = library.machines(service);
-    if is_core(service) {
+    if service.is_core() {
         return machines;
     }
-    let own = machines.into_iter().map(|it| it.without(is_core));
+    let own = machines.into_iter().map(|it| it.without(Service::is_core));
     own.filter(Machine::has_transitions).collect()
 }
 
@@ -184,7 +183,7 @@ impl<'a> Emitter<'a> {
 
     /// The innermost states of the component's control.
     fn inherited(&self) -> Vec<StateIndex> {
-        let base = core_base(self.messages, self.service).filter(|_| !is_core(self.service));
+        let base = core_base(self.messages, self.service).filter(|_| !self.service.is_core());
         let Some(base) = base else {
             return Vec::new();
         };

@@ -7,8 +7,8 @@ use jaus_test_kit::tools::workspace;
 
 use crate::support::{Run, run};
 
-/// The definition of the example crate.
-const LAMP: &str = "examples/own-service/services/Lamp.xml";
+/// The definitions of the example crate.
+const LAMP: &str = "examples/own-service/services";
 
 /// An empty directory of one test.
 fn directory(test: &str) -> PathBuf {
@@ -30,12 +30,16 @@ fn lamp() -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// A definition that refers to a missing type.
+/// Definitions of which one refers to a missing type.
 fn broken(directory: &Path) -> String {
-    let path = directory.join("Broken.xml");
-    let text = fs::read_to_string(lamp()).unwrap();
-    fs::write(&path, text.replacen("types.Header", "types.Haeder", 1)).unwrap();
-    path.to_str().unwrap().to_owned()
+    let services = directory.join("services");
+    fs::create_dir(&services).unwrap();
+    for name in ["Lamp.xml", "LampMessages.xml"] {
+        let text = fs::read_to_string(workspace(LAMP).join(name)).unwrap();
+        let text = text.replacen("types.Header", "types.Haeder", 1);
+        fs::write(services.join(name), text).unwrap();
+    }
+    services.to_str().unwrap().to_owned()
 }
 
 #[test]
