@@ -109,13 +109,13 @@ impl Scene {
         )
     }
 
-    /// Waits until the mission is in one of these stages. Returns its report, and the least distance
-    /// of the vehicle's centre from the edge of a disc on the way.
-    async fn until(&self, stages: &[Stage], discs: &[Disc]) -> (ReportMission, f64) {
+    /// Waits until the mission has arrived or failed.
+    async fn ends(&self, discs: &[Disc]) -> Ending {
         let query = QueryLocalPose::none().with_x().with_y();
         let poses = self.operator.subscribe(self.pose, &query, When::hz(20.0));
         let mut poses = poses.await.unwrap();
         let mut least = f64::INFINITY;
+        let mut saw_obstacle = false;
         let waiting = async {
             loop {
                 if let Some(Update::Report(pose)) = poses.next().await
@@ -127,13 +127,19 @@ impl Scene {
                     }
                 }
                 let report = self.mission().await;
-                if stages.contains(&report.stage) {
+                let reason = report.reason.to_string();
+                saw_obstacle |= reason.contains("the range sensor sees an obstacle on the path");
+                if [Stage::ARRIVED, Stage::FAILED].contains(&report.stage) {
                     return report;
                 }
             }
         };
         let report = within_limit(waiting).await;
-        (report, least)
+        Ending {
+            report,
+            least,
+            saw_obstacle,
+        }
     }
 
     async fn comes_to_rest(&self) {
@@ -163,6 +169,15 @@ impl Scene {
     }
 }
 
+/// The end of a mission.
+struct Ending {
+    report: ReportMission,
+    /// Least distance of the vehicle's centre from the edge of a disc on the way, in metres.
+    least: f64,
+    /// Whether the planner gave up a path for an obstacle.
+    saw_obstacle: bool,
+}
+
 fn start_sensor(subsystem: u16, scenery: Scenery) -> (Node, JoinHandle<()>) {
     let node = Node::start(Config::loopback(subsystem, 51)).unwrap();
     let slot = Slot {
@@ -190,9 +205,10 @@ async fn a_mission_drives_round_an_obstacle_that_appears_on_its_way() {
         radius: 0.3,
     };
     scene.scenery.set(vec![disc]);
-    let (report, least) = scene.until(&[Stage::ARRIVED, Stage::FAILED], &[disc]).await;
-    assert_eq!(report.stage, Stage::ARRIVED, "{report:?}");
-    assert!(least > 0.25, "{least:.2} m from the obstacle");
+    let end = scene.ends(&[disc]).await;
+    assert_eq!(end.report.stage, Stage::ARRIVED, "{:?}", end.report);
+    assert!(end.saw_obstacle, "not only the driver that stops before it");
+    assert!(end.least > 0.25, "{:.2} m from the obstacle", end.least);
     let (x, y) = scene.here().await;
     assert!((x - DESTINATION.0).hypot(y - DESTINATION.1) < 0.5);
     scene.end().await;
@@ -211,11 +227,11 @@ async fn a_mission_without_a_way_round_stops_before_the_obstacles_and_says_why()
     };
     let discs: Vec<Disc> = (0..24).map(post).collect();
     scene.scenery.set(discs.clone());
-    let (report, least) = scene.until(&[Stage::ARRIVED, Stage::FAILED], &discs).await;
-    assert_eq!(report.stage, Stage::FAILED, "{report:?}");
-    let reason = report.reason.to_string();
+    let end = scene.ends(&discs).await;
+    assert_eq!(end.report.stage, Stage::FAILED, "{:?}", end.report);
+    let reason = end.report.reason.to_string();
     assert!(reason.contains("obstacle"), "{reason}");
-    assert!(least > 0.25, "{least:.2} m from an obstacle");
+    assert!(end.least > 0.25, "{:.2} m from an obstacle", end.least);
     scene.comes_to_rest().await;
     scene.end().await;
 }
