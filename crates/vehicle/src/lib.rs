@@ -7,6 +7,7 @@
 //! | [`navigation`] | the pose on the globe from GNSS, gyroscope and wheel travel |
 //! | [`actuator`] | wheels and what turns them: a simulated motor, stepper motors on GPIO lines |
 //! | [`zones`] | areas to stay in or keep out of |
+//! | [`sensing`] | scans of a range sensor, real or simulated, and the obstacles that they show |
 //! | [`world`] | vector objects and raster maps, their index and their file |
 //! | [`mission`] | path planning over a map, and the stages of a mission |
 //! | [`mobility`] | the services of the mobility set (AS6009), which command a [`motion::Pilot`] |
@@ -26,5 +27,6 @@ pub mod mobility;
 pub mod motion;
 pub mod navigation;
 pub mod parts;
+pub mod sensing;
 pub mod world;
 pub mod zones;

@@ -1,5 +1,5 @@
-//! The messages of the ground vehicle's own services and of handing over control, generated from
-//! their definitions.
+//! The messages of the ground vehicle's own services, of handing over control and of Range Sensor,
+//! generated from their definitions.
 
 use jaus::codec::{Registry, ServiceSet};
 
@@ -15,6 +15,12 @@ pub mod handoff {
     include!(concat!(env!("OUT_DIR"), "/handoff.rs"));
 }
 
+/// Environment sensing (AS6060): Range Sensor.
+#[allow(missing_docs, reason = "the definitions lack descriptions")]
+pub mod environment_sensing {
+    include!(concat!(env!("OUT_DIR"), "/environment_sensing.rs"));
+}
+
 /// All services and messages that the vehicle speaks: these, and those of the stack.
 #[must_use]
 pub const fn registry() -> Registry {
@@ -27,6 +33,10 @@ pub const fn registry() -> Registry {
         ServiceSet {
             services: handoff::SERVICES,
             messages: handoff::MESSAGES,
+        },
+        ServiceSet {
+            services: environment_sensing::SERVICES,
+            messages: environment_sensing::MESSAGES,
         },
     ];
     Registry::extending(&STACK, OWN)

@@ -41,6 +41,10 @@ struct Flags {
     #[arg(long, value_name = "SECONDS", default_value = "3")]
     control_timeout: u8,
 
+    /// Do not drive without a range sensor. Without this flag it is needed from its first scan on
+    #[arg(long)]
+    needs_range_sensor: bool,
+
     #[command(flatten)]
     fence: FenceFlags,
 }
@@ -68,6 +72,7 @@ impl Ready for Flags {
             stale: self.stale,
             authority: self.authority,
             fence: self.fence.into(),
+            needs_range_sensor: self.needs_range_sensor,
             control_timeout: self.control_timeout,
         })
     }

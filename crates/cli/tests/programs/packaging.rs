@@ -82,6 +82,13 @@ fn the_unit_of_the_motors_reaches_every_kind_of_them() {
 }
 
 #[test]
+fn a_simulated_range_sensor_is_no_service_of_a_board() {
+    // Drivers would take its empty surroundings for free ground.
+    assert!(programs().contains("range-sensor"));
+    assert!(!named(&packaging("etc"), "", ".toml").contains("range-sensor"));
+}
+
+#[test]
 fn every_settings_file_is_understood_by_its_program() {
     for part in named(&packaging("etc"), "", ".toml") {
         let file = packaging(&format!("etc/{part}.toml"));

@@ -37,7 +37,7 @@ impl Ground {
         if radius > 0.5 {
             ground.keep_away(radius);
         }
-        if radius > 0.5 || !terrain.zones().is_empty() {
+        if radius > 0.5 || terrain.is_restricted() {
             ground.open_around(start, radius, terrain);
         }
         let best = ground.cells.iter().max().copied().unwrap_or_default();

@@ -1,9 +1,10 @@
-//! The planning map: a raster with the traversability of each cell, less what zones bar.
+//! The planning map: a raster with the traversability of each cell, less the cells that zones bar and
+//! those with obstacles.
 
 use std::sync::Arc;
 
 use super::barred;
-use crate::zones::Zones;
+use crate::zones::{Point, Zones};
 
 /// Traversability of the cells of a rectangle in the local frame.
 ///
@@ -16,9 +17,10 @@ pub struct Terrain {
     cell: f64,
     corner: (f64, f64),
     cells: Vec<u8>,
-    /// Whether zones touch each cell; empty without zones.
+    /// Whether zones or obstacles touch each cell; empty without either.
     barred: Vec<bool>,
     zones: Arc<Zones>,
+    obstacles: Vec<Point>,
 }
 
 /// Error: a raster is unsuitable for planning.
@@ -101,6 +103,7 @@ impl Terrain {
             cells,
             barred: Vec::new(),
             zones: Arc::default(),
+            obstacles: Vec::new(),
         })
     }
 
@@ -110,6 +113,42 @@ impl Terrain {
         self.barred = barred::cells(&self, &zones);
         self.zones = zones;
         self
+    }
+
+    /// The same map with obstacles that a range sensor has seen, as points of the local frame, for a
+    /// vehicle with this clearance in metres.
+    #[must_use]
+    pub fn with_obstacles(mut self, obstacles: Vec<Point>, clearance: f64) -> Self {
+        if obstacles.is_empty() {
+            return self;
+        }
+        self.barred.resize(self.cells.len(), false);
+        // Planning keeps the clearance from closed cells, unless a cell is wider than the vehicle.
+        let reach = if clearance > self.cell / 2.0 {
+            0.0
+        } else {
+            clearance
+        };
+        for &(x, y) in &obstacles {
+            for (north, east) in [
+                (-reach, -reach),
+                (-reach, reach),
+                (reach, -reach),
+                (reach, reach),
+            ] {
+                if let Some((row, column)) = self.to_grid((x + north, y + east)) {
+                    let cell = row as usize * usize::from(self.columns) + column as usize;
+                    self.barred[cell] = true;
+                }
+            }
+        }
+        self.obstacles = obstacles;
+        self
+    }
+
+    /// Whether anything but the map itself closes cells.
+    pub(super) fn is_restricted(&self) -> bool {
+        !self.barred.is_empty()
     }
 
     /// The zones that bar cells of this map.
@@ -132,8 +171,10 @@ impl Terrain {
 
     /// Whether the vehicle's centre may be at a point, in rows and columns, whatever its clearance.
     pub(super) fn admits(&self, at: (f64, f64)) -> bool {
-        let clearance = self.zones.clearance(self.to_local(at));
-        clearance.is_none_or(|it| it.metres >= 0.0)
+        let point = self.to_local(at);
+        let clearance = self.zones.clearance(point);
+        let is_free = |it: &Point| (it.0 - point.0).hypot(it.1 - point.1) > self.cell;
+        clearance.is_none_or(|it| it.metres >= 0.0) && self.obstacles.iter().all(is_free)
     }
 
     /// Number of rows.

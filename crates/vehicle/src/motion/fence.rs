@@ -1,4 +1,5 @@
-//! The fence: the speed up to which a vehicle can still stop before the edge of a zone.
+//! The fence: the speed up to which a vehicle can still stop before the edge of a zone, or before an
+//! obstacle that a range sensor sees.
 //!
 //! A fence limits, it does not stop: the command stays in force, and the vehicle moves on when the
 //! zones allow it. Turning on the spot is always possible, because the vehicle counts as a disc.
@@ -30,7 +31,7 @@ impl Default for FenceConfig {
     }
 }
 
-/// The zones that a vehicle keeps to. Cheap to clone; all clones share one state.
+/// The zones and obstacles that a vehicle keeps to. Cheap to clone; all clones share one state.
 #[derive(Debug, Clone, Default)]
 pub struct Fence(Arc<Mutex<State>>);
 
@@ -38,6 +39,8 @@ pub struct Fence(Arc<Mutex<State>>);
 struct State {
     config: FenceConfig,
     zones: Arc<Zones>,
+    /// Where a range sensor sees something, in the local frame.
+    obstacles: Vec<Point>,
     /// The pose in the zones' frame, if it is not the platform's own.
     located: Option<Located>,
     held: Option<String>,
@@ -97,6 +100,11 @@ impl Fence {
         }
     }
 
+    /// Sets the places where a range sensor sees something, in the local frame.
+    pub fn set_obstacles(&self, obstacles: Vec<Point>) {
+        self.lock().obstacles = obstacles;
+    }
+
     /// Sets the pose that another component measured at `sampled_at`; `None` if it is unknown.
     pub fn handle_pose(&self, pose: Option<(Pose, Instant)>) {
         self.lock().located = Some(Located(pose));
@@ -119,7 +127,7 @@ impl Fence {
     ) -> Bounds {
         let mut state = self.lock();
         state.held = None;
-        if state.zones.is_empty() {
+        if state.zones.is_empty() && state.obstacles.is_empty() {
             return Bounds::NONE;
         }
         let Some(pose) = state.pose(now, motion) else {
@@ -138,7 +146,7 @@ impl Fence {
             back: speed(-1.0),
         };
         if bounds.hold(wanted) {
-            state.held = state.zones.clearance((pose.x, pose.y)).map(reason);
+            state.held = Some(state.reason((pose.x, pose.y)));
         }
         bounds
     }
@@ -205,11 +213,28 @@ impl State {
     /// Distance between the vehicle's disc at a point and the nearest forbidden place.
     fn room(&self, point: Point) -> f64 {
         let clearance = self.zones.clearance(point);
-        clearance.map_or(f64::INFINITY, |it| it.metres - self.config.radius)
+        let clearance = clearance.map_or(f64::INFINITY, |it| it.metres);
+        clearance.min(self.nearest_obstacle(point)) - self.config.radius
+    }
+
+    fn nearest_obstacle(&self, (x, y): Point) -> f64 {
+        let obstacles = self.obstacles.iter();
+        let distances = obstacles.map(|it| (it.0 - x).hypot(it.1 - y));
+        distances.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Why a vehicle at a point is held.
+    fn reason(&self, point: Point) -> String {
+        let obstacle = self.nearest_obstacle(point);
+        let zone = self.zones.clearance(point);
+        match zone.filter(|it| it.metres <= obstacle) {
+            Some(clearance) => beyond_or_before(clearance),
+            None => format!("an obstacle is {obstacle:.1} m away: turn or drive back"),
+        }
     }
 }
 
-fn reason(Clearance { metres, zone }: Clearance) -> String {
+fn beyond_or_before(Clearance { metres, zone }: Clearance) -> String {
     if metres < 0.0 {
         let beyond = -metres;
         return format!(

@@ -72,6 +72,7 @@ impl Part for GlobalDriver {
         let remote_platform = RemotePlatform::new(RemotePlatformSettings {
             limits: self.limits,
             stale: self.stale,
+            needs_scan: false,
             by_heading: false,
         });
         let fence = Fence::located_elsewhere(self.fence);

@@ -66,6 +66,18 @@ impl KnowledgeStore {
         (raster, picture)
     }
 
+    /// The same map in cells of a quarter metre, on which a path leads closely round an obstacle.
+    #[must_use]
+    pub fn fine_demo_map() -> (Raster, Picture) {
+        const PARTS: u16 = 4;
+        let (raster, picture) = Self::demo_map();
+        let Some(fine) = picture.divided(PARTS) else {
+            return (raster, picture);
+        };
+        let cell = raster.cell / f32::from(PARTS);
+        (fine.at(raster.name, cell, (raster.x, raster.y)), fine)
+    }
+
     fn open(&self) -> Result<World, PartError> {
         let mut world = match World::open(&self.file) {
             Err(error @ OpenError::Broken { .. }) if self.broken == Broken::SetAside => {

@@ -18,6 +18,7 @@ mod planner;
 mod pose_file;
 mod pose_sensor;
 mod primitive_driver;
+mod range_sensor;
 mod stop_line;
 pub mod tester;
 mod vector_driver;
@@ -47,6 +48,7 @@ pub use path_driver::PathDriver;
 pub use planner::Planner;
 pub use pose_sensor::PoseSensor;
 pub use primitive_driver::PrimitiveDriver;
+pub use range_sensor::RangeSensor;
 pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
 

@@ -26,6 +26,8 @@ pub struct PathDriver {
     pub stale: Duration,
     /// Dimensions and delays by which it keeps to the operating zones.
     pub fence: FenceConfig,
+    /// Whether it needs a range sensor from the start. Otherwise it needs one from its first scan on.
+    pub needs_range_sensor: bool,
     /// The authority used to control the vector driver.
     pub authority: u8,
     /// Control timeout in seconds unless the client renews control; 0 disables it.
@@ -42,6 +44,7 @@ impl Default for PathDriver {
             },
             stale: Duration::from_millis(600),
             fence: FenceConfig::default(),
+            needs_range_sensor: false,
             authority: 100,
             control_timeout: 3,
         }
@@ -51,6 +54,8 @@ impl Default for PathDriver {
 impl PathDriver {
     /// Report rate requested from the sensor, in hertz.
     const HZ: f64 = 25.0;
+    /// Scan rate requested from the range sensor, in hertz.
+    const SCANS: f64 = 10.0;
 
     /// Sets the vehicle's least turning radius in metres; 0 if it turns on the spot.
     #[must_use]
@@ -65,6 +70,7 @@ impl Part for PathDriver {
         let remote_platform = RemotePlatform::new(RemotePlatformSettings {
             limits: self.limits,
             stale: self.stale,
+            needs_scan: self.needs_range_sensor,
             by_heading: true,
         });
         let fence = Fence::new(self.fence);
@@ -80,6 +86,7 @@ impl Part for PathDriver {
             .live_on(slot.port)?;
         let poses = Sense::pose(&component, Self::HZ)?;
         let zones = Sense::zones(&component)?;
+        let scans = Sense::scans(&component, Self::SCANS)?;
         let own = component.clone();
         let next = Next {
             component,
@@ -96,6 +103,7 @@ impl Part for PathDriver {
         tokio::select! {
             end = poses.steer(&remote_platform) => end,
             end = zones.enclose(&fence) => end,
+            end = scans.watch(&remote_platform, &fence) => end,
             end = next.run() => end,
             end = shut_down(&own) => end,
         }

@@ -82,6 +82,7 @@ impl Part for Planner {
         let task = PlannerTask::new(&self, &component, missions, &wake);
         let watch = |link| chain::watch(&component, link, &tell);
         let poses = Sense::pose(&component, POSES)?;
+        let scans = Sense::scans(&component, SCANS)?;
         // Each of these runs until it cannot continue.
         tokio::select! {
             () = task.work(news) => {}
@@ -89,14 +90,18 @@ impl Part for Planner {
             () = watch(Link::Vector) => {}
             () = watch(Link::Primitive) => {}
             end = chain::follow(poses, &tell) => end?,
+            end = chain::look_around(scans, &tell) => end?,
             end = shut_down(&component) => return end,
         }
         Err(PartError::NodeStopped)
     }
 }
 
-/// Report rate requested for the pose, in hertz. The pose is recorded for the return path.
-const POSES: f64 = 2.0;
+/// Report rate requested for the pose, in hertz. The pose is recorded for the return path, and places
+/// what the range sensor sees.
+const POSES: f64 = 10.0;
+/// Scan rate requested from the range sensor, in hertz.
+const SCANS: f64 = 5.0;
 
 /// Waits for another component of the subsystem that offers all of these services; `None` when the
 /// component has stopped.

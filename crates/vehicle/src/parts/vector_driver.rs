@@ -28,6 +28,8 @@ pub struct VectorDriver {
     pub stale: Duration,
     /// Dimensions and delays by which it keeps to the operating zones.
     pub fence: FenceConfig,
+    /// Whether it needs a range sensor from the start. Otherwise it needs one from its first scan on.
+    pub needs_range_sensor: bool,
     /// The authority used to control the primitive driver.
     pub authority: u8,
     /// Control timeout in seconds unless the client renews control; 0 disables it.
@@ -41,6 +43,7 @@ impl Default for VectorDriver {
             silence: Duration::from_secs(1),
             stale: Duration::from_millis(600),
             fence: FenceConfig::default(),
+            needs_range_sensor: false,
             authority: 100,
             control_timeout: 3,
         }
@@ -50,6 +53,8 @@ impl Default for VectorDriver {
 impl VectorDriver {
     /// Report rate requested from the sensors, in hertz.
     const HZ: f64 = 25.0;
+    /// Scan rate requested from the range sensor, in hertz.
+    const SCANS: f64 = 10.0;
 
     /// Sets the vehicle's least turning radius in metres; 0 if it turns on the spot.
     #[must_use]
@@ -64,6 +69,7 @@ impl Part for VectorDriver {
         let remote_platform = RemotePlatform::new(RemotePlatformSettings {
             limits: self.limits,
             stale: self.stale,
+            needs_scan: self.needs_range_sensor,
             by_heading: false,
         });
         let fence = Fence::new(self.fence);
@@ -78,6 +84,7 @@ impl Part for VectorDriver {
             .live_on(slot.port)?;
         let poses = Sense::pose(&component, Self::HZ)?;
         let zones = Sense::zones(&component)?;
+        let scans = Sense::scans(&component, Self::SCANS)?;
         let velocities = Sense::velocity(&component, Self::HZ)?;
         let own = component.clone();
         let next = Next {
@@ -95,6 +102,7 @@ impl Part for VectorDriver {
             end = poses.steer(&remote_platform) => end,
             end = velocities.steer(&remote_platform) => end,
             end = zones.enclose(&fence) => end,
+            end = scans.watch(&remote_platform, &fence) => end,
             end = next.run() => end,
             end = shut_down(&own) => end,
         }

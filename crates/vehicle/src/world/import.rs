@@ -87,6 +87,25 @@ impl Picture {
         })
     }
 
+    /// The same map with each cell divided into `parts` x `parts` cells. `None` if these are none or
+    /// too many.
+    #[must_use]
+    pub fn divided(&self, parts: u16) -> Option<Self> {
+        let sides = 1..=Raster::MOST_SIDE;
+        let side = |count: u16| count.checked_mul(parts).filter(|it| sides.contains(it));
+        let (rows, columns) = (side(self.rows)?, side(self.columns)?);
+        let part = |row: u16, column: u16| {
+            let row = usize::from(row / parts);
+            self.cells[row * usize::from(self.columns) + usize::from(column / parts)]
+        };
+        let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| part(row, column)));
+        Some(Self {
+            rows,
+            columns,
+            cells: cells.collect(),
+        })
+    }
+
     /// The map at a position.
     #[must_use]
     pub fn at(&self, name: String, cell: f32, (x, y): (f64, f64)) -> Raster {

@@ -491,6 +491,18 @@ fn pictures_and_text_become_maps_with_north_at_the_top() {
 }
 
 #[test]
+fn a_divided_map_has_several_cells_for_each_one() {
+    let map = Picture::read(b".#\n4.\n").unwrap();
+    let fine = map.divided(2).unwrap();
+    assert_eq!((fine.rows, fine.columns), (4, 4));
+    let [south, north] = [[113, 113, 255, 255], [255, 255, 0, 0]];
+    assert_eq!(fine.cells, [south, south, north, north].concat());
+    assert_eq!(map.divided(1), Some(map.clone()));
+    assert_eq!(map.divided(3000), None);
+    assert_eq!(map.divided(0), None);
+}
+
+#[test]
 fn files_that_are_no_map_are_refused_with_what_is_wrong() {
     let error = |octets: &[u8]| Picture::read(octets).unwrap_err().to_string();
     assert!(error(b"").contains("0 rows"));

@@ -11,6 +11,7 @@ mod tests;
 use std::collections::BTreeMap;
 use std::fmt;
 
+pub(crate) use polygon::distance;
 pub use polygon::{Point, Polygon, PolygonError};
 
 /// A zone, by its role and number.

@@ -155,6 +155,14 @@ fn crosses_ray((x, y): Point, a: Point, b: Point) -> bool {
     (a.0 > x) != (b.0 > x) && y < (b.1 - a.1) * (x - a.0) / (b.0 - a.0) + a.1
 }
 
+/// Distance of a point from the line between two others.
+pub(crate) fn distance(point: Point, a: Point, b: Point) -> f64 {
+    match a == b {
+        true => (point.0 - a.0).hypot(point.1 - a.1),
+        false => squared_distance(point, a, b).sqrt(),
+    }
+}
+
 /// Square of the distance of a point from the edge from `a` to `b`.
 fn squared_distance((x, y): Point, a: Point, b: Point) -> f64 {
     let (dx, dy) = (b.0 - a.0, b.1 - a.1);

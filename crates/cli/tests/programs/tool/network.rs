@@ -5,47 +5,57 @@ use std::fs;
 use crate::support::{Running, jaus, own_group, run};
 
 #[test]
-fn the_demo_drives_a_mission_to_its_end_or_says_why_it_can_not() {
-    let demo = |to| run(&["demo", "--headless", "--seconds", "60", "--to", to], b"");
-    let run = demo("0,2");
-    let mut rest = &*run.stdout;
-    for part in [
-        "system    starts 101.1.35, the communicator",
-        "starts 101.3.36, the planner",
-        "operator  takes control of the planner 101.3.36 with authority 150",
-        "operator  sets the destination x 0 m, y 2 m",
-        "planner   all stages are ready: under way",
-        "planner   arrived",
-        "vehicle   at x",
-        "the vehicle has arrived",
-    ] {
-        let place = rest
-            .find(part)
-            .unwrap_or_else(|| panic!("no `{part}` in {}", run.stdout));
-        rest = &rest[place + part.len()..];
-    }
-    assert!(!run.stdout.contains('\x1b'), "colours are for terminals");
-    assert_eq!((run.status, &*run.stderr), (0, ""));
+fn the_demo_drives_a_mission_round_an_obstacle_or_says_why_it_can_not() {
+    let demo = |flags: &[&str]| {
+        run(
+            &[&["demo", "--headless", "--seconds", "90"], flags].concat(),
+            b"",
+        )
+    };
+    let there = demo(&["--to", "0,2"]);
+    in_order(
+        &there.stdout,
+        &[
+            "system    starts 101.1.35, the communicator",
+            "starts 101.3.36, the planner",
+            "operator  takes control of the planner 101.3.36 with authority 150",
+            "operator  sets the destination x 0 m, y 2 m",
+            "planner   all stages are ready: under way",
+            "planner   arrived",
+            "vehicle   at x",
+            "the vehicle has arrived",
+        ],
+    );
+    assert!(!there.stdout.contains('\x1b'), "colours are for terminals");
+    assert_eq!((there.status, &*there.stderr), (0, ""));
 
     // Afterwards, because all have the same ids on the same loopback interface.
-    let car = [
-        "demo",
-        "--ackermann",
-        "--headless",
-        "--seconds",
-        "60",
-        "--to",
-        "3,4",
-    ];
-    let car = crate::support::run(&car, b"");
-    assert!(car.stdout.contains("the vehicle has arrived"), "{car:?}");
-    assert_eq!((car.status, &*car.stderr), (0, ""));
-
-    let outside = demo("200,0");
-    let said = &outside.stdout;
-    assert!(said.contains("planner   gives up ("), "{said}");
-    assert!(said.contains("has not arrived"), "{said}");
+    let outside = demo(&["--to", "200,0"]);
+    in_order(
+        &outside.stdout,
+        &["planner   gives up (", "has not arrived"],
+    );
     assert_eq!(outside.status, 1);
+
+    for steering in [&[][..], &["--ackermann"]] {
+        let round = demo(steering);
+        let told = [
+            "system    an obstacle appears on the path",
+            "planner   arrived",
+        ];
+        in_order(&round.stdout, &told);
+        assert_eq!((round.status, &*round.stderr), (0, ""));
+    }
+}
+
+/// Checks that the parts are in a text, one after the other.
+fn in_order(text: &str, parts: &[&str]) {
+    let mut rest = text;
+    for part in parts {
+        let place = rest.find(part);
+        let place = place.unwrap_or_else(|| panic!("no `{part}` in {text}"));
+        rest = &rest[place + part.len()..];
+    }
 }
 
 #[test]

@@ -125,3 +125,27 @@ fn a_planned_path_is_clear() {
         assert_eq!(blocked_after(&map, &vehicle, (2.0, 18.0), &path, 0), None);
     }
 }
+
+#[test]
+fn a_path_leads_round_obstacles_that_were_seen_also_from_close_before_them() {
+    let vehicle = Vehicle::default();
+    let seen: Vec<Point> = (0..6)
+        .map(|it| (10.1, 9.0 + 0.25 * f64::from(it)))
+        .collect();
+    for cell in [1.0, 0.25] {
+        for start in [(2.0, 10.0), (9.7, 10.0)] {
+            let map = open(cell).with_obstacles(seen.clone(), vehicle.clearance());
+            let path = plan(&map, &vehicle, start, (18.0, 10.0)).unwrap();
+            let near = |point: &Point| {
+                let near = |(a, b)| crate::zones::distance(*point, a, b);
+                // The first segment may begin closer than the clearance.
+                path.segments()
+                    .skip(1)
+                    .map(near)
+                    .fold(f64::INFINITY, f64::min)
+            };
+            let nearest = seen.iter().map(near).fold(f64::INFINITY, f64::min);
+            assert!(nearest > 0.3, "{cell}, {start:?}: {nearest:.2} m, {path:?}");
+        }
+    }
+}

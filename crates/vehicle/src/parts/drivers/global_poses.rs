@@ -141,6 +141,7 @@ mod tests {
                 limits,
                 stale: Duration::from_millis(600),
                 by_heading: false,
+                needs_scan: false,
             });
             let mut pilot = Pilot::new(remote_platform.clone(), Frame::at(52.5, 13.4));
             pilot.pursue(Goal::Waypoint {

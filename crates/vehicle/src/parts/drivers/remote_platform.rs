@@ -5,6 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::motion::{CommandDeadline, Drive, Freshness, Limits, Motion, Platform, Pose, Velocity};
+use crate::sensing::Scan;
+use crate::zones::Point;
 
 /// Motion and orders of a driver. Cheap to clone; all clones share one state.
 #[derive(Debug, Clone)]
@@ -17,6 +19,10 @@ struct State {
     motion: Motion,
     pose: Freshness,
     velocity: Freshness,
+    /// The scans of the range sensor.
+    scan: Freshness,
+    /// Whether the vehicle must not move without scans.
+    needs_scan: bool,
     order: Option<Order>,
     /// Deadline since the pilot's last control step.
     deadline: CommandDeadline,
@@ -32,6 +38,8 @@ pub(in crate::parts) struct RemotePlatformSettings {
     /// Whether the next driver holds headings. Otherwise it needs velocity commands, which require
     /// velocity measurements.
     pub(in crate::parts) by_heading: bool,
+    /// Whether it needs a range sensor from the start. Otherwise it needs one from its first scan on.
+    pub(in crate::parts) needs_scan: bool,
 }
 
 /// An order to the next driver.
@@ -56,6 +64,9 @@ pub(in crate::parts) enum Plan {
 }
 
 impl RemotePlatform {
+    /// Time from the measurement of a scan to its report in seconds, at a scan rate of 10 Hz.
+    const SCAN_LAG: f64 = 0.1;
+
     pub(in crate::parts) fn new(settings: RemotePlatformSettings) -> Self {
         Self(Arc::new(Mutex::new(State {
             settings,
@@ -63,6 +74,8 @@ impl RemotePlatform {
             motion: Motion::default(),
             pose: Freshness::default(),
             velocity: Freshness::default(),
+            scan: Freshness::default(),
+            needs_scan: settings.needs_scan,
             order: None,
             deadline: CommandDeadline::default(),
         })))
@@ -106,6 +119,32 @@ impl RemotePlatform {
         }
     }
 
+    /// Handles a scan of the range sensor, sampled at `stamp`; `None` if the sensor does not measure.
+    /// Returns the places of the obstacles in the local frame.
+    pub(in crate::parts) fn handle_scan(
+        &self,
+        now: Instant,
+        stamp: Option<Duration>,
+        scan: Option<&Scan>,
+    ) -> Vec<Point> {
+        let mut state = self.lock();
+        let Some(scan) = scan else {
+            state.scan.forget();
+            return Vec::new();
+        };
+        state.needs_scan = true;
+        state.scan.handle(now, stamp);
+        let Motion { pose, velocity, .. } = state.motion;
+        let (way, turn) = (velocity.x * Self::SCAN_LAG, velocity.yaw * Self::SCAN_LAG);
+        let measured_at = Pose {
+            x: pose.x - way * pose.yaw.cos(),
+            y: pose.y - way * pose.yaw.sin(),
+            yaw: pose.yaw - turn,
+            ..pose
+        };
+        scan.hits(measured_at).collect()
+    }
+
     /// The action to take now.
     pub(in crate::parts) fn plan(&self, now: Instant) -> Plan {
         let mut state = self.lock();
@@ -136,6 +175,7 @@ impl State {
         let needs = [
             (&self.pose, "pose", true),
             (&self.velocity, "velocity", !self.settings.by_heading),
+            (&self.scan, "range sensor's scan", self.needs_scan),
         ];
         let mut needs = needs.into_iter().filter(|&(_, _, needed)| needed);
         needs.find_map(|(sensor, what, _)| match sensor.age(now) {
@@ -207,12 +247,14 @@ impl Platform for RemotePlatform {
 )]
 mod tests {
     use super::*;
+    use crate::sensing::Ray;
 
     fn remote_platform(by_heading: bool) -> RemotePlatform {
         RemotePlatform::new(RemotePlatformSettings {
             limits: Limits::default(),
             stale: Duration::from_millis(600),
             by_heading,
+            needs_scan: false,
         })
     }
 
@@ -284,6 +326,57 @@ mod tests {
         let plans: Vec<_> = (10..30).map(|count| plan(count, 9)).collect();
         assert!(matches!(plans[14], Plan::Go(..)), "0.6 s old");
         assert_eq!(wait(&plans[15]), "the pose is 0.6 s old");
+    }
+
+    #[test]
+    fn once_there_was_a_scan_a_silent_or_frozen_range_sensor_is_a_fault() {
+        let mut remote_platform = remote_platform(true);
+        let start = Instant::now();
+        let period = Duration::from_millis(100);
+        let mut plan = |count: u32, stamp: Option<u32>| {
+            let now = start + period * count;
+            remote_platform.handle_time(now);
+            remote_platform.handle_pose(now, None, Some((1.0, 2.0, 0.5)));
+            remote_platform.head(0.0, 1.0);
+            let scan = Scan::default();
+            let at = stamp.map(|stamp| Duration::from_secs(3600) + period * stamp);
+            let places = remote_platform.handle_scan(now, at, at.map(|_| &scan));
+            assert!(places.is_empty());
+            remote_platform.plan(now)
+        };
+        assert!(matches!(plan(0, None), Plan::Go(..)), "no range sensor");
+        for count in 1..10 {
+            assert_eq!(
+                matches!(plan(count, Some(count)), Plan::Go(..)),
+                count > 1,
+                "{count}"
+            );
+        }
+        let frozen: Vec<_> = (10..20).map(|count| plan(count, Some(9))).collect();
+        assert!(matches!(frozen[5], Plan::Go(..)), "0.6 s old");
+        assert_eq!(wait(&frozen[6]), "the range sensor's scan is 0.7 s old");
+        assert_eq!(wait(&plan(20, None)), "no range sensor's scan is known");
+        for count in 21..23 {
+            plan(count, Some(count));
+        }
+        assert!(matches!(plan(23, Some(23)), Plan::Go(..)), "it is back");
+    }
+
+    #[test]
+    fn an_obstacle_is_where_it_was_seen_while_the_vehicle_drives_on() {
+        let remote_platform = remote_platform(false);
+        let now = Instant::now();
+        remote_platform.handle_pose(now, None, Some((3.0, 1.0, std::f64::consts::FRAC_PI_2)));
+        remote_platform.handle_velocity(now, None, Some((2.0, 0.0)));
+        let ahead = Ray {
+            bearing: 0.0,
+            range: 4.0,
+        };
+        let places = remote_platform.handle_scan(now, None, Some(&Scan::new([ahead])));
+        let [(x, y)] = places[..] else {
+            panic!("{places:?}");
+        };
+        assert!((x - 3.0).abs() < 1e-9 && (y - 4.8).abs() < 1e-9, "{x}, {y}");
     }
 
     #[test]

@@ -6,9 +6,16 @@ use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
 use super::{GlobalPoses, RemotePlatform};
-use crate::ground::reported_zones;
+use crate::ground::{reported_scan, reported_zones};
+use crate::messages::environment_sensing::query_range_sensor_data::{
+    QueryRangeSensorDataRec, ReportCoordinateSystem,
+};
+use crate::messages::environment_sensing::{
+    QueryRangeSensorData, ReportRangeSensorData, range_sensor,
+};
 use crate::motion::{Fence, Freshness, Pose};
 use crate::parts::PartError;
+use crate::sensing::Scan;
 use crate::zones::Zones;
 use jaus::address::JausId;
 use jaus::codec::{Message, Query};
@@ -89,6 +96,15 @@ impl<R: Message> Sense<R> {
     }
 }
 
+/// The pose in a report; `None` if the sensor does not know it.
+pub(in crate::parts) fn reported_pose(report: &ReportLocalPose) -> Option<Pose> {
+    let place = report.x_m().zip(report.y_m()).zip(report.yaw_rad());
+    place.map(|((x, y), yaw)| Pose {
+        yaw,
+        ..Pose::at(x, y)
+    })
+}
+
 impl Sense<ReportLocalPose> {
     /// The pose in the local frame.
     pub(in crate::parts) fn pose(component: &Component, hz: f64) -> Result<Self, PartError> {
@@ -111,9 +127,9 @@ impl Sense<ReportLocalPose> {
             if self.take_loss() {
                 remote_platform.handle_pose(now, None, None);
             }
-            let place = report.x_m().zip(report.y_m()).zip(report.yaw_rad());
+            let pose = reported_pose(&report).map(|it| (it.x, it.y, it.yaw));
             let stamp = report.time_stamp.and_then(time_in_month);
-            remote_platform.handle_pose(now, stamp, place.map(|((x, y), yaw)| (x, y, yaw)));
+            remote_platform.handle_pose(now, stamp, pose);
         }
     }
 }
@@ -124,20 +140,57 @@ impl Sense<ReportLocalPose> {
         let mut freshness = Freshness::default();
         loop {
             let report = self.next().await?;
-            let place = report.x_m().zip(report.y_m()).zip(report.yaw_rad());
+            let pose = reported_pose(&report);
             let stamp = report.time_stamp.and_then(time_in_month);
-            if self.take_loss() || place.is_none() {
+            if self.take_loss() || pose.is_none() {
                 freshness.forget();
                 fence.handle_pose(None);
             }
             let sampled_at = freshness.handle(Instant::now(), stamp);
-            if let Some((((x, y), yaw), sampled_at)) = place.zip(sampled_at) {
-                let pose = Pose {
-                    yaw,
-                    ..Pose::at(x, y)
-                };
-                fence.handle_pose(Some((pose, sampled_at)));
+            if let Some(located) = pose.zip(sampled_at) {
+                fence.handle_pose(Some(located));
             }
+        }
+    }
+}
+
+impl Sense<ReportRangeSensorData> {
+    /// Scans of the range sensor in the vehicle's coordinates.
+    pub(in crate::parts) fn scans(component: &Component, hz: f64) -> Result<Self, PartError> {
+        let query = QueryRangeSensorData {
+            query_range_sensor_data_list: vec![QueryRangeSensorDataRec {
+                report_coordinate_system: ReportCoordinateSystem::VEHICLE_COORDINATE_SYSTEM,
+                ..QueryRangeSensorDataRec::default()
+            }],
+        };
+        Self::of(component, range_sensor::URN, &query, hz, "scans")
+    }
+
+    /// Waits for the next report of a sensor: its scan and time stamp, or `None` while it does not
+    /// measure.
+    pub(in crate::parts) async fn next_scan(
+        &mut self,
+    ) -> Result<Option<(Option<Duration>, Scan)>, PartError> {
+        let report = self.next().await?;
+        let scan = reported_scan(&report);
+        Ok(scan.map(|(stamp, scan)| (time_in_month(TimeStamp(stamp.0)), scan)))
+    }
+
+    /// Passes all scans to a remote platform, and the obstacles to a fence.
+    pub(in crate::parts) async fn watch(
+        mut self,
+        remote_platform: &RemotePlatform,
+        fence: &Fence,
+    ) -> Result<Infallible, PartError> {
+        loop {
+            let scan = self.next_scan().await?;
+            let now = Instant::now();
+            if self.take_loss() {
+                remote_platform.handle_scan(now, None, None);
+            }
+            let stamp = scan.as_ref().and_then(|(stamp, _)| *stamp);
+            let scan = scan.as_ref().map(|(_, scan)| scan);
+            fence.set_obstacles(remote_platform.handle_scan(now, stamp, scan));
         }
     }
 }

@@ -1,16 +1,22 @@
 //! Monitoring of one driver of the chain: its stage, its controller and emergencies.
-#![expect(clippy::disallowed_methods, reason = "waits for a lost driver")]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "waits for a lost driver, and stamps the arrival of scans"
+)]
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc;
 
 use super::find;
+use crate::messages::environment_sensing::ReportRangeSensorData;
 use crate::messages::ground::report_stage::State;
 use crate::messages::ground::{QueryStage, ReportStage, stage};
-use crate::mission::{Link, LinkState, Point};
+use crate::mission::{Link, LinkState};
+use crate::motion::{Freshness, Pose};
 use crate::parts::PartError;
-use crate::parts::drivers::Sense;
+use crate::parts::drivers::{Sense, reported_pose};
+use crate::sensing::Scan;
 use jaus::address::JausId;
 use jaus::codec::Query;
 use jaus::component::{Component, Subscription, Update, When};
@@ -23,8 +29,10 @@ use jaus::messages::mobility::{
 /// An event of a driver of the chain.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum News {
-    /// The vehicle's position in the local frame.
-    Pose(Point),
+    /// The vehicle's position in the local frame, and its heading.
+    Pose(Pose),
+    /// A scan of the range sensor.
+    Scan(Scan),
     /// The driver was found or lost.
     Found(Link, Option<JausId>),
     /// The driver's stage, and the completed part of its command from 0 to 100 %.
@@ -77,8 +85,26 @@ pub(super) async fn follow(
 ) -> Result<(), PartError> {
     loop {
         let report = poses.next().await?;
-        if let Some(point) = report.x_m().zip(report.y_m())
-            && tell.send(News::Pose(point)).await.is_err()
+        if let Some(pose) = reported_pose(&report)
+            && tell.send(News::Pose(pose)).await.is_err()
+        {
+            return Ok(());
+        }
+    }
+}
+
+/// Passes on the scans of the range sensor, each once. Ends when the component has stopped.
+pub(super) async fn look_around(
+    mut scans: Sense<ReportRangeSensorData>,
+    tell: &mpsc::Sender<News>,
+) -> Result<(), PartError> {
+    let mut freshness = Freshness::default();
+    loop {
+        let Some((stamp, scan)) = scans.next_scan().await? else {
+            continue;
+        };
+        if freshness.handle(Instant::now(), stamp).is_some()
+            && tell.send(News::Scan(scan)).await.is_err()
         {
             return Ok(());
         }

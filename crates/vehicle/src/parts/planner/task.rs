@@ -19,9 +19,9 @@ use super::{PATIENCE, Planner, find_soon, hand_over};
 use crate::ground::Missions;
 use crate::messages::ground::{QueryMission, QueryPlannedPath, QueryStage, ReportStage, stage};
 use crate::mission::{
-    self, Action, Destination, Link, LinkState, Mission, NotPlanned, Path, Point, Run, Stage,
-    Terrain,
+    self, Action, Destination, Link, LinkState, Mission, NotPlanned, Path, Run, Stage, Terrain,
 };
+use crate::sensing::Lookout;
 use crate::zones::Zones;
 use jaus::address::JausId;
 use jaus::component::{
@@ -55,8 +55,8 @@ pub(super) struct PlannerTask<'a> {
     /// The session with the path segment driver during a mission.
     session: Option<Session>,
     job: Option<Job>,
-    /// The vehicle's position.
-    here: Option<Point>,
+    /// The vehicle's pose, and the obstacles around it.
+    lookout: Lookout,
     /// The survey under way, and when the next one begins.
     survey: Option<Job>,
     survey_at: Option<Instant>,
@@ -85,7 +85,7 @@ impl<'a> PlannerTask<'a> {
             zones: Arc::default(),
             session: None,
             job: None,
-            here: None,
+            lookout: Lookout::default(),
             survey: None,
             survey_at: None,
             peers: [None; 3],
@@ -113,6 +113,7 @@ impl<'a> PlannerTask<'a> {
                 () = until(self.survey_at) => {
                     self.survey_at = None;
                     self.survey = self.survey();
+                    self.check_obstacles().await;
                 }
                 news = news.recv() => match news {
                     Some(news) => self.hear(news).await,
@@ -211,6 +212,7 @@ impl<'a> PlannerTask<'a> {
         let vehicle = self.settings.vehicle;
         let terrain = self.map.as_ref().map(|map| Arc::clone(&map.terrain));
         let zones = Arc::clone(&self.zones);
+        let obstacles = self.lookout.obstacles();
         Box::pin(async move {
             let passing = |reason| NotPlanned {
                 reason,
@@ -222,7 +224,9 @@ impl<'a> PlannerTask<'a> {
             };
             let plan = move || {
                 let terrain = terrain.ok_or_else(|| passing("there is no map".to_owned()))?;
-                let terrain = Terrain::clone(&terrain).within(zones);
+                let terrain = Terrain::clone(&terrain)
+                    .within(zones)
+                    .with_obstacles(obstacles, vehicle.clearance());
                 Ok(mission::plan(&terrain, &vehicle, start, (to.x, to.y))?)
             };
             let planned = tokio::task::spawn_blocking(plan).await;
@@ -258,6 +262,7 @@ impl<'a> PlannerTask<'a> {
         let (report, _) = self.missions.tell(|mission| mission.report().stage);
         if !report.is_handed_over() {
             (self.survey, self.survey_at) = (None, None);
+            self.lookout.begin();
         } else if self.survey.is_none() && self.survey_at.is_none() {
             self.survey_at = Instant::now().checked_add(survey::PERIOD);
         }
@@ -275,7 +280,7 @@ impl<'a> PlannerTask<'a> {
         });
         let way = UnderWay {
             vehicle: self.settings.vehicle,
-            here: self.here?,
+            here: self.lookout.here()?,
             segment: UnderWay::segment(&path, progress),
             path,
         };
@@ -283,6 +288,22 @@ impl<'a> PlannerTask<'a> {
         Some(Box::pin(async move {
             Done::Surveyed(run, known.make(&component, &name, way).await)
         }))
+    }
+
+    /// Has another path planned when there is an obstacle on this one. The drivers stop before it in
+    /// any case.
+    async fn check_obstacles(&mut self) {
+        let ((report, path), _) = self
+            .missions
+            .tell(|mission| (mission.report().clone(), Arc::clone(mission.path())));
+        let segment = UnderWay::segment(&path, report.progress);
+        let ahead = path.points().iter().skip(segment + 1).copied();
+        let radius = self.settings.vehicle.width / 2.0;
+        if self.lookout.sees_blocked(ahead, radius) {
+            let why = "the range sensor sees an obstacle on the path";
+            self.tell(|mission, now| mission.handle_blocked_path(now, report.run, why))
+                .await;
+        }
     }
 
     async fn handle(&mut self, done: Done) {
@@ -332,10 +353,12 @@ impl<'a> PlannerTask<'a> {
 
     async fn hear(&mut self, news: News) {
         match news {
-            News::Pose(point) => {
-                self.here = Some(point);
-                self.tell(|mission, _| mission.handle_pose(point)).await;
+            News::Pose(pose) => {
+                self.lookout.handle_pose(pose);
+                self.tell(|mission, _| mission.handle_pose((pose.x, pose.y)))
+                    .await;
             }
+            News::Scan(scan) => self.lookout.handle_scan(Instant::now(), &scan),
             News::Found(link, peer) => self.peers[link as usize] = peer,
             News::Stage(link, state, progress) => {
                 self.tell(|mission, now| {

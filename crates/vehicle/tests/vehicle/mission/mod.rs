@@ -14,5 +14,6 @@
 
 mod fake;
 mod missions;
+mod obstacles;
 mod whole;
 pub(crate) mod zones;

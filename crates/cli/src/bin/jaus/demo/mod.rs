@@ -3,6 +3,7 @@
 
 mod operator;
 mod story;
+mod surprise;
 mod system;
 
 use std::time::Duration;
@@ -15,12 +16,13 @@ use jaus_cli::runtime;
 use jaus_ocu::Station;
 use jaus_vehicle::motion::Ackermann;
 use jaus_vehicle::parts::{
-    Communicator, DEBUG_ADDRESS, PathDriver, Planner, PoseSensor, PrimitiveDriver, SteeringGear,
-    VectorDriver, VelocitySensor,
+    Communicator, DEBUG_ADDRESS, PathDriver, Planner, PoseSensor, PrimitiveDriver, RangeSensor,
+    SteeringGear, VectorDriver, VelocitySensor,
 };
 
 use operator::{Ending, Operator};
 use story::{Story, Who};
+use surprise::Surprise;
 use system::{OPERATOR, System, VEHICLE};
 
 /// Run a whole vehicle on this computer and watch it drive a mission on the operator's page
@@ -46,7 +48,7 @@ pub(crate) struct Demo {
     headless: bool,
 
     /// The destination: NORTH,EAST of the start in metres
-    #[arg(long, value_name = "X,Y", default_value = "6,5", value_parser = place, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y", default_value = "6,6.5", value_parser = place, allow_hyphen_values = true)]
     to: (f64, f64),
 
     /// Steer the front wheels, as in a car, instead of turning on the spot
@@ -74,11 +76,15 @@ impl Demo {
             self.opening(&mut story)?;
             let mut system = System::new();
             let started = self.start(&mut system, &mut story).await;
+            let surprise = Surprise {
+                scenery: system.scenery(),
+                vehicle: self.planner().vehicle,
+            };
             let outcome = match started {
                 Ok(operator) => tokio::select! {
                     failure = system.failure() => Err(failure),
                     () = runtime::end(self.seconds) => Ok(None),
-                    outcome = self.play(operator, &mut story) => outcome.map(Some),
+                    outcome = self.play(operator, surprise, &mut story) => outcome.map(Some),
                 },
                 Err(failure) => Err(failure),
             };
@@ -105,8 +111,7 @@ impl Demo {
 
     /// Starts everything; returns the operator's component.
     async fn start(&self, system: &mut System, story: &mut Story) -> Result<Component, Failure> {
-        let geometry = self.ackermann.then_some(CAR);
-        let radius = geometry.map_or(0.0, |it| it.turning_radius());
+        let radius = self.turning_radius();
         let vehicle = system.node(VEHICLE, 1)?;
         start_part(
             system,
@@ -123,7 +128,7 @@ impl Demo {
             &wheels,
             33,
             "primitive driver",
-            PrimitiveDriver::default().steering(geometry.map(SteeringGear::simulated)),
+            PrimitiveDriver::default().steering(self.geometry().map(SteeringGear::simulated)),
         )?;
         start_part(
             system,
@@ -141,6 +146,11 @@ impl Demo {
             "local pose sensor",
             PoseSensor::default(),
         )?;
+        let sensor = RangeSensor {
+            scenery: system.scenery(),
+            ..RangeSensor::default()
+        };
+        start_part(system, story, &wheels, 51, "range sensor", sensor)?;
         let mind = system.node(VEHICLE, 3)?;
         start_part(
             system,
@@ -166,11 +176,7 @@ impl Demo {
             "vector knowledge store",
             system.store(),
         )?;
-        let mut planner = Planner::default().turning_radius(radius);
-        if self.ackermann {
-            planner.vehicle.width = CAR_WIDTH;
-        }
-        start_part(system, story, &mind, 36, "planner", planner)?;
+        start_part(system, story, &mind, 36, "planner", self.planner())?;
         let desk = system.node(OPERATOR, 1)?;
         if !self.headless {
             let station = Station::default().open().await.map_err(Failure::of)?;
@@ -186,6 +192,23 @@ impl Demo {
             .map_err(Failure::of)
     }
 
+    /// The geometry of the steering, if the front wheels are steered.
+    fn geometry(&self) -> Option<Ackermann> {
+        self.ackermann.then_some(CAR)
+    }
+
+    fn turning_radius(&self) -> f64 {
+        self.geometry().map_or(0.0, |it| it.turning_radius())
+    }
+
+    fn planner(&self) -> Planner {
+        let mut planner = Planner::default().turning_radius(self.turning_radius());
+        if self.ackermann {
+            planner.vehicle.width = CAR_WIDTH;
+        }
+        planner
+    }
+
     /// With the debug view, unless another program uses its port.
     fn communicator(&self) -> Communicator {
         Communicator {
@@ -195,7 +218,12 @@ impl Demo {
     }
 
     /// Plays the operator.
-    async fn play(&self, component: Component, story: &mut Story) -> Result<Ending, Failure> {
+    async fn play(
+        &self,
+        component: Component,
+        surprise: Surprise,
+        story: &mut Story,
+    ) -> Result<Ending, Failure> {
         if self.stay {
             story.tell(
                 Who::Operator,
@@ -203,7 +231,9 @@ impl Demo {
             )?;
             std::future::pending::<()>().await;
         }
-        let ending = Operator::new(component, story).drive(self.to).await?;
+        let ending = Operator::new(component, surprise, story)
+            .drive(self.to)
+            .await?;
         if !self.headless {
             story.tell(
                 Who::Operator,

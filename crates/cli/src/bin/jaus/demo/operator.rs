@@ -13,6 +13,7 @@ use jaus_vehicle::messages::ground::{
 };
 
 use super::story::{Story, Who};
+use super::surprise::Surprise;
 
 /// Below the page's authority, which is 200, so that a person can always take over.
 const AUTHORITY: u8 = 150;
@@ -30,12 +31,18 @@ pub(super) enum Ending {
 
 pub(super) struct Operator<'s> {
     component: Component,
+    /// The obstacle that has not appeared yet.
+    surprise: Option<Surprise>,
     story: &'s mut Story,
 }
 
 impl<'s> Operator<'s> {
-    pub(super) fn new(component: Component, story: &'s mut Story) -> Self {
-        Self { component, story }
+    pub(super) fn new(component: Component, surprise: Surprise, story: &'s mut Story) -> Self {
+        Self {
+            component,
+            surprise: Some(surprise),
+            story,
+        }
     }
 
     /// Has the vehicle drive to a place in its local frame, in metres, and waits for the end.
@@ -103,6 +110,7 @@ impl<'s> Operator<'s> {
             told = Some(report.stage);
             self.tell_stage(planner, &report).await?;
             match report.stage {
+                Stage::DRIVING => self.put_obstacle(planner, sensor).await?,
                 Stage::ARRIVED => {
                     self.tell_pose(sensor).await?;
                     return Ok(Ending::Arrived);
@@ -153,6 +161,33 @@ impl<'s> Operator<'s> {
             Ok(pieces) if pieces > 1 => format!("a path of {pieces} pieces"),
             _ => "the path".to_owned(),
         }
+    }
+
+    /// Puts the obstacle on the path, if it has not appeared yet.
+    async fn put_obstacle(&mut self, planner: JausId, sensor: JausId) -> Result<(), Failure> {
+        let Some(surprise) = self.surprise.take() else {
+            return Ok(());
+        };
+        let path = self.component.query(planner, &QueryPlannedPath {}).await;
+        let query = QueryLocalPose::none().with_x().with_y();
+        let pose = self.component.query(sensor, &query).await;
+        let (Ok(path), Ok(pose)) = (path, pose) else {
+            return Ok(());
+        };
+        let path: Vec<_> = path.point_list.iter().map(|it| (it.x, it.y)).collect();
+        let here = pose.x_m().zip(pose.y_m());
+        let Some(here) = here else {
+            return Ok(());
+        };
+        // It plans many paths; the parts of the vehicle must go on meanwhile.
+        let putting = tokio::task::spawn_blocking(move || surprise.put(&path, here));
+        let Ok(Some((x, y))) = putting.await else {
+            return Ok(());
+        };
+        self.tell(
+            Who::System,
+            format!("an obstacle appears on the path, at x {x:.1} m, y {y:.1} m"),
+        )
     }
 
     async fn tell_pose(&mut self, sensor: JausId) -> Result<(), Failure> {

@@ -10,6 +10,7 @@ use jaus::component::Kind;
 use jaus::node::{Config, Node};
 use jaus_cli::failure::Failure;
 use jaus_vehicle::parts::{KnowledgeStore, Part, PartError, Slot};
+use jaus_vehicle::sensing::Scenery;
 use tokio::task::JoinSet;
 
 /// The operator's subsystem.
@@ -24,6 +25,8 @@ pub(super) struct System {
     nodes: Vec<Node>,
     /// File of the knowledge store, kept as long as the demo runs.
     scratch: Scratch,
+    /// What the range sensor sees.
+    scenery: Scenery,
     parts: JoinSet<(&'static str, PartError)>,
 }
 
@@ -35,6 +38,7 @@ impl System {
             scratch: Scratch(
                 std::env::temp_dir().join(format!("jaus-demo-{}.redb", process::id())),
             ),
+            scenery: Scenery::default(),
             parts: JoinSet::new(),
         }
     }
@@ -43,9 +47,14 @@ impl System {
     pub(super) fn store(&self) -> KnowledgeStore {
         KnowledgeStore {
             file: self.scratch.0.clone(),
-            map: Some(KnowledgeStore::demo_map()),
+            map: Some(KnowledgeStore::fine_demo_map()),
             ..KnowledgeStore::default()
         }
+    }
+
+    /// The obstacles around the vehicle.
+    pub(super) fn scenery(&self) -> Scenery {
+        self.scenery.clone()
     }
 
     /// Adds a node on loopback.

@@ -2,11 +2,12 @@
 
 use std::sync::mpsc;
 
-use jaus::component::{Builder, Component, Kind};
+use jaus::component::{AccessControl, Builder, Component, Kind};
 use jaus::link::Group;
 use jaus::node::{Config, Node};
 use jaus::service::Management;
-use jaus_vehicle::ground::StageBoard;
+use jaus_vehicle::ground::{RangeSensor, StageBoard};
+use jaus_vehicle::sensing::{RangerConfig, Ray, Scan};
 
 use crate::support::run;
 use crate::tool::judge::peer::network;
@@ -22,6 +23,30 @@ fn a_service_of_the_ground_vehicle_passes_its_steps() {
     let stage = |component: Builder| component.offer(StageBoard::default().service());
     let judged = judge(stage, &["--service", "Stage"]);
     assert!(judged.contains("QueryStage is answered"), "{judged}");
+}
+
+#[test]
+fn a_range_sensor_passes_its_steps() {
+    let sensor = |component: Builder| {
+        let sensor = RangeSensor::new(RangerConfig::default(), 10.0);
+        let rays = [-0.5, 0.0, 0.5].map(|bearing| Ray {
+            bearing,
+            range: 3.0,
+        });
+        sensor.publish(Some(&Scan::new(rays)), std::time::UNIX_EPOCH);
+        component
+            .access_control(AccessControl::new())
+            .offer(sensor.service())
+    };
+    let judged = judge(sensor, &["--service", "RangeSensor"]);
+    for query in [
+        "QueryRangeSensorData",
+        "QueryRangeSensorCapabilities",
+        "QueryRangeSensorConfiguration",
+        "QuerySensorGeometricProperties",
+    ] {
+        assert!(judged.contains(&format!("{query} is answered")), "{judged}");
+    }
 }
 
 /// Judges a component with these services, and returns the report. No step may fail.

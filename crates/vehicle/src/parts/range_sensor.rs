@@ -1,0 +1,66 @@
+//! The range sensor (component 51), simulated: measures round obstacles around the vehicle's pose.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "gives the sensor its clock and timer"
+)]
+
+use std::convert::Infallible;
+use std::time::{Duration, SystemTime};
+
+use tokio::time::timeout;
+
+use super::drivers::{Sense, reported_pose};
+use super::{Part, PartError, Slot};
+use crate::ground;
+use crate::messages::environment_sensing::QueryRangeSensorData;
+use crate::sensing::{RangerConfig, Scenery, SimulatedRanger};
+use jaus::component::AccessControl;
+
+/// Measures the distances to the obstacles of a simulation, as seen from the vehicle's pose.
+///
+/// It offers Range Sensor, with Access Control. It finds the pose sensor in its own subsystem,
+/// measures with each of its reports, and does not measure without a pose.
+#[derive(Debug, Clone)]
+pub struct RangeSensor {
+    /// Parameters of the sensor.
+    pub ranger: RangerConfig,
+    /// The obstacles.
+    pub scenery: Scenery,
+    /// Measurements per second.
+    pub hz: f64,
+}
+
+impl Default for RangeSensor {
+    fn default() -> Self {
+        Self {
+            ranger: RangerConfig::default(),
+            scenery: Scenery::default(),
+            hz: 10.0,
+        }
+    }
+}
+
+/// How long a pose counts without a new one.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+impl Part for RangeSensor {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
+        let sensor = ground::RangeSensor::new(self.ranger, self.hz);
+        let mut ranger = SimulatedRanger::new(self.ranger, self.scenery);
+        let component = slot
+            .component("Range Sensor")
+            .access_control(AccessControl::new())
+            .offer(sensor.service())
+            .live_on(slot.port)?;
+        let mut poses = Sense::pose(&component, self.hz)?;
+        loop {
+            let pose = match timeout(PATIENCE, poses.next()).await {
+                Ok(report) => reported_pose(&report?),
+                Err(_) => None,
+            };
+            let scan = pose.map(|pose| ranger.scan(&pose));
+            sensor.publish(scan.as_ref(), SystemTime::now());
+            component.changed::<QueryRangeSensorData>().await;
+        }
+    }
+}
