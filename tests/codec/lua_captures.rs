@@ -156,5 +156,5 @@ fn tshark_finds_the_messages_and_faults_that_our_own_reading_finds() {
         assert_eq!(theirs.len(), ours.len(), "{}", file.display());
     }
     println!("{total} messages in all");
-    assert!(total > 5000, "the captures have more messages than {total}");
+    assert!(total > 1000, "the captures have more messages than {total}");
 }
