@@ -16,7 +16,7 @@
 //! allocates new shared octets.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a benchmark")]
 
-mod hand;
+mod handwritten;
 mod samples;
 
 use std::hint::black_box;
@@ -106,8 +106,8 @@ fn benches(criterion: &mut Criterion) {
     by_hand(
         &mut group,
         &samples::pose32(),
-        hand::Pose::decode,
-        hand::Pose::encode,
+        handwritten::Pose::decode,
+        handwritten::Pose::encode,
     );
     group.finish();
 
@@ -124,9 +124,9 @@ fn benches(criterion: &mut Criterion) {
     by_hand(
         &mut group,
         &samples::services(),
-        hand::services::decode,
+        handwritten::services::decode,
         |nodes, buffer| {
-            hand::services::encode(nodes, buffer);
+            handwritten::services::encode(nodes, buffer);
         },
     );
     group.finish();
@@ -136,8 +136,8 @@ fn benches(criterion: &mut Criterion) {
     by_hand(
         &mut group,
         &samples::elements(),
-        hand::Elements::decode,
-        hand::Elements::encode,
+        handwritten::Elements::decode,
+        handwritten::Elements::encode,
     );
     group.finish();
 

@@ -199,6 +199,7 @@ fn start_sensor(subsystem: u16, scenery: Scenery) -> (Node, JoinHandle<()>) {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_mission_drives_round_an_obstacle_that_appears_on_its_way() {
+    let _turn = super::turn().await;
     let scene = Scene::under_way(1141).await;
     let disc = Disc {
         middle: scene.before_the_end(2.0).await,
@@ -216,6 +217,7 @@ async fn a_mission_drives_round_an_obstacle_that_appears_on_its_way() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_mission_without_a_way_round_stops_before_the_obstacles_and_says_why() {
+    let _turn = super::turn().await;
     let scene = Scene::under_way(1143).await;
     // A ring around the destination.
     let post = |number: u32| {
@@ -238,6 +240,7 @@ async fn a_mission_without_a_way_round_stops_before_the_obstacles_and_says_why()
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_mission_stops_when_its_range_sensor_dies_and_says_why() {
+    let _turn = super::turn().await;
     let scene = Scene::under_way(1145).await;
     scene.sensor.1.abort();
     let stopped = async {

@@ -43,6 +43,7 @@ fn told(steps: &[Step]) -> String {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_mission_goes_through_the_whole_chain_though_the_path_driver_dies_on_the_way() {
+    let _turn = super::turn().await;
     let directory = Directory::new("restart");
     let mut alone = Alone::start(1111, &directory.0, None).unwrap();
     let (node, tester) = tester(1112).await;
@@ -72,6 +73,7 @@ async fn a_mission_goes_through_the_whole_chain_though_the_path_driver_dies_on_t
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_vehicle_with_steered_wheels_drives_the_same_mission() {
+    let _turn = super::turn().await;
     let directory = Directory::new("steered");
     let steering = Some(Ackermann::default());
     let alone = Alone::start(1113, &directory.0, steering).unwrap();

@@ -101,6 +101,7 @@ pub(crate) fn square((x, y): Point, half: f64) -> [Point; 4] {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_mission_drives_round_a_zone_that_is_set_on_its_way() {
+    let _turn = super::turn().await;
     let scene = Scene::new(1121).await;
     let store = scene.control(61).await;
     let planner = scene.control(36).await;
@@ -166,6 +167,7 @@ async fn a_mission_drives_round_a_zone_that_is_set_on_its_way() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn full_effort_by_hand_ends_before_a_zone() {
+    let _turn = super::turn().await;
     let scene = Scene::new(1131).await;
     let store = scene.control(61).await;
     store

@@ -9,9 +9,9 @@ use crate::support::run;
 use crate::tool::judge::peer::{Peer, free_port, network};
 
 /// A test's own file, removed when dropped.
-struct Paper(PathBuf);
+struct OutputFile(PathBuf);
 
-impl Paper {
+impl OutputFile {
     fn new(name: &str) -> Self {
         Self(std::env::temp_dir().join(format!("jaus-judge-{}-{name}", std::process::id())))
     }
@@ -25,7 +25,7 @@ impl Paper {
     }
 }
 
-impl Drop for Paper {
+impl Drop for OutputFile {
     fn drop(&mut self) {
         let _ = fs::remove_file(&self.0);
     }
@@ -60,7 +60,11 @@ fn a_run_is_written_down_in_every_form_that_is_asked_for() {
     let flags = network();
     let _peer = Peer::offering(&[liveness::URN, access_control::URN]).start(&flags);
     let network: Vec<&str> = flags.iter().map(String::as_str).collect();
-    let (json, junit, record) = (Paper::new("json"), Paper::new("xml"), Paper::new("pcapng"));
+    let (json, junit, record) = (
+        OutputFile::new("json"),
+        OutputFile::new("xml"),
+        OutputFile::new("pcapng"),
+    );
     let json_flag = format!("--json={}", json.path());
     let port = free_port().to_string();
     let judge = [
