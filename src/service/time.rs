@@ -57,8 +57,7 @@ impl TimeOfDay {
         }
     }
 
-    /// [`now`](Self::now) as the time of a sample, for example for
-    /// [`Component::publish`](crate::component::Component::publish).
+    /// [`now`](Self::now) as the time of a sample, as `Component::publish` takes it.
     #[must_use]
     pub fn system_time(&self) -> SystemTime {
         UNIX_EPOCH + self.now()
