@@ -1,9 +1,5 @@
 //! The global pose sensor: position and heading on the globe from a GNSS receiver, a gyroscope and
 //! wheel travel.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "gives the sensor its clock and timer"
-)]
 
 use std::convert::Infallible;
 use std::time::{Duration, Instant};

@@ -1,9 +1,5 @@
 //! The primitive driver: wrench efforts for the drives of a vehicle and its steering, and wheel
 //! odometry.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "supervises the motors in real time"
-)]
 
 use std::convert::Infallible;
 use std::hash::{BuildHasher, Hasher, RandomState};

@@ -1,7 +1,5 @@
 //! Sensor input: subscriptions to a service of the own subsystem, with rediscovery after loss.
 
-#![expect(clippy::disallowed_methods, reason = "stamps the arrival of reports")]
-
 use std::convert::Infallible;
 use std::time::Duration;
 
