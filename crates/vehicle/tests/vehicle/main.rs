@@ -7,3 +7,4 @@ mod scene;
 mod store;
 mod vehicle_hostile;
 mod waterfall;
+mod whole_vehicle;

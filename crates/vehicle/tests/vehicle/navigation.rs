@@ -11,7 +11,7 @@
 
 use std::fs::File;
 use std::io::Write;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::component::{Control, State};
@@ -19,6 +19,7 @@ use jaus::messages::mobility::{
     QueryGlobalPose, ReportGlobalPose, SetGlobalVector, SetGlobalWaypoint, SetTravelSpeed,
     global_waypoint_driver, local_operating_zone,
 };
+use jaus::node::now;
 use jaus_vehicle::ground::StageState;
 use jaus_vehicle::messages::ground::QueryWheelOdometry;
 use jaus_vehicle::motion::{Ackermann, DeadReckoning, Frame, Pose, WheelCount};
@@ -31,10 +32,9 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use tokio::sync::{mpsc, watch};
 
 use crate::mission::zones::{keep_out, square};
-use crate::scene::{POSE, PRIMITIVE, Running, Scene, VELOCITY};
+use crate::scene::{POSE, PRIMITIVE, Running, STORE, Scene, VELOCITY};
 
 const GLOBAL_POSE: JausId = JausId::new(101, 43, 43);
-const STORE: JausId = JausId::new(101, 61, 61);
 const DRIVER: JausId = JausId::new(101, 46, 46);
 
 fn here() -> Frame {
@@ -66,7 +66,7 @@ async fn a_receiver_on_a_serial_line_gives_a_position_that_does_not_outlive_its_
     let mut simulated = SimulatedReceiver::default();
     // Between good sentences: noise, half a sentence, a wrong checksum, no fix.
     let mut good = move || {
-        let now = Instant::now();
+        let now = now();
         let good = simulated.fix(now, &place, None);
         let wrong = good.replace("5230", "5231");
         let no_fix = simulated.no_fix(now);
@@ -120,7 +120,7 @@ impl Sky {
             let truth = self.reckoning.pose();
             self.truth.send_replace(truth);
             let seen = Pose::at(truth.x, truth.y + *self.offset.borrow());
-            let sentence = simulated.fix(Instant::now(), &here().to_global(&seen), None);
+            let sentence = simulated.fix(now(), &here().to_global(&seen), None);
             if self.octets.send(sentence.into_bytes()).await.is_err() {
                 return;
             }
@@ -199,7 +199,7 @@ fn north() -> SetGlobalVector {
     vector
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_vehicle_drives_to_a_waypoint_on_the_globe_and_stops_when_its_position_jumps() {
     for geometry in [None, Some(Ackermann::default())] {
         let scene = Scene::new();
@@ -245,7 +245,7 @@ async fn a_vehicle_drives_to_a_waypoint_on_the_globe_and_stops_when_its_position
     }
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn on_the_globe_it_stops_before_a_zone_also_when_the_store_is_dead() {
     let scene = Scene::new();
     let globe = Globe::start(&scene, Pose::default(), None);

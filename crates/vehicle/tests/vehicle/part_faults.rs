@@ -37,7 +37,7 @@ fn ahead() -> SetWrenchEffort {
     effort
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_motor_fault_stops_both_sides_and_is_a_failure_until_it_is_gone() {
     let scene = Scene::new();
     let [left, right] = [(); 2].map(|()| SimulatedMotor::new(MotorConfig::default()));
@@ -88,7 +88,7 @@ async fn a_motor_fault_stops_both_sides_and_is_a_failure_until_it_is_gone() {
     running.stop().await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_sensor_that_stays_away_is_a_failure_of_the_driver_until_it_is_back() {
     let scene = Scene::new();
     let wheels = scene.start(PRIMITIVE, |slot| PrimitiveDriver::default().run(slot));
@@ -130,7 +130,7 @@ async fn a_sensor_that_stays_away_is_a_failure_of_the_driver_until_it_is_back() 
     }
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_fault_of_the_steering_stops_the_drive_and_is_a_failure() {
     let scene = Scene::new();
     let servo = SimulatedServo::new(SimulatedServo::RATE);
@@ -171,7 +171,7 @@ async fn a_fault_of_the_steering_stops_the_drive_and_is_a_failure() {
     running.stop().await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
     let scene = Scene::new();
     let [left, right] = [(); 2].map(|()| {
@@ -229,7 +229,7 @@ impl Actuator for Shown {
     }
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn motors_are_commanded_to_stop_when_the_part_is_stopped() {
     let scene = Scene::new();
     let last = std::sync::Arc::<std::sync::Mutex<jaus_vehicle::actuator::Command>>::default();
@@ -325,7 +325,7 @@ async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_st
     std::fs::remove_dir_all(&directory).unwrap();
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_part_ends_when_the_client_in_control_shuts_it_down() {
     let scene = Scene::new();
     let running = scene.start(PRIMITIVE, |slot| PrimitiveDriver::default().run(slot));

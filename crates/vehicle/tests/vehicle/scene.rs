@@ -1,4 +1,9 @@
-//! A client, and parts of a vehicle that start and stop.
+//! An operator, and parts of a vehicle that start and stop, each on its own node on loopback.
+//!
+//! Tests run in virtual time: the clock of tokio is paused, and leaps to the next timer whenever
+//! there is nothing left to do. A mission then takes as long as its computation, and no deadline is
+//! missed on a busy machine. A loop that waits for something sleeps between two looks: without a
+//! pause virtual time would stand still.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,
@@ -9,13 +14,14 @@
 )]
 
 use std::future::Future;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::component::{Component, Control, Kind, State};
 use jaus::link::Group;
 use jaus::messages::core::QueryStatus;
-use jaus::node::{Config, Node};
+use jaus::node::{Config, Node, now};
+use jaus::service::TimeOfDay;
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::{LIMIT, within_limit};
 use jaus_vehicle::ground::StageReport;
@@ -24,12 +30,20 @@ use jaus_vehicle::parts::{PartError, Slot};
 use tokio::task::JoinHandle;
 
 pub(crate) const PRIMITIVE: JausId = JausId::new(101, 33, 33);
+pub(crate) const PLANNER: JausId = JausId::new(101, 36, 36);
 pub(crate) const POSE: JausId = JausId::new(101, 41, 41);
 pub(crate) const VELOCITY: JausId = JausId::new(101, 42, 42);
 pub(crate) const VECTOR: JausId = JausId::new(101, 44, 44);
-/// A client and the multicast group that it shares with the parts.
+pub(crate) const PATH: JausId = JausId::new(101, 48, 48);
+pub(crate) const STORE: JausId = JausId::new(101, 61, 61);
+
+/// Time of day at the beginning of a test, since the beginning of 1970.
+const BEGIN: Duration = Duration::from_secs(1_700_000_000);
+
+/// A client, the multicast group that it shares with the parts, and the time of day.
 pub(crate) struct Scene {
     group: Group,
+    time: TimeOfDay,
     pub(crate) client: Component,
     _node: Node,
 }
@@ -50,8 +64,10 @@ impl Scene {
         let group = own_group();
         let node = Node::start(Config::loopback(42, 1).group(group)).unwrap();
         let client = Component::builder(Kind::OperatorControlUnit, "Operator");
+        let begin = now();
         Self {
             group,
+            time: TimeOfDay::new(move || BEGIN + (now() - begin)),
             client: client.attach(&node, 1).unwrap(),
             _node: node,
         }
@@ -63,12 +79,11 @@ impl Scene {
     {
         let config = Config::loopback(id.subsystem(), id.node()).group(self.group);
         let node = Node::start(config).unwrap();
-        let part = run(Slot::new(
-            node.attach(id.component()).unwrap(),
-            node.clone(),
-            Kind::Vehicle,
-            "Rover",
-        ));
+        let port = node.attach(id.component()).unwrap();
+        let part = run(Slot {
+            time: self.time.clone(),
+            ..Slot::new(port, node.clone(), Kind::Vehicle, "Rover")
+        });
         let task = tokio::spawn(async move {
             match part.await {
                 Err(PartError::ShutDown) => {}
@@ -128,12 +143,12 @@ impl Scene {
         what: &str,
         mut attempt: impl FnMut() -> F,
     ) -> T {
-        let start = Instant::now();
+        let start = now();
         loop {
             if let Some(answer) = attempt().await {
                 return answer;
             }
-            assert!(start.elapsed() < LIMIT, "{what}: in vain");
+            assert!(now() - start < LIMIT, "{what}: in vain");
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
     }

@@ -9,7 +9,7 @@ use jaus_vehicle::messages::ground::{
 
 use super::fake::{World, store};
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_mission_is_planned_approved_and_driven_to_its_end() {
     let mut world = World::new(1011).await;
     for column in 0..12 {
@@ -41,7 +41,7 @@ async fn a_mission_is_planned_approved_and_driven_to_its_end() {
     world.shut_down().await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_blocked_stage_is_tried_again_and_given_up_in_the_end() {
     let mut world = World::new(1021).await;
     world.go(9.5, 9.5, true).await;
@@ -58,7 +58,7 @@ async fn a_blocked_stage_is_tried_again_and_given_up_in_the_end() {
     world.shut_down().await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn whoever_takes_over_a_driver_ends_the_mission_and_it_does_not_go_on() {
     let mut world = World::new(1031).await;
     world.go(9.5, 9.5, true).await;
@@ -78,7 +78,7 @@ async fn whoever_takes_over_a_driver_ends_the_mission_and_it_does_not_go_on() {
     world.shut_down().await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn an_emergency_of_a_driver_ends_the_mission() {
     let mut world = World::new(1041).await;
     world.go(9.5, 9.5, true).await;
@@ -91,7 +91,7 @@ async fn an_emergency_of_a_driver_ends_the_mission() {
     world.shut_down().await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_driver_that_stands_down_ends_the_mission() {
     let mut world = World::new(1081).await;
     world.go(9.5, 9.5, true).await;
@@ -105,7 +105,7 @@ async fn a_driver_that_stands_down_ends_the_mission() {
     world.shut_down().await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn the_operator_stops_it_and_the_driver_is_given_back() {
     let mut world = World::new(1051).await;
     world.go(9.5, 9.5, true).await;
@@ -118,7 +118,7 @@ async fn the_operator_stops_it_and_the_driver_is_given_back() {
     world.shut_down().await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn mistakes_are_told_with_what_to_do() {
     let mut world = World::new(1061).await;
     world.go(99.0, 9.5, true).await;
@@ -128,7 +128,7 @@ async fn mistakes_are_told_with_what_to_do() {
     world.shut_down().await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_store_that_comes_back_is_asked_again() {
     let mut world = World::new(1071).await;
     drop(world.store.take());

@@ -16,5 +16,4 @@ mod fake;
 mod missions;
 mod obstacles;
 mod whole;
-mod whole_vehicle;
 pub(crate) mod zones;

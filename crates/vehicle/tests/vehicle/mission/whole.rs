@@ -7,7 +7,8 @@ use jaus_vehicle::motion::Ackermann;
 use jaus_vehicle::parts::tester::MissionTest;
 use jaus_vehicle::parts::tester::steps::{Step, all_pass};
 
-use super::whole_vehicle::WholeVehicle;
+use crate::scene::PATH;
+use crate::whole_vehicle::WholeVehicle;
 
 fn listed(steps: &[Step]) -> String {
     let lines: Vec<_> = steps.iter().map(ToString::to_string).collect();
@@ -16,10 +17,10 @@ fn listed(steps: &[Step]) -> String {
 
 #[tokio::test(start_paused = true)]
 async fn a_mission_goes_through_the_whole_chain_though_the_path_driver_dies_on_the_way() {
-    let mut vehicle = WholeVehicle::start(1111, None);
-    let (desk, tester) = vehicle.operator();
+    let mut vehicle = WholeVehicle::start("chain", None);
+    let tester = vehicle.client.clone();
     let test = MissionTest {
-        subsystem: 1111,
+        subsystem: PATH.subsystem(),
         patience: Duration::from_secs(30),
         speed: 0.3,
         ..MissionTest::default()
@@ -29,32 +30,26 @@ async fn a_mission_goes_through_the_whole_chain_though_the_path_driver_dies_on_t
     let killing = async {
         while let Some(step) = steps_so_far.recv().await {
             if step.starts_with("each driver is commanded") {
-                vehicle.kill(48).await;
-                vehicle.start_part(48);
+                vehicle.restart(PATH).await;
                 break;
             }
         }
     };
     let (steps, ()) = tokio::join!(running, killing);
     assert!(all_pass(&steps), "{}", listed(&steps));
-    drop(tester);
-    desk.shutdown().await;
     vehicle.end().await;
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_vehicle_with_steered_wheels_drives_the_same_mission() {
-    let vehicle = WholeVehicle::start(1113, Some(Ackermann::default()));
-    let (desk, tester) = vehicle.operator();
+    let vehicle = WholeVehicle::start("steered", Some(Ackermann::default()));
     let test = MissionTest {
-        subsystem: 1113,
+        subsystem: PATH.subsystem(),
         patience: Duration::from_secs(60),
         speed: 0.5,
         ..MissionTest::default()
     };
-    let steps = test.run(&tester, |_| {}).await;
+    let steps = test.run(&vehicle.client, |_| {}).await;
     assert!(all_pass(&steps), "{}", listed(&steps));
-    drop(tester);
-    desk.shutdown().await;
     vehicle.end().await;
 }
