@@ -171,7 +171,8 @@ async fn a_fault_of_the_steering_stops_the_drive_and_is_a_failure() {
     running.stop().await;
 }
 
-#[tokio::test(start_paused = true)]
+// In real time, as the thread that reads the stop input is.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
     let scene = Scene::new();
     let [left, right] = [(); 2].map(|()| {
@@ -277,6 +278,7 @@ fn milliseconds(stamp: TimeStamp) -> i64 {
     (minutes * 60 + i64::from(stamp.seconds())) * 1000 + i64::from(stamp.milliseconds())
 }
 
+// In real time, as the disk is.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_stamps() {
     let directory = std::env::temp_dir().join(format!("jaus-stall-{}", std::process::id()));

@@ -1,6 +1,6 @@
 //! An operator, and parts of a vehicle that start and stop, each on its own node on loopback.
 //!
-//! Tests run in virtual time: the clock of tokio is paused, and leaps to the next timer whenever
+//! Most tests run in virtual time: the clock of tokio is paused, and leaps to the next timer whenever
 //! there is nothing left to do. A mission then takes as long as its computation, and no deadline is
 //! missed on a busy machine. A loop that waits for something sleeps between two looks: without a
 //! pause virtual time would stand still.
