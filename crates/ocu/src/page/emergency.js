@@ -16,9 +16,14 @@ export class Emergency {
   /** The same for all vehicles. */
   #wantedAll = false;
   #vehicles = [];
+  /** Whether the station takes no requests from this page before it has the token. */
+  #barred = false;
+  #unbar;
 
-  constructor(link) {
+  /** Calls `unbar` when somebody wants to stop a vehicle and the station wants a token first. */
+  constructor(link, unbar) {
     this.#link = link;
+    this.#unbar = unbar;
     get("estop").addEventListener("click", () => this.stop());
     get("estop-all").addEventListener("click", () => this.stopAll());
     get("estop-clear").addEventListener("click", () => this.#openSheet());
@@ -44,6 +49,10 @@ export class Emergency {
   }
 
   #stop(type) {
+    if (this.#barred) {
+      [this.#wanted, this.#wantedAll] = [false, false];
+      return this.#unbar();
+    }
     this.#closeSheet();
     this.#wanted = true;
     this.#refusal = "";
@@ -62,9 +71,10 @@ export class Emergency {
     return true;
   }
 
-  /** Takes a state and the list of vehicles. */
-  update(state, vehicles) {
+  /** Takes a state, the list of vehicles, and whether the token is missing. */
+  update(state, vehicles, barred) {
     this.#vehicles = vehicles;
+    this.#barred = barred;
     this.#confirmed = state?.vehicle?.emergency === true;
     if (this.#confirmed) this.#wanted = false;
     if (this.#moving() === 0) this.#wantedAll = false;
@@ -85,23 +95,24 @@ export class Emergency {
   }
 
   #render() {
-    const how = this.#confirmed ? "stopped" : this.#wanted ? "wanted" : "ready";
+    const how = this.#confirmed ? "stopped" : this.#wanted ? "wanted" : this.#barred ? "barred" : "ready";
     document.body.dataset.emergency = how;
     const [word, detail] = {
       ready: ["Emergency stop", touch.matches ? "stops the vehicle at once" : "Esc or Space"],
+      barred: ["Emergency stop", "enter the token to use it"],
       wanted: ["Stopping", this.#link.open ? this.#refusal || "not confirmed yet" : "NOT SENT: no connection"],
       stopped: ["Emergency", "the vehicle is stopped"],
     }[how];
     say(get("estop-word"), word);
     say(get("estop-detail"), detail);
-    mark(get("estop"), "aria-pressed", String(how !== "ready"));
+    mark(get("estop"), "aria-pressed", String(["wanted", "stopped"].includes(how)));
     const [count, moving] = [this.#vehicles.length, this.#moving()];
     show(get("estop-all"), count > 1);
     const all = this.#wantedAll ? `${moving} not stopped yet` : moving === 0 ? "all are stopped" : `${count} vehicles`;
     say(get("estop-all-detail"), all);
     mark(get("estop-all"), "data-wanted", this.#wantedAll ? "yes" : null);
     show(get("clear-all"), count - moving > 1);
-    show(get("estop-clear"), this.#confirmed);
+    show(get("estop-clear"), this.#confirmed && !this.#barred);
     if (!this.#confirmed) show(get("clear-sheet"), false);
   }
 

@@ -4,6 +4,7 @@
 import { get, mark, plain, say, show, toast, typing } from "./dom.js";
 import { Drive } from "./drive.js";
 import { Emergency } from "./emergency.js";
+import { Engage } from "./engage.js";
 import { Fleet } from "./fleet.js";
 import { Handover } from "./handover.js";
 import { Link } from "./link.js";
@@ -17,9 +18,10 @@ import { showSystem, showTree } from "./tree.js";
 const link = new Link();
 const map = new MapView((place) => choose(place));
 const mission = new Mission(ask, map);
-const emergency = new Emergency(link);
+const emergency = new Emergency(link, () => show(get("token-sheet"), true));
 const drive = new Drive(link, () => emergency.stop());
 const fleet = new Fleet((subsystem) => selectVehicle(subsystem));
+const engage = new Engage(ask, () => readyToDrive());
 const handover = new Handover(ask);
 new Messages(link);
 followTheme(() => map.recolour());
@@ -60,14 +62,16 @@ function render() {
   showLink(link, state);
   const live = link.condition === "live";
   const operable = live && trusted && Boolean(state?.vehicle);
-  emergency.update(state, fleet.vehicles);
+  emergency.update(state, fleet.vehicles, link.open && link.settled && !trusted);
   fleet.update(state, live && trusted);
-  drive.update(state, obstacle(live));
+  const hindrance = hindered(live);
+  drive.update(state, hindrance || uncontrolled());
   const mode = part(state, "primitive_driver")?.state;
-  get("resume").disabled = !operable || !state.control?.held || mode === "ready";
+  get("resume").disabled = !operable || !state.control?.held || mode !== "standby";
   get("standby").disabled = !operable || !state.control?.held || mode !== "ready";
   if (!state) return;
   showControl(state, authority, operable);
+  engage.update(state, operable, hindrance);
   handover.update(state, operable);
   showStatus(state, Number.isFinite(link.age) ? link.age : 0);
   showMissing(state, live);
@@ -76,16 +80,20 @@ function render() {
   showSystem(state);
 }
 
-/** Why nobody can drive from here now, in words; empty if one can. */
-function obstacle(live) {
+/** Why nobody can drive from here now, even with control of a ready vehicle; empty if one can. */
+function hindered(live) {
   if (!live) return "Not connected";
   if (!trusted) return "Watching only: enter the token to drive";
   if (!state.vehicle) return "No vehicle";
   if (state.vehicle.emergency) return "Emergency: clear it before driving";
-  if (!state.control?.wanted) return "Take control before driving";
-  if (state.vehicle.stale) return sentence(state.vehicle.stale);
+  return state.vehicle.stale ? sentence(state.vehicle.stale) : "";
+}
+
+/** What is still missing for driving; empty if nothing is. */
+function uncontrolled() {
+  if (!state.control?.wanted) return "Press Drive by hand first";
   const driver = part(state, "primitive_driver");
-  if (state.control.held && driver?.ours && driver.state === "standby") return "In standby: press Resume before driving";
+  if (state.control.held && driver?.ours && driver.state === "standby") return "In standby: press Drive by hand first";
   // While control is asked for, as when the operator takes over from the planner, what is held is
   // sent already and acts as soon as the vehicle agrees.
   return state.control.held ? "" : sentence(state.control.reason);
@@ -122,6 +130,13 @@ async function selectVehicle(subsystem) {
   drive.release();
   mission.forget();
   await ask({ type: "select", subsystem });
+}
+
+/** The vehicle does what the stick and the keys say. */
+function readyToDrive() {
+  select("drive");
+  get("stick").focus();
+  toast("good", "Ready: use the stick, the keys or the gamepad");
 }
 
 function showFleet() {

@@ -59,7 +59,8 @@ export class MapView {
     this.#path = list(mission?.path).filter((p) => number(p?.[0]) !== null && number(p?.[1]) !== null);
     this.#over = ["failed", "stopped", "idle"].includes(mission?.stage);
     const [x, y] = list(mission?.destination);
-    this.#destination = number(x) !== null && number(y) !== null ? { x, y } : null;
+    const isGiven = mission?.stage !== "idle" && number(x) !== null && number(y) !== null;
+    this.#destination = isGiven ? { x, y } : null;
     this.#raster.update(state.map, token, () => this.#draw());
     const empty = get("map-empty");
     show(empty, !this.#raster.picture);
@@ -240,7 +241,7 @@ export class MapView {
   #readout(place) {
     const element = get("map-readout");
     show(element, place !== null);
-    if (place) say(element, `N ${figure(place.x, 1)}  E ${figure(place.y, 1)} m`);
+    if (place) say(element, `x ${figure(place.x, 1)}  y ${figure(place.y, 1)} m`);
   }
 
   // Drawing.

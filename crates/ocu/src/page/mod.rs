@@ -48,6 +48,7 @@ pub(crate) const FILES: &[File] = files! {
     "/raster.js" SCRIPT "raster.js",
     "/mission.js" SCRIPT "mission.js",
     "/drive.js" SCRIPT "drive.js",
+    "/engage.js" SCRIPT "engage.js",
     "/gamepad.js" SCRIPT "gamepad.js",
     "/emergency.js" SCRIPT "emergency.js",
     "/theme.js" SCRIPT "theme.js",

@@ -6,9 +6,17 @@ import { authority } from "./status.js";
 
 const PERIOD = 400;
 let shown = 0;
+let tree = null;
+/** How the selected vehicle's components are, by their ids. */
+let health = new Map();
 
 /** Shows the tree of components. */
-export function showTree(tree) {
+export function showTree(told) {
+  tree = told;
+  renderTree();
+}
+
+function renderTree() {
   const subsystems = list(tree?.subsystems, 256);
   const counts = { nodes: 0, components: 0 };
   update(get("tree"), subsystems.map((one) => subsystem(one, counts)));
@@ -20,7 +28,21 @@ export function showSystem(state) {
   const now = performance.now();
   if (now - shown < PERIOD) return;
   shown = now;
-  showParts(list(state.vehicle?.parts, 64), list(state.vehicle?.missing, 64));
+  const [present, missing] = [list(state.vehicle?.parts, 64), list(state.vehicle?.missing, 64)];
+  const silent = new Map(missing.map((one) => [plain(one?.id, 16), one]));
+  const parts = [...present, ...missing.filter((one) => one?.how === "gone")];
+  health = new Map(parts.map((part) => [plain(part?.id, 16), condition(part, silent.get(plain(part?.id, 16)))]));
+  showParts(parts);
+  if (tree) renderTree();
+}
+
+/** A part's state for the colours, and in words. A sensor or a store has no state: that it is there counts. */
+function condition(part, absence) {
+  const age = number(part?.age_ms) === null ? "" : ` ${duration(part.age_ms)}`;
+  if (absence) return { state: "lost", word: `${absence.how === "gone" ? "Gone" : "Silent"}${age}` };
+  if (part?.managed !== true) return { state: "present", word: "" };
+  const state = plain(part.state ?? "unknown", 20);
+  return { state, word: words(state) };
 }
 
 // What the tree is to be: branches with key, title, badge and children.
@@ -53,11 +75,13 @@ function node(one, subsystem, counts) {
 
 function component(one) {
   const services = list(one?.services, 255);
+  const { state, word } = health.get(plain(one?.id, 16)) ?? {};
   return {
+    state: state ?? "unknown",
     key: `c${plain(one?.id, 16)}`,
     id: plain(one?.id, 16),
     title: plain(one?.name, 60) || "Component",
-    note: `${services.length}`,
+    note: `${word ? `${word} · ` : ""}${services.length} services`,
     open: false,
     children: services.map((service, index) => {
       const urn = plain(service?.urn, 160);
@@ -86,6 +110,7 @@ function update(parent, branches) {
     say(id, branch.id);
     say(title, branch.title);
     say(note, branch.note);
+    mark(element, "data-state", branch.state);
     if (branch.children) update(element, branch.children);
   }
   for (const gone of old.values()) gone.remove();
@@ -102,17 +127,15 @@ function create(branch) {
     leaf.dataset.key = branch.key;
     return leaf;
   }
+  if (branch.state) line.push(make("span", { className: "dot", "aria-hidden": "true" }));
   const element = make("details", {}, make("summary", {}, ...line));
   element.dataset.key = branch.key;
   element.open = branch.open;
   return element;
 }
 
-function showParts(present, missing) {
+function showParts(parts) {
   const area = get("parts");
-  const gone = missing.filter((one) => one?.how === "gone");
-  const silent = new Set(missing.map((one) => plain(one?.id, 16)));
-  const parts = [...present, ...gone];
   show(area, parts.length > 0);
   const old = new Map([...area.children].map((child) => [child.dataset.key, child]));
   for (const part of parts) {
@@ -125,17 +148,14 @@ function showParts(present, missing) {
       area.append(row);
     }
     const [, name, mode, detail] = row.children;
-    // A sensor or a store has no state, and is controlled by nobody: that it is there is what counts.
-    const managed = part?.managed === true;
-    const lost = silent.has(key);
-    mark(row, "data-state", lost ? "lost" : managed ? plain(part.state ?? "unknown", 20) : "present");
-    mark(row, "data-missing", lost ? "yes" : null);
+    const { state, word } = health.get(key);
+    mark(row, "data-state", state);
+    mark(row, "data-missing", state === "lost" ? "yes" : null);
     say(name, words(part?.role ?? part?.id));
-    const age = number(part?.age_ms) === null ? "" : ` ${duration(part.age_ms)}`;
-    say(mode, lost ? `${part?.how === "gone" ? "Gone" : "Silent"}${age}` : managed ? words(part.state ?? "unknown") : "");
+    say(mode, word);
     const stage = part?.stage?.state ? ` · ${words(part.stage.state).toLowerCase()}` : "";
     const reason = plain(part?.stage?.reason, 160);
-    const control = managed ? ` · ${authority(part)}` : "";
+    const control = part?.managed === true ? ` · ${authority(part)}` : "";
     say(detail, `${key}${control}${stage}${reason ? `: ${reason}` : ""}`);
   }
   for (const gone of old.values()) gone.remove();

@@ -206,14 +206,14 @@ fn lost_client(before: &Standing, now: &Standing) -> Option<JausId> {
 fn why_stopped(before: &Standing, now: &Standing) -> String {
     let client = |standing: &Standing| standing.controller.map(|controller| controller.id);
     match (now.state, client(now)) {
-        (State::Emergency, _) => "the planner is in emergency".to_owned(),
+        (State::Emergency, _) => "an emergency stopped the planner".to_owned(),
         (_, Some(id)) if client(before) != Some(id) => {
             format!("{id} has taken control of the planner")
         }
         (State::Ready | State::Standby, None) if before.controller.is_some() => {
             "control of the planner has shut down".to_owned()
         }
-        (state, _) => format!("the planner is in the state {state}"),
+        (state, _) => format!("the planner went to the state {state}"),
     }
 }
 
@@ -355,12 +355,12 @@ mod tests {
             (
                 State::Emergency,
                 Some(CLIENT),
-                "the planner is in emergency",
+                "an emergency stopped the planner",
             ),
             (
                 State::Standby,
                 Some(CLIENT),
-                "the planner is in the state standby",
+                "the planner went to the state standby",
             ),
             (
                 State::Ready,

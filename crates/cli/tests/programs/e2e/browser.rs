@@ -27,7 +27,7 @@ pub(crate) struct Screen {
 }
 
 /// The supported screens.
-pub(crate) const SCREENS: [Screen; 5] = [
+pub(crate) const SCREENS: [Screen; 6] = [
     Screen {
         name: "tablet",
         size: (1280, 800),
@@ -47,6 +47,11 @@ pub(crate) const SCREENS: [Screen; 5] = [
         name: "phone",
         size: (390, 844),
         dark: true,
+    },
+    Screen {
+        name: "phone-across",
+        size: (844, 390),
+        dark: false,
     },
     Screen {
         name: "desktop",
@@ -250,6 +255,27 @@ impl Browser {
             json!(selector)
         ));
         value.as_str().unwrap_or_default().to_owned()
+    }
+
+    /// Roles and names of the controls as a screen reader hears them.
+    pub(crate) fn controls(&mut self) -> Vec<(String, String)> {
+        let tree = self.call("Accessibility.getFullAXTree", &json!({}));
+        let nodes = tree["nodes"].as_array().unwrap();
+        let text = |value: &Value| {
+            value["value"]
+                .as_str()
+                .unwrap_or_default()
+                .trim()
+                .to_owned()
+        };
+        let controls = nodes.iter().filter(|node| {
+            let properties = node["properties"].as_array().into_iter().flatten();
+            let mut focusable = properties.filter(|it| it["name"] == "focusable");
+            node["ignored"] == false && focusable.any(|it| it["value"]["value"] == true)
+        });
+        controls
+            .map(|node| (text(&node["role"]), text(&node["name"])))
+            .collect()
     }
 
     /// Waits until an expression is true.

@@ -84,9 +84,8 @@ pub(crate) fn run() {
     page.open(&address);
     page.wait("document.body.dataset.link === 'live'");
     page.wait("document.querySelector('#vehicle-name').textContent.includes('G-Bat')");
-    take_control(&mut page);
-
-    page.press("[data-show=drive]");
+    one_button_leads_from_arrival_to_driving(&mut page);
+    every_control_has_a_name(&mut page);
     page.key_down("ArrowUp", "ArrowUp");
     page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
     page.screenshot("by-hand-keys");
@@ -122,6 +121,37 @@ pub(crate) fn run() {
     refuses_to_drive_without_news(&mut page, &vehicle);
     names_what_is_gone(&mut page, vehicle);
     assert!(page.complaints().is_empty(), "{:?}", page.complaints());
+}
+
+/// The button takes control, resumes, and gives the stick the focus. Its notice lets touches of the
+/// map through.
+fn one_button_leads_from_arrival_to_driving(page: &mut Browser) {
+    look_from_all_screens(page, "by-hand-arrival");
+    page.press("#by-hand");
+    page.wait("document.activeElement.id === 'stick'");
+    assert_eq!(page.text("#state-word"), "Ready");
+    assert_eq!(page.value("document.body.dataset.control"), "held");
+    assert_eq!(page.value("document.body.dataset.view"), "drive");
+    page.wait("document.querySelector('#by-hand').hidden");
+    let under_notice = "(() => { const b = document.querySelector('.toast p').getBoundingClientRect(); \
+        return document.elementFromPoint(b.x + 5, b.y + 5).id; })()";
+    assert_eq!(page.value(under_notice), "map");
+    look_from_all_screens(page, "by-hand-ready");
+}
+
+/// On every view, a screen reader has a name for each control that can have the focus.
+fn every_control_has_a_name(page: &mut Browser) {
+    for view in ["vehicles", "system", "messages", "mission", "drive"] {
+        page.press(&format!("[data-show={view}]"));
+        let controls = page.controls();
+        assert!(controls.len() > 10, "{controls:?}");
+        for (role, name) in &controls {
+            assert!(
+                !name.is_empty(),
+                "{view}: a {role} without a name: {controls:?}"
+            );
+        }
+    }
 }
 
 /// While the vehicle is suspended, all values on the page are stale: the page says so and does not

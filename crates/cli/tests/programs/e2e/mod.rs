@@ -11,6 +11,7 @@ mod fleet;
 mod handover;
 mod steps;
 mod system;
+mod watching;
 
 use std::time::Duration;
 
@@ -74,6 +75,11 @@ fn an_operator_chooses_among_vehicles_and_stops_all_of_them() {
 #[test]
 fn control_is_handed_over_between_the_pages_of_two_operators() {
     on_a_station(handover::run);
+}
+
+#[test]
+fn a_page_without_the_token_asks_for_it_where_it_would_stop_the_vehicle() {
+    on_a_station(watching::run);
 }
 
 /// Runs a test that starts its own vehicles and stations.

@@ -28,6 +28,10 @@ pub(crate) fn emergency(page: &mut Browser) {
     page.key_up("Escape", "Escape");
     page.wait("document.body.dataset.emergency === 'stopped'");
     look_from_all_screens(page, "4-emergency");
+    assert_eq!(
+        page.value("document.querySelector('#resume').disabled"),
+        true
+    );
     page.press("#estop-clear");
     page.wait("document.activeElement.id === 'clear-no'");
     page.screenshot("4-emergency-clear");
@@ -36,11 +40,25 @@ pub(crate) fn emergency(page: &mut Browser) {
     take_control(page);
 }
 
-/// Takes a screenshot on every screen.
+/// The labels of visible buttons that are wider than their buttons. A vehicle's name is shortened.
+const OVERFLOWING: &str = "[...document.querySelectorAll('button:not(#vehicle-button)')] \
+    .filter(it => it.getClientRects().length && it.scrollWidth > it.clientWidth) \
+    .map(it => it.textContent).join(', ')";
+
+/// Takes a screenshot on every screen. On each one, the vehicle's state is visible, and no text is
+/// wider than its place.
 pub(crate) fn look_from_all_screens(page: &mut Browser, name: &str) {
     for screen in SCREENS {
         page.look_on(screen);
         page.wait("document.documentElement.scrollWidth <= innerWidth");
+        page.wait("document.querySelector('#state-word').getClientRects().length");
+        let fits = page.holds_within(Duration::from_secs(5), &format!("{OVERFLOWING} === ''"));
+        assert!(
+            fits,
+            "{name} on {}: {}",
+            screen.name,
+            page.value(OVERFLOWING)
+        );
         std::thread::sleep(Duration::from_millis(120));
         page.screenshot(&format!("{name}-{}", screen.name));
     }

@@ -384,7 +384,7 @@ impl<'a> PlannerTask<'a> {
                 self.stop_if_driving(&reason).await;
             }
             News::Emergency(link) => {
-                let reason = format!("the {link}{} is in emergency", self.named(link));
+                let reason = format!("an emergency stopped the {link}{}", self.named(link));
                 self.stop_if_driving(&reason).await;
             }
         }

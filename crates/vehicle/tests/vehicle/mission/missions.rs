@@ -87,7 +87,10 @@ async fn an_emergency_of_a_driver_ends_the_mission() {
     world.operator.set_emergency(path).await.unwrap();
     let report = world.until_stage(Stage::STOPPED).await;
     let reason = report.reason.to_string_lossy();
-    assert!(reason.contains("is in emergency"), "{reason}");
+    assert!(
+        reason.contains("an emergency stopped the path segment driver"),
+        "{reason}"
+    );
     world.shut_down().await;
 }
 
