@@ -193,7 +193,9 @@ impl Sense<ReportRangeSensorData> {
             }
             let stamp = scan.as_ref().and_then(|(stamp, _)| *stamp);
             let scan = scan.as_ref().map(|(_, scan)| scan);
-            fence.set_obstacles(remote_platform.handle_scan(now, stamp, scan));
+            if let Some(obstacles) = remote_platform.handle_scan(now, stamp, scan) {
+                fence.set_obstacles(obstacles);
+            }
         }
     }
 }
