@@ -3,13 +3,13 @@
 
 use std::collections::HashMap;
 use std::sync::Arc;
-use std::time::Instant;
 
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::feed::Feed;
 use crate::address::JausId;
 use crate::node;
+use crate::node::now;
 use crate::service::{
     Audience, CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Patience,
     SessionId, SessionOrder, SessionSettings, SessionState, Stack, SubscriptionEnd, SubscriptionId,
@@ -163,7 +163,7 @@ impl Clients {
                 settings,
                 reply,
             } => {
-                let now = Instant::now();
+                let now = now();
                 let id = stack.begin_session(now, audience, settings, patience);
                 let (state, told) = watch::channel(SessionState::Seeking);
                 self.sessions.insert(id, state);
@@ -180,7 +180,7 @@ impl Clients {
     }
 
     pub(super) fn follow(&mut self, stack: &mut Stack, instruction: Instruction) {
-        let now = Instant::now();
+        let now = now();
         match instruction {
             Instruction::EndSubscription(id) => {
                 self.feeds.remove(&id);
@@ -204,7 +204,7 @@ impl Clients {
             let _ = reply.send(Ok((self.ticket(Instruction::EndSubscription(id)), feed)));
         }
         if let Some(feed) = self.feeds.get(&id) {
-            feed.tell(Instant::now(), news);
+            feed.tell(now(), news);
         }
     }
 
@@ -254,13 +254,13 @@ impl Clients {
     pub(super) fn cancel_abandoned(&mut self, stack: &mut Stack) {
         self.subscribing.retain(|&id, reply| {
             if reply.is_closed() {
-                stack.unsubscribe(Instant::now(), id);
+                stack.unsubscribe(now(), id);
             }
             !reply.is_closed()
         });
         self.asking.retain(|&id, reply| {
             if reply.is_closed() {
-                stack.release_control(Instant::now(), id);
+                stack.release_control(now(), id);
             }
             !reply.is_closed()
         });
@@ -281,7 +281,7 @@ fn begin_subscription(
     patience: Patience,
     transmit: impl FnOnce(&mut Stack) -> Result<(), node::SendError>,
 ) -> Result<SubscriptionId, NotSubscribed> {
-    let now = Instant::now();
+    let now = now();
     let id = stack
         .subscribe(now, topic, patience)
         .map_err(NotSubscribed::Impossible)?;
@@ -299,7 +299,7 @@ fn begin_control(
     patience: Patience,
     transmit: impl FnOnce(&mut Stack) -> Result<(), node::SendError>,
 ) -> Result<ControlId, NotControlled> {
-    let now = Instant::now();
+    let now = now();
     let id = stack
         .request_control(now, peer, authority, patience)
         .map_err(NotControlled::Refused)?;

@@ -1,7 +1,7 @@
 //! The application's handle for control over a peer.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tokio::sync::watch;
 
@@ -10,6 +10,7 @@ use super::{Component, ControlError, ManageError};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::messages::core::{ClearEmergency, QueryStatus, Reset, Resume, SetEmergency, Standby};
+use crate::node::now;
 use crate::service::State;
 use crate::wire::Priority;
 
@@ -234,13 +235,13 @@ impl Component {
         command: &M,
         wanted: impl Fn(u8) -> bool,
     ) -> Result<u8, ManageError> {
-        let start = Instant::now();
+        let start = now();
         loop {
             self.send_with(priority, peer, command)
                 .map_err(ControlError::from)?;
             let report = self.query(peer, &QueryStatus {}).await?;
             let found = report.status.0;
-            if wanted(found) || start.elapsed() > STATE_LIMIT {
+            if wanted(found) || now() - start > STATE_LIMIT {
                 return Ok(found);
             }
             tokio::time::sleep(STATE_PAUSE).await;

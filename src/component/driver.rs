@@ -16,6 +16,7 @@ use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::QueryHeartbeatPulse;
+use crate::node::now;
 use crate::node::{self, Port, Resident};
 use crate::service::{
     Change, Condition, Event, Inquiry, NoAnswer, NotPublished, Patience, Publication, QueryOptions,
@@ -121,13 +122,13 @@ impl Driver {
 
     /// Runs until the node stops or the last handle of the component is dropped.
     pub(super) async fn run(mut self) {
-        self.stack.start(Instant::now());
+        self.stack.start(now());
         self.settle();
         loop {
             let wake = self.stack.poll_timeout();
             tokio::select! {
                 received = self.port.recv() => match received {
-                    Some(message) => self.stack.handle_message(Instant::now(), &message),
+                    Some(message) => self.stack.handle_message(now(), &message),
                     None => return,
                 },
                 command = self.inbox.recv() => match command {
@@ -143,13 +144,13 @@ impl Driver {
                 }
                 Some((peer, delivered)) = self.probes.next() => {
                     if delivered {
-                        self.stack.handle_acknowledged(Instant::now(), peer);
+                        self.stack.handle_acknowledged(now(), peer);
                     }
                 }
-                () = self.membership.changed() => self.stack.handle_directory(Instant::now()),
+                () = self.membership.changed() => self.stack.handle_directory(now()),
                 () = sleep_until(wake) => {
                     self.note_progress();
-                    self.stack.handle_timeout(Instant::now());
+                    self.stack.handle_timeout(now());
                 }
             }
             self.settle();
@@ -158,7 +159,7 @@ impl Driver {
 
     /// Postpones the repetition of queries to peers that are sending a large message.
     fn note_progress(&mut self) {
-        let now = Instant::now();
+        let now = now();
         let overdue: BTreeSet<_> = self.stack.overdue(now).collect();
         for peer in overdue {
             if let Some(latest) = self.port.last_fragment(peer) {
@@ -178,20 +179,19 @@ impl Driver {
     /// Stops what the services move, ends subscriptions and control of peers, and waits a moment
     /// for the confirmations.
     async fn leave(&mut self) {
-        let now = Instant::now();
-        self.stack.take_leave(now);
+        let end = now() + Self::LEAVE;
+        self.stack.take_leave(now());
         self.settle();
-        let end = now + Self::LEAVE;
         while self.stack.is_releasing() {
             let wake = self.stack.poll_timeout().map_or(end, |wake| wake.min(end));
             tokio::select! {
                 received = self.port.recv() => match received {
-                    Some(message) => self.stack.handle_message(Instant::now(), &message),
+                    Some(message) => self.stack.handle_message(now(), &message),
                     None => return,
                 },
-                () = sleep_until(Some(wake)) => self.stack.handle_timeout(Instant::now()),
+                () = sleep_until(Some(wake)) => self.stack.handle_timeout(now()),
             }
-            if Instant::now() >= end {
+            if now() >= end {
                 return;
             }
             self.settle();
@@ -206,7 +206,7 @@ impl Driver {
             mut options,
             reply,
         } = ask;
-        let now = Instant::now();
+        let now = now();
         options.patience.get_or_insert(self.patience);
         let inquiry = self.stack.ask(now, peer, query, report, options);
         match self.transmit() {
@@ -227,20 +227,20 @@ impl Driver {
             Command::Hold(hold) => self.hold(*hold),
             Command::Offer(service, reply) => {
                 // The application may not wait for it.
-                let _ = reply.send(self.stack.offer(Instant::now(), service));
+                let _ = reply.send(self.stack.offer(now(), service));
             }
             Command::Withdraw(urn) => {
-                self.stack.withdraw(Instant::now(), urn);
+                self.stack.withdraw(now(), urn);
             }
-            Command::Condition(condition) => self.stack.set_condition(Instant::now(), condition),
+            Command::Condition(condition) => self.stack.set_condition(now(), condition),
             Command::End(command, successful) => {
-                self.stack.end_command(Instant::now(), command, successful);
+                self.stack.end_command(now(), command, successful);
             }
             Command::Publish(publication, reply) => {
                 // As above.
-                let _ = reply.send(self.stack.publish(Instant::now(), &publication));
+                let _ = reply.send(self.stack.publish(now(), &publication));
             }
-            Command::Announce(query) => self.stack.announce(Instant::now(), query),
+            Command::Announce(query) => self.stack.announce(now(), query),
         }
     }
 
@@ -300,7 +300,7 @@ impl Driver {
         let stack = &mut self.stack;
         self.waiting.retain(|&inquiry, reply| {
             if reply.is_closed() {
-                stack.cancel(Instant::now(), inquiry);
+                stack.cancel(now(), inquiry);
             }
             !reply.is_closed()
         });

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU8;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, SystemTime};
 
 use tokio::sync::{mpsc, oneshot, watch};
 
@@ -20,6 +20,7 @@ use crate::codec::{Message, Query, Report, ServiceId};
 use crate::endpoint::{Outgoing, Received};
 use crate::messages;
 use crate::node;
+use crate::node::now;
 use crate::service::{
     Change, Condition, Directory, Kind, LaterAnswer, NodeDirectory, Offer, Publication,
     QueryOptions, Service, Standing, Topic, UnsafeService, When, code_of,
@@ -489,7 +490,7 @@ impl Component {
         limit: Duration,
         found: impl Fn(&Others<'_>) -> Option<T>,
     ) -> Result<T, FindError> {
-        let start = Instant::now();
+        let start = now();
         let own = self.id();
         let mut result = None;
         let mut directories = self.shared.directories.clone();
@@ -501,7 +502,7 @@ impl Component {
         match tokio::time::timeout(limit, known).await {
             Ok(Ok(_)) => result.ok_or(FindError::Stopped),
             Ok(Err(_)) => Err(FindError::Stopped),
-            Err(_) => Err(self.not_found(sought, start.elapsed())),
+            Err(_) => Err(self.not_found(sought, now() - start)),
         }
     }
 

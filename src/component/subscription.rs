@@ -15,6 +15,7 @@ use super::clients::Ticket;
 use super::feed::{Feed, Item};
 use crate::address::JausId;
 use crate::codec::{DecodeError, Message};
+use crate::node::now;
 use crate::service::{Outage, SubscriptionEnd};
 
 /// The stream of one peer's reports. Created by [`Component::subscribe`]; dropping it ends the
@@ -184,7 +185,7 @@ impl<R> Subscription<R> {
     /// How long ago the report that was read last arrived. `None` before the first.
     #[must_use]
     pub fn age(&self) -> Option<Duration> {
-        self.arrived.map(|arrived| arrived.elapsed())
+        self.arrived.map(|arrived| now() - arrived)
     }
 
     /// The component that sends the reports.

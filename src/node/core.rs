@@ -37,10 +37,10 @@ const BURST: usize = 64;
 /// How long a node that shuts down tries to send queued messages.
 pub(super) const LAST_WORDS: Duration = Duration::from_millis(250);
 
-/// The node's clock. It is tokio's, so that a paused test clock applies to timers and endpoint
-/// alike.
+/// The clock of nodes and components. It is tokio's: where a test pauses that clock, timers,
+/// endpoints, components and the control loops that read it share one virtual time.
 #[expect(clippy::disallowed_methods, reason = "the node owns the clock")]
-pub(super) fn now() -> Instant {
+pub fn now() -> Instant {
     tokio::time::Instant::now().into_std()
 }
 

@@ -58,6 +58,7 @@ use std::sync::Arc;
 
 pub use self::components::{ComponentEvent, Departure};
 pub use self::config::{Config, ConfigError, Delivery, Peer, Tcp, units};
+pub use self::core::now;
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::events::EventStream;
 pub use self::host::{Host, HostEvent, HostEvents};

@@ -14,7 +14,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::{Context, Handled, Hazards, Service, code_of, read};
 use crate::codec::{Date, Message, Query, ServiceId};
@@ -55,6 +55,12 @@ impl TimeOfDay {
         } else {
             clock.saturating_add(ahead)
         }
+    }
+
+    /// [`now`](Self::now) as the time of a sample, as `Component::publish` takes it.
+    #[must_use]
+    pub fn system_time(&self) -> SystemTime {
+        UNIX_EPOCH + self.now()
     }
 
     /// How many milliseconds it is ahead of its clock.

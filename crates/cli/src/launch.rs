@@ -113,12 +113,7 @@ impl<F: Ready> Program<F> {
             let kind = place.identity.kind.map_or(F::KIND, Kind::from);
             let name = self.name.or(place.identity.name);
             let name = name.unwrap_or_else(|| F::SUBSYSTEM.to_owned());
-            let slot = Slot {
-                port,
-                node,
-                kind,
-                name,
-            };
+            let slot = Slot::new(port, node, kind, name);
             let systemd = Systemd::from_environment();
             let outcome = tokio::select! {
                 result = part.run(slot) => {

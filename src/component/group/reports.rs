@@ -17,6 +17,7 @@ use crate::address::JausId;
 use crate::codec::Message;
 use crate::component::driver::sleep_until;
 use crate::component::{Component, SubscribeError, Subscription, Update};
+use crate::node::now;
 use crate::service::Audience;
 use crate::service::{Outage, Topic};
 
@@ -164,7 +165,7 @@ impl<R: Message> GroupSubscription<R> {
     }
 
     fn subscribe_due_members(&mut self) {
-        while let Some(peer) = self.member_table.poll_ask(Instant::now()) {
+        while let Some(peer) = self.member_table.poll_ask(now()) {
             let component = self.component.clone();
             let topic = Topic {
                 peer,
@@ -221,7 +222,7 @@ fn poll_asked<R>(
             // The end of the whole stream reports this.
             Poll::Ready(Err(SubscribeError::Stopped)) => {}
             Poll::Ready(Err(why)) => {
-                let again = member_table.handle_refused(Instant::now(), member);
+                let again = member_table.handle_refused(now(), member);
                 news.push_back((member, GroupUpdate::NotSubscribed { why, again }));
             }
         }
@@ -256,7 +257,7 @@ fn poll_subscribed<R: Message>(
                     // Without a reason the component has stopped, which the end of the whole stream
                     // reports.
                     if let Some(why) = end {
-                        let again = member_table.handle_refused(Instant::now(), member);
+                        let again = member_table.handle_refused(now(), member);
                         let why = SubscribeError::Ended {
                             peer: member,
                             query,

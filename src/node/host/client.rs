@@ -5,7 +5,7 @@ use std::convert::Infallible;
 use std::future::poll_fn;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, ready};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tokio::sync::{Notify, watch};
 use tokio::time::{sleep, timeout};
@@ -13,6 +13,7 @@ use tokio::time::{sleep, timeout};
 use super::super::awaiting::{Awaiting, MAX_AWAITED, Waiter};
 use super::super::events::EventSender;
 use super::super::mailbox::Mailbox;
+use super::super::now;
 use super::super::{HostError, SendError, Undelivered};
 use super::{Attached, Host, HostEvent};
 use crate::address::JausId;
@@ -318,7 +319,7 @@ impl Client {
                     to: self.id,
                 });
             }
-            Head::Progress { source } => self.mailbox.note_progress(Instant::now(), source),
+            Head::Progress { source } => self.mailbox.note_progress(now(), source),
             Head::Outcome { handle, outcome } => self.handle_outcome(handle, outcome, &record),
             _ => return Err(RecordError::Unexpected),
         }

@@ -177,12 +177,12 @@ impl Scene {
     /// A slot for another part of the vehicle.
     pub(crate) fn slot(&self, component: u8) -> Slot {
         let node = &self.nodes[0];
-        Slot {
-            port: node.attach(component).unwrap(),
-            node: Some(node.clone()),
-            kind: Kind::Vehicle,
-            name: "Rover".to_owned(),
-        }
+        Slot::new(
+            node.attach(component).unwrap(),
+            node.clone(),
+            Kind::Vehicle,
+            "Rover",
+        )
     }
 
     /// Attaches another component to the vehicle's node.
@@ -276,12 +276,12 @@ async fn start(
     let node = Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
     let open = station.open().await.unwrap();
     let address = open.address();
-    let slot = Slot {
-        port: node.attach(1).unwrap(),
-        node: Some(node.clone()),
-        kind: Kind::OperatorControlUnit,
-        name: "Operator".to_owned(),
-    };
+    let slot = Slot::new(
+        node.attach(1).unwrap(),
+        node.clone(),
+        Kind::OperatorControlUnit,
+        "Operator",
+    );
     let running = tokio::spawn(async move {
         let Err(error) = open.run(slot).await;
         panic!("the station has ended: {error}");

@@ -1,9 +1,5 @@
 //! The global pose sensor: position and heading on the globe from a GNSS receiver, a gyroscope and
 //! wheel travel.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "gives the sensor its clock and timer"
-)]
 
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
@@ -20,6 +16,7 @@ use crate::motion::{Frame, GlobalPose, Motion, Observed, Pilot, Pose, WheelCount
 use crate::navigation::{IioImu, Navigator, NavigatorConfig};
 use jaus::component::{AccessControl, Component};
 use jaus::messages::mobility::{QueryGlobalPose, QueryGlobalPoseExt};
+use jaus::node::now;
 
 /// Reports the pose on the globe, with its standard errors.
 ///
@@ -90,7 +87,7 @@ impl GlobalPoseSensor {
     ) -> Result<Infallible, PartError> {
         let observed = Observed::new(unknown(None));
         let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
-            .with_clock(super::host_clock());
+            .with_clock(slot.time.clone());
         let component = slot
             .component("Global Pose Sensor")
             .access_control(AccessControl::new())
@@ -133,20 +130,20 @@ impl Running {
         loop {
             tokio::select! {
                 octets = inputs.receiver.recv() => match octets {
-                    Some(octets) => self.navigator.handle_octets(Instant::now(), &octets),
+                    Some(octets) => self.navigator.handle_octets(now(), &octets),
                     None => return Err(PartError::Broken(
                         "the GNSS receiver's input has ended".to_owned(),
                     )),
                 },
                 rate = next(&mut inputs.gyro) => {
-                    self.navigator.handle_rate(Instant::now(), rate);
+                    self.navigator.handle_rate(now(), rate);
                     continue;
                 }
                 count = counts.next() => {
                     if counts.take_loss() {
                         self.navigator.forget_wheels();
                     }
-                    self.navigator.handle_count(Instant::now(), WheelCount::from(&count?));
+                    self.navigator.handle_count(now(), WheelCount::from(&count?));
                 }
                 _ = looks.tick() => {}
             }
@@ -158,7 +155,7 @@ impl Running {
     }
 
     async fn publish(&mut self) {
-        let now = Instant::now();
+        let now = now();
         let pose = self.navigator.pose(now);
         let was_lost = std::mem::replace(&mut self.is_lost, pose.is_err());
         match &pose {

@@ -28,7 +28,7 @@ mod velocity_sensor;
 
 use std::convert::Infallible;
 use std::future::Future;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use jaus::component::{self, Builder, Component, Kind};
 use jaus::node::{Node, Port};
@@ -73,9 +73,28 @@ pub struct Slot {
     pub kind: Kind,
     /// Name of the subsystem.
     pub name: String,
+    /// The clock for the time stamps of samples.
+    pub time: TimeOfDay,
 }
 
 impl Slot {
+    /// A place on a node, `None` if the node runs in another process. Samples are stamped by the
+    /// host's clock.
+    pub fn new(
+        port: Port,
+        node: impl Into<Option<Node>>,
+        kind: Kind,
+        name: impl Into<String>,
+    ) -> Self {
+        Self {
+            port,
+            node: node.into(),
+            kind,
+            name: name.into(),
+            time: TimeOfDay::new(since_1970),
+        }
+    }
+
     /// Creates a builder for a component of this subsystem, to [start](Builder::live_on) on the
     /// slot's port.
     pub fn component(&self, name: &str) -> Builder {
@@ -105,14 +124,12 @@ pub enum PartError {
     Broken(String),
 }
 
-/// The host's clock for time stamps of samples. Clocks before 1970 yield 1970.
+/// The host's time of day. Clocks before 1970 yield 1970.
 #[expect(
     clippy::disallowed_methods,
     reason = "parts run in real time, and their reports carry the time of day"
 )]
-fn host_clock() -> TimeOfDay {
-    TimeOfDay::new(|| {
-        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
-        since_1970.unwrap_or_default()
-    })
+fn since_1970() -> Duration {
+    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
+    since_1970.unwrap_or_default()
 }

@@ -19,6 +19,7 @@ use crate::mobility::Vehicle;
 use crate::motion::{DeadReckoning, Frame, Freshness, Motion, Observed, Pilot, Pose, WheelCount};
 use jaus::component::{AccessControl, Component};
 use jaus::messages::mobility::{QueryLocalPose, QueryLocalPoseExt};
+use jaus::node::now;
 
 /// Estimates the pose by dead reckoning from a start pose and the wheel travel since.
 ///
@@ -53,7 +54,7 @@ impl Part for PoseSensor {
         let reckoning = self.begin().await?;
         let observed = Observed::new(standing(Pose::UNKNOWN, None));
         let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
-            .with_clock(super::host_clock());
+            .with_clock(slot.time.clone());
         let component = slot
             .component("Local Pose Sensor")
             .access_control(AccessControl::new())
@@ -126,7 +127,7 @@ impl Running {
         let mut sampled_at = None;
         loop {
             let heard = timeout(silence, counts.next()).await;
-            let now = Instant::now();
+            let now = now();
             if counts.take_loss() {
                 freshness.forget();
             }

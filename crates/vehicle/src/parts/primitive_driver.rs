@@ -1,13 +1,9 @@
 //! The primitive driver: wrench efforts for the drives of a vehicle and its steering, and wheel
 //! odometry.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "supervises the motors in real time"
-)]
 
 use std::convert::Infallible;
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tokio::time::{MissedTickBehavior, interval};
 
@@ -22,6 +18,7 @@ use crate::messages::ground::QueryStage;
 use crate::mobility::Vehicle;
 use crate::motion::{Fence, FenceConfig};
 use jaus::component::{Component, Condition, State};
+use jaus::node::now;
 use jaus::service::{MotionPolicy, StopCause};
 
 /// Drives the wheels of a vehicle as commanded, and stops them when commands cease. While a motor
@@ -220,9 +217,9 @@ impl Running {
     /// A motor fault is a failure as long as it lasts.
     async fn check_motors(&self, faults: &mut FaultMonitor) {
         // Also at rest, when nothing else reads the motors.
-        self.vehicle.handle_time(Instant::now());
+        self.vehicle.handle_time(now());
         let condition = match self.odometer.fault() {
-            Some(fault) => faults.lacks(Instant::now(), &fault, Duration::ZERO),
+            Some(fault) => faults.lacks(now(), &fault, Duration::ZERO),
             None => faults.is_over(),
         };
         if let Some(condition) = condition {

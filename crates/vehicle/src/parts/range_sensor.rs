@@ -5,7 +5,7 @@
 )]
 
 use std::convert::Infallible;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use tokio::time::timeout;
 
@@ -59,7 +59,7 @@ impl Part for RangeSensor {
                 Err(_) => None,
             };
             let scan = pose.map(|pose| ranger.scan(&pose));
-            sensor.publish(scan.as_ref(), SystemTime::now());
+            sensor.publish(scan.as_ref(), slot.time.system_time());
             component.changed::<QueryRangeSensorData>().await;
         }
     }

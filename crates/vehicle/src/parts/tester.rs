@@ -1,11 +1,9 @@
 //! The tester behind `jaus test`: a mission through the whole chain, checked message
 //! by message, and charts of load measurements.
 
-mod alone;
 pub mod figure;
 mod mission;
 pub mod plot;
 pub mod steps;
 
-pub use alone::{Alone, AloneError};
 pub use mission::MissionTest;

@@ -5,7 +5,7 @@
 )]
 
 use std::convert::Infallible;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::Duration;
 
 use tokio::time::timeout;
 
@@ -19,6 +19,7 @@ use jaus::messages::mobility::{
     QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, ReportVelocityStateExt,
     velocity_state_sensor,
 };
+use jaus::node::now;
 
 /// Computes the velocity of the vehicle from the travel of its wheels.
 ///
@@ -62,10 +63,10 @@ impl Part for VelocitySensor {
         )?;
         let mut speedometer = Speedometer::default();
         let mut freshness = Freshness::default();
-        let mut sampled_at = SystemTime::now();
+        let mut sampled_at = slot.time.system_time();
         loop {
             let heard = timeout(self.silence, counts.next()).await;
-            let now = Instant::now();
+            let now = now();
             if counts.take_loss() {
                 freshness.forget();
             }
@@ -74,13 +75,13 @@ impl Part for VelocitySensor {
                     let count = WheelCount::from(&report?);
                     let read_at = Duration::from_millis(count.time_ms.into());
                     if let Some(at) = freshness.handle(now, Some(read_at)) {
-                        sampled_at = SystemTime::now() - now.saturating_duration_since(at);
+                        sampled_at = slot.time.system_time() - now.saturating_duration_since(at);
                     }
                     speedometer.handle_count(count)
                 }
                 Err(_) => {
                     speedometer = Speedometer::default();
-                    sampled_at = SystemTime::now();
+                    sampled_at = slot.time.system_time();
                     None
                 }
             };

@@ -63,12 +63,12 @@ impl Scene {
     {
         let config = Config::loopback(id.subsystem(), id.node()).group(self.group);
         let node = Node::start(config).unwrap();
-        let part = run(Slot {
-            port: node.attach(id.component()).unwrap(),
-            node: Some(node.clone()),
-            kind: Kind::Vehicle,
-            name: "Rover".to_owned(),
-        });
+        let part = run(Slot::new(
+            node.attach(id.component()).unwrap(),
+            node.clone(),
+            Kind::Vehicle,
+            "Rover",
+        ));
         let task = tokio::spawn(async move {
             match part.await {
                 Err(PartError::ShutDown) => {}

@@ -88,12 +88,12 @@ impl Scene {
     fn run(&mut self, id: JausId, part: impl Part) {
         let config = Config::loopback(id.subsystem(), id.node()).group(self.group);
         let node = Node::start(config).unwrap();
-        let slot = Slot {
-            port: node.attach(id.component()).unwrap(),
-            node: Some(node.clone()),
-            kind: Kind::Vehicle,
-            name: "Rover".to_owned(),
-        };
+        let slot = Slot::new(
+            node.attach(id.component()).unwrap(),
+            node.clone(),
+            Kind::Vehicle,
+            "Rover",
+        );
         let task = tokio::spawn(async move {
             let Err(error) = part.run(slot).await;
             panic!("{id} can not go on: {error}");

@@ -284,12 +284,12 @@ async fn the_communicator_logs_what_passes_and_its_log_is_read_back_with_filters
         log: Some(JournalSettings::new(&scratch.0)),
         ..Communicator::default()
     };
-    let slot = Slot {
-        port: vehicle.attach(35).unwrap(),
-        node: Some(vehicle.clone()),
-        kind: Kind::Vehicle,
-        name: "Rover".to_owned(),
-    };
+    let slot = Slot::new(
+        vehicle.attach(35).unwrap(),
+        vehicle.clone(),
+        Kind::Vehicle,
+        "Rover",
+    );
     let running = tokio::spawn(part.run(slot));
     // It runs once its component answers.
     let ask = async {

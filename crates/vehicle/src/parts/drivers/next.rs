@@ -26,6 +26,7 @@ use jaus::codec::Message;
 use jaus::component::{
     Audience, Component, Retake, Session, SessionLoss, SessionSettings, SessionState,
 };
+use jaus::node::now;
 
 /// The command interface of the next driver.
 pub(in crate::parts) trait Language: Send + 'static {
@@ -95,7 +96,7 @@ impl<L: Language> Next<L> {
         mut down: Option<String>,
     ) {
         let before = self.component.standing();
-        while self.remote_platform.plan(Instant::now()) == Plan::Rest {
+        while self.remote_platform.plan(now()) == Plan::Rest {
             let standing = self.component.standing();
             watchman.note(standing);
             if standing.controller != before.controller {
@@ -124,8 +125,8 @@ impl<L: Language> Next<L> {
     async fn stand_down(&self, ticks: &mut Interval, watchman: &mut Watchman, why: &str) {
         let controller = self.component.standing().controller;
         self.vehicle.stop();
-        let mut since = Instant::now();
-        while since.elapsed() < self.settling {
+        let mut since = now();
+        while now() - since < self.settling {
             let standing = self.component.standing();
             watchman.note(standing);
             self.tell_down(why).await;
@@ -135,7 +136,7 @@ impl<L: Language> Next<L> {
             }
             if self.vehicle.is_under_way() {
                 self.vehicle.stop();
-                since = Instant::now();
+                since = now();
             }
         }
     }
@@ -171,16 +172,16 @@ impl<L: Language> Next<L> {
         ticks: &mut Interval,
         watchman: &mut Watchman,
     ) -> Option<String> {
-        let mut busy = Instant::now();
+        let mut busy = now();
         let mut acknowledged = busy;
         let mut had_control = false;
         loop {
             watchman.note(self.component.standing());
-            let (now, state) = (Instant::now(), session.state());
-            let plan = self.remote_platform.plan(now);
+            let (start, state) = (now(), session.state());
+            let plan = self.remote_platform.plan(start);
             if plan != Plan::Rest {
-                busy = now;
-            } else if now - busy > Self::LINGER {
+                busy = start;
+            } else if start - busy > Self::LINGER {
                 return None;
             }
             if stands_down_in(state, had_control) {
@@ -188,15 +189,15 @@ impl<L: Language> Next<L> {
             }
             if let SessionState::Ready(peer) = state {
                 had_control = true;
-                let is_silent = now.saturating_duration_since(acknowledged) > Self::SILENCE;
-                let command = self.carry_out(now, plan, peer, is_silent).await;
+                let is_silent = start.saturating_duration_since(acknowledged) > Self::SILENCE;
+                let command = self.carry_out(start, plan, peer, is_silent).await;
                 match timeout(Self::PATIENCE, session.deliver(&command)).await {
-                    Ok(Ok(())) => acknowledged = Instant::now(),
+                    Ok(Ok(())) => acknowledged = now(),
                     Ok(Err(error)) => tracing::debug!(%error, "not delivered"),
                     Err(_) => tracing::debug!(%peer, "not acknowledged in time"),
                 }
             } else {
-                acknowledged = now;
+                acknowledged = start;
                 self.tell_engaging(state).await;
             }
             ticks.tick().await;
@@ -241,7 +242,7 @@ impl<L: Language> Next<L> {
     /// which stops and releases control. It ends when the sensors report again. The component then
     /// waits in Standby.
     async fn check_sensors(&mut self, lack: Option<&str>) {
-        let now = Instant::now();
+        let now = now();
         let condition = match lack {
             Some(why) => self.sensors.lacks(now, why, FaultMonitor::LIMIT),
             None if self.sensors.failure().is_some()

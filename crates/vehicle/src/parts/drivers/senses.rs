@@ -1,9 +1,7 @@
 //! Sensor input: subscriptions to a service of the own subsystem, with rediscovery after loss.
 
-#![expect(clippy::disallowed_methods, reason = "stamps the arrival of reports")]
-
 use std::convert::Infallible;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::{GlobalPoses, RemotePlatform};
 use crate::ground::{reported_scan, reported_zones};
@@ -26,6 +24,7 @@ use jaus::messages::mobility::{
     ReportLocalOperatingZone, ReportLocalPose, ReportVelocityState, global_pose_sensor,
     local_operating_zone, local_pose_sensor, velocity_state_sensor,
 };
+use jaus::node::now;
 
 /// The reports of one sensor of the own subsystem, whichever provides them at the time.
 ///
@@ -126,7 +125,7 @@ impl Sense<ReportLocalPose> {
     ) -> Result<Infallible, PartError> {
         loop {
             let report = self.next().await?;
-            let now = Instant::now();
+            let now = now();
             if self.take_loss() {
                 remote_platform.handle_pose(now, None, None);
             }
@@ -149,7 +148,7 @@ impl Sense<ReportLocalPose> {
                 freshness.forget();
                 fence.handle_pose(None);
             }
-            let sampled_at = freshness.handle(Instant::now(), stamp);
+            let sampled_at = freshness.handle(now(), stamp);
             if let Some(located) = pose.zip(sampled_at) {
                 fence.handle_pose(Some(located));
             }
@@ -187,7 +186,7 @@ impl Sense<ReportRangeSensorData> {
     ) -> Result<Infallible, PartError> {
         loop {
             let scan = self.next_scan().await?;
-            let now = Instant::now();
+            let now = now();
             if self.take_loss() {
                 remote_platform.handle_scan(now, None, None);
             }
@@ -258,7 +257,7 @@ impl Sense<ReportGlobalPose> {
     ) -> Result<Infallible, PartError> {
         loop {
             let report = self.next().await?;
-            let now = Instant::now();
+            let now = now();
             if self.take_loss() {
                 poses.handle_loss(now);
             }
@@ -290,7 +289,7 @@ impl Sense<ReportVelocityState> {
     ) -> Result<Infallible, PartError> {
         loop {
             let report = self.next().await?;
-            let now = Instant::now();
+            let now = now();
             if self.take_loss() {
                 remote_platform.handle_velocity(now, None, None);
             }

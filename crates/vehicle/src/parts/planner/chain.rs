@@ -4,7 +4,7 @@
     reason = "waits for a lost driver, and stamps the arrival of scans"
 )]
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tokio::sync::mpsc;
 
@@ -24,6 +24,7 @@ use jaus::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatu
 use jaus::messages::mobility::{
     ReportLocalPose, local_path_segment_driver, local_vector_driver, primitive_driver,
 };
+use jaus::node::now;
 
 /// An event of a driver of the chain.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,9 +107,7 @@ pub(super) async fn look_around(
         let Some((stamp, scan)) = scans.next_scan().await? else {
             continue;
         };
-        if freshness.handle(Instant::now(), stamp).is_some()
-            && tell.send(News::Scan(scan)).await.is_err()
-        {
+        if freshness.handle(now(), stamp).is_some() && tell.send(News::Scan(scan)).await.is_err() {
             return Ok(());
         }
     }

@@ -28,6 +28,7 @@ use jaus::component::{
     Component, Retake, Session, SessionLoss, SessionSettings, SessionState, State,
 };
 use jaus::messages::core::QueryHeartbeatPulse;
+use jaus::node::now;
 
 /// Time limit for stopping the driver and releasing control.
 const HALT: Duration = Duration::from_secs(2);
@@ -129,7 +130,7 @@ impl<'a> PlannerTask<'a> {
 
     /// Updates the mission, and announces the resulting changes.
     async fn tell<T>(&mut self, words: impl FnOnce(&mut Mission, Instant) -> T) -> T {
-        let now = Instant::now();
+        let now = now();
         let (answer, news) = self.missions.tell(|mission| words(mission, now));
         if news.mission {
             self.component.changed::<QueryMission>().await;
@@ -263,7 +264,7 @@ impl<'a> PlannerTask<'a> {
             (self.survey, self.survey_at) = (None, None);
             self.lookout.begin();
         } else if self.survey.is_none() && self.survey_at.is_none() {
-            self.survey_at = Instant::now().checked_add(survey::PERIOD);
+            self.survey_at = now().checked_add(survey::PERIOD);
         }
     }
 
@@ -357,7 +358,7 @@ impl<'a> PlannerTask<'a> {
                 self.tell(|mission, _| mission.handle_pose((pose.x, pose.y)))
                     .await;
             }
-            News::Scan(scan) => self.lookout.handle_scan(Instant::now(), &scan),
+            News::Scan(scan) => self.lookout.handle_scan(now(), &scan),
             News::Found(link, peer) => self.peers[link as usize] = peer,
             News::Stage(link, state, progress) => {
                 self.tell(|mission, now| {

@@ -5,7 +5,7 @@
     reason = "gives the steps their clock and timeouts"
 )]
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::steps::{Step, Verdict};
 use crate::messages::ground::report_mission::Stage;
@@ -23,6 +23,7 @@ use jaus::messages::core::QueryControl;
 use jaus::messages::mobility::{
     QueryLocalPose, QueryVelocityState, local_pose_sensor, velocity_state_sensor,
 };
+use jaus::node::now;
 
 /// Settings of a mission test.
 #[derive(Debug, Clone, PartialEq)]
@@ -186,7 +187,7 @@ impl<T: FnMut(&Step)> Running<'_, T> {
         &mut self,
         check: impl Future<Output = Result<(V, String), String>>,
     ) -> Option<V> {
-        let begin = Instant::now();
+        let begin = now();
         let limit = self.test.patience + self.test.drive;
         let result = match tokio::time::timeout(limit, check).await {
             Ok(result) => result,
@@ -196,7 +197,7 @@ impl<T: FnMut(&Step)> Running<'_, T> {
             Ok((value, seen)) => (Some(value), Verdict::Pass(seen)),
             Err(wrong) => (None, Verdict::Fail(wrong)),
         };
-        self.note(verdict, begin.elapsed());
+        self.note(verdict, now() - begin);
         value
     }
 
@@ -269,7 +270,7 @@ impl<'a> Reports<'a> {
 
     /// Collects reports until a stage is reached. An earlier end of the mission is an error.
     async fn until(&mut self, stage: Stage, limit: Duration) -> Result<Vec<ReportMission>, String> {
-        let deadline = Instant::now() + limit;
+        let deadline = now() + limit;
         let mut seen = vec![self.now().await?];
         loop {
             if let Some(last) = seen.last() {
@@ -283,7 +284,7 @@ impl<'a> Reports<'a> {
                         last.reason.to_string_lossy()
                     ));
                 }
-                if Instant::now() > deadline {
+                if now() > deadline {
                     return Err(format!(
                         "still {} after {} s {}",
                         name(last.stage),
@@ -346,10 +347,10 @@ async fn patiently<V, F: Future<Output = Result<V, String>>>(
     test: &MissionTest,
     ask: impl Fn() -> F,
 ) -> Result<V, String> {
-    let begin = Instant::now();
+    let begin = now();
     loop {
         match ask().await {
-            Err(_) if begin.elapsed() < test.patience => tokio::time::sleep(LOOK).await,
+            Err(_) if now() - begin < test.patience => tokio::time::sleep(LOOK).await,
             answer => return answer,
         }
     }
@@ -508,7 +509,7 @@ async fn give_back(
     control: Control,
 ) -> Result<((), String), String> {
     control.release().await;
-    let begin = Instant::now();
+    let begin = now();
     loop {
         let mut held = Vec::new();
         for part in [cast.planner].into_iter().chain(cast.drivers) {
@@ -520,7 +521,7 @@ async fn give_back(
         if held.is_empty() {
             return Ok(((), "all drivers are released".to_owned()));
         }
-        if begin.elapsed() > Duration::from_secs(10) {
+        if now() - begin > Duration::from_secs(10) {
             return Err(format!("still controlled: {}", held.join(", ")));
         }
         tokio::time::sleep(LOOK).await;

@@ -113,12 +113,12 @@ impl World {
         let primitive = plain(33, primitive_driver::LATEST);
         let cells = Arc::new(Mutex::new(vec![255; usize::from(SIDE) * usize::from(SIDE)]));
         let store = store(&node, Arc::clone(&cells));
-        let slot = Slot {
-            port: node.attach(36).unwrap(),
-            node: Some(node.clone()),
-            kind: Kind::Vehicle,
-            name: "Fake".to_owned(),
-        };
+        let slot = Slot::new(
+            node.attach(36).unwrap(),
+            node.clone(),
+            Kind::Vehicle,
+            "Fake",
+        );
         let planner = tokio::spawn(async move {
             let error = settings().run(slot).await.unwrap_err();
             panic!("{error}");

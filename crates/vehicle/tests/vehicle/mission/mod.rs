@@ -16,13 +16,5 @@ mod fake;
 mod missions;
 mod obstacles;
 mod whole;
+mod whole_vehicle;
 pub(crate) mod zones;
-
-use tokio::sync::{Semaphore, SemaphorePermit};
-
-/// Waits for the turn of a test with a whole vehicle. The control loops of a vehicle miss their
-/// deadlines on a machine with few processors if many vehicles plan and drive at once.
-async fn turn() -> SemaphorePermit<'static> {
-    static TURNS: Semaphore = Semaphore::const_new(2);
-    TURNS.acquire().await.expect("never closed")
-}

@@ -2,47 +2,46 @@
 //! and says why.
 
 use jaus::address::JausId;
-use jaus::component::{Component, Control, Kind, Update, When};
+use jaus::component::{Component, Control, Update, When};
 use jaus::messages::mobility::{QueryLocalPose, QueryVelocityState};
-use jaus::node::{Config, Node};
+use jaus::node::Node;
 use jaus_test_kit::waiting::within_limit;
 use jaus_vehicle::messages::ground::report_mission::Stage;
 use jaus_vehicle::messages::ground::set_destination::Approved;
 use jaus_vehicle::messages::ground::{
     QueryMission, QueryPlannedPath, ReportMission, SetDestination,
 };
-use jaus_vehicle::parts::tester::Alone;
-use jaus_vehicle::parts::{Part, RangeSensor, Slot};
+use jaus_vehicle::parts::RangeSensor;
 use jaus_vehicle::sensing::{Disc, Scenery};
 use jaus_vehicle::zones::Point;
-use tokio::task::JoinHandle;
 
-use super::whole::Directory;
+use super::whole_vehicle::{LOOK, WholeVehicle};
 
+/// Number of its component and its node.
+const RANGE_SENSOR: u8 = 51;
 const DESTINATION: Point = (6.0, 5.0);
 
 /// A vehicle with a range sensor, and an operator who controls its planner.
 struct Scene {
-    alone: Alone,
-    sensor: (Node, JoinHandle<()>),
+    vehicle: WholeVehicle,
     scenery: Scenery,
     desk: Node,
     operator: Component,
     planner: Control,
     pose: JausId,
-    _directory: Directory,
 }
 
 impl Scene {
     /// A vehicle that has begun its mission.
     async fn under_way(subsystem: u16) -> Self {
-        let directory = Directory::new(&subsystem.to_string());
-        let alone = Alone::start(subsystem, &directory.0, None).unwrap();
+        let mut vehicle = WholeVehicle::start(subsystem, None);
         let scenery = Scenery::default();
-        let sensor = start_sensor(subsystem, scenery.clone());
-        let desk = Node::start(Config::loopback(subsystem + 1, 1)).unwrap();
-        let operator = Component::builder(Kind::OperatorControlUnit, "Operator");
-        let operator = operator.attach(&desk, 1).unwrap();
+        let sensor = RangeSensor {
+            scenery: scenery.clone(),
+            ..RangeSensor::default()
+        };
+        vehicle.run(RANGE_SENSOR, sensor);
+        let (desk, operator) = vehicle.operator();
         let planner = JausId::new(subsystem, 36, 36);
         let engage = async {
             loop {
@@ -51,6 +50,7 @@ impl Scene {
                 {
                     return control;
                 }
+                tokio::time::sleep(LOOK).await;
             }
         };
         let planner = within_limit(engage).await;
@@ -63,17 +63,19 @@ impl Scene {
         };
         planner.deliver(&go).await.unwrap();
         let scene = Self {
-            alone,
-            sensor,
+            vehicle,
             scenery,
             desk,
             operator,
             planner,
             pose: JausId::new(subsystem, 41, 41),
-            _directory: directory,
         };
-        within_limit(async { while scene.here().await.0.hypot(scene.here().await.1) < 0.3 {} })
-            .await;
+        within_limit(async {
+            while scene.here().await.0.hypot(scene.here().await.1) < 0.3 {
+                tokio::time::sleep(LOOK).await;
+            }
+        })
+        .await;
         scene
     }
 
@@ -85,6 +87,7 @@ impl Scene {
             if let Some(place) = pose.ok().and_then(|it| it.x_m().zip(it.y_m())) {
                 return place;
             }
+            tokio::time::sleep(LOOK).await;
         }
     }
 
@@ -154,6 +157,7 @@ impl Scene {
                 {
                     return;
                 }
+                tokio::time::sleep(LOOK).await;
             }
         };
         within_limit(rest).await;
@@ -163,9 +167,7 @@ impl Scene {
         drop(self.planner);
         drop(self.operator);
         self.desk.shutdown().await;
-        self.sensor.1.abort();
-        self.sensor.0.shutdown().await;
-        self.alone.end().await;
+        self.vehicle.end().await;
     }
 }
 
@@ -178,28 +180,8 @@ struct Ending {
     saw_obstacle: bool,
 }
 
-fn start_sensor(subsystem: u16, scenery: Scenery) -> (Node, JoinHandle<()>) {
-    let node = Node::start(Config::loopback(subsystem, 51)).unwrap();
-    let slot = Slot {
-        port: node.attach(51).unwrap(),
-        node: Some(node.clone()),
-        kind: Kind::Vehicle,
-        name: "Tested".to_owned(),
-    };
-    let sensor = RangeSensor {
-        scenery,
-        ..RangeSensor::default()
-    };
-    let task = tokio::spawn(async move {
-        let Err(error) = sensor.run(slot).await;
-        panic!("the sensor cannot go on: {error}");
-    });
-    (node, task)
-}
-
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_mission_drives_round_an_obstacle_that_appears_on_its_way() {
-    let _turn = super::turn().await;
     let scene = Scene::under_way(1141).await;
     let disc = Disc {
         middle: scene.before_the_end(2.0).await,
@@ -215,9 +197,8 @@ async fn a_mission_drives_round_an_obstacle_that_appears_on_its_way() {
     scene.end().await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_mission_without_a_way_round_stops_before_the_obstacles_and_says_why() {
-    let _turn = super::turn().await;
     let scene = Scene::under_way(1143).await;
     // A ring around the destination.
     let post = |number: u32| {
@@ -238,17 +219,17 @@ async fn a_mission_without_a_way_round_stops_before_the_obstacles_and_says_why()
     scene.end().await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_mission_stops_when_its_range_sensor_dies_and_says_why() {
-    let _turn = super::turn().await;
-    let scene = Scene::under_way(1145).await;
-    scene.sensor.1.abort();
+    let mut scene = Scene::under_way(1145).await;
+    scene.vehicle.kill(RANGE_SENSOR).await;
     let stopped = async {
         loop {
             let reason = scene.mission().await.reason.to_string();
             if reason.contains("range sensor") {
                 return;
             }
+            tokio::time::sleep(LOOK).await;
         }
     };
     within_limit(stopped).await;

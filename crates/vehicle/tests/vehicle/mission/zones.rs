@@ -1,7 +1,7 @@
 //! Operating zones in a whole vehicle: a mission keeps to them, also to one that is set on its way.
 
 use jaus::address::JausId;
-use jaus::component::{Component, Control, Kind, Update, When};
+use jaus::component::{Component, Control, Update, When};
 use jaus::messages::mobility::set_local_operating_zone::{
     LocalExclusionZoneRec, LocalExclusionZoneSeq, LocalPolygonPointRec, X, Y,
 };
@@ -9,32 +9,27 @@ use jaus::messages::mobility::{
     QueryExcursion, QueryLocalPose, SetLocalOperatingZone, SetWrenchEffort, delete_zone,
     set_wrench_effort,
 };
-use jaus::node::{Config, Node};
+use jaus::node::Node;
 use jaus_test_kit::waiting::within_limit;
 use jaus_vehicle::messages::ground::report_mission::Stage;
 use jaus_vehicle::messages::ground::set_destination::Approved;
 use jaus_vehicle::messages::ground::{QueryMission, QueryPlannedPath, SetDestination};
-use jaus_vehicle::parts::tester::Alone;
 use jaus_vehicle::zones::{Point, Polygon};
 
-use super::whole::Directory;
+use super::whole_vehicle::{LOOK, WholeVehicle};
 
 /// A vehicle, and an operator who controls its store and its planner.
 struct Scene {
-    alone: Alone,
+    vehicle: WholeVehicle,
     desk: Node,
     operator: Component,
     pose: JausId,
-    _directory: Directory,
 }
 
 impl Scene {
     async fn new(subsystem: u16) -> Self {
-        let directory = Directory::new(&subsystem.to_string());
-        let alone = Alone::start(subsystem, &directory.0, None).unwrap();
-        let desk = Node::start(Config::loopback(subsystem + 1, 1)).unwrap();
-        let operator = Component::builder(Kind::OperatorControlUnit, "Operator");
-        let operator = operator.attach(&desk, 1).unwrap();
+        let vehicle = WholeVehicle::start(subsystem, None);
+        let (desk, operator) = vehicle.operator();
         let pose = JausId::new(subsystem, 41, 41);
         let is_up = || async {
             operator
@@ -42,13 +37,17 @@ impl Scene {
                 .await
                 .is_ok()
         };
-        within_limit(async { while !is_up().await {} }).await;
+        within_limit(async {
+            while !is_up().await {
+                tokio::time::sleep(LOOK).await;
+            }
+        })
+        .await;
         Self {
-            alone,
+            vehicle,
             desk,
             operator,
             pose,
-            _directory: directory,
         }
     }
 
@@ -66,13 +65,14 @@ impl Scene {
             if let Some(place) = pose.ok().and_then(|it| it.x_m().zip(it.y_m())) {
                 return place;
             }
+            tokio::time::sleep(LOOK).await;
         }
     }
 
     async fn end(self) {
         drop(self.operator);
         self.desk.shutdown().await;
-        self.alone.end().await;
+        self.vehicle.end().await;
     }
 }
 
@@ -99,9 +99,8 @@ pub(crate) fn square((x, y): Point, half: f64) -> [Point; 4] {
     [(south, west), (north, west), (north, east), (south, east)]
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn a_mission_drives_round_a_zone_that_is_set_on_its_way() {
-    let _turn = super::turn().await;
     let scene = Scene::new(1121).await;
     let store = scene.control(61).await;
     let planner = scene.control(36).await;
@@ -123,7 +122,12 @@ async fn a_mission_drives_round_a_zone_that_is_set_on_its_way() {
         .await
         .unwrap();
     // As soon as the vehicle moves, a zone appears 2 m before the destination.
-    within_limit(async { while scene.here().await.0.hypot(scene.here().await.1) < 0.3 {} }).await;
+    within_limit(async {
+        while scene.here().await.0.hypot(scene.here().await.1) < 0.3 {
+            tokio::time::sleep(LOOK).await;
+        }
+    })
+    .await;
     let path = operator
         .query(planner.peer(), &QueryPlannedPath {})
         .await
@@ -165,9 +169,8 @@ async fn a_mission_drives_round_a_zone_that_is_set_on_its_way() {
     scene.end().await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[tokio::test(start_paused = true)]
 async fn full_effort_by_hand_ends_before_a_zone() {
-    let _turn = super::turn().await;
     let scene = Scene::new(1131).await;
     let store = scene.control(61).await;
     store

@@ -78,12 +78,7 @@ impl System {
             OPERATOR => (Kind::OperatorControlUnit, "Operator"),
             _ => (Kind::Vehicle, NAME),
         };
-        let slot = Slot {
-            port,
-            node: Some(node.clone()),
-            kind,
-            name: subsystem.to_owned(),
-        };
+        let slot = Slot::new(port, node.clone(), kind, subsystem);
         self.parts.spawn(async move {
             let Err(error): Result<Infallible, _> = part.run(slot).await;
             (name, error)
