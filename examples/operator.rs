@@ -12,7 +12,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let node = Node::start(Config::loopback(43, 1))?;
     let operator = Component::builder(Kind::OperatorControlUnit, "Operator").attach(&node, 1)?;
 
-    let rover = operator.find_version(primitive_driver::LATEST).await?;
+    let rover = operator.find(primitive_driver::LATEST).await?;
     let control = operator.control(rover, 127).await?;
     control.resume().await?;
     println!("{rover} is ready");

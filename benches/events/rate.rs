@@ -6,7 +6,9 @@ use jaus::codec::Message;
 use jaus::component::{Component, Handlers, Kind};
 use jaus::endpoint::Outgoing;
 use jaus::messages::core::{ConfirmEventRequest, CreateEvent, Event};
-use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+use jaus::messages::mobility::{
+    QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, velocity_state_sensor,
+};
 use jaus::node::{Config, Node, Port};
 
 use crate::quantile;
@@ -68,7 +70,8 @@ async fn sensor(started: &std::sync::mpsc::Sender<()>) {
     let mut report = ReportVelocityState::default();
     report.set_velocity_x_m_per_s(1.5).unwrap();
     let sensor = Handlers::new(velocity_state_sensor::LATEST)
-        .answer(move |_: QueryVelocityState| report.clone());
+        .answer(move |_: QueryVelocityState| report.clone())
+        .declines::<QueryVelocityStateExt>();
     let component = Component::builder(Kind::Vehicle, "Bench")
         .offer(sensor)
         .attach(&node, 1)

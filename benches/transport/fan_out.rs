@@ -11,7 +11,9 @@ use jaus::component::{Component, Handlers, Kind};
 use jaus::endpoint::Outgoing;
 use jaus::link::Group;
 use jaus::messages::core::{CreateEvent, Event, create_event};
-use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+use jaus::messages::mobility::{
+    QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, velocity_state_sensor,
+};
 use jaus::node::{Config, Node, Port};
 use tokio::time::{sleep, timeout};
 
@@ -142,7 +144,9 @@ pub(crate) async fn sensor(at: SocketAddr, subscribers: Vec<SocketAddr>) {
         set.expect("within its range");
         report
     };
-    let sensor = Handlers::new(velocity_state_sensor::LATEST).answer(answer);
+    let sensor = Handlers::new(velocity_state_sensor::LATEST)
+        .answer(answer)
+        .declines::<QueryVelocityStateExt>();
     let component = Component::builder(Kind::Vehicle, "Bench")
         .offer(sensor)
         .attach(&node, SENSOR.component())

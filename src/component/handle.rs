@@ -12,8 +12,8 @@ use super::driver::{Answer, Ask, Command};
 use super::offers::missing_for;
 use super::watch::Outlet;
 use super::{
-    Builder, Control, ControlError, DeliverError, FindError, FromReport, Messages, PublishError,
-    QueryError, SendError, SubscribeError, Subscription, Undecoded, Watch,
+    Audience, Builder, Control, ControlError, DeliverError, FindError, FromReport, Messages,
+    PublishError, QueryError, SendError, SubscribeError, Subscription, Undecoded, Watch,
 };
 use crate::address::JausId;
 use crate::codec::{Message, Query, Report, ServiceId};
@@ -411,46 +411,41 @@ impl Component {
         answer.await.ok()
     }
 
-    /// Waits until another component is known that offers a service, in any version, for at most
-    /// [`FIND_LIMIT`](Self::FIND_LIMIT). The [`directory`](Self::directory) holds the version.
+    /// Waits until another component is known that belongs to an audience, for at most
+    /// [`FIND_LIMIT`](Self::FIND_LIMIT). A string means the providers of the service with that URN, in
+    /// any version; a [`ServiceId`] those of a version that a client made for it can use: the same
+    /// major version, and at least the same minor one. The [`directory`](Self::directory) holds the
+    /// version.
+    ///
+    /// ```no_run
+    /// # use jaus::component::{Audience, Component, FindError};
+    /// # use jaus::messages::mobility::{local_pose_sensor, primitive_driver};
+    /// # async fn find(client: Component) -> Result<(), FindError> {
+    /// let driver = client.find(primitive_driver::LATEST).await?;
+    /// let on_board = Audience::providers(local_pose_sensor::URN).in_subsystem(101);
+    /// let sensor = client.find(on_board).await?;
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
-    /// [`FindError`] gives the time of the search.
-    pub async fn find(&self, urn: &str) -> Result<JausId, FindError> {
-        self.find_within(urn, Self::FIND_LIMIT).await
+    /// [`FindError`] gives the time of the search, and the components with other versions.
+    pub async fn find(&self, audience: impl Into<Audience>) -> Result<JausId, FindError> {
+        self.find_within(audience, Self::FIND_LIMIT).await
     }
 
     /// Like [`find`](Self::find), with another time limit.
     ///
     /// # Errors
-    /// [`FindError`] gives the time of the search.
-    pub async fn find_within(&self, urn: &str, limit: Duration) -> Result<JausId, FindError> {
-        self.search(&Sought::Service(urn), limit, |others| {
-            who(others, |offer| offer.urn == urn)
-        })
-        .await
-    }
-
-    /// Waits until another component is known that offers a service in a version that a client made
-    /// for `wanted` can use: the same major version, and at least the same minor one.
-    ///
-    /// # Errors
-    /// [`FindError`] gives the time of the search, and the components with other versions.
-    pub async fn find_version(&self, wanted: ServiceId) -> Result<JausId, FindError> {
-        self.find_version_within(wanted, Self::FIND_LIMIT).await
-    }
-
-    /// Like [`find_version`](Self::find_version), with another time limit.
-    ///
-    /// # Errors
-    /// Those of [`find_version`](Self::find_version).
-    pub async fn find_version_within(
+    /// Those of [`find`](Self::find).
+    pub async fn find_within(
         &self,
-        wanted: ServiceId,
+        audience: impl Into<Audience>,
         limit: Duration,
     ) -> Result<JausId, FindError> {
-        self.search(&Sought::OneOf(&[wanted]), limit, |others| {
-            who(others, |offer| offer.serves(wanted))
+        let audience = audience.into();
+        self.search(&Sought::Member(&audience), limit, |others| {
+            who(others, |it| audience.includes(it))
         })
         .await
     }
@@ -481,7 +476,8 @@ impl Component {
         self.search(&Sought::OneOf(versions), limit, |others| {
             versions.iter().find_map(|&version| {
                 let exactly = Offer::from(version);
-                Some((who(others, |offer| *offer == exactly)?, version))
+                let found = who(others, |it| it.offered().any(|offer| *offer == exactly));
+                Some((found?, version))
             })
         })
         .await
@@ -545,19 +541,19 @@ impl Component {
     }
 }
 
-/// The wanted service.
+/// What a search is for.
 enum Sought<'a> {
-    /// A service in any version.
-    Service(&'a str),
+    /// A member of an audience.
+    Member(&'a Audience),
     /// A service in one of several versions.
     OneOf(&'a [ServiceId]),
 }
 
 impl Sought<'_> {
-    /// Whether the service with this URN is wanted.
+    /// Whether a service with this URN is wanted.
     fn is_of(&self, urn: &str) -> bool {
         match self {
-            Self::Service(wanted) => *wanted == urn,
+            Self::Member(audience) => audience.wants(urn),
             Self::OneOf(versions) => versions.iter().any(|version| version.urn == urn),
         }
     }
@@ -566,13 +562,10 @@ impl Sought<'_> {
 impl fmt::Display for Sought<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Service(urn) => f.write_str(urn),
+            Self::Member(audience) => audience.fmt(f),
             Self::OneOf(versions) => {
-                for (place, version) in versions.iter().enumerate() {
-                    let gap = if place == 0 { "" } else { " or " };
-                    write!(f, "{gap}{version}")?;
-                }
-                Ok(())
+                let versions: Vec<_> = versions.iter().map(ToString::to_string).collect();
+                f.write_str(&versions.join(" or "))
             }
         }
     }
@@ -584,9 +577,12 @@ struct Others<'a> {
     own: JausId,
 }
 
-/// The first of them with a suitable service.
-fn who(others: &Others<'_>, will_do: impl Fn(&Offer) -> bool) -> Option<JausId> {
+/// The first of them that will do.
+fn who(
+    others: &Others<'_>,
+    will_do: impl Fn(&crate::service::Component) -> bool,
+) -> Option<JausId> {
     let mut components = others.directory.components();
-    let found = components.find(|it| it.id != others.own && it.offered().any(&will_do));
+    let found = components.find(|it| it.id != others.own && will_do(it));
     found.map(|component| component.id)
 }

@@ -4,7 +4,9 @@
 //!
 //! ```no_run
 //! use jaus::component::{Component, Handlers, Kind};
-//! use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+//! use jaus::messages::mobility::{
+//!     QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, velocity_state_sensor,
+//! };
 //! use jaus::node::{Config, Node};
 //!
 //! # #[tokio::main(flavor = "current_thread")]
@@ -14,7 +16,11 @@
 //! let mut speed = ReportVelocityState::default();
 //! speed.set_velocity_x_m_per_s(1.5)?;
 //! let rover = Component::builder(Kind::Vehicle, "Rover")
-//!     .offer(Handlers::new(velocity_state_sensor::LATEST).answer(move |_: QueryVelocityState| speed.clone()))
+//!     .offer(
+//!         Handlers::new(velocity_state_sensor::LATEST)
+//!             .answer(move |_: QueryVelocityState| speed.clone())
+//!             .declines::<QueryVelocityStateExt>(),
+//!     )
 //!     .attach(&node, 33)?;
 //!
 //! // At the operator's desk: subsystem 42.

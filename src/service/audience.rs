@@ -1,6 +1,8 @@
 //! The audience of a message: a part of the network, the providers of a service, or such providers
 //! within a part.
 
+use std::fmt;
+
 use crate::address::JausId;
 use crate::codec::ServiceId;
 use crate::service::{self, Directory};
@@ -22,13 +24,23 @@ use crate::service::{self, Directory};
 pub struct Audience {
     /// An id, usually with wildcards.
     scope: JausId,
-    service: Option<Wanted>,
+    /// A member offers all of these.
+    services: Vec<Wanted>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Wanted {
     AnyVersion(String),
     Version(ServiceId),
+}
+
+impl Wanted {
+    fn urn(&self) -> &str {
+        match self {
+            Self::AnyVersion(urn) => urn,
+            Self::Version(version) => version.urn,
+        }
+    }
 }
 
 impl Audience {
@@ -38,7 +50,7 @@ impl Audience {
     const fn scope(scope: JausId) -> Self {
         Self {
             scope,
-            service: None,
+            services: Vec::new(),
         }
     }
 
@@ -58,7 +70,7 @@ impl Audience {
     #[must_use]
     pub fn providers(urn: impl Into<String>) -> Self {
         Self {
-            service: Some(Wanted::AnyVersion(urn.into())),
+            services: vec![Wanted::AnyVersion(urn.into())],
             ..Self::EVERYBODY
         }
     }
@@ -66,11 +78,18 @@ impl Audience {
     /// All components anywhere that offer a service in a version that a client made for `wanted`
     /// can use: the same major version, and at least the same minor one.
     #[must_use]
-    pub const fn providers_of(wanted: ServiceId) -> Self {
+    pub fn providers_of(wanted: ServiceId) -> Self {
         Self {
-            scope: JausId::EVERYONE,
-            service: Some(Wanted::Version(wanted)),
+            services: vec![Wanted::Version(wanted)],
+            ..Self::EVERYBODY
         }
+    }
+
+    /// Restricts the audience to components that also offer this service, in any version.
+    #[must_use]
+    pub fn that_offer(mut self, urn: impl Into<String>) -> Self {
+        self.services.push(Wanted::AnyVersion(urn.into()));
+        self
     }
 
     /// Restricts the audience to a subsystem.
@@ -88,12 +107,16 @@ impl Audience {
     /// Whether a component of the directory belongs to the audience.
     #[must_use]
     pub fn includes(&self, component: &service::Component) -> bool {
-        let offers = match &self.service {
-            None => true,
-            Some(Wanted::AnyVersion(urn)) => component.offers(urn),
-            Some(Wanted::Version(wanted)) => component.offered().any(|it| it.serves(*wanted)),
+        let offers = |wanted: &Wanted| match wanted {
+            Wanted::AnyVersion(urn) => component.offers(urn),
+            Wanted::Version(wanted) => component.offered().any(|it| it.serves(*wanted)),
         };
-        offers && self.scope.matches(component.id)
+        self.scope.matches(component.id) && self.services.iter().all(offers)
+    }
+
+    /// Whether its members offer the service with this URN.
+    pub(crate) fn wants(&self, urn: &str) -> bool {
+        self.services.iter().any(|wanted| wanted.urn() == urn)
     }
 
     /// The ids of all members except `own`, in order.
@@ -107,9 +130,27 @@ impl Audience {
 
     /// The destination that reaches all members at once, if there is one.
     pub(crate) const fn as_destination(&self) -> Option<JausId> {
-        match self.service {
-            None => Some(self.scope),
-            Some(_) => None,
+        match self.services.is_empty() {
+            true => Some(self.scope),
+            false => None,
+        }
+    }
+}
+
+/// The services and the scope, such as `urn:jaus:jss:core:Events in 101.255.255`.
+impl fmt::Display for Audience {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let services = self.services.iter().map(|wanted| match wanted {
+            Wanted::AnyVersion(urn) => urn.clone(),
+            Wanted::Version(version) => version.to_string(),
+        });
+        let services: Vec<_> = services.collect();
+        f.write_str(&services.join(" and "))?;
+        match (self.scope, services.is_empty()) {
+            (JausId::EVERYONE, false) => Ok(()),
+            (JausId::EVERYONE, true) => f.write_str("any service"),
+            (scope, false) => write!(f, " in {scope}"),
+            (scope, true) => write!(f, "any service in {scope}"),
         }
     }
 }
@@ -178,6 +219,8 @@ mod tests {
             (Audience::providers("urn:speed").in_subsystem(101), true),
             (Audience::providers("urn:speed").in_subsystem(102), false),
             (Audience::providers("urn:pose").in_subsystem(101), false),
+            (Audience::from(SPEED).that_offer("urn:pose"), false),
+            (Audience::from("urn:speed").that_offer("urn:speed"), true),
         ] {
             assert_eq!(audience.includes(&here), is_in, "{audience:?}");
         }

@@ -1,15 +1,16 @@
 //! An application's own service, made of one function per message.
 
 use std::any::TypeId;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use super::publication::Latest;
 use super::{Call, Context, Handlers, Hazards, Publication, Standing, Validity};
 use crate::address::JausId;
 use crate::codec::machine::Outcome;
-use crate::codec::{self, Call as _, DecodeError, Message, Query, ServiceId};
+use crate::codec::{self, Call as _, DecodeError, Message, Query, ServiceId, ServiceInfo};
 use crate::endpoint::Received;
+use crate::messages;
 
 type Stop = Box<dyn FnMut(&mut Context<'_>) + Send>;
 
@@ -49,6 +50,7 @@ impl<Q: Query> Function for Latest<Q> {
 pub struct Functions {
     offers: Vec<ServiceId>,
     by_code: BTreeMap<u16, Vec<Layout>>,
+    declined: BTreeSet<u16>,
     stops: Vec<Stop>,
     hazards: Hazards,
 }
@@ -120,6 +122,23 @@ impl Handlers {
         self.handle::<Q>(Q::Report::OTHER_LAYOUTS, move |call: &mut Call<'_>| {
             call.answer(|query, _| Some(function(query)))
         });
+        self
+    }
+
+    /// Leaves every query of type `Q` without an answer. A component can be attached only if each
+    /// query that a service of [`messages`](crate::messages) defines is answered or declined.
+    ///
+    /// ```
+    /// use jaus::messages::mobility::{QueryVelocityState, QueryVelocityStateExt, velocity_state_sensor};
+    /// use jaus::service::Handlers;
+    ///
+    /// let speedometer = Handlers::new(velocity_state_sensor::LATEST)
+    ///     .publishes::<QueryVelocityState>()
+    ///     .declines::<QueryVelocityStateExt>();
+    /// ```
+    #[must_use]
+    pub fn declines<Q: Query>(mut self) -> Self {
+        self.provider.declined.insert(Q::CODE);
         self
     }
 
@@ -283,6 +302,19 @@ impl<'a> codec::Provider<Call<'a>> for Functions {
         })
     }
 
+    fn unanswered_query(&self) -> Option<(ServiceId, &'static str)> {
+        let registry = messages::registry();
+        let of_ours = |info: &&ServiceInfo| self.offers.contains(&info.id);
+        let services = registry.services().filter(of_ours);
+        let mut messages =
+            services.flat_map(|info| info.inputs.iter().map(|&code| (info.id, code)));
+        let (service, query) = messages.find(|(_, code)| {
+            let is_known = self.by_code.contains_key(code) || self.declined.contains(code);
+            codec::report_code(*code).is_some() && !is_known
+        })?;
+        Some((service, registry.in_service(service, query)?.name))
+    }
+
     fn receive(&mut self, code: u16, call: &mut Call<'a>) -> Option<Result<(), DecodeError>> {
         let layouts = self.by_code.get_mut(&code)?.iter_mut();
         let mut result = Ok(());
@@ -323,7 +355,7 @@ mod tests {
         let handlers = Handlers::new(list_manager::LATEST)
             .receive(move |_: QueryTimeout, _, _| count(&heard))
             .configure(move |_: SetAuthority, _, _| count(&set_up))
-            .command(move |_: crate::messages::core::Reset, _, _| count(&acted))
+            .command(move |_: messages::core::Reset, _, _| count(&acted))
             .on_stop(move |_| count(&stopped));
         (Rig::new(vec![Box::new(handlers)]), counts)
     }
@@ -331,7 +363,7 @@ mod tests {
     fn say_everything(rig: &mut Rig, source: JausId) {
         rig.send(source, &QueryTimeout);
         rig.send(source, &SetAuthority::default());
-        rig.send(source, &crate::messages::core::Reset);
+        rig.send(source, &messages::core::Reset);
     }
 
     #[test]

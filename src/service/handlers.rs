@@ -16,11 +16,14 @@ use crate::endpoint::Received;
 /// A service whose messages are handled by functions of the application.
 ///
 /// ```
-/// use jaus::messages::mobility::{self, QueryVelocityState, ReportVelocityState};
+/// use jaus::messages::mobility::{
+///     QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, velocity_state_sensor,
+/// };
 /// use jaus::service::Handlers;
 ///
-/// let speedometer = Handlers::new(mobility::velocity_state_sensor::LATEST)
-///     .answer(|_query: QueryVelocityState| ReportVelocityState::default());
+/// let speedometer = Handlers::new(velocity_state_sensor::LATEST)
+///     .answer(|_query: QueryVelocityState| ReportVelocityState::default())
+///     .declines::<QueryVelocityStateExt>();
 /// ```
 ///
 /// # A type instead of functions
@@ -260,6 +263,10 @@ where
 
     fn unhandled_version(&self) -> Option<(ServiceId, &'static str)> {
         self.provider.unhandled_version()
+    }
+
+    fn unanswered_query(&self) -> Option<(ServiceId, &'static str)> {
+        self.provider.unanswered_query()
     }
 
     fn tells_end_of(&self, command: u16) -> bool {

@@ -332,6 +332,25 @@ mod tests {
     }
 
     #[test]
+    fn the_patience_of_a_query_holds_for_that_query_alone() {
+        let (mut inquiries, start) = (Inquiries::default(), Instant::now());
+        let mut out = Outbox::new(US);
+        let (usual, patient) = (QueryOptions::default(), QueryOptions::default());
+        let patient = patient.within(Duration::from_secs(5));
+        for (report, options) in [(0x4202, usual), (0x4203, patient), (0x4204, usual)] {
+            inquiries.ask(start, PEER, Bytes::new(), report, options, &mut out);
+        }
+        let mut ends = Vec::new();
+        while let Some(now) = inquiries.poll_timeout() {
+            inquiries.handle_timeout(now, &mut out);
+            while let Some((Inquiry(number), failure)) = inquiries.poll_failure() {
+                ends.push((number, failure.tries, failure.waited.as_millis()));
+            }
+        }
+        assert_eq!(ends, [(1, 3, 1500), (3, 3, 1500), (2, 10, 5000)]);
+    }
+
+    #[test]
     fn a_query_is_not_repeated_while_parts_of_a_large_report_arrive() {
         let (mut inquiries, start) = (Inquiries::default(), Instant::now());
         let mut out = Outbox::new(US);

@@ -152,6 +152,11 @@ pub trait Service: Send {
         None
     }
 
+    /// An offered version with a query that is neither answered nor declined, and the query's name.
+    fn unanswered_query(&self) -> Option<(ServiceId, &'static str)> {
+        None
+    }
+
     /// Whether this service reports the end of commands with this code, with [`Context::ended`]. If
     /// so, clients may run them as command events (AS5710 1.1).
     fn tells_end_of(&self, command: u16) -> bool {

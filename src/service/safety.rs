@@ -2,7 +2,8 @@
 //!
 //! A service that moves something needs a stop action, and Management, so that it acts only for the
 //! client in control of a ready component. A service that clients can configure needs Access
-//! Control. A service must understand every version that it offers.
+//! Control. A service must understand every version that it offers, and answer or decline each of its
+//! queries.
 
 use super::{Service, Standing};
 use crate::codec::ServiceId;
@@ -56,6 +57,17 @@ pub enum UnsafeService {
         /// The message.
         message: &'static str,
     },
+    /// It would not answer a query that it defines.
+    #[error(
+        "{service} is offered, but nothing answers {query}: answer it, too, or add \
+         `.declines::<{query}>()`, which leaves it without an answer"
+    )]
+    QueryNotAnswered {
+        /// The service and its version.
+        service: ServiceId,
+        /// The query.
+        query: &'static str,
+    },
 }
 
 /// Checks whether a component with or without Management, and with this standing, may offer a
@@ -85,7 +97,10 @@ pub(super) fn check(
             service: id,
             command,
         }),
-        _ => Ok(()),
+        _ => match service.unanswered_query() {
+            Some((service, query)) => Err(UnsafeService::QueryNotAnswered { service, query }),
+            None => Ok(()),
+        },
     }
 }
 
@@ -93,10 +108,10 @@ pub(super) fn check(
 mod tests {
     use super::*;
     use crate::codec::Message;
-    use crate::messages::core::{Reset, SetTime, list_manager};
+    use crate::messages::core::{QueryTime, ReportTime, Reset, SetTime, time, transport};
     use crate::service::{AccessControl, Handlers, Management, Stack};
 
-    const SERVICE: ServiceId = list_manager::LATEST;
+    const SERVICE: ServiceId = transport::LATEST;
 
     /// The error for a component with these settings and these handlers.
     fn refused(
@@ -127,6 +142,26 @@ mod tests {
             Err(UnsafeService::NoStop { service, command })
         );
         assert_eq!(refused(handlers().on_stop(|_| {}), managed), Ok(()));
+    }
+
+    #[test]
+    fn each_query_is_answered_or_declined() {
+        let handlers = || Handlers::new(time::LATEST);
+        let (service, query) = (time::LATEST, QueryTime::NAME);
+        let error = refused(handlers(), |stack| stack).unwrap_err();
+        assert_eq!(error, UnsafeService::QueryNotAnswered { service, query });
+        assert!(
+            error.to_string().contains(".declines::<QueryTime>()"),
+            "{error}"
+        );
+        for complete in [
+            handlers().answer(|_: QueryTime| ReportTime::default()),
+            handlers().publishes::<QueryTime>(),
+            handlers().receive(|_: QueryTime, _, _| {}),
+            handlers().declines::<QueryTime>(),
+        ] {
+            assert_eq!(refused(complete, |stack| stack), Ok(()));
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use jaus::codec::{Message, ServiceId};
 use jaus::component::{AttachError, Component, FindError, Handlers, Kind};
 use jaus::link::Group;
 use jaus::messages::mobility::local_vector_driver::{V1_0, V1_1};
-use jaus::messages::mobility::{self, v1_0};
+use jaus::messages::mobility::{self, QueryLocalVector, QueryLocalVectorExt, v1_0};
 use jaus::messages::registry;
 use jaus::node::{Config, Node};
 use jaus::service::UnsafeService;
@@ -37,6 +37,8 @@ fn both(heard: mpsc::UnboundedSender<Heard>) -> Handlers {
             let (speed, heading) = (vector.speed_m_per_s(), vector.heading_rad());
             heard.send(("1.0", speed, heading)).unwrap();
         })
+        .declines::<QueryLocalVector>()
+        .declines::<QueryLocalVectorExt>()
 }
 
 fn rounded((version, speed, heading): Heard) -> Heard {
@@ -79,7 +81,11 @@ async fn a_client_is_told_which_version_it_speaks_and_is_understood_in_it() {
 async fn a_client_without_a_common_version_is_told_the_versions_of_both_sides() {
     let group = own_group();
     let rover = Component::builder(Kind::Vehicle, "Rover")
-        .offer(Handlers::new(V1_0))
+        .offer(
+            Handlers::new(V1_0)
+                .declines::<QueryLocalVector>()
+                .declines::<QueryLocalVectorExt>(),
+        )
         .attach(&start(group, 101), 1)
         .unwrap();
     let client = Component::builder(Kind::OperatorControlUnit, "Operator")
@@ -115,8 +121,12 @@ fn the_registry_settles_by_service_and_version_where_a_code_is_shared() {
 
 #[tokio::test]
 async fn a_version_whose_layout_nothing_handles_cannot_be_offered() {
-    let newest_only =
-        || Handlers::new(V1_1).receive_unguarded(|_: mobility::SetLocalVector, _, _| {});
+    let newest_only = || {
+        Handlers::new(V1_1)
+            .receive_unguarded(|_: mobility::SetLocalVector, _, _| {})
+            .declines::<QueryLocalVector>()
+            .declines::<QueryLocalVectorExt>()
+    };
     let node = start(own_group(), 101);
     let rover = || Component::builder(Kind::Vehicle, "Rover");
     let both = rover().offer(newest_only().and_version(V1_0));

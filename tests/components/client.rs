@@ -326,9 +326,7 @@ async fn the_greater_authority_takes_control_and_an_emergency_stops_everybody() 
         .management(Management::new())
         .attach(&start(101), 1)
         .unwrap();
-    let peer = within_limit(pupil.find_version(management::LATEST))
-        .await
-        .unwrap();
+    let peer = within_limit(pupil.find(management::LATEST)).await.unwrap();
     assert_eq!(peer, rover.id());
     let query = QueryStatus {};
     let subscribing = teacher.subscribe(peer, &query, When::OnChange);
@@ -397,14 +395,11 @@ async fn a_version_that_nobody_offers_is_told_with_the_versions_that_are_there()
         .attach(&start(43), 1)
         .unwrap();
     let older = ServiceId { minor: 1, ..CAMERA };
-    let found = within_limit(operator.find_version(older)).await;
+    let found = within_limit(operator.find(older)).await;
     assert_eq!(found, Ok(rover.id()));
     let newer = ServiceId { minor: 3, ..CAMERA };
     let limit = Duration::from_millis(50);
-    let error = operator
-        .find_version_within(newer, limit)
-        .await
-        .unwrap_err();
+    let error = operator.find_within(newer, limit).await.unwrap_err();
     assert!(matches!(&error, FindError::NotFound { instead, .. } if instead.len() == 1));
     let told = error.to_string();
     assert!(
@@ -412,11 +407,7 @@ async fn a_version_that_nobody_offers_is_told_with_the_versions_that_are_there()
         "{told}"
     );
     assert!(told.ends_with("(102.1.1 offers version 1.2)"), "{told}");
-    assert!(
-        within_limit(operator.find_version(discovery::LATEST))
-            .await
-            .is_ok()
-    );
+    assert!(within_limit(operator.find(discovery::LATEST)).await.is_ok());
 }
 
 #[tokio::test]

@@ -11,7 +11,9 @@ use jaus::component::{
 };
 use jaus::link::Group;
 use jaus::messages::core::{QueryIdentification, ReportHeartbeatPulse, discovery};
-use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+use jaus::messages::mobility::{
+    QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, velocity_state_sensor,
+};
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::within_limit;
@@ -37,7 +39,8 @@ impl Network {
         let mut report = ReportVelocityState::default();
         report.set_velocity_x_m_per_s(speed).unwrap();
         let speedometer = Handlers::new(velocity_state_sensor::LATEST)
-            .answer(move |_: QueryVelocityState| report.clone());
+            .answer(move |_: QueryVelocityState| report.clone())
+            .declines::<QueryVelocityStateExt>();
         Component::builder(Kind::Vehicle, "Sensor")
             .offer(speedometer)
             .attach(&self.node(subsystem, 1), 42)
@@ -249,12 +252,12 @@ async fn what_no_member_could_grant_is_refused_at_once_and_a_stopped_node_ends_t
 async fn queries_of_one_component_and_of_a_group_reach_it_with_their_priority() {
     let network = Network::new();
     let (heard, mut priorities) = tokio::sync::mpsc::unbounded_channel();
-    let sensor = Handlers::new(velocity_state_sensor::LATEST).receive(
-        move |_: QueryVelocityState, query, context| {
+    let sensor = Handlers::new(velocity_state_sensor::LATEST)
+        .receive(move |_: QueryVelocityState, query, context| {
             heard.send(query.priority).unwrap();
             context.reply(query, &ReportVelocityState::default());
-        },
-    );
+        })
+        .declines::<QueryVelocityStateExt>();
     let sensor = Component::builder(Kind::Vehicle, "Sensor")
         .offer(sensor)
         .attach(&network.node(101, 1), 42)

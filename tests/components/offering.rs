@@ -6,11 +6,13 @@ use std::time::Duration;
 use jaus::address::JausId;
 use jaus::component::{
     AttachError, Change, Component, FindError, Handlers, Kind, Level, Liveness, Patience,
-    QueryError, SendError,
+    QueryError, QueryOptions, SendError,
 };
 use jaus::link::Group;
 use jaus::messages::core::{QueryHeartbeatPulse, QueryStatus, ReportStatus, liveness, management};
-use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+use jaus::messages::mobility::{
+    QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, velocity_state_sensor,
+};
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::within_limit;
@@ -25,7 +27,8 @@ fn rover_and_operator() -> (Component, Component) {
     let mut speed = ReportVelocityState::default();
     speed.set_velocity_x_m_per_s(1.5).unwrap();
     let speedometer = Handlers::new(velocity_state_sensor::LATEST)
-        .answer(move |_: QueryVelocityState| speed.clone());
+        .answer(move |_: QueryVelocityState| speed.clone())
+        .declines::<QueryVelocityStateExt>();
     let rover = Component::builder(Kind::Vehicle, "Rover")
         .component_name("Drive")
         .offer(speedometer)
@@ -76,6 +79,28 @@ async fn who_does_not_answer_is_named_with_what_was_asked_and_for_how_long() {
         told.starts_with("101.1.33 did not answer QueryStatus with ReportStatus: 2 attempts"),
         "{told}"
     );
+}
+
+#[tokio::test]
+async fn the_patience_of_a_call_holds_for_that_call_alone() {
+    let (_rover, operator) = rover_and_operator();
+    let absent = JausId::new(101, 1, 34);
+    let patient = QueryOptions::from(Patience {
+        tries: 4,
+        interval: Duration::from_millis(20),
+    });
+    let ask = |options| operator.query_with(options, absent, &QueryStatus);
+    for (options, expected) in [
+        (QueryOptions::default(), 2),
+        (patient, 4),
+        (QueryOptions::default(), 2),
+    ] {
+        let error = within_limit(ask(options)).await.unwrap_err();
+        let QueryError::NoAnswer { tries, .. } = error else {
+            panic!("{error}")
+        };
+        assert_eq!(tries, expected);
+    }
 }
 
 #[tokio::test]

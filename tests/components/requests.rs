@@ -5,7 +5,7 @@ use std::time::Duration;
 use jaus::component::{AccessControl, Component, Handlers, Kind, Management, RequestError};
 use jaus::messages::core::Reset;
 use jaus::messages::mobility::{
-    SetLocalWaypoint, SetTravelSpeed, SetWrenchEffort, primitive_driver,
+    QueryWrenchEffort, SetLocalWaypoint, SetTravelSpeed, SetWrenchEffort, primitive_driver,
 };
 use jaus::node::{Config, Node};
 use jaus::service::{Elements, ListManager};
@@ -62,6 +62,7 @@ async fn a_list_is_filled_read_and_emptied() {
 async fn drivable(node: &Node) -> (Component, Component) {
     let driver = Handlers::new(primitive_driver::LATEST)
         .command(|_: SetWrenchEffort, _, _| {})
+        .declines::<QueryWrenchEffort>()
         .on_stop(|context| {
             let effort = <SetWrenchEffort as jaus::codec::Message>::CODE;
             context.ended(effort, false);

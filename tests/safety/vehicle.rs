@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
-use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
+use jaus::messages::mobility::{QueryWrenchEffort, SetWrenchEffort, primitive_driver};
 use jaus::service::{
     Condition, Discovery, Handlers, Kind, Liveness, Management, MotionPolicy, Profile, Scope,
     Service, Stack, Standing, State, StopCause, Time, TimeOfDay, Timing,
@@ -150,6 +150,7 @@ fn own_service(plant: &SharedPlant) -> Handlers {
                 ..Effort::default()
             }));
         })
+        .declines::<QueryWrenchEffort>()
         .on_stop(move |_| brake.drive(Drive::Stop))
 }
 

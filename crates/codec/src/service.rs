@@ -24,6 +24,11 @@ pub trait Provider<C> {
         None
     }
 
+    /// An offered version with a query that is neither answered nor declined, and the query's name.
+    fn unanswered_query(&self) -> Option<(ServiceId, &'static str)> {
+        None
+    }
+
     /// Handles the message of the call. `None` if the service has no message with this code.
     fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), DecodeError>>;
 

@@ -194,7 +194,11 @@ impl Picture {
             }
             Report::Velocity(what, stamp) => {
                 let at = sampled_at(&mut part.velocity_clock, now, stamp);
-                self.velocity = Some(Sample { what, by, at });
+                // An inertial measurement unit reports turn rates without a speed.
+                let source = self.velocity.map(|known| known.by);
+                if what.x.is_some() || source.is_none_or(|source| source == by) {
+                    self.velocity = Some(Sample { what, by, at });
+                }
             }
             Report::Mission(what) => self.mission = Some(Sample { what, by, at: now }),
             Report::Path(path) => self.path = path,

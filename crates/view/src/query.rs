@@ -1,9 +1,11 @@
 //! A query to send, made from its name and the fields that its report is to have.
 
 use std::cmp::Ordering;
+use std::collections::BTreeSet;
 
 use bytes::Bytes;
 use jaus::codec::report_code;
+use jsidl::model::Service;
 use jsidl::presence;
 use serde_json::{Map, Value as Json};
 
@@ -82,6 +84,27 @@ impl Dictionary {
         let name = format!("Report{}", query.name().strip_prefix("Query")?);
         let mut known = self.definitions().filter(shares_service);
         known.find(|it| it.name() == name)
+    }
+
+    /// The services that receive a message, if a component that offers these services has none of
+    /// them: not even one that inherits from them. Empty if that is not known for certain.
+    pub fn missing_services<'o>(
+        &self,
+        offered: impl IntoIterator<Item = &'o str>,
+        code: u16,
+    ) -> BTreeSet<&str> {
+        let library = self.library();
+        let receives = |service: &Service| service.inputs.iter().any(|it| it.code == code);
+        let may_receive = |urn: &str| {
+            let mut versions = library.versions(urn).peekable();
+            // An unknown service may inherit from any.
+            versions.peek().is_none() || versions.any(|it| library.lineage(it).any(receives))
+        };
+        if offered.into_iter().any(may_receive) {
+            return BTreeSet::new();
+        }
+        let receivers = library.services().filter(|it| receives(it));
+        receivers.map(|it| &*it.id.urn).collect()
     }
 
     fn vectors(&self, query: &Definition, report: &Definition) -> Vec<presence::PresenceVector> {
@@ -165,6 +188,9 @@ mod tests {
 
     use super::*;
 
+    const CORE: &str = "urn:jaus:jss:core";
+    const QUERY_STATUS: u16 = 0x2002;
+
     fn dictionary() -> Dictionary {
         Dictionary::new().with_catalogue()
     }
@@ -194,6 +220,24 @@ mod tests {
         assert_eq!(query("QueryStatus").unwrap().report, 0x4002);
         let resume = query("Resume").unwrap_err();
         assert!(resume.problem.contains("Resume is not a query"), "{resume}");
+    }
+
+    #[test]
+    fn a_service_is_missing_only_if_no_offered_one_can_receive_the_message() {
+        let dictionary = dictionary();
+        let missing = |offered: &[&str], code| {
+            let missing = dictionary.missing_services(offered.iter().copied(), code);
+            missing.into_iter().collect::<Vec<_>>()
+        };
+        let [discovery, management] = ["Discovery", "Management"].map(|it| format!("{CORE}:{it}"));
+        let driver = "urn:jaus:jss:mobility:PrimitiveDriver";
+        assert_eq!(missing(&[], QUERY_STATUS), [&*management]);
+        assert_eq!(missing(&[&discovery], QUERY_STATUS), [&*management]);
+        for offered in [&*management, driver, "urn:example:arm"] {
+            let found = missing(&[&discovery, offered], QUERY_STATUS);
+            assert!(found.is_empty(), "{offered}: {found:?}");
+        }
+        assert!(missing(&[&discovery], 0xD3FF).is_empty());
     }
 
     #[test]

@@ -12,7 +12,7 @@ use jaus_cli::runtime::{between, seconds};
 use jaus_cli::{Ready, launch};
 use jaus_vehicle::motion::wrap;
 use jaus_vehicle::navigation::NavigatorConfig;
-use jaus_vehicle::parts::{GlobalPoseSensor, Gyro, Part};
+use jaus_vehicle::parts::{GlobalPoseSensor, IioDevice, Part};
 
 #[derive(Args)]
 struct Flags {
@@ -72,7 +72,7 @@ impl Ready for Flags {
         Ok(GlobalPoseSensor {
             receiver: self.receiver,
             baud: self.baud,
-            gyro: self.gyro.map(|directory| Gyro {
+            gyro: self.gyro.map(|directory| IioDevice {
                 directory,
                 inverted,
             }),

@@ -24,8 +24,13 @@ fn named(folder: &Path, prefix: &str, suffix: &str) -> BTreeSet<String> {
 }
 
 /// Services that do not belong on a machine that runs a whole system: one joins two networks, the
-/// others need a GNSS receiver.
-const ELSEWHERE: [&str; 3] = ["ra-gateway", "global-pose-sensor", "global-driver"];
+/// others need a GNSS receiver or an inertial measurement unit.
+const ELSEWHERE: [&str; 4] = [
+    "ra-gateway",
+    "global-pose-sensor",
+    "global-driver",
+    "imu-sensor",
+];
 
 /// Names of our programs without `jaus-`.
 fn programs() -> BTreeSet<String> {

@@ -202,6 +202,7 @@ fn flags_of_motors_and_receivers_out_of_their_range_are_told_with_the_range() {
     ] {
         refused("jaus-global-pose-sensor", flags, told);
     }
+    refused("jaus-imu-sensor", "--silence 0", "write more than 0");
     refused(
         "jaus-global-driver",
         "--turning-radius 101",

@@ -106,6 +106,28 @@ fn the_picture_is_stale_without_a_status_a_pose_and_a_velocity_of_the_last_secon
 }
 
 #[test]
+fn turn_rates_of_an_imu_do_not_stand_in_for_the_speed() {
+    let start = Instant::now();
+    let imu_id = JausId::new(101, 52, 52);
+    let imu = component(imu_id, &[velocity_state_sensor::URN]);
+    let mut picture = picture(start, &[driver(), sensors(), imu]);
+    let mut speed = ReportVelocityState::default();
+    speed.set_velocity_x_m_per_s(0.5).unwrap();
+    let mut turn = ReportVelocityState::default();
+    turn.set_yaw_rate_rad_per_s(0.1).unwrap();
+    picture.handle_report(start, imu_id, turn.clone().into());
+    report_all(&mut picture, start);
+    picture.handle_report(start, SENSORS, speed.into());
+    for now in [500, 1000].map(|it| start + ms(it)) {
+        picture.handle_report(now, DRIVER, ReportStatus::default().into());
+        picture.handle_report(now, SENSORS, pose().into());
+        picture.handle_report(now, imu_id, turn.clone().into());
+    }
+    let why = picture.stale(start + ms(1000)).unwrap_or_default();
+    assert!(why.contains("no new velocity"), "{why}");
+}
+
+#[test]
 fn a_vehicle_without_sensors_is_driven_by_its_status_alone() {
     let start = Instant::now();
     let mut picture = picture(start, &[driver()]);

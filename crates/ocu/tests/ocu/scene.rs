@@ -14,7 +14,8 @@ use jaus::component::{
 use jaus::link::Group;
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::messages::mobility::{
-    QueryLocalPose, ReportLocalPose, SetWrenchEffort, local_pose_sensor, primitive_driver,
+    QueryLocalPose, QueryLocalPoseExt, QueryWrenchEffort, ReportLocalPose, SetWrenchEffort,
+    local_pose_sensor, primitive_driver,
 };
 use jaus::node::{Config, Node};
 use jaus_ocu::{Listen, Station};
@@ -112,6 +113,7 @@ impl Scene {
         let start = |subsystem| {
             let driver = Handlers::new(primitive_driver::LATEST)
                 .command(|_: SetWrenchEffort, _, _| {})
+                .declines::<QueryWrenchEffort>()
                 .on_stop(|_| {});
             let rover = Component::builder(Kind::Vehicle, "Rover")
                 .scope(Scope::Nobody)
@@ -247,21 +249,23 @@ fn rover(
 fn pose_that_freezes(switch: Arc<AtomicBool>) -> Handlers {
     let start = Instant::now();
     let mut sampled = Duration::ZERO;
-    Handlers::new(local_pose_sensor::LATEST).answer(move |_: QueryLocalPose| {
-        if !switch.load(Ordering::Relaxed) {
-            sampled = start.elapsed();
-        }
-        let seconds = u8::try_from(sampled.as_secs()).unwrap();
-        let stamp = TimeStamp::default().with_seconds(seconds).unwrap();
-        let milliseconds = u16::try_from(sampled.subsec_millis()).unwrap();
-        let mut report = ReportLocalPose {
-            time_stamp: stamp.with_milliseconds(milliseconds).ok(),
-            ..ReportLocalPose::default()
-        };
-        report.set_x_m(3.0).unwrap();
-        report.set_y_m(4.0).unwrap();
-        report
-    })
+    Handlers::new(local_pose_sensor::LATEST)
+        .answer(move |_: QueryLocalPose| {
+            if !switch.load(Ordering::Relaxed) {
+                sampled = start.elapsed();
+            }
+            let seconds = u8::try_from(sampled.as_secs()).unwrap();
+            let stamp = TimeStamp::default().with_seconds(seconds).unwrap();
+            let milliseconds = u16::try_from(sampled.subsec_millis()).unwrap();
+            let mut report = ReportLocalPose {
+                time_stamp: stamp.with_milliseconds(milliseconds).ok(),
+                ..ReportLocalPose::default()
+            };
+            report.set_x_m(3.0).unwrap();
+            report.set_y_m(4.0).unwrap();
+            report
+        })
+        .declines::<QueryLocalPoseExt>()
 }
 
 async fn start(

@@ -38,6 +38,8 @@ use jaus::component::{Call, Handlers};
 
 /// The number of the sensor.
 const SENSOR: u16 = 1;
+/// A sensor most of whose distances are below this, in metres, is covered.
+const COVERED: f64 = 0.05;
 /// Its name, for people.
 const NAME: &str = "range sensor";
 
@@ -266,8 +268,9 @@ fn refusal(set: &SetRangeSensorConfiguration) -> ConfirmSensorConfiguration {
 /// The scan in a report and its time stamp; `None` if no sensor measures.
 ///
 /// Only data in the vehicle's coordinates count, because the mounting of a sensor is not known here.
-/// Distances are horizontal: a measurement of the ground is an obstacle. If the sensor marks more
-/// than half of the measurements as invalid, it is blind, and there is no scan.
+/// Distances are horizontal: a measurement of the ground is an obstacle. If more than half of the
+/// measurements are marked as invalid, or end at the sensor because it is covered, it is blind, and
+/// there is no scan.
 #[must_use]
 pub fn reported_scan(report: &ReportRangeSensorData) -> Option<(TimeStamp, Scan)> {
     report.range_sensor_data_list.iter().find_map(|sensor| {
@@ -277,7 +280,9 @@ pub fn reported_scan(report: &ReportRangeSensorData) -> Option<(TimeStamp, Scan)
         let points = &data.range_sensor_data_point_list;
         let is_valid =
             |it: &&RangeSensorDataPointRec| it.range_validity != Some(RangeValidity::FALSE);
-        let is_blind = points.iter().filter(is_valid).count() * 2 < points.len();
+        let sees = |it: &&RangeSensorDataPointRec| it.range.value() > COVERED;
+        let seen = points.iter().filter(is_valid).filter(sees).count();
+        let is_blind = seen * 2 < points.len();
         let system = data.range_sensor_data_rec.report_coordinate_system;
         let is_of_vehicle = system == ReportCoordinateSystem::VEHICLE_COORDINATE_SYSTEM;
         if points.is_empty() || is_blind || !is_of_vehicle {
@@ -361,6 +366,14 @@ mod tests {
             });
             let rays = reported_scan(&report).map(|(_, scan)| scan.rays().len());
             assert_eq!(rays, (invalid <= 5).then_some(10 - invalid), "{invalid}");
+        }
+        for covered in [5, 6] {
+            let report = changed(|data| {
+                for point in data.range_sensor_data_point_list.iter_mut().take(covered) {
+                    point.range = Range::new(0.01).unwrap();
+                }
+            });
+            assert_eq!(reported_scan(&report).is_some(), covered == 5);
         }
         let nothing = changed(|data| data.range_sensor_data_point_list.clear());
         assert_eq!(reported_scan(&nothing), None);

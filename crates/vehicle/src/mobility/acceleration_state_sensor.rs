@@ -3,6 +3,7 @@
 use super::behaviour::Behaviour;
 use super::controls::Controls;
 use super::exchange::Exchange;
+use crate::motion::Acceleration;
 use jaus::codec::{Message, ServiceId};
 use jaus::messages::mobility::report_acceleration_state as fields;
 use jaus::messages::mobility::report_acceleration_state_ext as ext;
@@ -35,35 +36,42 @@ impl Behaviour for AccelerationStateSensor {
 }
 
 fn report(_: &QueryAccelerationState, exchange: &mut Exchange<'_, '_>) -> ReportAccelerationState {
-    let acceleration = exchange.controls.pilot.motion().acceleration;
-    ReportAccelerationState {
-        acceleration_x: fields::AccelerationX::new(acceleration.x).ok(),
-        acceleration_y: fields::AccelerationY::new(acceleration.y).ok(),
-        acceleration_z: fields::AccelerationZ::new(acceleration.z).ok(),
-        acceleration_rms: None,
-        roll_acceleration: fields::RollAcceleration::new(acceleration.roll).ok(),
-        pitch_acceleration: fields::PitchAcceleration::new(acceleration.pitch).ok(),
-        yaw_acceleration: fields::YawAcceleration::new(acceleration.yaw).ok(),
-        rotational_acceleration_rms: None,
-        time_stamp: None,
-    }
+    exchange.controls.pilot.motion().acceleration.into()
 }
 
 fn report_ext(
     _: &QueryAccelerationStateExt,
     exchange: &mut Exchange<'_, '_>,
 ) -> ReportAccelerationStateExt {
-    let acceleration = exchange.controls.pilot.motion().acceleration;
-    ReportAccelerationStateExt {
-        acceleration_x: ext::AccelerationX::new(acceleration.x).ok(),
-        acceleration_y: ext::AccelerationY::new(acceleration.y).ok(),
-        acceleration_z: ext::AccelerationZ::new(acceleration.z).ok(),
-        acceleration_rms: None,
-        roll_acceleration: ext::RollAcceleration::new(acceleration.roll).ok(),
-        pitch_acceleration: ext::PitchAcceleration::new(acceleration.pitch).ok(),
-        yaw_acceleration: ext::YawAcceleration::new(acceleration.yaw).ok(),
-        rotational_acceleration_rms: None,
-        time_seconds: None,
-        time_nano_seconds: None,
+    exchange.controls.pilot.motion().acceleration.into()
+}
+
+/// Without the components that are NaN.
+impl From<Acceleration> for ReportAccelerationState {
+    fn from(acceleration: Acceleration) -> Self {
+        Self {
+            acceleration_x: fields::AccelerationX::new(acceleration.x).ok(),
+            acceleration_y: fields::AccelerationY::new(acceleration.y).ok(),
+            acceleration_z: fields::AccelerationZ::new(acceleration.z).ok(),
+            roll_acceleration: fields::RollAcceleration::new(acceleration.roll).ok(),
+            pitch_acceleration: fields::PitchAcceleration::new(acceleration.pitch).ok(),
+            yaw_acceleration: fields::YawAcceleration::new(acceleration.yaw).ok(),
+            ..Self::default()
+        }
+    }
+}
+
+/// Without the components that are NaN.
+impl From<Acceleration> for ReportAccelerationStateExt {
+    fn from(acceleration: Acceleration) -> Self {
+        Self {
+            acceleration_x: ext::AccelerationX::new(acceleration.x).ok(),
+            acceleration_y: ext::AccelerationY::new(acceleration.y).ok(),
+            acceleration_z: ext::AccelerationZ::new(acceleration.z).ok(),
+            roll_acceleration: ext::RollAcceleration::new(acceleration.roll).ok(),
+            pitch_acceleration: ext::PitchAcceleration::new(acceleration.pitch).ok(),
+            yaw_acceleration: ext::YawAcceleration::new(acceleration.yaw).ok(),
+            ..Self::default()
+        }
     }
 }

@@ -8,12 +8,12 @@ use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::drivers::Sense;
-use super::navigation_inputs::{self, Gyro};
-use super::{Part, PartError, Slot};
+use super::navigation_inputs;
+use super::{IioDevice, Part, PartError, Slot};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::Vehicle;
 use crate::motion::{Frame, GlobalPose, Motion, Observed, Pilot, Pose, WheelCount};
-use crate::navigation::{Navigator, NavigatorConfig};
+use crate::navigation::{IioImu, Navigator, NavigatorConfig};
 use jaus::component::{AccessControl, Component};
 use jaus::messages::mobility::{QueryGlobalPose, QueryGlobalPoseExt};
 use jaus::node::now;
@@ -31,7 +31,7 @@ pub struct GlobalPoseSensor {
     /// Bits per second of the line.
     pub baud: u32,
     /// The gyroscope, if there is one.
-    pub gyro: Option<Gyro>,
+    pub gyro: Option<IioDevice>,
     /// Report rate requested for the wheels, in hertz.
     pub hz: f64,
     /// The heading at the start, and when the pose becomes unknown.
@@ -62,7 +62,11 @@ impl Default for GlobalPoseSensor {
 impl Part for GlobalPoseSensor {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let (line, receiver) = navigation_inputs::receiver(&self.receiver, self.baud)?;
-        let gyro = self.gyro.as_ref().map(Gyro::start).transpose()?;
+        let gyro = self.gyro.as_ref().map(|device| {
+            let device = device.open()?;
+            IioDevice::start(device, IioImu::turn_rate)
+        });
+        let gyro = gyro.transpose()?;
         let inputs = NavigationInputs { receiver, gyro };
         tokio::select! {
             end = self.run_on(inputs, slot) => end,

@@ -1,64 +1,16 @@
-//! The devices of the global pose sensor: a serial line and a gyroscope.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "reads devices in real time, the gyroscope on its own thread"
+//! The serial line of the global pose sensor.
+#![cfg_attr(
+    feature = "serial",
+    expect(clippy::disallowed_methods, reason = "reads a line in real time")
 )]
 
 use std::convert::Infallible;
-use std::path::PathBuf;
+#[cfg(feature = "serial")]
 use std::time::Duration;
 
 use tokio::sync::mpsc;
 
 use super::PartError;
-use crate::navigation::IioGyro;
-
-/// A gyroscope of Linux's industrial I/O.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Gyro {
-    /// Its directory, such as `/sys/bus/iio/devices/iio:device0`.
-    pub directory: PathBuf,
-    /// Whether its Z axis points down.
-    pub inverted: bool,
-}
-
-impl Gyro {
-    /// Interval between two readings.
-    const PERIOD: Duration = Duration::from_millis(20);
-    /// Interval between attempts to read a device that failed.
-    const RETRY: Duration = Duration::from_secs(1);
-
-    /// Starts a thread that reads the turn rate. It ends with the receiver.
-    pub(super) fn start(&self) -> Result<mpsc::Receiver<f64>, PartError> {
-        let broken = |why: &dyn std::fmt::Display| PartError::Broken(why.to_string());
-        let mut gyro =
-            IioGyro::open(&self.directory, self.inverted).map_err(|error| broken(&error))?;
-        let (tell, rates) = mpsc::channel(8);
-        let thread = std::thread::Builder::new().name("gyroscope".to_owned());
-        let reading = move || {
-            let mut works = true;
-            while !tell.is_closed() {
-                match gyro.turn_rate() {
-                    Ok(rate) => {
-                        works = true;
-                        // A full queue means that the program hangs; old rates are useless.
-                        let _ = tell.try_send(rate);
-                    }
-                    Err(error) if works => {
-                        tracing::warn!("no turn rate: {error}");
-                        works = false;
-                    }
-                    Err(_) => {}
-                }
-                std::thread::sleep(if works { Self::PERIOD } else { Self::RETRY });
-            }
-        };
-        thread
-            .spawn(reading)
-            .map_err(|error| broken(&format!("cannot start the gyroscope's thread: {error}")))?;
-        Ok(rates)
-    }
-}
 
 type Octets = mpsc::Receiver<Vec<u8>>;
 

@@ -4,7 +4,6 @@
 //! sensor, plans, takes control of the path segment driver, hands over the segments, and monitors
 //! all drivers of the chain until the vehicle has arrived. It discovers these components in its own
 //! subsystem, repeatedly if necessary.
-#![expect(clippy::disallowed_methods, reason = "runs the timeouts")]
 
 pub(super) mod chain;
 mod hand_over;
@@ -24,7 +23,7 @@ use crate::ground::Missions;
 use crate::handoff::Handoff;
 use crate::mission::{Link, Settings, Vehicle};
 use jaus::address::JausId;
-use jaus::component::{AccessControl, Component, Management};
+use jaus::component::{AccessControl, Audience, Component, FindError, Management};
 use task::PlannerTask;
 
 /// Settings of a planner.
@@ -103,38 +102,26 @@ const POSES: f64 = 10.0;
 /// Scan rate requested from the range sensor, in hertz.
 const SCANS: f64 = 5.0;
 
-/// Waits for another component of the subsystem that offers all of these services; `None` when the
-/// component has stopped.
-async fn find(component: &Component, services: &[&str]) -> Option<JausId> {
-    let mut changes = component.watch();
-    loop {
-        let directory = component.directory();
-        let own = component.id();
-        let offers = |other: &jaus::service::Component| {
-            other.id != own
-                && other.id.subsystem() == own.subsystem()
-                && services
-                    .iter()
-                    .all(|urn| other.offered().any(|offer| offer.urn == *urn))
-        };
-        if let Some(found) = directory.components().find(|other| offers(other)) {
-            return Some(found.id);
-        }
-        changes.next().await?;
-    }
-}
-
-/// Like [`find`], with a timeout of [`PATIENCE`] and an error for the operator.
-async fn find_soon(component: &Component, services: &[&str], what: &str) -> Result<JausId, String> {
-    match tokio::time::timeout(PATIENCE, find(component, services)).await {
-        Ok(Some(found)) => Ok(found),
-        Ok(None) => Err("the node has stopped".to_owned()),
-        Err(_) => Err(format!(
+/// Finds a component, with an error for the operator. `what` says what it is.
+async fn find_soon(
+    component: &Component,
+    audience: Audience,
+    what: &str,
+) -> Result<JausId, String> {
+    let found = component.find_within(audience, PATIENCE).await;
+    found.map_err(|error| match error {
+        FindError::NotFound { .. } => format!(
             "no {what} found in subsystem {} within {} s: start one",
             component.id().subsystem(),
             PATIENCE.as_secs()
-        )),
-    }
+        ),
+        stopped => stopped.to_string(),
+    })
+}
+
+/// The components of this one's subsystem that offer a service.
+fn on_board(component: &Component, urn: &str) -> Audience {
+    Audience::providers(urn).in_subsystem(component.id().subsystem())
 }
 
 const PATIENCE: Duration = Duration::from_secs(5);

@@ -1,5 +1,6 @@
-//! The reference vehicle: missions, the store under power cuts, faults, and hostile clients.
+//! The reference vehicle: missions, sensors, the store under power cuts, faults, and hostile clients.
 
+mod inertial;
 mod mission;
 mod navigation;
 mod part_faults;

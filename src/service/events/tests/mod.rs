@@ -333,9 +333,8 @@ fn discovery_announces_what_it_learns() {
     rig.create(CLIENT, &services);
     rig.now += SECOND;
     let now = rig.now;
-    rig.stack
-        .offer(now, Box::new(Handlers::new(time::LATEST)))
-        .unwrap();
+    let time = Handlers::new(time::LATEST).declines::<QueryTime>();
+    rig.stack.offer(now, Box::new(time)).unwrap();
     let told = events(&rig.said());
     let report = ReportServices::decode(&told[0].report_message).unwrap();
     let text = format!("{report:?}");

@@ -23,6 +23,7 @@ mod load;
 mod manual;
 mod monitor;
 mod node;
+mod offers;
 mod ping;
 mod queries;
 mod query;

@@ -7,9 +7,12 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
+use bytes::Bytes;
 use clap::Args;
 use jaus::address::JausId;
+use jaus::codec::Message;
 use jaus::endpoint::{Outgoing, Received};
+use jaus::messages::core::ReportServices;
 use jaus::node::Port;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::{self, Network};
@@ -20,6 +23,7 @@ use serde::Serialize;
 use tokio::time::{Instant, timeout_at};
 
 use crate::definitions::Definitions;
+use crate::offers::{not_offered, query_services};
 use crate::queries::{Fields, Named};
 
 /// Interval of repeated queries without an answer.
@@ -28,7 +32,8 @@ const AGAIN: Duration = Duration::from_millis(500);
 /// Query a component and print its report as JSON
 ///
 /// With a wildcard in the address (65535 or 255) all reports that arrive in time are printed. Exit
-/// status 1 means that there was no answer.
+/// status 1 means that there was no answer. If the component does not list the query's service, its
+/// name is printed.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus query 101.1.1 QueryIdentification '{\"QueryType\":2}'\n  \
@@ -89,12 +94,24 @@ impl Query {
         let mut answered = BTreeSet::new();
         let mut complete = true;
         let end = Instant::now() + self.timeout;
+        let mut is_repeated = false;
         while Instant::now() < end {
-            let outgoing = Outgoing::new(port.id(), self.address, query.octets.clone());
-            port.send(outgoing).map_err(Failure::of)?;
+            self.send(&port, query.octets.clone())?;
+            if is_repeated && !self.address.has_wildcard() {
+                let services = query_services(self.address).encode();
+                self.send(&port, services.map_err(Failure::of)?)?;
+            }
+            is_repeated = true;
             let again = end.min(Instant::now() + AGAIN);
             while let Ok(Some(received)) = timeout_at(again, port.recv()).await {
-                if !self.is_answer(&received, query.report) || !answered.insert(received.source) {
+                if !self.is_answer(&received, query.report) {
+                    if let Some(why) = self.not_offered(&received, query, dictionary) {
+                        say(why);
+                        return Ok(Outcome::Incomplete);
+                    }
+                    continue;
+                }
+                if !answered.insert(received.source) {
                     continue;
                 }
                 let line = dictionary.line(&received.payload);
@@ -109,6 +126,26 @@ impl Query {
             say(self.silence());
         }
         Ok(Outcome::complete_if(complete && !answered.is_empty()))
+    }
+
+    fn send(&self, port: &Port, octets: Bytes) -> Result<(), Failure> {
+        let outgoing = Outgoing::new(port.id(), self.address, octets);
+        port.send(outgoing).map(drop).map_err(Failure::of)
+    }
+
+    /// Why there will be no answer, if this message is the component's list of services.
+    fn not_offered(
+        &self,
+        received: &Received,
+        query: &EncodedQuery,
+        dictionary: &Dictionary,
+    ) -> Option<String> {
+        if received.source != self.address {
+            return None;
+        }
+        let report = ReportServices::decode(&received.payload).ok()?;
+        let code = u16::from_le_bytes(*query.octets.first_chunk()?);
+        not_offered(dictionary, &report, self.address, code)
     }
 
     fn is_answer(&self, received: &Received, report: u16) -> bool {

@@ -16,11 +16,13 @@ use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::{self, Network};
 use jaus_cli::output::{Output, say};
 use jaus_cli::runtime::{self, RunFor, between};
+use jaus_view::Dictionary;
 use serde_json::json;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use crate::definitions::Definitions;
 use crate::lease::take_control;
+use crate::offers::ask_if_not_offered;
 use crate::queries::Named;
 
 /// Send a message to a component
@@ -28,7 +30,8 @@ use crate::queries::Named;
 /// A message to a single component is acknowledged; one to a wildcard (65535 or 255) is sent once,
 /// by multicast. With --control it takes control of the component first, makes it ready, and
 /// releases it at the end: components obey commands only from the client in control. Exit status 1
-/// means that the message was not acknowledged, or that control was not granted.
+/// means that the message was not acknowledged, that control was not granted, or that the component
+/// does not list the message's service.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus send 101.2.33 SetWrenchEffort '{\"PropulsiveLinearEffortX\":30}' --control 127 --hz 10 \
@@ -99,9 +102,17 @@ impl Send {
             let joined = self.network.component_for_a_moment("jaus send");
             let (component, sender, stay) = joined.await?;
             let sent = self.send(&component, &sender, &octets).await;
+            let not_offered = match sent {
+                Ok(_) => self.not_offered(&component, &dictionary, &octets).await,
+                Err(_) => None,
+            };
             drop((component, sender));
             stay.end().await;
             self.report(&octets, &sent?)?;
+            if let Some(why) = not_offered {
+                say(why);
+                return Ok(Outcome::Incomplete);
+            }
             if is_command && self.control.is_none() {
                 say(format_args!(
                     "{} is a command: components obey it only from the client in control; take \
@@ -111,6 +122,20 @@ impl Send {
             }
             Ok(Outcome::Done)
         })
+    }
+
+    /// Why the component will not handle the message.
+    async fn not_offered(
+        &self,
+        component: &Component,
+        dictionary: &Dictionary,
+        octets: &Bytes,
+    ) -> Option<String> {
+        if self.address.has_wildcard() {
+            return None;
+        }
+        let code = u16::from_le_bytes(*octets.first_chunk()?);
+        ask_if_not_offered(component, dictionary, self.address, &[code]).await
     }
 
     async fn send(

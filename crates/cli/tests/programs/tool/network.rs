@@ -171,6 +171,28 @@ fn silence_is_told_with_who_did_not_answer_and_what_to_do() {
 }
 
 #[test]
+fn a_message_of_a_service_that_the_component_does_not_list_fails_with_the_service() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let mut node = Running::node(&[&["--id", "103.1.9"], &*network].concat());
+    node.read_until("Ctrl-C");
+    let service = "urn:jaus:jss:core:Management";
+    for (command, message) in [
+        (
+            &["query", "103.1.9", "QueryStatus", "--timeout", "20s"][..],
+            "QueryStatus",
+        ),
+        (&["send", "103.1.9", "Standby"], "Standby"),
+        (&["subscribe", "103.1.9", "QueryStatus"], "QueryStatus"),
+    ] {
+        let run = run(&[command, &*network].concat(), b"");
+        let reason = format!("103.1.9 does not offer the service of {message}: {service}\n");
+        assert!(run.stderr.ends_with(&reason), "{run:?}");
+        assert_eq!(run.status, 1, "{command:?}");
+    }
+}
+
+#[test]
 fn a_wrong_flag_is_refused_with_what_would_be_right() {
     let config = std::env::temp_dir().join(format!("jaus-cli-{}.toml", std::process::id()));
     fs::write(&config, "id = \"103.1.7\"\nprot = 3794\n").unwrap();

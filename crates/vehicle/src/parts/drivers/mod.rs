@@ -4,6 +4,8 @@
 mod fault_monitor;
 mod global_poses;
 mod next;
+#[cfg(test)]
+mod range_faults;
 mod remote_platform;
 mod senses;
 mod standing;

@@ -4,7 +4,9 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::motion::{CommandDeadline, Drive, Freshness, Limits, Motion, Platform, Pose, Velocity};
+use crate::motion::{
+    CommandDeadline, Drive, Freshness, Limits, Motion, Platform, Pose, Velocity, wrap,
+};
 use crate::sensing::Scan;
 use crate::zones::Point;
 
@@ -21,6 +23,8 @@ struct State {
     velocity: Freshness,
     /// The scans of the range sensor.
     scan: Freshness,
+    /// The last scan, and the pose when it was first reported.
+    last_scan: Option<(Scan, Pose)>,
     /// Whether the vehicle must not move without scans.
     needs_scan: bool,
     order: Option<Order>,
@@ -75,6 +79,7 @@ impl RemotePlatform {
             pose: Freshness::default(),
             velocity: Freshness::default(),
             scan: Freshness::default(),
+            last_scan: None,
             needs_scan: settings.needs_scan,
             order: None,
             deadline: CommandDeadline::default(),
@@ -120,20 +125,24 @@ impl RemotePlatform {
     }
 
     /// Handles a scan of the range sensor, sampled at `stamp`; `None` if the sensor does not measure.
-    /// Returns the places of the obstacles in the local frame.
+    /// Returns the places of the obstacles in the local frame; `None` if it says nothing new, so that
+    /// the places seen before remain.
     pub(in crate::parts) fn handle_scan(
         &self,
         now: Instant,
         stamp: Option<Duration>,
         scan: Option<&Scan>,
-    ) -> Vec<Point> {
+    ) -> Option<Vec<Point>> {
         let mut state = self.lock();
         let Some(scan) = scan else {
             state.scan.forget();
-            return Vec::new();
+            return None;
         };
         state.needs_scan = true;
-        state.scan.handle(now, stamp);
+        if state.has_frozen(scan) {
+            return None;
+        }
+        state.scan.handle(now, stamp)?;
         let Motion { pose, velocity, .. } = state.motion;
         let (way, turn) = (velocity.x * Self::SCAN_LAG, velocity.yaw * Self::SCAN_LAG);
         let measured_at = Pose {
@@ -142,7 +151,7 @@ impl RemotePlatform {
             yaw: pose.yaw - turn,
             ..pose
         };
-        scan.hits(measured_at).collect()
+        Some(scan.hits(measured_at).collect())
     }
 
     /// The action to take now.
@@ -171,6 +180,28 @@ impl RemotePlatform {
 }
 
 impl State {
+    /// Distance in metres, and turn in radians, after which a sensor that measures something cannot
+    /// report the same scan again, whatever its time stamp.
+    const CHANGES: f64 = 0.05;
+    /// From this number of obstacles on, the noise of a working sensor changes at least one.
+    const HITS: usize = 3;
+
+    /// Whether the vehicle has moved while the sensor kept reporting the same obstacles.
+    fn has_frozen(&mut self, scan: &Scan) -> bool {
+        let pose = self.motion.pose;
+        match &self.last_scan {
+            Some((last, at)) if last == scan => {
+                let turn = wrap(pose.yaw - at.yaw).abs();
+                let has_moved = pose.distance(at.x, at.y).max(turn) > Self::CHANGES;
+                has_moved && scan.hits(pose).count() >= Self::HITS
+            }
+            _ => {
+                self.last_scan = Some((scan.clone(), pose));
+                false
+            }
+        }
+    }
+
     fn lack(&self, now: Instant) -> Option<String> {
         let needs = [
             (&self.pose, "pose", true),
@@ -224,7 +255,7 @@ impl Platform for RemotePlatform {
         }
         let is_known = heading.is_finite() && speed.is_finite();
         state.order = is_known.then(|| Order::Heading {
-            heading: crate::motion::wrap(heading),
+            heading: wrap(heading),
             speed: speed.clamp(0.0, state.limits.speed),
         });
         true
@@ -341,7 +372,7 @@ mod tests {
             let scan = Scan::default();
             let at = stamp.map(|stamp| Duration::from_secs(3600) + period * stamp);
             let places = remote_platform.handle_scan(now, at, at.map(|_| &scan));
-            assert!(places.is_empty());
+            assert!(places.is_none_or(|it| it.is_empty()));
             remote_platform.plan(now)
         };
         assert!(matches!(plan(0, None), Plan::Go(..)), "no range sensor");
@@ -373,10 +404,37 @@ mod tests {
             range: 4.0,
         };
         let places = remote_platform.handle_scan(now, None, Some(&Scan::new([ahead])));
-        let [(x, y)] = places[..] else {
+        let Some([(x, y)]) = places.as_deref() else {
             panic!("{places:?}");
         };
         assert!((x - 3.0).abs() < 1e-9 && (y - 4.8).abs() < 1e-9, "{x}, {y}");
+    }
+
+    #[test]
+    fn a_report_with_nothing_new_moves_no_obstacle() {
+        let remote_platform = remote_platform(true);
+        let start = Instant::now();
+        let ahead = [0.0, 0.1, 0.2].map(|bearing| Ray {
+            bearing,
+            range: 4.0,
+        });
+        // Report, time stamp and X of the vehicle.
+        let mut places = |count: u32, stamp: u32, x: f64| {
+            let now = start + Duration::from_millis(100) * count;
+            let stamp = Duration::from_secs(3600) + Duration::from_millis(100) * stamp;
+            remote_platform.handle_pose(now, None, Some((x, 0.0, 0.0)));
+            let seen = remote_platform.handle_scan(now, Some(stamp), Some(&Scan::new(ahead)));
+            seen.map(|places| places[0].0)
+        };
+        places(0, 0, 0.0);
+        assert_eq!(places(1, 1, 0.0), Some(4.0));
+        assert_eq!(places(2, 1, 0.04), None, "the same time stamp");
+        assert_eq!(places(3, 3, 0.04), Some(4.04), "it may be a coincidence");
+        for (count, x) in [(4, 0.06), (5, 0.06), (6, 0.0)] {
+            let expected = (x < 0.05).then_some(4.0);
+            assert_eq!(places(count, count, x), expected, "the same distances");
+        }
+        assert!(remote_platform.handle_scan(start, None, None).is_none());
     }
 
     #[test]

@@ -31,6 +31,8 @@ use jaus::node::now;
 /// If there are several providers, the first one to report is used until it falls silent.
 pub(in crate::parts) struct Sense<R> {
     reports: GroupSubscription<R>,
+    /// Whether a report has what is wanted of a source.
+    is_suitable: fn(&R) -> bool,
     source: Option<JausId>,
     /// Whether the source was lost since the last report.
     was_lost: bool,
@@ -50,6 +52,7 @@ impl<R: Message> Sense<R> {
         let reports = component.subscribe_all(providers, query, When::hz(hz));
         Ok(Self {
             reports: reports.map_err(|error| PartError::Broken(error.to_string()))?,
+            is_suitable: |_| true,
             source: None,
             was_lost: false,
             what,
@@ -63,7 +66,7 @@ impl<R: Message> Sense<R> {
             let (source, update) = next.ok_or(PartError::NodeStopped)?;
             match update {
                 GroupUpdate::Report(report) => {
-                    if self.source.is_none() {
+                    if self.source.is_none() && (self.is_suitable)(&report) {
                         tracing::info!("{} from {source}", self.what);
                         self.source = Some(source);
                     }
@@ -189,7 +192,9 @@ impl Sense<ReportRangeSensorData> {
             }
             let stamp = scan.as_ref().and_then(|(stamp, _)| *stamp);
             let scan = scan.as_ref().map(|(_, scan)| scan);
-            fence.set_obstacles(remote_platform.handle_scan(now, stamp, scan));
+            if let Some(obstacles) = remote_platform.handle_scan(now, stamp, scan) {
+                fence.set_obstacles(obstacles);
+            }
         }
     }
 }
@@ -262,19 +267,19 @@ impl Sense<ReportGlobalPose> {
 }
 
 impl Sense<ReportVelocityState> {
-    /// The velocity along and about the vehicle's own axes.
+    /// The velocity along and about the vehicle's own axes, of a source that knows the speed: an
+    /// inertial measurement unit does not.
     pub(in crate::parts) fn velocity(component: &Component, hz: f64) -> Result<Self, PartError> {
         let query = QueryVelocityState::none()
             .with_velocity_x()
             .with_yaw_rate()
             .with_time_stamp();
-        Self::of(
-            component,
-            velocity_state_sensor::URN,
-            &query,
-            hz,
-            "velocity",
-        )
+        let urn = velocity_state_sensor::URN;
+        let sense = Self::of(component, urn, &query, hz, "velocity")?;
+        Ok(Self {
+            is_suitable: |report| report.velocity_x.is_some(),
+            ..sense
+        })
     }
 
     /// Passes all reports to a remote platform.

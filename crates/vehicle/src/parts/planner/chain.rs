@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 
-use super::find;
 use crate::messages::environment_sensing::ReportRangeSensorData;
 use crate::messages::ground::report_stage::State;
 use crate::messages::ground::{QueryStage, ReportStage, stage};
@@ -19,7 +18,7 @@ use crate::parts::drivers::{Sense, reported_pose};
 use crate::sensing::Scan;
 use jaus::address::JausId;
 use jaus::codec::Query;
-use jaus::component::{Component, Subscription, Update, When};
+use jaus::component::{Audience, Component, Subscription, Update, When};
 use jaus::messages::core::report_status::Status;
 use jaus::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatus};
 use jaus::messages::mobility::{
@@ -49,18 +48,22 @@ pub(super) enum News {
 /// Interval between attempts to subscribe.
 const PAUSE: Duration = Duration::from_secs(1);
 
-/// The service that identifies the component for this link, besides Stage.
-pub(in crate::parts) const fn service(link: Link) -> &'static str {
-    match link {
+/// The components of a subsystem that can be this link.
+pub(in crate::parts) fn drivers(link: Link, subsystem: u16) -> Audience {
+    let service = match link {
         Link::Path => local_path_segment_driver::URN,
         Link::Vector => local_vector_driver::URN,
         Link::Primitive => primitive_driver::URN,
-    }
+    };
+    Audience::providers(service)
+        .that_offer(stage::URN)
+        .in_subsystem(subsystem)
 }
 
 /// Monitors a driver, including its replacements. Ends when the component has stopped.
 pub(super) async fn watch(component: &Component, link: Link, tell: &mpsc::Sender<News>) {
-    while let Some(peer) = find(component, &[service(link), stage::URN]).await {
+    let drivers = drivers(link, component.id().subsystem());
+    while let Ok(peer) = component.find_within(&drivers, Duration::MAX).await {
         tracing::info!("the {link} is {peer}");
         if tell.send(News::Found(link, Some(peer))).await.is_err() {
             return;

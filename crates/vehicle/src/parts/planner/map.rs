@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use super::{find_soon, hand_over::in_words};
+use super::{find_soon, hand_over::in_words, on_board};
 use crate::ground::{RasterEdition, fetch_cells, reported_zones};
 use crate::messages::ground::report_raster_maps::MapRec;
 use crate::messages::ground::{QueryRasterMaps, raster_maps};
 use crate::mission::{Point, Terrain};
 use crate::zones::Zones;
 use jaus::address::JausId;
-use jaus::component::{Audience, Component};
+use jaus::component::Component;
 use jaus::messages::mobility::{
     QueryLocalOperatingZone, QueryLocalPose, local_operating_zone, local_pose_sensor,
 };
@@ -31,7 +31,12 @@ pub(super) async fn fetch(
     name: &str,
     known: Option<Map>,
 ) -> Result<Map, String> {
-    let store = find_soon(component, &[raster_maps::URN], "knowledge store").await?;
+    let store = find_soon(
+        component,
+        on_board(component, raster_maps::URN),
+        "knowledge store",
+    )
+    .await?;
     fetch_from(component, store, name, known).await
 }
 
@@ -106,8 +111,7 @@ fn choose(maps: Vec<MapRec>, name: &str, store: JausId) -> Result<MapRec, String
 /// Fetches the operating zones from the first component of the subsystem that has them. `None` if
 /// there is no such component.
 pub(super) async fn fetch_zones(component: &Component) -> Result<Option<Zones>, String> {
-    let providers = Audience::providers(local_operating_zone::URN);
-    let providers = providers.in_subsystem(component.id().subsystem());
+    let providers = on_board(component, local_operating_zone::URN);
     let Some(&store) = component.members(providers).first() else {
         return Ok(None);
     };
@@ -121,8 +125,8 @@ pub(super) async fn fetch_zones(component: &Component) -> Result<Option<Zones>, 
 
 /// Fetches the vehicle's position.
 pub(super) async fn fetch_pose(component: &Component) -> Result<Point, String> {
-    let services = [local_pose_sensor::URN];
-    let sensor = find_soon(component, &services, "local pose sensor").await?;
+    let sensors = on_board(component, local_pose_sensor::URN);
+    let sensor = find_soon(component, sensors, "local pose sensor").await?;
     let query = QueryLocalPose::none().with_x().with_y();
     let pose = component.query(sensor, &query).await.map_err(in_words)?;
     let place = pose.x_m().zip(pose.y_m());

@@ -17,7 +17,7 @@ use super::map::{self, Map};
 use super::survey::{self, Survey, UnderWay};
 use super::{PATIENCE, Planner, find_soon, hand_over};
 use crate::ground::Missions;
-use crate::messages::ground::{QueryMission, QueryPlannedPath, QueryStage, ReportStage, stage};
+use crate::messages::ground::{QueryMission, QueryPlannedPath, QueryStage, ReportStage};
 use crate::mission::{
     self, Action, Destination, Link, LinkState, Mission, NotPlanned, Path, Run, Stage, Terrain,
 };
@@ -247,9 +247,8 @@ impl<'a> PlannerTask<'a> {
         } = *self.settings;
         Box::pin(async move {
             let given = async {
-                let services = [chain::service(Link::Path), stage::URN];
-                let what = "local path segment driver";
-                let driver = find_soon(&component, &services, what).await?;
+                let drivers = chain::drivers(Link::Path, component.id().subsystem());
+                let driver = find_soon(&component, drivers, "local path segment driver").await?;
                 let session = engage(&component, driver, authority).await?;
                 hand_over::hand_over(&component, &session, &path, speed, tolerance).await?;
                 Ok((session, look(&component).await))
@@ -447,8 +446,8 @@ async fn engage(component: &Component, driver: JausId, authority: u8) -> Result<
 async fn look(component: &Component) -> Vec<(Link, LinkState)> {
     let mut states = Vec::new();
     for link in Link::ALL {
-        let services = [chain::service(link), stage::URN];
-        if let Ok(peer) = find_soon(component, &services, "driver").await {
+        let drivers = chain::drivers(link, component.id().subsystem());
+        if let Ok(peer) = component.find_within(drivers, PATIENCE).await {
             let report = component.query(peer, &QueryStage {}).await;
             let state = report.map_or(LinkState::Silent, |it: ReportStage| chain::state(&it));
             states.push((link, state));

@@ -12,13 +12,13 @@ use crate::messages::ground::report_mission::Stage;
 use crate::messages::ground::set_destination::Approved;
 use crate::messages::ground::{
     ApproveMission, QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, ReportMission,
-    SetDestination, mission_planner, raster_maps, stage,
+    SetDestination, mission_planner, raster_maps,
 };
 use crate::mission::{Link, Path, Point, Vehicle, plan};
 use crate::parts::planner::{chain, map};
 use jaus::address::JausId;
 use jaus::codec::Query;
-use jaus::component::{Component, Control, Subscription, When};
+use jaus::component::{Audience, Component, Control, Subscription, When};
 use jaus::messages::core::QueryControl;
 use jaus::messages::mobility::{
     QueryLocalPose, QueryVelocityState, local_pose_sensor, velocity_state_sensor,
@@ -128,18 +128,19 @@ impl<T: FnMut(&Step)> Running<'_, T> {
 
     async fn find_all(&mut self) -> Option<Cast> {
         let (component, test) = (self.component, self.test);
-        let find = |services: Vec<&'static str>| find(component, test, services);
-        let driver = |link| find(vec![chain::service(link), stage::URN]);
+        let find = |audience: Audience| find(component, test, audience);
+        let provider = |urn: &str| find(urn.into());
+        let driver = |link| find(chain::drivers(link, test.subsystem));
         Some(Cast {
-            store: self.step(find(vec![raster_maps::URN])).await?,
-            pose: self.step(find(vec![local_pose_sensor::URN])).await?,
-            velocity: self.step(find(vec![velocity_state_sensor::URN])).await?,
+            store: self.step(provider(raster_maps::URN)).await?,
+            pose: self.step(provider(local_pose_sensor::URN)).await?,
+            velocity: self.step(provider(velocity_state_sensor::URN)).await?,
             drivers: [
                 self.step(driver(Link::Path)).await?,
                 self.step(driver(Link::Vector)).await?,
                 self.step(driver(Link::Primitive)).await?,
             ],
-            planner: self.step(find(vec![mission_planner::URN])).await?,
+            planner: self.step(provider(mission_planner::URN)).await?,
         })
     }
 
@@ -318,35 +319,12 @@ async fn ask<Q: Query>(
 async fn find(
     component: &Component,
     test: &MissionTest,
-    services: Vec<&'static str>,
+    audience: Audience,
 ) -> Result<(JausId, String), String> {
-    let mut changes = component.watch();
-    let searching = async {
-        loop {
-            let directory = component.directory();
-            let mut others = directory
-                .components()
-                .filter(|it| it.id.subsystem() == test.subsystem && it.id != component.id());
-            let found = others.find(|it| {
-                let offers = |urn: &&str| it.offered().any(|offer| offer.urn == *urn);
-                services.iter().all(offers)
-            });
-            if let Some(found) = found {
-                return Some(found.id);
-            }
-            changes.next().await?;
-        }
-    };
-    match tokio::time::timeout(test.patience, searching).await {
-        Ok(Some(id)) => Ok((id, id.to_string())),
-        Ok(None) => Err("the node has stopped".to_owned()),
-        Err(_) => Err(format!(
-            "no component in subsystem {} offers {} after {} s: start one, or choose another \
-             subsystem",
-            test.subsystem,
-            services.join(" and "),
-            test.patience.as_secs()
-        )),
+    let audience = audience.in_subsystem(test.subsystem);
+    match component.find_within(audience, test.patience).await {
+        Ok(id) => Ok((id, id.to_string())),
+        Err(error) => Err(format!("{error}: start one, or choose another subsystem")),
     }
 }
 

@@ -5,7 +5,9 @@ use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::component::{Component, Control, Handlers, Kind, Management, Subscription, When};
-use jaus::messages::mobility::{local_vector_driver, primitive_driver};
+use jaus::messages::mobility::{
+    QueryLocalVector, QueryLocalVectorExt, QueryWrenchEffort, local_vector_driver, primitive_driver,
+};
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::{LIMIT, within_limit};
@@ -99,7 +101,11 @@ impl World {
         let plain = |number, service: jaus::codec::ServiceId| {
             let stage = Switch::default();
             let component = driver(&node, number, |builder| {
-                builder.offer(Handlers::new(service)).offer(stage.service())
+                let service = Handlers::new(service)
+                    .declines::<QueryLocalVector>()
+                    .declines::<QueryLocalVectorExt>()
+                    .declines::<QueryWrenchEffort>();
+                builder.offer(service).offer(stage.service())
             });
             Driver { component, stage }
         };

@@ -9,16 +9,16 @@ use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::messages::core::query_identification::QueryType;
-use jaus::messages::core::query_services::{ComponentId, ComponentRec, NodeId, NodeRec, NodeSeq};
 use jaus::messages::core::{
-    QueryHeartbeatPulse, QueryIdentification, QueryServices, ReportHeartbeatPulse,
-    ReportIdentification, ReportServices,
+    QueryHeartbeatPulse, QueryIdentification, ReportHeartbeatPulse, ReportIdentification,
+    ReportServices,
 };
 use jaus_cli::failure::Failure;
 use tokio::time::Instant;
 
 use super::judge_nodes::{JudgeNodes, SETTLING, code_of};
 use super::step::{Reach, Speaker};
+use crate::offers::{query_services, services};
 
 /// Attempts of each query, because the first datagrams may be lost while addresses are learned.
 const TRIES: u32 = 3;
@@ -64,7 +64,8 @@ impl Subject {
         let code = ReportServices::CODE;
         let report = ask_again(judge_nodes, &query_services(id), code, limit).await?;
         is_there |= report.is_some();
-        let services = report.and_then(|octets| services(&octets, id));
+        let services =
+            report.and_then(|octets| services(&ReportServices::decode(&octets).ok()?, id));
         Ok(is_there.then_some(Self { id, name, services }))
     }
 
@@ -112,35 +113,4 @@ async fn ask(
         }
     }
     Ok(None)
-}
-
-fn query_services(subject: JausId) -> QueryServices {
-    QueryServices {
-        node_list: vec![NodeSeq {
-            node_rec: NodeRec {
-                node_id: NodeId(subject.node()),
-            },
-            component_list: vec![ComponentRec {
-                component_id: ComponentId(subject.component()),
-            }],
-        }],
-    }
-}
-
-/// Services of the subject's component. Some peers list it under the wildcard number.
-fn services(octets: &Bytes, subject: JausId) -> Option<BTreeMap<String, (u8, u8)>> {
-    let report = ReportServices::decode(octets).ok()?;
-    let nodes = report.node_list.iter();
-    let nodes = nodes.filter(|node| node.node_rec.node_id == subject.node());
-    let components = nodes.flat_map(|node| &node.component_list);
-    let wanted = [subject.component(), JausId::ANY_COMPONENT];
-    let component = components.filter(|one| wanted.contains(&one.component_rec.component_id));
-    let mut services = BTreeMap::new();
-    for service in component.flat_map(|component| &component.service_list) {
-        let uri = service.uri.to_string_lossy().into_owned();
-        let version = (service.major_version_number, service.minor_version_number);
-        let newest = services.entry(uri).or_insert(version);
-        *newest = version.max(*newest);
-    }
-    (!services.is_empty()).then_some(services)
 }

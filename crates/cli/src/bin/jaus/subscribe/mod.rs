@@ -6,7 +6,9 @@ mod topic;
 use clap::Args;
 use futures_util::future::select_all;
 use jaus::address::JausId;
+use jaus::codec::Message;
 use jaus::component::{Component, SubscribeError, Undecoded, Update, When};
+use jaus::messages::core::CreateEvent;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::{self, Network};
 use jaus_cli::output::say;
@@ -15,6 +17,7 @@ use jaus_view::{Dictionary, EncodedQuery};
 
 use self::topic::{Printer, Topic};
 use crate::definitions::Definitions;
+use crate::offers::ask_if_not_offered;
 use crate::queries::{Fields, Named};
 
 /// Subscribe to reports of a component and print each as it arrives
@@ -96,7 +99,7 @@ impl Subscribe {
                 say(format_args!("{} has confirmed no subscription. {}", self.address, network::REMEDY));
                 return Ok(Outcome::Incomplete);
             }
-            subscribed = self.subscribe(component, queries) => subscribed?,
+            subscribed = self.subscribe(component, queries, dictionary) => subscribed?,
         };
         let Some(mut topics) = subscribed else {
             return Ok(Outcome::Incomplete);
@@ -128,9 +131,12 @@ impl Subscribe {
         &self,
         component: &Component,
         queries: Vec<EncodedQuery>,
+        dictionary: &Dictionary,
     ) -> Result<Option<Vec<Topic>>, Failure> {
         let mut topics = Vec::new();
         for query in queries {
+            let code = query.octets.first_chunk();
+            let code = code.map_or(0, |&code| u16::from_le_bytes(code));
             let wanted = jaus::service::Topic {
                 peer: self.address,
                 query: query.octets,
@@ -145,6 +151,9 @@ impl Subscribe {
                 Err(SubscribeError::Ended { why, .. }) => {
                     let (name, peer) = (query.name, self.address);
                     say(format_args!("no subscription to {name} of {peer}: {why}"));
+                    let codes = [code, CreateEvent::CODE];
+                    let not_offered = ask_if_not_offered(component, dictionary, peer, &codes);
+                    not_offered.await.iter().for_each(say);
                     return Ok(None);
                 }
                 Err(error) => return Err(Failure::of(error)),
