@@ -143,14 +143,14 @@ impl Bench {
             let now = self.now();
             let step = self.time.as_millis() / Pilot::STEP.as_millis();
             self.vehicle.handle_time(now);
-            if step % 2 == 0 {
+            if step.is_multiple_of(2) {
                 self.report_motion(now);
             }
-            if step % 5 == 0 {
+            if step.is_multiple_of(5) {
                 self.report_scan(now);
             }
             self.pilot.handle_time(now);
-            if step % 4 == 0 {
+            if step.is_multiple_of(4) {
                 self.order(now);
             }
             let room = self.room();

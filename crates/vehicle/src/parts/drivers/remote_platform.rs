@@ -419,7 +419,7 @@ mod tests {
             range: 4.0,
         });
         // Report, time stamp and X of the vehicle.
-        let mut places = |count: u32, stamp: u32, x: f64| {
+        let places = |count: u32, stamp: u32, x: f64| {
             let now = start + Duration::from_millis(100) * count;
             let stamp = Duration::from_secs(3600) + Duration::from_millis(100) * stamp;
             remote_platform.handle_pose(now, None, Some((x, 0.0, 0.0)));
