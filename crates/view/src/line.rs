@@ -7,7 +7,7 @@ use serde::ser::{SerializeMap, Serializer};
 use super::capture::CaptureError;
 use super::definition::{Body, Unreadable};
 use super::dictionary::{Dictionary, Reading};
-use super::hex::to_hex;
+use super::hex::{from_hex, to_hex};
 use super::time::Timestamp;
 use jaus::address::JausId;
 use jaus::wire::ra::RaId;
@@ -31,9 +31,11 @@ pub struct Line<'d> {
     pub version: Option<jsidl::model::Version>,
     /// The content of the message.
     pub content: Content,
+    /// `carries`: the message inside an event or a request for events, as an object of this kind.
+    pub carried: Option<Box<Self>>,
 }
 
-/// The last keys of a [`Line`].
+/// The content of a [`Line`].
 #[derive(Debug, Clone)]
 pub enum Content {
     /// `body`: the fields.
@@ -99,8 +101,25 @@ impl Line<'_> {
 impl Dictionary {
     /// The message as a line without transport keys.
     pub fn line(&self, octets: &Bytes) -> Line<'_> {
-        Line::of_reading(None, self.read(octets), octets)
+        let line = Line::of_reading(None, self.read(octets), octets);
+        line.opened(|carried| Some(self.read(carried)))
     }
+}
+
+/// The messages with a message inside: Create Event, Update Event, Create Command Event, Event. The
+/// Reference Architecture has the same codes and field names.
+const CARRIERS: [u16; 4] = [0x01F0, 0x01F1, 0x01F6, 0x41F1];
+/// The fields with the message inside.
+pub(super) const CARRIED: [&str; 3] = ["ReportMessage", "QueryMessage", "CommandMessage"];
+
+/// The message inside the body of an event or a request for events.
+fn carried(body: &Body) -> Option<Bytes> {
+    let body = serde_json::to_value(body).ok()?;
+    let text = CARRIED
+        .iter()
+        .find_map(|&field| body.get(field)?.as_str())?;
+    let octets = from_hex(text).ok()?;
+    (!octets.is_empty()).then(|| octets.into())
 }
 
 impl<'d> Line<'d> {
@@ -125,7 +144,23 @@ impl<'d> Line<'d> {
             service: reading.service,
             version: reading.version,
             content,
+            carried: None,
         }
+    }
+
+    /// Adds the message inside an event or a request for events, decoded by `read`. A further
+    /// message inside that one stays as it is.
+    pub(super) fn opened(self, read: impl FnOnce(&Bytes) -> Option<Reading<'d>>) -> Self {
+        let is_carrier = self.code.is_some_and(|code| CARRIERS.contains(&code));
+        let octets = match &self.content {
+            Content::Body(body) if is_carrier => carried(body),
+            _ => None,
+        };
+        let carried = octets.and_then(|octets| {
+            let line = Self::of_reading(None, read(&octets)?, &octets);
+            Some(Box::new(line))
+        });
+        Self { carried, ..self }
     }
 
     /// Creates the line of an error outside any message.
@@ -141,6 +176,7 @@ impl<'d> Line<'d> {
                 offset,
                 octets: None,
             },
+            carried: None,
         }
     }
 }
@@ -213,6 +249,9 @@ impl Serialize for Line<'_> {
                     map.serialize_entry("octets", &to_hex(octets))?;
                 }
             }
+        }
+        if let Some(carried) = &self.carried {
+            map.serialize_entry("carries", carried)?;
         }
         map.end()
     }

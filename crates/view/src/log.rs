@@ -2,7 +2,7 @@
 
 use bytes::Bytes;
 
-use super::dictionary::Dictionary;
+use super::dictionary::{Dictionary, Reading};
 use super::large::LargeMessages;
 use super::line::{Content, Envelope, Header, Line};
 use super::network::Datagram;
@@ -117,33 +117,42 @@ impl<'d> MessageLog<'d> {
         Some(self.line(envelope, &frame.payload))
     }
 
-    /// The line of a complete message.
+    /// The line of a complete message, with the message inside an event.
     fn line(&self, envelope: Envelope, octets: &Bytes) -> Line<'d> {
-        let transport = envelope.header.as_ref().map(|header| header.transport);
-        let reading = self.ra(&envelope).and_then(|ra| ra.read_ra(octets));
-        let reading = match (reading, transport) {
-            (Some(reading), _) if reading.body.is_ok() => reading,
-            (Some(reading), Some(Version::Ra)) => reading,
-            (None, Some(Version::Ra)) => {
-                // Messages of the Reference Architecture share codes and names with those of the
-                // services, but not layouts. Decoding them with service definitions would produce
-                // wrong values.
+        let header = envelope.header.clone();
+        match self.reading(header.as_ref(), octets) {
+            Some(reading) => Line::of_reading(Some(envelope), reading, octets)
+                .opened(|carried| self.reading(header.as_ref(), carried)),
+            None => {
                 let code = octets.first_chunk().map(|&code| u16::from_le_bytes(code));
-                return self.bare(envelope, code, Content::Octets(octets.clone()));
+                self.bare(envelope, code, Content::Octets(octets.clone()))
             }
+        }
+    }
+
+    /// The fields of a message by the definitions that its header determines; `None` for an unknown
+    /// message of the Reference Architecture.
+    ///
+    /// Those share codes and names with the messages of services, but not layouts. Decoding them
+    /// with service definitions would produce wrong values.
+    fn reading(&self, header: Option<&Header>, octets: &Bytes) -> Option<Reading<'d>> {
+        let transport = header.map(|header| header.transport);
+        let reading = self.ra(header).and_then(|ra| ra.read_ra(octets));
+        match (reading, transport) {
+            (Some(reading), _) if reading.body.is_ok() => Some(reading),
+            (reading, Some(Version::Ra)) => reading,
             // With the other older header, a service message may come from a subsystem number that
             // resembles the Reference Architecture.
             (of_ra, _) => {
                 let reading = self.dictionary.read(octets);
-                of_ra.filter(|_| reading.body.is_err()).unwrap_or(reading)
+                Some(of_ra.filter(|_| reading.body.is_err()).unwrap_or(reading))
             }
-        };
-        Line::of_reading(Some(envelope), reading, octets)
+        }
     }
 
     /// The dictionary, if the message may belong to the Reference Architecture.
-    fn ra(&self, envelope: &Envelope) -> Option<&'d Dictionary> {
-        let is_ra = envelope.header.as_ref().is_some_and(Header::is_ra);
+    fn ra(&self, header: Option<&Header>) -> Option<&'d Dictionary> {
+        let is_ra = header.is_some_and(Header::is_ra);
         is_ra.then_some(self.dictionary)
     }
 
@@ -177,7 +186,7 @@ impl<'d> MessageLog<'d> {
     /// A line without a body.
     fn bare(&self, envelope: Envelope, code: Option<u16>, content: Content) -> Line<'d> {
         let name = |code| {
-            let ra = self.ra(&envelope);
+            let ra = self.ra(envelope.header.as_ref());
             ra.and_then(|ra| ra.ra_name_of(code))
                 .or_else(|| self.dictionary.name_of(code))
         };
@@ -189,6 +198,7 @@ impl<'d> MessageLog<'d> {
             service: None,
             version: None,
             content,
+            carried: None,
         }
     }
 }

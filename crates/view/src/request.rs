@@ -7,7 +7,7 @@ use serde_json::{Map, Value as Json};
 use super::definition::{ServiceName, Unreadable, parse_version};
 
 /// Ignored keys, which `jaus decode` and `jaus watch` add to a line.
-const PASSED_OVER: [&str; 12] = [
+const PASSED_OVER: [&str; 13] = [
     "time",
     "direction",
     "link",
@@ -20,6 +20,7 @@ const PASSED_OVER: [&str; 12] = [
     "ack",
     "data",
     "sequence",
+    "carries",
 ];
 
 /// Specification of a message and its content.

@@ -79,7 +79,6 @@ fn in_a_frame(entry: &Entry) -> Utf8Bytes {
         ("source", "source"),
         ("destination", "destination"),
         ("code", "code"),
-        ("message", "name"),
         ("service", "service"),
         ("error", "error"),
     ] {
@@ -87,11 +86,12 @@ fn in_a_frame(entry: &Entry) -> Utf8Bytes {
             frame.insert(name.to_owned(), text.into());
         }
     }
-    let body = entry
-        .json()
-        .get("body")
-        .or_else(|| entry.json().get("octets"));
-    frame.insert("value".to_owned(), body.map_or(Value::Null, shortened));
+    let name = entry.name();
+    frame.insert("name".to_owned(), name.into());
+    let octets = || entry.json().get("octets").cloned();
+    let value = entry.body().or_else(octets);
+    let value = value.as_ref().map_or(Value::Null, shortened);
+    frame.insert("value".to_owned(), value);
     Value::Object(frame).to_string().into()
 }
 
@@ -101,5 +101,28 @@ fn shortened(value: &Value) -> Value {
         value.clone()
     } else {
         format!("{length} octets of JSON, too long to show").into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_names_the_report_of_an_event_and_gets_its_fields() {
+        let Value::Object(line) = json!({
+            "time": "2026-01-01T12:00:00.000000Z", "source": "101.2.42", "destination": "42.1.1",
+            "code": "41F1", "message": "Event", "service": "urn:jaus:jss:core:Events",
+            "body": {"EventID": 3, "SequenceNumber": 7, "ReportMessage": "044400"},
+            "carries": {"code": "4404", "message": "ReportVelocityState", "body": {"Velocity_X": 1.5}},
+        }) else {
+            unreachable!("an object")
+        };
+        let frame: Value = serde_json::from_str(&in_a_frame(&Entry::of_object(line))).unwrap();
+        assert_eq!(frame["name"], "Event: ReportVelocityState");
+        assert_eq!(
+            frame["value"],
+            json!({"EventID": 3, "SequenceNumber": 7, "ReportMessage": {"Velocity_X": 1.5}})
+        );
     }
 }

@@ -6,7 +6,7 @@
 
 use std::convert::Infallible;
 use std::path::PathBuf;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use tokio::time::timeout;
 
@@ -73,7 +73,7 @@ impl Part for ImuSensor {
                 velocity,
                 acceleration,
             } = sample.unwrap_or(InertialSample::UNKNOWN);
-            let now = SystemTime::now();
+            let now = slot.time.system_time();
             let report = ReportVelocityState::from(velocity);
             component.publish(report, now).await?;
             let report = ReportVelocityStateExt::from(velocity);

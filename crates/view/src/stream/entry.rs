@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde_json::{Map, Value as Json};
 
-use crate::line::Line;
+use crate::line::{CARRIED, Line};
 use jaus::address::JausId;
 
 /// A message or an error as one JSON object.
@@ -17,6 +17,8 @@ pub struct Entry {
     json: Map<String, Json>,
 }
 
+/// The code of events.
+const EVENT: &str = "41F1";
 /// Maximum number of characters for the fields on a readable line.
 const MOST_OF_BODY: usize = 160;
 
@@ -76,6 +78,46 @@ impl Entry {
         self.json.get(key)?.as_str()
     }
 
+    /// The name of the message, or its code. An event and a request for events name the message
+    /// inside too: `Event: ReportVelocityState`.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let name = name_of(&self.json).unwrap_or_default();
+        match self.carried().and_then(name_of) {
+            Some(carried) => format!("{name}: {carried}"),
+            None => name,
+        }
+    }
+
+    /// The report inside, if the message is an event.
+    #[must_use]
+    pub fn event_report(&self) -> Option<String> {
+        let is_event = self.text("code") == Some(EVENT);
+        self.carried().filter(|_| is_event).and_then(name_of)
+    }
+
+    /// The fields, with those of the message inside an event in place of its octets.
+    #[must_use]
+    pub fn body(&self) -> Option<Json> {
+        let mut body = self.json.get("body")?.clone();
+        if let Some(carried) = self.carried()
+            && let Some(object) = body.as_object_mut()
+            && let Some(content) = carried.get("body").or_else(|| carried.get("error"))
+            && let Some(field) = object
+                .iter_mut()
+                .find_map(|(key, value)| CARRIED.contains(&&**key).then_some(value))
+        {
+            *field = content.clone();
+        }
+        Some(body)
+    }
+
+    /// The message inside an event or a request for events: an object with `code`, `message`,
+    /// `service` and `body`.
+    pub(super) fn carried(&self) -> Option<&Map<String, Json>> {
+        self.json.get("carries")?.as_object()
+    }
+
     /// Formats one readable line: time, source and destination, name, and the fields.
     #[must_use]
     pub fn in_words(&self, colours: bool) -> String {
@@ -92,11 +134,6 @@ impl Entry {
             source.unwrap_or("?"),
             destination.unwrap_or("?")
         );
-        let name = match (self.text("message"), self.text("code")) {
-            (Some(message), _) => message.to_owned(),
-            (None, Some(code)) => format!("{code}h"),
-            (None, None) => String::new(),
-        };
         let mut line = format!(
             "{} {} ",
             paint("2", format!("{time:<12}")),
@@ -105,16 +142,24 @@ impl Entry {
         if let Some(direction) = self.text("direction") {
             line += &paint("2", format!("{direction:<8} "));
         }
-        line += &paint("1", name);
+        line += &paint("1", self.name());
         if let Some(error) = self.text("error") {
             let _ = write!(line, "  {}", paint("31", error.to_owned()));
-        } else if let Some(body) = self.json.get("body") {
-            let _ = write!(line, "  {}", shortened(&fields(body)));
+        } else if let Some(body) = self.body() {
+            let _ = write!(line, "  {}", shortened(&fields(&body)));
         } else if let Some(octets) = self.text("octets") {
             let _ = write!(line, "  {}", shortened(octets));
         }
         line.trim_end().to_owned()
     }
+}
+
+/// The name of a message, or its code.
+fn name_of(message: &Map<String, Json>) -> Option<String> {
+    let text = |key: &str| message.get(key)?.as_str();
+    text("message")
+        .map(str::to_owned)
+        .or_else(|| Some(format!("{}h", text("code")?)))
 }
 
 fn put(json: &mut Map<String, Json>, way: Option<Vec<(&'static str, String)>>) {

@@ -94,10 +94,14 @@ impl Field {
         by_size && self.wanted.parse::<f64>().is_err()
     }
 
-    /// Whether a message has a matching field, at the top level or at any depth of its body.
+    /// Whether a message has a matching field, at the top level or at any depth of its body or of
+    /// the message inside it.
     pub(super) fn holds(&self, object: &Map<String, Json>) -> bool {
-        object.get("body").is_some_and(|body| self.is_within(body))
-            || self.is_in(object, &self.path)
+        let carried = object
+            .get("carries")
+            .and_then(|carried| carried.get("body"));
+        let mut bodies = object.get("body").into_iter().chain(carried);
+        bodies.any(|body| self.is_within(body)) || self.is_in(object, &self.path)
     }
 
     /// Whether the path starts here or further inside.

@@ -16,10 +16,12 @@
 //!
 //! The comparisons are `=`, `!=`, `<`, `<=`, `>`, `>=` and `~` (contains). Case and underscores in
 //! names are ignored. A field is found at any depth; dots select a field inside another. Values
-//! separated by commas are alternatives.
+//! separated by commas are alternatives. An event matches as itself and as the report inside it.
 
 use std::fmt;
 use std::str::FromStr;
+
+use serde_json::Value as Json;
 
 use super::Entry;
 use super::fields::Field;
@@ -305,15 +307,24 @@ impl End {
 impl Test {
     fn holds(&self, entry: &Entry) -> bool {
         let text = |key| entry.text(key).unwrap_or_default().to_lowercase();
+        let carried = |key| {
+            let value = entry.carried().and_then(|carried| carried.get(key));
+            value.and_then(Json::as_str).map(str::to_lowercase)
+        };
+        // An event matches by itself, and by the report inside.
+        let is_either = |key, wanted: &dyn Fn(&str) -> bool| {
+            wanted(&text(key)) || carried(key).is_some_and(|text| wanted(&text))
+        };
         match self {
             Self::Component(end, places) => end.is_at(places, entry.source, entry.destination),
-            Self::Service(names) => names.iter().any(|name| is_like(&text("service"), name)),
-            Self::Message(names) => {
-                let (message, code) = (text("message"), text("code"));
-                names.iter().any(|name| {
-                    is_like(&message, name) || name.strip_suffix('h').unwrap_or(name) == code
-                })
-            }
+            Self::Service(names) => names
+                .iter()
+                .any(|name| is_either("service", &|service| is_like(service, name))),
+            Self::Message(names) => names.iter().any(|name| {
+                let code = name.strip_suffix('h').unwrap_or(name);
+                is_either("message", &|message| is_like(message, name))
+                    || is_either("code", &|it| it == code)
+            }),
             Self::Direction(names) => names.contains(&text("direction")),
             Self::Field(field) => field.holds(entry.json()),
             Self::Text(text) => entry.to_json().to_lowercase().contains(text),

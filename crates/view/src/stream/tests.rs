@@ -5,6 +5,8 @@ use serde_json::json;
 
 use super::*;
 use jaus::address::JausId;
+use jaus::codec::Message as _;
+use jaus::messages::mobility::ReportVelocityState;
 use jaus::wire::{Acknowledgement, DataControl, Flags, Priority};
 
 fn entry(json: Json) -> Entry {
@@ -213,4 +215,65 @@ fn lines_that_were_written_are_read_back_as_they_were() {
     assert_eq!(stream.read_json(&line), Ok(Some(velocity())));
     assert_eq!(stream.read_json(r#"{"message":"M"}"#), Ok(None));
     assert!(stream.read_json("{").is_err() && stream.read_json("7").is_err());
+}
+
+/// An event 3, number 7, with the velocity 1.5 m/s.
+fn event() -> Frame {
+    let mut report = ReportVelocityState::default();
+    report.set_velocity_x_m_per_s(1.5).unwrap();
+    let report = report.encode().unwrap();
+    let length = (report.len() as u32).to_le_bytes();
+    let payload = [&b"\xF1\x41\x03\x07"[..], &length, &report].concat();
+    Frame {
+        payload: payload.into(),
+        ..frame(1, b"")
+    }
+}
+
+#[test]
+fn an_event_is_shown_with_the_report_inside_and_matches_as_that_report() {
+    let dictionary = Dictionary::new();
+    for filter in [
+        "",
+        "message=Event",
+        "message=41F1",
+        "message=ReportVelocityState",
+        "message=4404",
+        "service=VelocityStateSensor",
+        "service=core:Events",
+        "velocity_x>1.0",
+        "sequencenumber=7 velocity_x<2",
+        "message=ReportVelocityState eventid=3",
+    ] {
+        let mut stream = MessageStream::new(&dictionary, filter.parse().unwrap());
+        let shown = stream.read_frame(at(0), &event());
+        let words = shown.expect(filter).in_words(false);
+        assert!(words.contains("Event: ReportVelocityState "), "{words}");
+        assert!(words.contains("EventID=3 SequenceNumber=7"), "{words}");
+        assert!(words.contains("Velocity_X=1.5"), "{words}");
+    }
+    for filter in ["velocity_x>2", "message=4403", "service=PoseSensor"] {
+        let mut stream = MessageStream::new(&dictionary, filter.parse().unwrap());
+        assert_eq!(stream.read_frame(at(0), &event()), None, "{filter}");
+    }
+}
+
+#[test]
+fn an_event_in_an_event_is_opened_once_and_a_damaged_report_is_named() {
+    let dictionary = Dictionary::new();
+    let shown = |report: &[u8]| {
+        let length = (report.len() as u32).to_le_bytes();
+        let octets = [&b"\xF1\x41\x03\x07"[..], &length, report].concat();
+        let line = dictionary.line(&octets.into());
+        serde_json::to_value(&line).unwrap()
+    };
+    let nested = shown(&event().payload);
+    assert_eq!(nested["carries"]["message"], "Event");
+    assert!(nested["carries"]["body"]["ReportMessage"].is_string());
+    let damaged = shown(b"\x02\x42");
+    assert_eq!(damaged["carries"]["message"], "ReportHeartbeatPulse");
+    let unknown = shown(b"\xEE\xEE\x01");
+    assert_eq!(unknown["carries"]["octets"], "eeee01");
+    assert!(unknown["carries"]["error"].is_string(), "{unknown}");
+    assert!(shown(b"").get("carries").is_none());
 }

@@ -20,11 +20,11 @@ impl Tally {
     pub(super) fn add(&mut self, entry: &Entry) {
         self.total += 1;
         let text = |key| entry.text(key).map(str::to_owned);
-        let message = text("message").or_else(|| text("code").map(|code| code + "h"));
-        let key = (
-            text("source").unwrap_or_default(),
-            message.unwrap_or_default(),
-        );
+        let message = match entry.event_report() {
+            Some(report) => format!("{report} (event)"),
+            None => entry.name(),
+        };
+        let key = (text("source").unwrap_or_default(), message);
         if self.counts.len() < MOST || self.counts.contains_key(&key) {
             *self.counts.entry(key).or_default() += 1;
         }
@@ -65,4 +65,35 @@ impl Tally {
 
 fn seconds(time: Timestamp) -> f64 {
     time.seconds() as f64 + f64::from(time.subsec_nanos()) / 1e9
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value as Json, json};
+
+    use super::*;
+
+    #[test]
+    fn an_event_counts_as_its_report_apart_from_answers_to_queries() {
+        let mut tally = Tally::default();
+        for (code, message) in [("41F1", "Event"), ("4404", "ReportVelocityState")] {
+            let carried = json!({"code": "4404", "message": "ReportVelocityState"});
+            let mut line = json!({"source": "101.2.42", "code": code, "message": message});
+            if code == "41F1" {
+                line["carries"] = carried;
+            }
+            if let Json::Object(line) = line {
+                tally.add(&Entry::of_object(line));
+            }
+        }
+        let lines = tally.lines().join("\n");
+        assert!(
+            lines.contains("101.2.42     ReportVelocityState (event)\n"),
+            "{lines}"
+        );
+        assert!(
+            lines.contains("101.2.42     ReportVelocityState\n"),
+            "{lines}"
+        );
+    }
 }
