@@ -34,7 +34,8 @@ fn recorded(file: &FilePath) -> Vec<Recorded> {
         let time = frame.time.map_or(Duration::ZERO, |time| {
             Duration::new(time.seconds().unsigned_abs(), time.subsec_nanos())
         });
-        if let Some(datagram) = network.handle_frame(&frame) {
+        let found = network.handle_frame(&frame).into_iter();
+        for datagram in found.filter(|it| !it.by_tcp) {
             let payload = Bytes::copy_from_slice(&datagram.payload);
             let (source, destination) = (datagram.source, datagram.destination);
             datagrams.push(Recorded {

@@ -39,7 +39,7 @@ fn recorded(file: &FilePath) -> Vec<Recorded> {
     let mut network = Network::new([judp::PORT]);
     let mut datagrams = Vec::new();
     while let Some(frame) = capture.next_frame() {
-        let Some(datagram) = network.handle_frame(&frame.unwrap()) else {
+        let [datagram] = &network.handle_frame(&frame.unwrap())[..] else {
             continue;
         };
         let payload = Bytes::copy_from_slice(&datagram.payload);

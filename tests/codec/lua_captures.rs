@@ -23,10 +23,13 @@ fn ours(dictionary: &Dictionary, path: &Path) -> Packets {
     while let Some(frame) = capture.next_frame() {
         number += 1;
         let frame = frame.unwrap();
-        let Some(datagram) = network.handle_frame(&frame) else {
+        let [datagram] = &network.handle_frame(&frame)[..] else {
             continue;
         };
-        let lines = log.read(frame.time, &datagram);
+        if datagram.by_tcp {
+            continue;
+        }
+        let lines = log.read(frame.time, datagram);
         let mut messages = Vec::new();
         for line in &lines {
             let is_whole = header(line).is_some_and(|header| header.data == "whole");

@@ -77,6 +77,8 @@ pub struct Header {
     pub destination: JausId,
     /// Version of the header.
     pub transport: Version,
+    /// Whether it came by TCP.
+    pub by_tcp: bool,
     /// Priority, broadcast, acknowledgement.
     pub flags: wire::Flags,
     /// `single`, `first`, `middle` or `last`; `whole` for a reassembled message.
@@ -193,6 +195,7 @@ impl Header {
             source: frame.source,
             destination: frame.destination,
             transport: frame.version,
+            by_tcp: false,
             flags: frame.flags,
             data: frame.flags.data().name(),
             sequence: frame.sequence,
@@ -268,7 +271,13 @@ impl Envelope {
         let flags = header.flags;
         map.serialize_entry("source", &header.id(header.source))?;
         map.serialize_entry("destination", &header.id(header.destination))?;
-        map.serialize_entry("transport", header.transport.name())?;
+        let name = header.transport.name();
+        let transport = if header.by_tcp {
+            name.replace("judp", "jtcp")
+        } else {
+            name.to_owned()
+        };
+        map.serialize_entry("transport", &transport)?;
         map.serialize_entry("priority", flags.priority().name())?;
         let broadcast = flags.broadcast().map_or("reserved", wire::Broadcast::name);
         map.serialize_entry("broadcast", broadcast)?;

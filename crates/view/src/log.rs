@@ -56,6 +56,10 @@ impl<'d> MessageLog<'d> {
             let offset = error.offset as u64;
             lines.push(Line::of_error(Some(envelope), &sentence, offset));
         }
+        let envelopes = lines.iter_mut().filter_map(|line| line.envelope.as_mut());
+        for header in envelopes.filter_map(|it| it.header.as_mut()) {
+            header.by_tcp = datagram.by_tcp;
+        }
         lines
     }
 

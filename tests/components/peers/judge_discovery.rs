@@ -37,10 +37,10 @@ fn requests(capture: &Path) -> Vec<Vec<u8>> {
     let mut requests: Vec<Vec<u8>> = Vec::new();
     while let Some(frame) = capture.next_frame() {
         let frame = frame.unwrap();
-        let Some(datagram) = network.handle_frame(&frame) else {
+        let [datagram] = &network.handle_frame(&frame)[..] else {
             continue;
         };
-        let mut octets = datagram.payload.into_owned();
+        let mut octets = datagram.payload.to_vec();
         let wanted = [0x2B00, 0x2B01, 0x2B02, 0x2B03, 0x2202];
         if datagram.source.ip() != judge.ip()
             || octets.len() < CODE.end

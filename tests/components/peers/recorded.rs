@@ -41,7 +41,7 @@ pub(crate) fn datagrams(file: &Path) -> Vec<Recorded> {
         let time = frame.time.map_or(Duration::ZERO, |time| {
             Duration::new(time.seconds().unsigned_abs(), time.subsec_nanos())
         });
-        if let Some(datagram) = network.handle_frame(&frame) {
+        for datagram in network.handle_frame(&frame) {
             datagrams.push(Recorded {
                 at: time.saturating_sub(*began.get_or_insert(time)),
                 source: datagram.source,

@@ -34,11 +34,16 @@ fn recorded(file: &str) -> Vec<Datagram> {
         let frame = frame.expect("a whole capture");
         let time = frame.time.expect("a time");
         let time = Duration::new(time.seconds().unsigned_abs(), time.subsec_nanos());
-        datagrams.extend(network.handle_frame(&frame).map(|datagram| Datagram {
-            time,
-            from: datagram.source.ip(),
-            octets: Bytes::copy_from_slice(&datagram.payload),
-        }));
+        datagrams.extend(
+            network
+                .handle_frame(&frame)
+                .into_iter()
+                .map(|datagram| Datagram {
+                    time,
+                    from: datagram.source.ip(),
+                    octets: Bytes::copy_from_slice(&datagram.payload),
+                }),
+        );
     }
     datagrams
 }

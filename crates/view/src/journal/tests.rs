@@ -68,7 +68,7 @@ fn read(octets: &[u8]) -> (Vec<Entry>, Option<CaptureError>) {
     while let Some(frame) = capture.next_frame() {
         match frame {
             Ok(frame) => {
-                let datagram = network.handle_frame(&frame).unwrap();
+                let datagram = network.handle_frame(&frame).remove(0);
                 entries.extend(stream.read_datagram(frame.time, &datagram));
             }
             Err(error) => return (entries, Some(error)),

@@ -1,35 +1,49 @@
-//! Extraction of UDP datagrams from captured frames: link header, IP, fragments, ports.
+//! Extraction of datagrams from captured frames: link header, IP, fragments, TCP streams, ports.
 
 mod fragments;
 mod packet;
+mod streams;
 
 use std::borrow::Cow;
 use std::net::{IpAddr, SocketAddr};
 
+use bytes::Bytes;
 use etherparse::{
     EtherType, Ipv6ExtensionSlice, LaxNetSlice, LaxSlicedPacket, TransportSlice, UdpSlice,
     ether_type, ip_number,
 };
 
 use self::fragments::{Fragment, Fragments, Key};
+use self::streams::{Segment, Streams};
 use super::capture::{Frame, LinkType};
+use jaus::wire::judp;
 
 pub use packet::udp_packet;
 
 /// The UDP and TCP port registered with IANA for JAUS.
 pub const JAUS_PORT: u16 = 3794;
 
-/// Extracts the datagrams on selected UDP ports from the frames of a capture.
+/// Extracts the datagrams of JAUS from the frames of a capture, and the messages of TCP streams as
+/// if they had been datagrams.
 ///
 /// Supports Ethernet (with VLAN tags), both Linux cooked headers, raw IP, and the null and loopback
 /// headers of the BSDs, each with IPv4 and IPv6. IP fragments are kept until the datagram is
-/// complete; see [`Counts`] for those that never are.
+/// complete, TCP segments until those before them have come; see [`Counts`] for what never does.
 #[derive(Debug)]
 pub struct Network {
-    /// The selected ports; empty for all.
-    ports: Vec<u16>,
+    choice: Choice,
     fragments: Fragments,
+    streams: Streams,
     counts: Counts,
+}
+
+/// Which traffic is taken for JAUS.
+#[derive(Debug)]
+enum Choice {
+    /// That of these ports; of all ports if there are none.
+    Ports(Vec<u16>),
+    /// That of the registered port, and what begins with a plausible message on any other.
+    Content,
 }
 
 /// Traffic that a [`Network`] did not return.
@@ -37,31 +51,46 @@ pub struct Network {
 pub struct Counts {
     /// Frames with an unsupported link type.
     pub unknown_links: u64,
-    /// TCP segments with payload on a selected port: JTCP, which is not supported yet.
-    pub tcp_segments: u64,
+    /// Datagrams and TCP segments on other ports that are not JAUS by their content.
+    pub foreign: u64,
+    /// Places of TCP streams where octets are missing or unreadable.
+    pub gaps: u64,
     /// Datagrams with missing, truncated or contradictory fragments.
     pub incomplete_datagrams: u64,
 }
 
-/// A UDP datagram on a selected port.
+/// A UDP datagram, or a message of a TCP stream.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Datagram<'a> {
     /// Address and port of the sender.
     pub source: SocketAddr,
     /// Address and port of the destination: a node or a multicast group.
     pub destination: SocketAddr,
-    /// The UDP payload, as far as it was captured.
+    /// The UDP payload, as far as it was captured; that of a datagram with the message of a stream.
     pub payload: Cow<'a, [u8]>,
     /// Octets at the end of the payload that were not captured (snap length).
     pub missing: usize,
+    /// Whether it came by TCP.
+    pub by_tcp: bool,
 }
 
 impl Network {
-    /// Selects datagrams from or to one of `ports`.
+    /// Selects what is from or to one of `ports`.
     pub fn new(ports: impl IntoIterator<Item = u16>) -> Self {
+        Self::choosing(Choice::Ports(ports.into_iter().collect()))
+    }
+
+    /// Selects what is on the registered port, and recognises JAUS on others by its content.
+    #[must_use]
+    pub fn by_content() -> Self {
+        Self::choosing(Choice::Content)
+    }
+
+    fn choosing(choice: Choice) -> Self {
         Self {
-            ports: ports.into_iter().collect(),
+            choice,
             fragments: Fragments::default(),
+            streams: Streams::default(),
             counts: Counts::default(),
         }
     }
@@ -76,53 +105,121 @@ impl Network {
         let incomplete_datagrams = self.counts.incomplete_datagrams + self.fragments.incomplete();
         Counts {
             incomplete_datagrams,
+            foreign: self.counts.foreign + self.streams.foreign(),
+            gaps: self.streams.gaps(),
             ..self.counts
         }
     }
 
-    /// The datagram that `frame` contains or completes, if it is on a selected port.
-    pub fn handle_frame<'a>(&mut self, frame: &Frame<'a>) -> Option<Datagram<'a>> {
+    /// The datagram that `frame` contains or completes, or the messages of a stream that it
+    /// completes, if they are selected.
+    pub fn handle_frame<'a>(&mut self, frame: &Frame<'a>) -> Vec<Datagram<'a>> {
         let Some((kind, octets)) = payload_of_link(frame.link, frame.octets) else {
             self.counts.unknown_links += 1;
-            return None;
+            return Vec::new();
         };
         let packet = LaxSlicedPacket::from_ether_type(kind, octets);
-        let addresses = addresses(packet.net.as_ref()?)?;
-        match packet.transport {
-            Some(TransportSlice::Udp(udp)) => self.datagram(addresses, &udp, Cow::Borrowed),
-            Some(TransportSlice::Tcp(tcp)) => {
-                let ports = [tcp.source_port(), tcp.destination_port()];
-                if self.is_chosen(ports) && !tcp.payload().is_empty() {
-                    self.counts.tcp_segments += 1;
-                }
-                None
+        let Some(addresses) = packet.net.as_ref().and_then(addresses) else {
+            return Vec::new();
+        };
+        match &packet.transport {
+            Some(TransportSlice::Udp(udp)) => {
+                let datagram = datagram(addresses, udp, Cow::Borrowed);
+                self.choose(datagram).into_iter().collect()
             }
-            Some(_) => None,
+            Some(TransportSlice::Tcp(tcp)) => {
+                let [source, destination] = addresses;
+                let cut = packet.net.as_ref().and_then(LaxNetSlice::ip_payload_ref);
+                self.messages(Segment {
+                    source: SocketAddr::new(source, tcp.source_port()),
+                    destination: SocketAddr::new(destination, tcp.destination_port()),
+                    number: tcp.sequence_number(),
+                    syn: tcp.syn(),
+                    cut: cut.is_some_and(|payload| payload.incomplete),
+                    octets: tcp.payload(),
+                })
+            }
+            Some(_) => Vec::new(),
             None => {
-                let whole = self.fragments.insert(fragment(addresses, &packet)?)?;
-                let udp = UdpSlice::from_slice_lax(&whole).ok()?;
-                self.datagram(addresses, &udp, |payload| Cow::Owned(payload.to_vec()))
+                let datagram = self.reassembled(addresses, &packet);
+                datagram
+                    .and_then(|it| self.choose(it))
+                    .into_iter()
+                    .collect()
             }
         }
     }
 
-    fn is_chosen(&self, ports: [u16; 2]) -> bool {
-        self.ports.is_empty() || ports.iter().any(|port| self.ports.contains(port))
+    /// The datagram that an IP fragment completes.
+    fn reassembled<'a>(
+        &mut self,
+        addresses: [IpAddr; 2],
+        packet: &LaxSlicedPacket<'_>,
+    ) -> Option<Datagram<'a>> {
+        let whole = self.fragments.insert(fragment(addresses, packet)?)?;
+        let udp = UdpSlice::from_slice_lax(&whole).ok()?;
+        let owned = |payload: &[u8]| Cow::Owned(payload.to_vec());
+        Some(datagram(addresses, &udp, owned))
     }
 
-    fn datagram<'u, 'a>(
-        &self,
-        [source, destination]: [IpAddr; 2],
-        udp: &UdpSlice<'u>,
-        payload: impl FnOnce(&'u [u8]) -> Cow<'a, [u8]>,
-    ) -> Option<Datagram<'a>> {
-        let ports = [udp.source_port(), udp.destination_port()];
-        self.is_chosen(ports).then(|| Datagram {
-            source: SocketAddr::new(source, ports[0]),
-            destination: SocketAddr::new(destination, ports[1]),
-            payload: payload(udp.payload()),
-            missing: usize::from(udp.length()).saturating_sub(udp.slice().len()),
-        })
+    /// The datagram, if it is selected.
+    fn choose<'a>(&mut self, datagram: Datagram<'a>) -> Option<Datagram<'a>> {
+        let ports = [datagram.source.port(), datagram.destination.port()];
+        match &self.choice {
+            Choice::Content if ports.contains(&JAUS_PORT) || is_jaus(&datagram) => Some(datagram),
+            Choice::Content => {
+                self.counts.foreign += 1;
+                None
+            }
+            Choice::Ports(chosen) => is_among(chosen, ports).then_some(datagram),
+        }
+    }
+
+    /// The messages that a TCP segment completes.
+    fn messages<'a>(&mut self, segment: Segment<'_>) -> Vec<Datagram<'a>> {
+        let (source, destination) = (segment.source, segment.destination);
+        if let Choice::Ports(chosen) = &self.choice
+            && !is_among(chosen, [source.port(), destination.port()])
+        {
+            return Vec::new();
+        }
+        let frames = self.streams.insert(segment);
+        // A message of JTCP fits in a datagram, but for the limit of IP.
+        let payloads = frames.iter().filter_map(|frame| judp::encode(frame).ok());
+        payloads
+            .map(|payload| Datagram {
+                source,
+                destination,
+                payload: Cow::Owned(payload.into()),
+                missing: 0,
+                by_tcp: true,
+            })
+            .collect()
+    }
+}
+
+fn is_among(chosen: &[u16], ports: [u16; 2]) -> bool {
+    chosen.is_empty() || ports.iter().any(|port| chosen.contains(port))
+}
+
+/// Whether a datagram begins with a plausible message.
+fn is_jaus(datagram: &Datagram<'_>) -> bool {
+    let frames = judp::frames(Bytes::copy_from_slice(&datagram.payload));
+    let first = frames.ok().and_then(|mut frames| frames.next()?.ok());
+    first.is_some_and(|frame| frame.is_plausible())
+}
+
+fn datagram<'u, 'a>(
+    [source, destination]: [IpAddr; 2],
+    udp: &UdpSlice<'u>,
+    payload: impl FnOnce(&'u [u8]) -> Cow<'a, [u8]>,
+) -> Datagram<'a> {
+    Datagram {
+        source: SocketAddr::new(source, udp.source_port()),
+        destination: SocketAddr::new(destination, udp.destination_port()),
+        payload: payload(udp.payload()),
+        missing: usize::from(udp.length()).saturating_sub(udp.slice().len()),
+        by_tcp: false,
     }
 }
 
@@ -260,13 +357,13 @@ mod tests {
     fn assert_found(link: LinkType, header: &[u8], packet: &[u8]) {
         let octets = [header, packet].concat();
         let mut network = Network::new([JAUS_PORT]);
-        let datagram = network.handle_frame(&frame(link, &octets)).unwrap();
+        let datagram = network.handle_frame(&frame(link, &octets)).remove(0);
         assert_eq!(datagram.payload, PAYLOAD);
         assert_eq!(datagram.missing, 0);
         assert_eq!(network.counts(), Counts::default());
         for length in 0..octets.len() {
             let cut = network.handle_frame(&frame(link, &octets[..length]));
-            assert!(cut.is_none_or(|datagram| datagram.missing > 0));
+            assert!(cut.iter().all(|datagram| datagram.missing > 0));
         }
     }
 
@@ -306,7 +403,7 @@ mod tests {
         assert!(
             Network::new([1234])
                 .handle_frame(&frame(LinkType::RAW, &packet))
-                .is_none()
+                .is_empty()
         );
     }
 
@@ -317,7 +414,7 @@ mod tests {
         assert!(
             network
                 .handle_frame(&frame(LinkType(147), &packet))
-                .is_none()
+                .is_empty()
         );
         assert_eq!(network.counts().unknown_links, 1);
     }
@@ -341,18 +438,65 @@ mod tests {
         assert!(
             network
                 .handle_frame(&frame(LinkType::RAW, &pieces[0]))
-                .is_none()
+                .is_empty()
         );
         assert!(
             network
                 .handle_frame(&frame(LinkType::RAW, &pieces[1]))
-                .is_none()
+                .is_empty()
         );
         assert_eq!(network.counts().incomplete_datagrams, 1);
         let datagram = network
             .handle_frame(&frame(LinkType::RAW, &pieces[2]))
-            .unwrap();
+            .remove(0);
         assert_eq!(datagram.payload, PAYLOAD);
         assert_eq!(network.counts(), Counts::default());
+    }
+
+    #[test]
+    fn jaus_is_recognised_on_any_port_and_what_is_not_is_counted() {
+        let message = b"\x02\x00\x11\x00\x09\xFF\xFF\xFF\xFF\x07\x01\xE8\x03\x00\x2B\x02\x00\x00";
+        let packet = |port, payload: &[u8]| {
+            let mut packet = Vec::new();
+            let builder = PacketBuilder::ipv4([10, 0, 0, 1], [10, 0, 0, 2], 16);
+            builder
+                .udp(40_000, port)
+                .write(&mut packet, payload)
+                .unwrap();
+            packet
+        };
+        let mut network = Network::by_content();
+        let mut found = |port, payload: &[u8]| {
+            let packet = packet(port, payload);
+            network.handle_frame(&frame(LinkType::RAW, &packet)).len()
+        };
+        assert_eq!(found(50_000, message), 1);
+        assert_eq!(found(3794, b"damaged"), 1, "an error is shown");
+        assert_eq!(found(53, b"\x02\x00 a query of something else"), 0);
+        assert_eq!(network.counts().foreign, 1);
+    }
+
+    #[test]
+    fn the_messages_of_a_tcp_connection_come_as_datagrams() {
+        // Recorded from JAUS++, which sends the version before each message as a segment of its own.
+        let parts = [
+            &b"\x02"[..],
+            b"\x00\x11\x00\x01\x01\x01\x66\x00\x01\x01\x65\x00\x00\x2B\x02\x01\x00",
+            b"\x02",
+            b"\x00\x11\x00\x01\x01\x01\x66\x00\x01\x01\x65\x00\x00\x2B\x02\x02\x00",
+        ];
+        let mut network = Network::by_content();
+        let mut number = 1000;
+        let mut found = Vec::new();
+        for part in parts {
+            let mut packet = Vec::new();
+            let builder = PacketBuilder::ipv4([10, 0, 0, 1], [10, 0, 0, 2], 16);
+            let builder = builder.tcp(40_000, 40_001, number, 1000);
+            builder.write(&mut packet, part).unwrap();
+            number += part.len() as u32;
+            let datagrams = network.handle_frame(&frame(LinkType::RAW, &packet));
+            found.extend(datagrams.into_iter().map(|it| (it.by_tcp, it.payload[16])));
+        }
+        assert_eq!(found, [(true, 1), (true, 2)]);
     }
 }

@@ -22,6 +22,12 @@ const EVENT: &str = "41F1";
 /// Maximum number of characters for the fields on a readable line.
 const MOST_OF_BODY: usize = 160;
 
+impl From<&Line<'_>> for Entry {
+    fn from(line: &Line<'_>) -> Self {
+        Self::of_line(line, Vec::new())
+    }
+}
+
 impl Entry {
     /// Creates an entry from a line. `way` is inserted after the time.
     pub(super) fn of_line(line: &Line<'_>, way: Vec<(&'static str, String)>) -> Self {

@@ -8,7 +8,7 @@ use bytes::Bytes;
 use clap::Args;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::{Output, say};
-use jaus_view::{self, Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network};
+use jaus_view::{self, Capture, Dictionary, Line, MessageLog, Network};
 
 use crate::definitions::Definitions;
 
@@ -39,8 +39,9 @@ pub(crate) struct Decode {
     #[arg(long, requires = "hex")]
     ra: bool,
 
-    /// A UDP source or destination port of JAUS messages (repeatable)
-    #[arg(long, value_name = "PORT", default_values_t = [JAUS_PORT], conflicts_with = "hex")]
+    /// Only messages from or to this UDP or TCP port (repeatable) [default: 3794, and what is JAUS
+    /// by its content on any other]
+    #[arg(long, value_name = "PORT", conflicts_with = "hex")]
     port: Vec<u16>,
 
     #[command(flatten)]
@@ -75,16 +76,15 @@ impl Decode {
         let name = self.file.as_deref().unwrap_or(Path::new("-"));
         let mut capture = Capture::new(BufReader::new(input))
             .map_err(|error| Failure::new(format!("{}: {error}", name.display())))?;
-        let mut network = Network::new(self.port.iter().copied());
+        let mut network = network(&self.port);
         let mut log = MessageLog::new(dictionary);
         while let Some(frame) = capture.next_frame() {
             match frame {
                 Ok(frame) => {
-                    let Some(datagram) = network.handle_frame(&frame) else {
-                        continue;
-                    };
-                    for line in log.read(frame.time, &datagram) {
-                        printer.print(&line)?;
+                    for datagram in network.handle_frame(&frame) {
+                        for line in log.read(frame.time, &datagram) {
+                            printer.print(&line)?;
+                        }
                     }
                 }
                 Err(error) => printer.print(&Line::from(&error))?,
@@ -105,6 +105,14 @@ impl Printer {
     fn print(&mut self, line: &Line<'_>) -> Result<(), Failure> {
         self.complete &= !line.is_error();
         self.output.line(line.to_json())
+    }
+}
+
+/// What is on these ports, or without any what is JAUS by its content.
+pub(crate) fn network(ports: &[u16]) -> Network {
+    match ports {
+        [] => Network::by_content(),
+        ports => Network::new(ports.iter().copied()),
     }
 }
 
@@ -153,8 +161,13 @@ fn report_unread(network: &Network, log: &MessageLog<'_>) {
     let counts = network.counts();
     let notes = [
         (
-            counts.tcp_segments,
-            "TCP segments skipped: JTCP is not decoded",
+            counts.foreign,
+            "datagrams and TCP segments skipped: not on port 3794, and not JAUS by their content; \
+             try --port",
+        ),
+        (
+            counts.gaps,
+            "gaps in TCP streams: octets are missing or unreadable",
         ),
         (
             counts.unknown_links,

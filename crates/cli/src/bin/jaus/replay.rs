@@ -1,4 +1,5 @@
-//! `jaus replay`: sends the datagrams of a capture again.
+//! `jaus replay`: sends the datagrams of a capture again, or a selection of them, from other ids if
+//! wanted.
 #![expect(
     clippy::disallowed_methods,
     clippy::disallowed_types,
@@ -21,21 +22,27 @@ use jaus::wire::judp;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::{Output, say};
 use jaus_cli::runtime;
-use jaus_view::{Capture, Datagram, JAUS_PORT, Network, Timestamp};
+use jaus_view::{Capture, Datagram, Filter, Line, MessageLog, Timestamp};
 use socket2::SockRef;
 use tokio::net::UdpSocket;
 use tokio::time::{Instant, sleep_until};
 
-/// Send the UDP datagrams of a capture again, with their original timing
+use crate::decode::network;
+use crate::definitions::Definitions;
+
+/// Send the datagrams of a capture again, with their original timing
 ///
 /// The destination is mandatory, because a replayed recording commands the vehicles on the network.
-/// All datagrams are sent from one socket; answers to it are ignored.
+/// All datagrams are sent from one socket; answers to it are ignored. Messages of TCP connections
+/// are sent as datagrams.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus replay drive.pcapng --dry-run\n  \
     jaus replay drive.pcapng --to 127.0.0.1:3794\n  \
     jaus replay drive.pcapng --to group --interface 127.0.0.1 --speed 10\n  \
-    jaus replay drive.pcapng --to 10.0.0.7 --from 101.255.255 --loop 0")]
+    jaus replay drive.pcapng --to 10.0.0.7 --from 101.255.255 --loop 0\n  \
+    jaus replay drive.pcapng --to group --start 90s --for 30s\n  \
+    jaus replay drive.pcapng --to group --filter 'service=Pose' --map 101=201")]
 pub(crate) struct Replay {
     /// The capture: pcap or pcapng from `jaus record`, tcpdump, Wireshark …
     file: PathBuf,
@@ -52,6 +59,14 @@ pub(crate) struct Replay {
     #[arg(long, default_value = "1", value_parser = speed)]
     speed: f64,
 
+    /// Leave out this much of the beginning, such as 90s
+    #[arg(long, value_name = "DURATION", value_parser = runtime::duration)]
+    start: Option<Duration>,
+
+    /// Send only this much of the capture, such as 30s [default: all of it]
+    #[arg(long = "for", value_name = "DURATION", value_parser = runtime::duration)]
+    length: Option<Duration>,
+
     /// How many times to send the capture; 0 repeats it until Ctrl-C
     #[arg(long = "loop", value_name = "TIMES", default_value = "1")]
     times: u64,
@@ -60,9 +75,23 @@ pub(crate) struct Replay {
     #[arg(long, value_name = "ID")]
     from: Option<JausId>,
 
-    /// Only datagrams that were sent to or from this UDP port (repeatable)
-    #[arg(long, default_values_t = [JAUS_PORT])]
+    /// Only datagrams with a message that matches this filter (repeatable); see `jaus watch --help`.
+    /// A fragment of a large message has an id, but no name and no fields
+    #[arg(long, value_name = "FILTER")]
+    filter: Vec<Filter>,
+
+    /// Replace an id, or a subsystem, in source and destination: 101.2.33=201.2.33, 101=201
+    /// (repeatable)
+    #[arg(long, value_name = "OLD=NEW")]
+    map: Vec<Mapping>,
+
+    /// Only what is from or to this UDP or TCP port (repeatable) [default: 3794, and what is JAUS by
+    /// its content on any other]
+    #[arg(long, value_name = "PORT")]
     port: Vec<u16>,
+
+    #[command(flatten)]
+    definitions: Definitions,
 
     /// Print what would be sent, and exit
     #[arg(long)]
@@ -102,6 +131,59 @@ fn speed(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Replacement of an id, or of a subsystem.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mapping {
+    Id(JausId, JausId),
+    Subsystem(u16, u16),
+}
+
+impl std::str::FromStr for Mapping {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let usage = || format!("`{text}`: write 101.2.33=201.2.33 or 101=201");
+        let (old, new) = text.split_once('=').ok_or_else(usage)?;
+        if let (Ok(old), Ok(new)) = (old.parse(), new.parse()) {
+            return Ok(Self::Id(old, new));
+        }
+        match (old.parse(), new.parse()) {
+            (Ok(old @ 1..), Ok(new @ 1..)) => Ok(Self::Subsystem(old, new)),
+            _ => Err(usage()),
+        }
+    }
+}
+
+impl Mapping {
+    /// The id that takes the place of another. The first mapping that matches counts.
+    fn replaced(mappings: &[Self], id: JausId) -> JausId {
+        let new = mappings.iter().find_map(|mapping| match *mapping {
+            Self::Id(old, new) => (old == id).then_some(new),
+            Self::Subsystem(old, new) => {
+                (old == id.subsystem()).then(|| JausId::new(new, id.node(), id.component()))
+            }
+        });
+        new.unwrap_or(id)
+    }
+
+    /// A datagram with other ids: one for each of its messages, as these cannot be put together
+    /// again. Without mappings it stays as it is.
+    fn applied(mappings: &[Self], payload: Bytes) -> Vec<Bytes> {
+        if mappings.is_empty() {
+            return vec![payload];
+        }
+        let frames = judp::frames(payload).into_iter().flatten();
+        let frames = frames.map_while(Result::ok).map(|mut frame| {
+            frame.source = Self::replaced(mappings, frame.source);
+            frame.destination = Self::replaced(mappings, frame.destination);
+            frame
+        });
+        frames
+            .filter_map(|frame| judp::encode(&frame).ok())
+            .collect()
+    }
+}
+
 /// A datagram, with its time relative to the first.
 struct Recorded {
     after: Duration,
@@ -116,6 +198,8 @@ struct Found {
     senders: BTreeMap<String, u64>,
     not_jaus: u64,
     others: u64,
+    unlike: u64,
+    at_other_times: u64,
     cut: u64,
 }
 
@@ -149,7 +233,9 @@ impl Replay {
             |error: &dyn fmt::Display| Failure::new(format!("{}: {error}", self.file.display()));
         let file = File::open(&self.file).map_err(|error| Failure::file(&self.file, &error))?;
         let mut capture = Capture::new(BufReader::new(file)).map_err(|error| in_file(&error))?;
-        let mut network = Network::new(self.port.iter().copied());
+        let mut network = network(&self.port);
+        let dictionary = self.definitions.load()?;
+        let mut log = MessageLog::new(&dictionary);
         let (mut found, mut first) = (Found::default(), None);
         while let Some(frame) = capture.next_frame() {
             let frame = match frame {
@@ -162,25 +248,32 @@ impl Replay {
                     break;
                 }
             };
-            if let Some(datagram) = network.handle_frame(&frame) {
+            for datagram in network.handle_frame(&frame) {
                 let time = frame.time.map_or(Duration::ZERO, since_1970);
                 let after = time.saturating_sub(*first.get_or_insert(time)).min(LONGEST);
-                self.sort(&datagram, after, &mut found);
+                let lines = log.read(frame.time, &datagram);
+                match after.checked_sub(self.start.unwrap_or_default()) {
+                    Some(after) if self.length.is_none_or(|it| after < it) => {
+                        self.sort(&datagram, &lines, after, &mut found);
+                    }
+                    _ => found.at_other_times += 1,
+                }
             }
         }
         let counts = network.counts();
         found.cut += counts.incomplete_datagrams;
-        if counts.tcp_segments > 0 {
-            say(format_args!(
-                "note: {} TCP segments are not sent: only UDP is replayed",
-                counts.tcp_segments
-            ));
-        }
+        found.not_jaus += counts.foreign;
         Ok(found)
     }
 
     /// Selects a datagram, or counts why it is left out.
-    fn sort(&self, datagram: &Datagram<'_>, after: Duration, found: &mut Found) {
+    fn sort(
+        &self,
+        datagram: &Datagram<'_>,
+        lines: &[Line<'_>],
+        after: Duration,
+        found: &mut Found,
+    ) {
         if datagram.missing > 0 {
             found.cut += 1;
             return;
@@ -197,8 +290,18 @@ impl Replay {
             found.others += 1;
             return;
         }
-        *found.senders.entry(frame.source.to_string()).or_default() += 1;
-        found.recorded.push(Recorded { after, payload });
+        let passes = |filter: &Filter| lines.iter().any(|line| filter.passes(&line.into()));
+        if !self.filter.iter().all(passes) {
+            found.unlike += 1;
+            return;
+        }
+        let source = Mapping::replaced(&self.map, frame.source);
+        *found.senders.entry(source.to_string()).or_default() += 1;
+        let payloads = Mapping::applied(&self.map, payload);
+        let recorded = payloads.into_iter();
+        found
+            .recorded
+            .extend(recorded.map(|payload| Recorded { after, payload }));
     }
 
     async fn socket(&self, to: SocketAddr) -> Result<UdpSocket, Failure> {
@@ -268,6 +371,8 @@ impl fmt::Display for Found {
         let left_out = [
             (self.not_jaus, "that are not JAUS"),
             (self.others, "from other ids"),
+            (self.unlike, "that do not match the filter"),
+            (self.at_other_times, "before --start or after --for"),
             (self.cut, "that the capture truncates"),
         ];
         for (count, what) in left_out.into_iter().filter(|(count, _)| *count > 0) {
@@ -279,4 +384,40 @@ impl fmt::Display for Found {
 
 fn since_1970(time: Timestamp) -> Duration {
     Duration::new(time.seconds().try_into().unwrap_or(0), time.subsec_nanos())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jaus::wire::Frame;
+
+    #[test]
+    fn ids_are_replaced_in_source_and_destination_of_every_message() {
+        let mappings = ["101.2.33=7.8.9", "101=201"].map(|text| text.parse().unwrap());
+        let id = |text: &str| text.parse::<JausId>().unwrap();
+        let payload = Bytes::from_static(&[0x00, 0x2B, 0x02]);
+        let frame = |source, destination| Frame::new(id(source), id(destination), payload.clone());
+        let first = judp::encode(&frame("101.2.33", "42.1.1")).unwrap();
+        let second = judp::encode(&frame("101.2.34", "101.2.33")).unwrap();
+        let both = [&first[..], &second[1..]].concat();
+        let sent = Mapping::applied(&mappings, both.clone().into());
+        let expected = [frame("7.8.9", "42.1.1"), frame("201.2.34", "7.8.9")];
+        assert_eq!(sent, expected.map(|frame| judp::encode(&frame).unwrap()));
+        assert_eq!(Mapping::applied(&[], both.clone().into()), [both]);
+    }
+
+    #[test]
+    fn a_mapping_without_both_sides_is_refused() {
+        for text in [
+            "101",
+            "101=",
+            "=7",
+            "0=7",
+            "101=70000",
+            "101.2.33=7",
+            "101=7.8.9",
+        ] {
+            assert!(text.parse::<Mapping>().is_err(), "{text}");
+        }
+    }
 }

@@ -28,7 +28,7 @@ fn lines(capture: &[u8], dictionary: &Dictionary) -> Vec<String> {
     while let Some(frame) = capture.next_frame() {
         match frame {
             Ok(frame) => {
-                if let Some(datagram) = network.handle_frame(&frame) {
+                for datagram in network.handle_frame(&frame) {
                     let read = log.read(frame.time, &datagram);
                     lines.extend(read.iter().map(Line::to_json));
                 }

@@ -158,3 +158,32 @@ fn a_capture_is_sent_again_to_where_it_is_told_and_nowhere_else() {
     );
     assert_eq!(others.status, 1);
 }
+
+#[test]
+fn a_part_of_a_capture_is_chosen_by_time_and_filter_and_sent_from_other_ids() {
+    let file = File::new("chosen");
+    fs::write(file.path(), capture()).unwrap();
+    let stdout = |flags: &[&str]| {
+        let replayed = run(
+            &[&["replay", file.path(), "--dry-run"], flags].concat(),
+            b"",
+        );
+        assert_eq!(replayed.stderr, "");
+        replayed.stdout
+    };
+    let first = stdout(&["--for", "10ms"]);
+    assert!(first.contains("1 datagrams over"), "{first}");
+    assert!(first.contains("2 before --start or after --for"), "{first}");
+    let last = stdout(&["--start", "30ms", "--filter", "message=QueryHeartbeatPulse"]);
+    assert!(last.contains("1 datagrams over"), "{last}");
+    let none = stdout(&["--filter", "message=ReportStatus"]);
+    assert!(none.contains("2 that do not match the filter"), "{none}");
+    let renamed = stdout(&["--map", "42.1.1=43.7.9"]);
+    assert!(renamed.contains("2 from 43.7.9"), "{renamed}");
+    let wrong = run(&["replay", file.path(), "--dry-run", "--map", "42"], b"");
+    assert!(
+        wrong.stderr.contains("write 101.2.33=201.2.33 or 101=201"),
+        "{wrong:?}"
+    );
+    assert_eq!(wrong.status, 2);
+}

@@ -74,7 +74,7 @@ fn every_message_of_the_capture_is_converted_and_comes_back() {
     let mut network = Network::new([24629]);
     let mut seen = BTreeMap::new();
     while let Some(frame) = capture.next_frame() {
-        let Some(datagram) = network.handle_frame(&frame.unwrap()) else {
+        let [datagram] = &network.handle_frame(&frame.unwrap())[..] else {
             continue;
         };
         let header = Header::decode(&datagram.payload).unwrap();

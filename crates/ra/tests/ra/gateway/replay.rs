@@ -39,12 +39,17 @@ fn recorded(file: &str, port: u16) -> Vec<Datagram> {
         let frame = frame.unwrap();
         let time = frame.time.unwrap();
         let time = Duration::new(time.seconds().unsigned_abs(), time.subsec_nanos());
-        datagrams.extend(network.handle_frame(&frame).map(|datagram| Datagram {
-            time,
-            from: datagram.source,
-            to: datagram.destination,
-            octets: Bytes::copy_from_slice(&datagram.payload),
-        }));
+        datagrams.extend(
+            network
+                .handle_frame(&frame)
+                .into_iter()
+                .map(|datagram| Datagram {
+                    time,
+                    from: datagram.source,
+                    to: datagram.destination,
+                    octets: Bytes::copy_from_slice(&datagram.payload),
+                }),
+        );
     }
     datagrams
 }

@@ -24,7 +24,7 @@ fn messages(file: &Path) -> Vec<Bytes> {
     let mut network = Network::new([judp::PORT, INNER_PORT]);
     let mut messages = Vec::new();
     while let Some(frame) = capture.next_frame() {
-        if let Some(datagram) = network.handle_frame(&frame.unwrap()) {
+        for datagram in network.handle_frame(&frame.unwrap()) {
             messages.extend(message(&datagram));
         }
     }

@@ -26,7 +26,7 @@ fn lines(file: &str) -> Vec<Value> {
     let mut lines = Vec::new();
     while let Some(frame) = capture.next_frame() {
         let frame = frame.unwrap();
-        if let Some(datagram) = network.handle_frame(&frame) {
+        for datagram in network.handle_frame(&frame) {
             let read = log.read(frame.time, &datagram);
             lines.extend(
                 read.iter()
@@ -94,6 +94,7 @@ fn shown(datagram: &Bytes) -> Value {
             destination: ([10, 0, 0, 2], judp::PORT).into(),
             payload: datagram[..].into(),
             missing: 0,
+            by_tcp: false,
         },
     );
     serde_json::from_str(&line[0].to_json()).unwrap()

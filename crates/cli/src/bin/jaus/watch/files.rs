@@ -82,7 +82,7 @@ fn read_capture(
         Ok(capture) => capture,
         Err(error) => return Err(Failure::new(format!("{name}: {error}"))),
     };
-    let mut network = Network::of_any_port();
+    let mut network = Network::by_content();
     let mut complete = true;
     while let Some(frame) = capture.next_frame() {
         let frame = match frame {
@@ -96,7 +96,7 @@ fn read_capture(
         if frame.lost > 0 {
             printer.lost(frame.lost)?;
         }
-        if let Some(datagram) = network.handle_frame(&frame) {
+        for datagram in network.handle_frame(&frame) {
             for entry in stream.read_datagram(frame.time, &datagram) {
                 printer.entry(&entry)?;
             }

@@ -106,15 +106,14 @@ fn messages(capture: &Path) -> Vec<(f64, Vec<u8>, Frame)> {
     while let Some(frame) = capture.next_frame() {
         let frame = frame.unwrap();
         let time = frame.time.map_or(0.0, in_seconds);
-        let Some(datagram) = network.handle_frame(&frame) else {
-            continue;
-        };
-        let octets = datagram.payload.into_owned();
-        let first = judp::frames(Bytes::from(octets.clone()));
-        let first = first.ok().and_then(|mut frames| frames.next()?.ok());
-        // Acknowledgements belong to the transport and have no code.
-        if let Some(message) = first.filter(|message| message.code().is_some()) {
-            messages.push((time, octets, message));
+        for datagram in network.handle_frame(&frame) {
+            let octets = datagram.payload.into_owned();
+            let first = judp::frames(Bytes::from(octets.clone()));
+            let first = first.ok().and_then(|mut frames| frames.next()?.ok());
+            // Acknowledgements belong to the transport and have no code.
+            if let Some(message) = first.filter(|message| message.code().is_some()) {
+                messages.push((time, octets, message));
+            }
         }
     }
     messages
