@@ -553,7 +553,7 @@ impl Sought<'_> {
     /// Whether a service with this URN is wanted.
     fn is_of(&self, urn: &str) -> bool {
         match self {
-            Self::Member(audience) => audience.wants(urn),
+            Self::Member(audience) => audience.requires(urn),
             Self::OneOf(versions) => versions.iter().any(|version| version.urn == urn),
         }
     }

@@ -114,8 +114,9 @@ impl Audience {
         self.scope.matches(component.id) && self.services.iter().all(offers)
     }
 
-    /// Whether its members offer the service with this URN.
-    pub(crate) fn wants(&self, urn: &str) -> bool {
+    /// Whether every member offers the service with this URN, in some version.
+    #[must_use]
+    pub fn requires(&self, urn: &str) -> bool {
         self.services.iter().any(|wanted| wanted.urn() == urn)
     }
 
