@@ -319,13 +319,21 @@ impl Browser {
         self.wait(&format!(
             "{place} && !{place}.disabled && {place}.getClientRects().length"
         ));
-        let middle = format!(
+        let measure = format!(
             "(() => {{ const e = {place}; e.scrollIntoView({{block: 'nearest'}}); const b = e.getBoundingClientRect(); \
              const [x, y] = [b.x + b.width / 2, b.y + b.height / 2]; \
              const top = document.elementFromPoint(x, y); \
              return {{ x, y, free: e === top || e.contains(top) }}; }})()"
         );
-        let middle = self.value(&middle);
+        // What the state shows and hides beside a button moves it: a hand waits until it rests.
+        let mut middle = self.value(&measure);
+        for _ in 0..20 {
+            std::thread::sleep(PERIOD);
+            let before = std::mem::replace(&mut middle, self.value(&measure));
+            if before == middle {
+                break;
+            }
+        }
         assert_eq!(
             middle["free"], true,
             "{selector} is covered or not on the screen"

@@ -158,11 +158,11 @@ const LEFT_OUT: &[&str] = &[
 /// Left out of Set Velocity State and, in reports, of Local Vector.
 const LEFT_OUT_OF_SOME: &[&str] = &["VelocityRMS", "RateRMS", "TimeStamp", "Z", "Roll", "Pitch"];
 
-/// Half a step of the coarser scale, plus the rounding of the displayed digits.
+/// Half a step of each of the two scales, rounded up.
 fn tolerance(field: &str) -> f64 {
     match field {
-        // 10 000 m/s in 16 bits.
-        "Speed" => 0.077,
+        // 10 000 m/s in 16 bits there, steps of 5 mm/s here.
+        "Speed" => 0.08,
         "WeightingFactor" => 0.005,
         _ if field.contains("Effort") => 0.004,
         _ if field.contains("Rate") => 0.001,
