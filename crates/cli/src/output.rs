@@ -100,7 +100,7 @@ fn harmless(text: &str) -> String {
     let mut rest = text;
     while let Some(first) = rest.chars().next() {
         let colour = colour_at(rest);
-        let is_harmless = matches!(first, '\n' | '\t') || !(first.is_control() || reorders(first));
+        let is_harmless = matches!(first, '\n' | '\t') || !disturbs_terminal(first);
         match colour {
             Some(sequence) => shown.push_str(sequence),
             None if is_harmless => shown.push(first),
@@ -119,9 +119,10 @@ fn colour_at(text: &str) -> Option<&str> {
     is_colour.then(|| &text[..text.len() - parameters.len() + end + 1])
 }
 
-/// Whether a character changes the direction of the text after it.
-const fn reorders(c: char) -> bool {
-    matches!(c, '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
+/// Whether a character could do more on a terminal than show itself: move the cursor, or change the
+/// direction of the text after it, so that a name reads as another one.
+pub fn disturbs_terminal(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
 }
 
 /// Whether to use colours: on a terminal, unless NO_COLOR (<https://no-color.org>) is set.

@@ -6,7 +6,7 @@ use terminal_size::{Height, Width, terminal_size};
 
 use super::sample::{DropRow, LinkRow, PeerRow, View};
 use jaus_cli::failure::Failure;
-use jaus_cli::output::Output;
+use jaus_cli::output::{Output, disturbs_terminal};
 
 /// Maximum number of rows without a limit and without a terminal.
 const MOST: usize = 1000;
@@ -184,10 +184,10 @@ fn short(number: f64) -> String {
     format!("{number:.0}G")
 }
 
-/// Shortens a text and marks the cut; drops control characters, which peers could use in names to
-/// disturb a terminal.
+/// Shortens a text and marks the cut; drops characters with which a peer's name could disturb the
+/// terminal.
 fn clipped(text: &str, width: usize) -> String {
-    let mut visible = text.chars().filter(|c| !c.is_control());
+    let mut visible = text.chars().filter(|&c| !disturbs_terminal(c));
     let mut clipped: String = visible.by_ref().take(width).collect();
     if visible.next().is_some() {
         clipped.pop();
@@ -217,5 +217,6 @@ mod tests {
         assert_eq!(clipped("Rover", 10), "Rover");
         assert_eq!(clipped("a very long name", 10), "a very lo…");
         assert_eq!(clipped("\x1b[2Jevil", 10), "[2Jevil");
+        assert_eq!(clipped("\u{202e}revoR", 10), "revoR");
     }
 }

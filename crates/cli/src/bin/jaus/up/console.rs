@@ -93,18 +93,18 @@ impl Console {
 }
 
 impl PrefixedConsole {
-    /// Prints a line; makes control characters visible.
+    /// Prints a line; shows a mark in place of characters that would disturb the terminal.
     pub(super) fn say(&self, line: &str) {
         let visible: String = line.chars().map(visible).collect();
         self.console.line(format!("{}{visible}\n", self.prefix));
     }
 }
 
-/// Replaces control characters with visible ones.
+/// The character, or what is shown in its place.
 fn visible(c: char) -> char {
     match c {
         '\t' => ' ',
-        c if c.is_control() => char::REPLACEMENT_CHARACTER,
+        c if output::disturbs_terminal(c) => char::REPLACEMENT_CHARACTER,
         c => c,
     }
 }
@@ -141,4 +141,15 @@ fn print(waiting: &Receiver<String>, lost: &AtomicU64) -> io::Result<()> {
         out.flush()?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_a_part_neither_moves_the_cursor_nor_reverses_the_text() {
+        let shown: String = "a\tb\x1b[2J \u{202e}gpj.exe".chars().map(visible).collect();
+        assert_eq!(shown, "a b\u{fffd}[2J \u{fffd}gpj.exe");
+    }
 }
