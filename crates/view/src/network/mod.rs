@@ -1,5 +1,6 @@
 //! Extraction of datagrams from captured frames: link header, IP, fragments, TCP streams, ports.
 
+mod batch;
 mod fragments;
 mod packet;
 mod streams;
@@ -123,10 +124,7 @@ impl Network {
             return Vec::new();
         };
         match &packet.transport {
-            Some(TransportSlice::Udp(udp)) => {
-                let datagram = datagram(addresses, udp, Cow::Borrowed);
-                self.choose(datagram).into_iter().collect()
-            }
+            Some(TransportSlice::Udp(udp)) => self.choose(datagram(addresses, udp, Cow::Borrowed)),
             Some(TransportSlice::Tcp(tcp)) => {
                 let [source, destination] = addresses;
                 let cut = packet.net.as_ref().and_then(LaxNetSlice::ip_payload_ref);
@@ -140,13 +138,10 @@ impl Network {
                 })
             }
             Some(_) => Vec::new(),
-            None => {
-                let datagram = self.reassembled(addresses, &packet);
-                datagram
-                    .and_then(|it| self.choose(it))
-                    .into_iter()
-                    .collect()
-            }
+            None => match self.reassembled(addresses, &packet) {
+                Some(datagram) => self.choose(datagram),
+                None => Vec::new(),
+            },
         }
     }
 
@@ -162,16 +157,21 @@ impl Network {
         Some(datagram(addresses, &udp, owned))
     }
 
-    /// The datagram, if it is selected.
-    fn choose<'a>(&mut self, datagram: Datagram<'a>) -> Option<Datagram<'a>> {
+    /// The datagram, or those of a batch, if they are selected.
+    fn choose<'a>(&mut self, datagram: Datagram<'a>) -> Vec<Datagram<'a>> {
         let ports = [datagram.source.port(), datagram.destination.port()];
-        match &self.choice {
-            Choice::Content if ports.contains(&JAUS_PORT) || is_jaus(&datagram) => Some(datagram),
+        let is_chosen = match &self.choice {
             Choice::Content => {
-                self.counts.foreign += 1;
-                None
+                let is_jaus =
+                    ports.contains(&JAUS_PORT) || first_message(&datagram.payload).is_some();
+                self.counts.foreign += u64::from(!is_jaus);
+                is_jaus
             }
-            Choice::Ports(chosen) => is_among(chosen, ports).then_some(datagram),
+            Choice::Ports(chosen) => is_among(chosen, ports),
+        };
+        match is_chosen {
+            true => batch::cut(datagram),
+            false => Vec::new(),
         }
     }
 
@@ -202,11 +202,10 @@ fn is_among(chosen: &[u16], ports: [u16; 2]) -> bool {
     chosen.is_empty() || ports.iter().any(|port| chosen.contains(port))
 }
 
-/// Whether a datagram begins with a plausible message.
-fn is_jaus(datagram: &Datagram<'_>) -> bool {
-    let frames = judp::frames(Bytes::copy_from_slice(&datagram.payload));
-    let first = frames.ok().and_then(|mut frames| frames.next()?.ok());
-    first.is_some_and(|frame| frame.is_plausible())
+/// The message at the beginning of a datagram, if it is a plausible one.
+fn first_message(datagram: &[u8]) -> Option<jaus::wire::Frame> {
+    let mut frames = judp::frames(Bytes::copy_from_slice(datagram)).ok()?;
+    frames.next()?.ok().filter(jaus::wire::Frame::is_plausible)
 }
 
 fn datagram<'u, 'a>(
