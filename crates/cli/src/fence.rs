@@ -1,9 +1,11 @@
 //! Flags of the drivers that keep to operating zones.
 
+use std::time::Duration;
+
 use clap::Args;
 use jaus_vehicle::motion::FenceConfig;
 
-use crate::runtime::between;
+use crate::runtime::{between, duration_within};
 
 /// Dimensions and delays of the vehicle at the edges of operating zones
 #[derive(Debug, Clone, Copy, Args)]
@@ -17,9 +19,9 @@ pub struct FenceFlags {
     #[arg(long, value_name = "M", default_value = "0.1", value_parser = |text: &str| between(text, 0.0, 50.0))]
     edge_margin: f64,
 
-    /// The time from a measurement to the brakes in seconds, from 0 to 10
-    #[arg(long, value_name = "SECONDS", default_value = "0.3", value_parser = |text: &str| between(text, 0.0, 10.0))]
-    reaction: f64,
+    /// The time from a measurement to the brakes, from 0s to 10s
+    #[arg(long, value_name = "DURATION", default_value = "300ms", value_parser = |text: &str| duration_within(text, "0s", "10s"))]
+    reaction: Duration,
 }
 
 impl From<FenceFlags> for FenceConfig {
@@ -27,7 +29,7 @@ impl From<FenceFlags> for FenceConfig {
         Self {
             radius: flags.radius,
             margin: flags.edge_margin,
-            reaction: flags.reaction,
+            reaction: flags.reaction.as_secs_f64(),
         }
     }
 }

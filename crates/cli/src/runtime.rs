@@ -85,25 +85,33 @@ async fn termination() {
     std::future::pending::<()>().await;
 }
 
-/// Parses a flag's number of seconds: `2`, `0.5`, `2s`.
-pub fn seconds(text: &str) -> Result<Duration, String> {
-    let number = text.strip_suffix('s').unwrap_or(text);
-    let seconds: f64 = number
-        .parse()
-        .map_err(|_| "write a number of seconds such as 2 or 0.5".to_owned())?;
-    match Duration::try_from_secs_f64(seconds) {
-        Ok(duration) if !duration.is_zero() && duration < MOST => Ok(duration),
-        _ => Err("write more than 0 and less than a year".to_owned()),
-    }
-}
-
-const MOST: Duration = Duration::from_secs(365 * 86_400);
-
 /// Parses a flag's duration with its unit, such as `10s`, `500ms` or `2 min`; more than 0.
 pub fn duration(text: &str) -> Result<Duration, String> {
     match units::duration(text) {
         Ok(Duration::ZERO) => Err("write more than 0".to_owned()),
         result => result.map_err(|error| error.to_string()),
+    }
+}
+
+/// Parses a flag's duration within bounds, which are written as the user would.
+pub fn duration_within(text: &str, least: &str, most: &str) -> Result<Duration, String> {
+    let bound = |text| units::duration(text).map_err(|error| error.to_string());
+    let duration = bound(text)?;
+    match (bound(least)?..=bound(most)?).contains(&duration) {
+        true => Ok(duration),
+        false => Err(format!("write a duration from {least} to {most}")),
+    }
+}
+
+/// Parses a flag's control timeout as Access Control reports it: whole seconds, 0 for `never`.
+pub fn control_timeout(text: &str) -> Result<u8, String> {
+    if text == "never" {
+        return Ok(0);
+    }
+    let duration = duration(text)?;
+    match u8::try_from(duration.as_secs()) {
+        Ok(seconds) if duration.subsec_nanos() == 0 => Ok(seconds),
+        _ => Err("write whole seconds up to 255s, or never".to_owned()),
     }
 }
 

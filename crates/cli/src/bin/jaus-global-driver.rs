@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use jaus::address::JausId;
 use jaus_cli::failure::Failure;
-use jaus_cli::runtime::{between, seconds};
+use jaus_cli::runtime::{between, control_timeout, duration};
 use jaus_cli::{FenceFlags, Ready, launch};
 use jaus_vehicle::motion::Limits;
 use jaus_vehicle::parts::{GlobalDriver, Part};
@@ -29,8 +29,8 @@ struct Flags {
     #[arg(long, value_name = "M/S²", default_value = "1", value_parser = |text: &str| between(text, 0.05, 20.0))]
     deceleration: f64,
 
-    /// Stop when pose or velocity is older than this, in seconds
-    #[arg(long, value_name = "SECONDS", default_value = "0.6", value_parser = seconds)]
+    /// Stop when pose or velocity is older than this
+    #[arg(long, value_name = "DURATION", default_value = "600ms", value_parser = duration)]
     stale: Duration,
 
     /// Stop when the standard error of the position exceeds this, in metres from 0.01 to 100
@@ -41,8 +41,9 @@ struct Flags {
     #[arg(long, value_name = "CODE", default_value = "100")]
     authority: u8,
 
-    /// Control timeout in seconds: control ends unless the client renews it; 0 for never
-    #[arg(long, value_name = "SECONDS", default_value = "3")]
+    /// Control ends unless the client renews it within this time, in whole seconds to 255s; `never` to
+    /// keep it
+    #[arg(long, value_name = "DURATION", default_value = "3s", value_parser = control_timeout)]
     control_timeout: u8,
 
     #[command(flatten)]

@@ -8,7 +8,7 @@ use std::time::Duration;
 use clap::Args;
 use jaus::address::JausId;
 use jaus_cli::failure::Failure;
-use jaus_cli::runtime::{between, seconds};
+use jaus_cli::runtime::{between, duration};
 use jaus_cli::{Ready, launch};
 use jaus_vehicle::motion::wrap;
 use jaus_vehicle::navigation::NavigatorConfig;
@@ -41,13 +41,13 @@ struct Flags {
     #[arg(long, value_name = "HZ", default_value = "25", value_parser = |text: &str| between(text, 1.0, 100.0))]
     rate: f64,
 
-    /// Stop reporting the pose after this many seconds without position and wheel odometry
-    #[arg(long, value_name = "SECONDS", default_value = "1.5", value_parser = seconds)]
+    /// Stop reporting the pose after this long without position and wheel odometry
+    #[arg(long, value_name = "DURATION", default_value = "1.5s", value_parser = duration)]
     silence: Duration,
 
-    /// Stop reporting the pose after this many seconds without an acceptable position, whatever the
+    /// Stop reporting the pose after this long without an acceptable position, whatever the
     /// wheels say: they also turn where the vehicle is stuck
-    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds)]
+    #[arg(long, value_name = "DURATION", default_value = "10s", value_parser = duration)]
     outage: Duration,
 
     /// Stop reporting the pose when the standard error of the position exceeds this, in metres from

@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use jaus::address::JausId;
 use jaus_cli::failure::Failure;
-use jaus_cli::runtime::seconds;
+use jaus_cli::runtime::duration;
 use jaus_cli::{Ready, launch};
 use jaus_vehicle::parts::{IioDevice, ImuSensor, Part};
 
@@ -26,8 +26,8 @@ struct Flags {
     #[arg(long)]
     inverted: bool,
 
-    /// Report no values after this many seconds without a measurement
-    #[arg(long, value_name = "SECONDS", default_value = "0.3", value_parser = seconds)]
+    /// Report no values after this long without a measurement
+    #[arg(long, value_name = "DURATION", default_value = "300ms", value_parser = duration)]
     silence: Duration,
 }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use jaus::address::JausId;
 use jaus_cli::failure::Failure;
-use jaus_cli::runtime::{between, seconds};
+use jaus_cli::runtime::{between, control_timeout, duration};
 use jaus_cli::{FenceFlags, Ready, launch};
 use jaus_vehicle::motion::Limits;
 use jaus_vehicle::parts::{Part, VectorDriver};
@@ -29,20 +29,21 @@ struct Flags {
     #[arg(long, value_name = "M/S²", default_value = "1", value_parser = |text: &str| between(text, 0.05, 20.0))]
     acceleration: f64,
 
-    /// Command timeout in seconds: stop when no command arrives for this long
-    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
+    /// Stop when no command arrives for this long
+    #[arg(long, value_name = "DURATION", default_value = "1s", value_parser = duration)]
     silence: Duration,
 
-    /// Stop when pose or velocity is older than this, in seconds
-    #[arg(long, value_name = "SECONDS", default_value = "0.6", value_parser = seconds)]
+    /// Stop when pose or velocity is older than this
+    #[arg(long, value_name = "DURATION", default_value = "600ms", value_parser = duration)]
     stale: Duration,
 
     /// The authority used to control the primitive driver
     #[arg(long, value_name = "CODE", default_value = "100")]
     authority: u8,
 
-    /// Control timeout in seconds: control ends unless the client renews it; 0 for never
-    #[arg(long, value_name = "SECONDS", default_value = "3")]
+    /// Control ends unless the client renews it within this time, in whole seconds to 255s; `never` to
+    /// keep it
+    #[arg(long, value_name = "DURATION", default_value = "3s", value_parser = control_timeout)]
     control_timeout: u8,
 
     /// Do not drive without a range sensor. Without this flag it is needed from its first scan on

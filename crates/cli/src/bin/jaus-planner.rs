@@ -41,16 +41,16 @@ struct Flags {
     #[arg(long, value_name = "COUNT", default_value = "3", value_parser = clap::value_parser!(u8).range(1..))]
     attempts: u8,
 
-    /// Seconds to wait after a blocked attempt
-    #[arg(long, value_name = "SECONDS", default_value = "3", value_parser = runtime::seconds)]
+    /// The time to wait after a blocked attempt
+    #[arg(long, value_name = "DURATION", default_value = "3s", value_parser = runtime::duration)]
     pause: Duration,
 
-    /// Seconds a stage may take to start or to recover
-    #[arg(long, value_name = "SECONDS", default_value = "15", value_parser = runtime::seconds)]
+    /// The time a stage may take to start or to recover
+    #[arg(long, value_name = "DURATION", default_value = "15s", value_parser = runtime::duration)]
     patience: Duration,
 
-    /// Seconds the vehicle may drive without progress
-    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = runtime::seconds)]
+    /// The time the vehicle may drive without progress
+    #[arg(long, value_name = "DURATION", default_value = "1min", value_parser = runtime::duration)]
     stall: Duration,
 
     /// The maximum number of new paths in one attempt because the map has changed on the way

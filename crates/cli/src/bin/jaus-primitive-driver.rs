@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use jaus::address::JausId;
 use jaus_cli::failure::Failure;
-use jaus_cli::runtime::{between, seconds};
+use jaus_cli::runtime::{between, control_timeout, duration, duration_within};
 use jaus_cli::{FenceFlags, Ready, launch};
 use jaus_vehicle::actuator::{MotorConfig, ServoConfig, WheelsConfig};
 use jaus_vehicle::motion::{Ackermann, Limits};
@@ -38,17 +38,18 @@ struct Flags {
     #[arg(long, value_name = "DEGREES", default_value = "25", value_parser = |text: &str| between(text, 1.0, 80.0), requires = "wheelbase")]
     steering_angle: f64,
 
-    /// Command timeout in seconds: stop the motors when no effort arrives for this long
-    #[arg(long, value_name = "SECONDS", default_value = "0.5", value_parser = seconds)]
+    /// Stop the motors when no effort arrives for this long
+    #[arg(long, value_name = "DURATION", default_value = "500ms", value_parser = duration)]
     silence: Duration,
 
-    /// Motor watchdog in seconds: the motors brake if the program hangs and stops repeating its
+    /// The motors' watchdog: they brake if the program hangs and stops repeating its
     /// command
-    #[arg(long, value_name = "SECONDS", default_value = "0.2", value_parser = seconds)]
+    #[arg(long, value_name = "DURATION", default_value = "200ms", value_parser = duration)]
     deadline: Duration,
 
-    /// Control timeout in seconds: control ends unless the client renews it; 0 for never
-    #[arg(long, value_name = "SECONDS", default_value = "3")]
+    /// Control ends unless the client renews it within this time, in whole seconds to 255s; `never` to
+    /// keep it
+    #[arg(long, value_name = "DURATION", default_value = "3s", value_parser = control_timeout)]
     control_timeout: u8,
 
     #[command(flatten)]
@@ -156,9 +157,9 @@ impl Bridges {
 #[derive(Args)]
 #[command(next_help_heading = "Simulated motors")]
 struct Simulation {
-    /// The motors' time constant in seconds, from 0.01 to 10
-    #[arg(long, value_name = "SECONDS", default_value = "0.25", value_parser = |text: &str| between(text, 0.01, 10.0))]
-    response: f64,
+    /// The motors' time constant, from 10ms to 10s
+    #[arg(long, value_name = "DURATION", default_value = "250ms", value_parser = |text: &str| duration_within(text, "10ms", "10s"))]
+    response: Duration,
 
     /// How unequal the motors are, as a fraction of their strength from 0 to 0.5
     #[arg(long, value_name = "SHARE", default_value = "0", value_parser = |text: &str| between(text, 0.0, 0.5))]
@@ -232,7 +233,7 @@ impl Flags {
         }
         let motor = MotorConfig {
             top: self.speed,
-            response: self.simulation.response,
+            response: self.simulation.response.as_secs_f64(),
             noise: self.simulation.noise,
             seed: self.simulation.seed,
             deadline: self.deadline,

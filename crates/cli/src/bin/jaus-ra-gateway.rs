@@ -12,7 +12,7 @@ use jaus::component::Kind;
 use jaus::link::{Group, STANDARD_PORT};
 use jaus::node::{Config, units};
 use jaus_cli::output::Output;
-use jaus_cli::runtime::seconds;
+use jaus_cli::runtime::{control_timeout, duration};
 use jaus_cli::{Failure, Ready, launch};
 use jaus_ra::RaId;
 use jaus_ra::carrier::Dialect;
@@ -22,17 +22,17 @@ use jaus_vehicle::parts::Part;
 
 #[derive(Args)]
 struct Flags {
-    /// The answer timeout from the other side, in seconds
-    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
+    /// How long to wait for an answer of the other side
+    #[arg(long, value_name = "DURATION", default_value = "1s", value_parser = duration)]
     patience: Duration,
 
     /// The maximum authority used to control RA components, even if the JAUS client's is higher
     #[arg(long, value_name = "CODE", default_value = "255")]
     authority: u8,
 
-    /// Control timeout for JAUS clients of RA components in seconds, plus a grace of a quarter; 0
-    /// for never
-    #[arg(long, value_name = "SECONDS", default_value = "4")]
+    /// Control of RA components ends unless the JAUS client renews it within this time, in whole
+    /// seconds to 255s, plus a grace of a quarter; `never` to keep it
+    #[arg(long, value_name = "DURATION", default_value = "4s", value_parser = control_timeout)]
     control_timeout: u8,
 
     /// Expose only this JAUS subsystem to RA systems (repeatable) [default: all that map to an RA

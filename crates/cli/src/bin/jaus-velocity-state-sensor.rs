@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use jaus::address::JausId;
 use jaus_cli::failure::Failure;
-use jaus_cli::runtime::{between, seconds};
+use jaus_cli::runtime::{between, duration};
 use jaus_cli::{Ready, launch};
 use jaus_vehicle::parts::{Part, VelocitySensor};
 
@@ -16,8 +16,8 @@ struct Flags {
     #[arg(long, value_name = "HZ", default_value = "25", value_parser = |text: &str| between(text, 1.0, 100.0))]
     rate: f64,
 
-    /// Stop reporting the velocity after this many seconds without wheel odometry
-    #[arg(long, value_name = "SECONDS", default_value = "0.3", value_parser = seconds)]
+    /// Stop reporting the velocity after this long without wheel odometry
+    #[arg(long, value_name = "DURATION", default_value = "300ms", value_parser = duration)]
     silence: Duration,
 }
 

@@ -195,14 +195,28 @@ fn flags_of_motors_and_receivers_out_of_their_range_are_told_with_the_range() {
         refused("jaus-primitive-driver", flags, told);
     }
     for (flags, told) in [
-        ("--outage 0", "write more than 0"),
+        ("--outage 0s", "write more than 0"),
+        ("--outage 10", "units us, ms, s, min and h"),
         ("--max-rms 0", "write a number from 0.01 to 100"),
         ("--gyro-inverted", "--gyro"),
         ("--baud 1", "1 is not in 300..=4000000"),
     ] {
         refused("jaus-global-pose-sensor", flags, told);
     }
-    refused("jaus-imu-sensor", "--silence 0", "write more than 0");
+    for (flags, told) in [
+        (
+            "--control-timeout 2.5s",
+            "whole seconds up to 255s, or never",
+        ),
+        (
+            "--control-timeout 256s",
+            "whole seconds up to 255s, or never",
+        ),
+        ("--reaction 11s", "write a duration from 0s to 10s"),
+    ] {
+        refused("jaus-local-vector-driver", flags, told);
+    }
+    refused("jaus-imu-sensor", "--silence 0s", "write more than 0");
     refused(
         "jaus-global-driver",
         "--turning-radius 101",

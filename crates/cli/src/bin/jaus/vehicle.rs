@@ -17,7 +17,7 @@ use jaus::service::{MotionPolicy, StopCause};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::output::Output;
-use jaus_cli::runtime::{self, Clock, RunFor, between};
+use jaus_cli::runtime::{self, Clock, RunFor, between, control_timeout};
 use jaus_cli::tree;
 use jaus_vehicle::handoff::Handoff;
 use jaus_vehicle::mobility::Vehicle;
@@ -62,9 +62,9 @@ pub(crate) struct VehicleCommand {
     #[arg(long, value_enum, default_value_t)]
     profile: Profile,
 
-    /// Control timeout in seconds: control ends unless the client renews it, plus a grace of a
-    /// quarter; 0 for never [default: 4]
-    #[arg(long, value_name = "SECONDS")]
+    /// Control ends unless the client renews it within this time, in whole seconds to 255s, plus a
+    /// grace of a quarter; `never` to keep it [default: 4s]
+    #[arg(long, value_name = "DURATION", value_parser = control_timeout)]
     control_timeout: Option<u8>,
 
     /// Keep an effort or velocity while its client sends anything at least once per second, instead

@@ -36,11 +36,15 @@ use system::{OPERATOR, System, VEHICLE};
     jaus demo --stay                  starts no mission: drive on the page\n  \
     jaus demo --ackermann             a vehicle that steers like a car\n  \
     jaus demo --headless              without the page; ends when the vehicle arrives\n  \
-    jaus demo --to 3,-5 --headless --seconds 60")]
+    jaus demo --to 3,-5 --headless --for 1min")]
 pub(crate) struct Demo {
     /// End after this time. With --headless, an unfinished mission then counts as failed: exit
     /// status 1 [default: at Ctrl-C; with --headless, when the mission is over]
-    #[arg(long, value_parser = runtime::seconds)]
+    #[arg(long = "for", value_name = "DURATION", value_parser = runtime::duration)]
+    duration: Option<Duration>,
+
+    /// The same time as a number of seconds
+    #[arg(long, value_name = "SECONDS", conflicts_with = "duration", value_parser = seconds)]
     seconds: Option<Duration>,
 
     /// Do not serve the operator's page
@@ -83,7 +87,7 @@ impl Demo {
             let outcome = match started {
                 Ok(operator) => tokio::select! {
                     failure = system.failure() => Err(failure),
-                    () = runtime::end(self.seconds) => Ok(None),
+                    () = runtime::end(self.duration.or(self.seconds)) => Ok(None),
                     outcome = self.play(operator, surprise, &mut story) => outcome.map(Some),
                 },
                 Err(failure) => Err(failure),
@@ -274,6 +278,13 @@ fn start_part(
 }
 
 /// Parses a place: `6,5`.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse().ok().filter(|&it| it > 0.0);
+    seconds
+        .and_then(|it| Duration::try_from_secs_f64(it).ok())
+        .ok_or_else(|| "write a number of seconds such as 60, or --for with a unit".to_owned())
+}
+
 fn place(text: &str) -> Result<(f64, f64), String> {
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|it| it.is_finite());
     let pair = text
