@@ -24,6 +24,7 @@ mod manual;
 mod monitor;
 mod node;
 mod offers;
+mod packets;
 mod ping;
 mod queries;
 mod query;

@@ -337,6 +337,33 @@ async fn the_communicator_logs_what_passes_and_its_log_is_read_back_with_filters
 }
 
 #[tokio::test]
+async fn an_interface_is_watched_without_a_communicator() {
+    let group = own_group();
+    let at = group.to_string();
+    let watching = tokio::task::spawn_blocking(move || {
+        let interface = ["watch", "--interface", "lo", "--group", &at];
+        // With the privilege it sees the traffic of other tests, too.
+        let chosen = ["--from", "4243", "--json", "--for", "3s"];
+        run(&[interface, chosen].concat(), b"")
+    });
+    let node = Node::start(Config::loopback(4243, 1).group(group)).unwrap();
+    let client = node.attach(1).unwrap();
+    while !watching.is_finished() {
+        let query = Bytes::from_static(QUERY);
+        client
+            .send(Outgoing::new(client.id(), JausId::EVERYONE, query))
+            .unwrap();
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    let watched = watching.await.unwrap();
+    let first = watched.stdout.lines().next().unwrap_or_default();
+    let first: Json = serde_json::from_str(first).unwrap_or_else(|_| panic!("{watched:?}"));
+    assert_eq!(first["message"], "QueryHeartbeatPulse");
+    assert_eq!(first["source"], "4243.1.1");
+    assert_eq!(watched.status, 0, "{watched:?}");
+}
+
+#[tokio::test]
 async fn jaus_watch_shows_what_passes_a_communicator_process() {
     let group = own_group();
     let Group::At(at) = group else { unreachable!() };

@@ -1,30 +1,23 @@
 //! `jaus record`: records the traffic of JAUS peers into a capture file.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "a recording carries the time of day and prints progress"
-)]
 
 mod filter;
-mod group;
-#[cfg(target_os = "linux")]
-mod packets;
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
-use bytes::Bytes;
 use clap::Args;
-use jaus::link::{Group, Interfaces};
+use jaus::link::Group;
 use jaus::node::units;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::say;
 use jaus_cli::runtime::{self, RunFor};
-use jaus_view::{CaptureWriter, InterfaceNumber, JAUS_PORT, LinkType, Timestamp};
+use jaus_view::{CaptureWriter, InterfaceNumber, JAUS_PORT, LinkType};
 use tokio::time::{MissedTickBehavior, interval};
 
+use crate::packets::{Packet, Source};
 use filter::Filter;
 
 /// Record JAUS traffic to a capture file, for `jaus decode`, `jaus replay` and Wireshark
@@ -72,34 +65,10 @@ pub(crate) struct Record {
     quiet: bool,
 }
 
-/// A captured IP packet.
-struct Packet {
-    interface: String,
-    octets: Bytes,
-}
-
-/// Source of packets.
-enum Source {
-    #[cfg(target_os = "linux")]
-    Packets(packets::PacketSocket),
-    Group(group::Listeners),
-}
-
-impl Source {
-    /// Waits for packets.
-    async fn next(&mut self) -> Result<Vec<Packet>, Failure> {
-        match self {
-            #[cfg(target_os = "linux")]
-            Self::Packets(socket) => socket.next().await,
-            Self::Group(listeners) => Ok(listeners.next().await),
-        }
-    }
-}
-
 impl Record {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         runtime::run(async {
-            let mut source = self.source()?;
+            let mut source = Source::open(&self.interface, self.group)?;
             let mut recording = Recording::create(&self.file, self.overwrite, &self.port)?;
             let result = self.record(&mut source, &mut recording).await;
             recording.flush()?;
@@ -112,28 +81,6 @@ impl Record {
             }
             result.map(|()| Outcome::complete_if(recording.packets > 0))
         })
-    }
-
-    fn source(&self) -> Result<Source, Failure> {
-        #[cfg(target_os = "linux")]
-        match packets::PacketSocket::open(&self.interface) {
-            Ok(socket) => return Ok(Source::Packets(socket)),
-            Err(packets::OpenError::NotAllowed) => say(
-                "this process may not open packet sockets (run as root, or grant the privilege \
-                 once: `sudo setcap cap_net_raw+ep $(which jaus)`). Only multicast is recorded, \
-                 not unicast between other nodes",
-            ),
-            Err(packets::OpenError::Other(failure)) => return Err(failure),
-        }
-        let interfaces = if self.interface.is_empty() {
-            Interfaces::All
-        } else {
-            Interfaces::Only(self.interface.clone())
-        };
-        Ok(Source::Group(group::Listeners::open(
-            &interfaces,
-            self.group,
-        )?))
     }
 
     async fn record(&self, source: &mut Source, recording: &mut Recording) -> Result<(), Failure> {
@@ -219,7 +166,9 @@ impl Recording {
             }
         };
         self.packets += 1;
-        self.writer.write(on, now(), &packet.octets).map_err(failed)
+        self.writer
+            .write(on, packet.time, &packet.octets)
+            .map_err(failed)
     }
 
     fn flush(&mut self) -> Result<(), Failure> {
@@ -231,13 +180,4 @@ impl Recording {
         let (packets, octets) = (self.packets, self.writer.written() as f64);
         format!("{packets} packets recorded, {:.1} kB", octets / 1e3)
     }
-}
-
-/// The kernel's time of day.
-fn now() -> Timestamp {
-    // A clock before 1970 is treated as 1970.
-    let time = SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .unwrap_or_default();
-    Timestamp::new(time.as_secs() as i64, time.subsec_nanos(), 9)
 }

@@ -85,7 +85,8 @@ fn no_view(address: &str, error: &Error) -> Failure {
         }
         other => format!(
             "there is no debug view at {address}: {other}. Start jaus-communicator, choose its \
-             address with --at, or read a log with `jaus watch FILE`"
+             address with --at, watch the network itself with --interface all, or read a log with \
+             `jaus watch FILE`"
         ),
     };
     Failure::new(words)

@@ -1,6 +1,7 @@
-//! `jaus watch`: prints the messages of a node, live or from its log, one per line.
+//! `jaus watch`: prints messages, one per line: those of a node, of network interfaces or of files.
 
 mod files;
+mod interfaces;
 mod live;
 mod tally;
 
@@ -8,6 +9,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
+use jaus::link::Group;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::{Output, colours_wanted};
 use jaus_cli::runtime;
@@ -16,17 +18,20 @@ use jaus_view::{Entry, Filter};
 use crate::definitions::Jsidl;
 use tally::Tally;
 
-/// Show the messages that pass through a node, live or from files, reassembled and without
-/// duplicates
+/// Show the messages that pass through a node or a network interface, or those of files, reassembled
+/// and without duplicates
 ///
 /// Live messages come from a communicator's debug view. A viewer that is too slow loses lines, and
-/// their number is shown. Files are captures (from a communicator's --log, `jaus record`, Wireshark
+/// their number is shown. With --interface they come from the network itself, without a
+/// communicator: with the privilege to open packet sockets (root, or `setcap cap_net_raw+ep jaus`)
+/// all traffic of this host whose content is JAUS, otherwise the multicast group. Files are captures (from a communicator's --log, `jaus record`, Wireshark
 /// …), JSON lines, or directories with a communicator's log.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus watch\n  \
     jaus watch --component 101.2.33 --message Velocity\n  \
     jaus watch --message ReportVelocityState --field 'velocity_x>1.0'\n  \
+    jaus watch --interface all\n  \
     jaus watch --at 127.0.0.1:9000 --json | grep 4404\n  \
     jaus watch /var/log/jaus --stats\n  \
     jaus watch drive.pcapng --filter 'from=101 to=42 service=Pose state!=ready'\n\n\
@@ -47,6 +52,15 @@ pub(crate) struct Watch {
         conflicts_with = "files"
     )]
     at: String,
+
+    /// Watch this network interface, by name or address, instead of a debug view (repeatable);
+    /// `all` for all of them, including loopback
+    #[arg(long, value_name = "INTERFACE", conflicts_with_all = ["files", "at"])]
+    interface: Vec<String>,
+
+    /// The multicast group to watch without packet sockets
+    #[arg(long, value_name = "ADDRESS", default_value_t, requires = "interface")]
+    group: Group,
 
     /// From or to this component, node or subsystem: 101.2.33, 101.2, 101 (this and the following
     /// are repeatable; a message must match all)
@@ -115,18 +129,30 @@ impl Watch {
                 },
             },
         };
-        let outcome = if self.files.is_empty() {
-            live::watch(&self.at, &filter, self.duration, &mut printer)?
-        } else {
-            let dictionary = self.jsidl.load()?;
-            files::watch(&self.files, &filter, &dictionary, &mut printer)?
-        };
+        let outcome = self.watch(&filter, &mut printer)?;
         if let Form::Tally(tally) = &printer.form {
             for line in tally.lines() {
                 printer.output.line(line)?;
             }
         }
         Ok(outcome)
+    }
+
+    fn watch(&self, filter: &Filter, printer: &mut Printer) -> Result<Outcome, Failure> {
+        if !self.files.is_empty() {
+            let dictionary = self.jsidl.load()?;
+            return files::watch(&self.files, filter, &dictionary, printer);
+        }
+        if self.interface.is_empty() {
+            return live::watch(&self.at, filter, self.duration, printer);
+        }
+        let dictionary = self.jsidl.load()?;
+        let chosen: &[String] = match self.interface.iter().any(|name| name == "all") {
+            true => &[],
+            false => &self.interface,
+        };
+        let limit = self.duration;
+        interfaces::watch(chosen, self.group, filter, &dictionary, limit, printer)
     }
 
     fn filter(&self) -> Result<Filter, Failure> {

@@ -1,4 +1,4 @@
-//! Records the multicast group, without the right to open packet sockets.
+//! Hears the multicast group, without the right to open packet sockets.
 
 use std::future::poll_fn;
 use std::task::Poll;
@@ -11,7 +11,7 @@ use jaus_view::udp_packet;
 use super::Packet;
 
 /// A passive listener on each interface.
-pub(super) struct Listeners {
+pub(crate) struct Listeners {
     links: Vec<UdpLink>,
     slab: Slab,
 }
@@ -51,10 +51,7 @@ impl Listeners {
         let octets = link
             .group()
             .and_then(|group| udp_packet(source, group, &datagram));
-        let packet = octets.map(|octets| Packet {
-            interface: link.interface().name.clone(),
-            octets: octets.into(),
-        });
+        let packet = octets.map(|octets| Packet::now(&link.interface().name, octets.into()));
         packet.into_iter().collect()
     }
 }

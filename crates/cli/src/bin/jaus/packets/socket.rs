@@ -29,7 +29,7 @@ const LONGEST: usize = 65_536;
 /// later, and is recorded then.
 const OUTGOING: u8 = 4;
 
-pub(super) struct PacketSocket {
+pub(crate) struct PacketSocket {
     /// Not a UDP socket, but the runtime only needs to poll its readiness.
     socket: UdpSocket,
     /// By interface number; only the chosen ones.
@@ -128,9 +128,9 @@ impl PacketSocket {
         let interface = from.and_then(|from| Some((self.interfaces.get(&from.ifindex())?, from)));
         Ok(interface
             .filter(|(interface, from)| !(interface.is_loopback && from.pkttype() == OUTGOING))
-            .map(|(interface, _)| Packet {
-                interface: interface.name.clone(),
-                octets: Bytes::copy_from_slice(&self.buffer[..length]),
+            .map(|(interface, _)| {
+                let octets = Bytes::copy_from_slice(&self.buffer[..length]);
+                Packet::now(&interface.name, octets)
             }))
     }
 }

@@ -1,0 +1,49 @@
+//! Reads messages off this host's network interfaces, without a communicator.
+
+use std::time::Duration;
+
+use jaus::link::Group;
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::runtime;
+use jaus_view::{Dictionary, Filter, Frame, LinkType, MessageStream, Network};
+
+use super::Printer;
+use crate::packets::Source;
+
+pub(super) fn watch(
+    interfaces: &[String],
+    group: Group,
+    filter: &Filter,
+    dictionary: &Dictionary,
+    limit: Option<Duration>,
+    printer: &mut Printer,
+) -> Result<Outcome, Failure> {
+    runtime::run(async {
+        let mut source = Source::open(interfaces, group)?;
+        let mut network = Network::by_content();
+        let mut stream = MessageStream::new(dictionary, filter.clone());
+        let end = runtime::end(limit);
+        tokio::pin!(end);
+        loop {
+            let packets = tokio::select! {
+                () = &mut end => return Ok(Outcome::Done),
+                packets = source.next() => packets?,
+            };
+            for packet in &packets {
+                let frame = Frame {
+                    time: Some(packet.time),
+                    link: LinkType::RAW,
+                    octets: &packet.octets,
+                    lost: 0,
+                    // A packet socket delivers packets of at most 64 KiB, whole.
+                    length: packet.octets.len() as u32,
+                };
+                for datagram in network.handle_frame(&frame) {
+                    for entry in stream.read_datagram(frame.time, &datagram) {
+                        printer.entry(&entry)?;
+                    }
+                }
+            }
+        }
+    })
+}
