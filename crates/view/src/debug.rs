@@ -1,4 +1,4 @@
-//! The debug view: what passes a node, for viewers on this host, over HTTP and WebSocket.
+//! The debug view: what passes a node or several, for viewers on this host, over HTTP and WebSocket.
 //!
 //! | path | what |
 //! |---|---|
@@ -20,7 +20,7 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use axum::{Json, Router};
-use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::stream::{SplitSink, SplitStream, select_all, unfold};
 use futures_util::{SinkExt, StreamExt};
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
@@ -42,25 +42,30 @@ const LONGEST: usize = 1024;
 /// A viewer that takes nothing for so long has gone.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// What passes a node, to be looked at.
+/// What passes nodes, to be looked at.
 #[derive(Debug, Clone)]
 pub struct DebugView(Arc<Inner>);
 
 #[derive(Debug)]
 struct Inner {
-    node: Node,
+    nodes: Vec<Node>,
     component: Component,
     dictionary: Dictionary,
     viewers: Arc<Semaphore>,
 }
 
 impl DebugView {
-    /// A view of `node` and of what `component`, which lives on it, has found; `dictionary` has
-    /// the messages that are shown with their fields.
+    /// A view of `nodes` and of what `component`, which lives on one of them, has found;
+    /// `dictionary` has the messages that are shown with their fields. A message between two of the
+    /// nodes is shown once.
     #[must_use]
-    pub fn new(node: Node, component: Component, dictionary: Dictionary) -> Self {
+    pub fn new(
+        nodes: impl IntoIterator<Item = Node>,
+        component: Component,
+        dictionary: Dictionary,
+    ) -> Self {
         Self(Arc::new(Inner {
-            node,
+            nodes: nodes.into_iter().collect(),
             component,
             dictionary,
             viewers: Arc::new(Semaphore::new(MOST_VIEWERS)),
@@ -123,13 +128,28 @@ async fn messages(
     })
 }
 
-/// Sends what passes, until the viewer or the node has gone.
+/// Sends what passes, until the viewer or all nodes have gone.
 async fn show(view: &Inner, filter: Filter, mut sender: SplitSink<WebSocket, Message>) {
-    let mut tap = view.node.tap(WAITING);
-    let mut links = Links::of(view.node.clone());
+    let mut links: Vec<_> = view.nodes.iter().cloned().map(Links::of).collect();
     let mut stream = MessageStream::new(&view.dictionary, filter);
-    while let Some(first) = tap.next().await {
-        let texts = read_on(first, &mut tap, &mut links, &mut stream);
+    let taps = view.nodes.iter().enumerate().map(|(node, it)| {
+        let tapped = |mut tap: Tap| async { Some((tap.next().await?, tap)) };
+        unfold(it.tap(WAITING), tapped)
+            .map(move |tapped| (node, tapped))
+            .boxed()
+    });
+    let mut tapped = select_all(taps).ready_chunks(TOGETHER);
+    while let Some(passed) = tapped.next().await {
+        let mut texts = Vec::new();
+        for (node, tapped) in passed {
+            match tapped {
+                Tapped::Lost(count) => texts.push(format!("{{\"lost\":{count}}}")),
+                Tapped::Passage(passage) => {
+                    let entries = stream.read_passage(&passage, &mut links[node]);
+                    texts.extend(entries.iter().map(super::Entry::to_json));
+                }
+            }
+        }
         if texts.is_empty() {
             // There may be much that does not pass the filter: others have their turn.
             tokio::task::yield_now().await;
@@ -149,27 +169,6 @@ async fn show(view: &Inner, filter: Filter, mut sender: SplitSink<WebSocket, Mes
     }
     // It has gone, at worst.
     let _ = sender.close().await;
-}
-
-/// What is there to be sent now.
-fn read_on(
-    first: Tapped,
-    tap: &mut Tap,
-    links: &mut Links,
-    stream: &mut MessageStream<'_>,
-) -> Vec<String> {
-    let mut texts = Vec::new();
-    let more = std::iter::from_fn(|| tap.try_next());
-    for tapped in std::iter::once(first).chain(more).take(TOGETHER) {
-        match tapped {
-            Tapped::Lost(count) => texts.push(format!("{{\"lost\":{count}}}")),
-            Tapped::Passage(passage) => {
-                let entries = stream.read_passage(&passage, links);
-                texts.extend(entries.iter().map(super::Entry::to_json));
-            }
-        }
-    }
-    texts
 }
 
 /// Waits until the viewer has gone; whatever it says is passed over.

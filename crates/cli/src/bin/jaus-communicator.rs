@@ -135,6 +135,7 @@ impl Ready for Flags {
             },
             debug_is_needed: self.debug.is_some(),
             log,
+            ..Communicator::default()
         })
     }
 }

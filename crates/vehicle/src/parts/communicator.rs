@@ -30,6 +30,8 @@ const MOST_CONFLICTS: usize = 256;
 pub struct Communicator {
     /// Address of the debug view, if it is served.
     pub debug: Option<SocketAddr>,
+    /// Other nodes of this process, whose messages the debug view shows too.
+    pub beside: Vec<Node>,
     /// Whether failure to open the debug view is an error.
     pub debug_is_needed: bool,
     /// The journal on disk.
@@ -92,7 +94,8 @@ impl Communicator {
         if let Some(address) = listener.as_ref().and_then(|l| l.local_addr().ok()) {
             tracing::info!("debug view: ws://{address}/messages, http://{address}/tree");
         }
-        let view = DebugView::new(node.clone(), component.clone(), dictionary());
+        let nodes = std::iter::once(node).chain(&self.beside).cloned();
+        let view = DebugView::new(nodes, component.clone(), dictionary());
         Ok(async move {
             let Some(listener) = listener else {
                 return pending().await;

@@ -146,7 +146,7 @@ async fn view(node: &Node) -> SocketAddr {
         .unwrap();
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
     let address = listener.local_addr().unwrap();
-    let view = DebugView::new(node.clone(), component, Dictionary::new());
+    let view = DebugView::new([node.clone()], component, Dictionary::new());
     tokio::spawn(view.serve(listener));
     address
 }

@@ -1,6 +1,7 @@
 //! `jaus demo`: runs a whole vehicle and its operator in one process, drives a mission and explains
 //! it to newcomers.
 
+mod network;
 mod operator;
 mod story;
 mod surprise;
@@ -16,10 +17,11 @@ use jaus_cli::runtime;
 use jaus_ocu::Station;
 use jaus_vehicle::motion::Ackermann;
 use jaus_vehicle::parts::{
-    Communicator, DEBUG_ADDRESS, PathDriver, Planner, PoseSensor, PrimitiveDriver, RangeSensor,
-    SteeringGear, VectorDriver, VelocitySensor,
+    Communicator, PathDriver, Planner, PoseSensor, PrimitiveDriver, RangeSensor, SteeringGear,
+    VectorDriver, VelocitySensor,
 };
 
+use network::OwnNetwork;
 use operator::{Ending, Operator};
 use story::{Story, Who};
 use surprise::Surprise;
@@ -77,8 +79,9 @@ impl Demo {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         runtime::run(async {
             let mut story = Story::new();
-            self.opening(&mut story)?;
-            let mut system = System::new();
+            let network = OwnNetwork::take()?;
+            self.opening(&network, &mut story)?;
+            let mut system = System::new(network);
             let started = self.start(&mut system, &mut story).await;
             let surprise = Surprise {
                 scenery: system.scenery(),
@@ -97,35 +100,46 @@ impl Demo {
         })
     }
 
-    fn opening(&self, story: &mut Story) -> Result<(), Failure> {
+    fn opening(&self, network: &OwnNetwork, story: &mut Story) -> Result<(), Failure> {
         story.line(
             "A ground vehicle and its operator control unit start on this computer. Every part is a\n\
              JAUS component that could also run as a program on its own board. They find each other\n\
              by Discovery and communicate over UDP on the loopback interface.\n",
         )?;
+        if network.is_further() {
+            story.line(format_args!(
+                "Another demo runs on this computer. So that the two do not mix, this one has the\n\
+                 multicast group {}.\n",
+                network.group()
+            ))?;
+        }
         let jaus = std::env::args().next().unwrap_or_else(|| "jaus".to_owned());
+        let flags = network.flags();
         story.line(format_args!(
             "Meanwhile, try in another terminal:\n  \
-             {jaus} discover --loopback\n  \
-             {jaus} query {VEHICLE}.2.41 QueryLocalPose '{{\"PresenceVector\":67}}' --loopback\n  \
-             {jaus} query {VEHICLE}.3.36 QueryMission --loopback\n  \
-             {jaus} watch\n"
-        ))
+             {jaus} discover {flags}\n  \
+             {jaus} query {VEHICLE}.2.41 QueryLocalPose {flags}\n  \
+             {jaus} query {VEHICLE}.3.36 QueryMission {flags}"
+        ))?;
+        match self.headless {
+            true => story.line(""),
+            false => story.line(format_args!("  {jaus} watch{}\n", network.watch_flags())),
+        }
     }
 
     /// Starts everything; returns the operator's component.
     async fn start(&self, system: &mut System, story: &mut Story) -> Result<Component, Failure> {
         let radius = self.turning_radius();
         let vehicle = system.node(VEHICLE, 1)?;
-        start_part(
-            system,
-            story,
-            &vehicle,
-            35,
-            "communicator",
-            self.communicator(),
-        )?;
         let wheels = system.node(VEHICLE, 2)?;
+        let mind = system.node(VEHICLE, 3)?;
+        let desk = system.node(OPERATOR, 1)?;
+        let communicator = Communicator {
+            debug: (!self.headless).then_some(system.debug_address()),
+            beside: vec![wheels.clone(), mind.clone(), desk.clone()],
+            ..Communicator::default()
+        };
+        start_part(system, story, &vehicle, 35, "communicator", communicator)?;
         start_part(
             system,
             story,
@@ -155,7 +169,6 @@ impl Demo {
             ..RangeSensor::default()
         };
         start_part(system, story, &wheels, 51, "range sensor", sensor)?;
-        let mind = system.node(VEHICLE, 3)?;
         start_part(
             system,
             story,
@@ -181,7 +194,6 @@ impl Demo {
             system.store(),
         )?;
         start_part(system, story, &mind, 36, "planner", self.planner())?;
-        let desk = system.node(OPERATOR, 1)?;
         if !self.headless {
             let station = Station::default().open().await.map_err(Failure::of)?;
             let urls = station.urls();
@@ -211,14 +223,6 @@ impl Demo {
             planner.vehicle.width = CAR_WIDTH;
         }
         planner
-    }
-
-    /// With the debug view, unless another program uses its port.
-    fn communicator(&self) -> Communicator {
-        Communicator {
-            debug: (!self.headless).then_some(DEBUG_ADDRESS),
-            ..Communicator::default()
-        }
     }
 
     /// Plays the operator.
@@ -277,7 +281,7 @@ fn start_part(
     story.tell(Who::System, format_args!("starts {id}, the {name}"))
 }
 
-/// Parses a place: `6,5`.
+/// Parses a number of seconds.
 fn seconds(text: &str) -> Result<Duration, String> {
     let seconds = text.parse().ok().filter(|&it| it > 0.0);
     seconds
@@ -285,6 +289,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "write a number of seconds such as 60, or --for with a unit".to_owned())
 }
 
+/// Parses a place: `6,5`.
 fn place(text: &str) -> Result<(f64, f64), String> {
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|it| it.is_finite());
     let pair = text

@@ -2,6 +2,7 @@
 //! on loopback. The parts are those of the programs `jaus-…`.
 
 use std::convert::Infallible;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::{fs, process};
 
@@ -13,6 +14,8 @@ use jaus_vehicle::parts::{KnowledgeStore, Part, PartError, Slot};
 use jaus_vehicle::sensing::Scenery;
 use tokio::task::JoinSet;
 
+use super::network::OwnNetwork;
+
 /// The operator's subsystem.
 pub(super) const OPERATOR: u16 = 42;
 /// The vehicle's subsystem.
@@ -23,6 +26,7 @@ pub(super) const NAME: &str = "G-Bat";
 /// Nodes with their parts.
 pub(super) struct System {
     nodes: Vec<Node>,
+    network: OwnNetwork,
     /// File of the knowledge store, kept as long as the demo runs.
     scratch: Scratch,
     /// What the range sensor sees.
@@ -32,9 +36,10 @@ pub(super) struct System {
 
 impl System {
     /// An empty system.
-    pub(super) fn new() -> Self {
+    pub(super) fn new(network: OwnNetwork) -> Self {
         Self {
             nodes: Vec::new(),
+            network,
             scratch: Scratch(
                 std::env::temp_dir().join(format!("jaus-demo-{}.redb", process::id())),
             ),
@@ -52,6 +57,11 @@ impl System {
         }
     }
 
+    /// Where the debug view is served, unless another program uses the port.
+    pub(super) fn debug_address(&self) -> SocketAddr {
+        self.network.debug()
+    }
+
     /// The obstacles around the vehicle.
     pub(super) fn scenery(&self) -> Scenery {
         self.scenery.clone()
@@ -59,7 +69,8 @@ impl System {
 
     /// Adds a node on loopback.
     pub(super) fn node(&mut self, subsystem: u16, number: u8) -> Result<Node, Failure> {
-        let node = Node::start(Config::loopback(subsystem, number)).map_err(Failure::of)?;
+        let config = Config::loopback(subsystem, number).group(self.network.group());
+        let node = Node::start(config).map_err(Failure::of)?;
         self.nodes.push(node.clone());
         Ok(node)
     }
