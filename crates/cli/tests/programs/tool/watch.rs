@@ -140,13 +140,13 @@ async fn what_passes_between_two_networks_is_seen_once_and_within_the_node_too()
 
 type Viewer = WebSocketStream<MaybeTlsStream<TcpStream>>;
 
-async fn view(node: &Node) -> SocketAddr {
+async fn view(nodes: &[Node]) -> SocketAddr {
     let component = Component::builder(Kind::Vehicle, "Rover")
-        .attach(node, 35)
+        .attach(&nodes[0], 35)
         .unwrap();
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
     let address = listener.local_addr().unwrap();
-    let view = DebugView::new([node.clone()], component, Dictionary::new());
+    let view = DebugView::new(nodes.to_vec(), component, Dictionary::new());
     tokio::spawn(view.serve(listener));
     address
 }
@@ -174,7 +174,7 @@ async fn next(viewer: &mut Viewer) -> Json {
 async fn a_slow_viewer_loses_messages_and_is_told_how_many_while_the_traffic_goes_on() {
     const COUNT: u32 = 40_000;
     let node = Node::start(Config::loopback(101, 1).group(own_group())).unwrap();
-    let address = view(&node).await;
+    let address = view(std::slice::from_ref(&node)).await;
     let mut slow = look_on(address, "?message=EEEE").await;
     let (one, mut other) = (node.attach(7).unwrap(), node.attach(8).unwrap());
     let mut delivered = 0_u32;
@@ -226,9 +226,36 @@ async fn a_slow_viewer_loses_messages_and_is_told_how_many_while_the_traffic_goe
 }
 
 #[tokio::test]
+async fn a_view_of_two_nodes_shows_what_passes_between_them_once() {
+    let group = own_group();
+    let nodes = [101, 102].map(|it| Node::start(Config::loopback(it, 1).group(group)).unwrap());
+    let address = view(&nodes).await;
+    let mut viewer = look_on(address, "?message=EEEE").await;
+    let (one, mut other) = (nodes[0].attach(7).unwrap(), nodes[1].attach(8).unwrap());
+    let mut shown = Vec::new();
+    for number in 0..u8::MAX {
+        let octets = Bytes::copy_from_slice(&[0xEE, 0xEE, number]);
+        one.send(Outgoing::new(one.id(), other.id(), octets))
+            .unwrap();
+        timeout(LIMIT, other.recv()).await.unwrap();
+        // The viewer may not look on yet when the first ones pass.
+        let Ok(object) = timeout(Duration::from_millis(50), next(&mut viewer)).await else {
+            continue;
+        };
+        let octets = object["octets"].as_str().unwrap().to_owned();
+        assert!(!shown.contains(&octets), "shown twice: {object}");
+        shown.push(octets);
+        if shown.len() == 10 {
+            return;
+        }
+    }
+    panic!("{shown:?}");
+}
+
+#[tokio::test]
 async fn a_viewer_can_only_look_and_mistakes_and_crowds_are_refused() {
     let node = Node::start(Config::loopback(101, 1).group(own_group())).unwrap();
-    let address = view(&node).await;
+    let address = view(std::slice::from_ref(&node)).await;
     let refused = |query: &str| {
         let url = format!("ws://{address}/messages{query}");
         async move {
