@@ -37,10 +37,14 @@ pub mod wire;
 #[doc(inline)]
 pub use jaus_codec as codec;
 
-/// Compiles the README's programs.
+/// Compiles the programs of the README and of the guides.
 #[cfg(all(doctest, feature = "node", feature = "mobility"))]
-#[doc = include_str!("../README.md")]
-struct Readme;
+mod texts {
+    #[doc = include_str!("../README.md")]
+    struct Readme;
+    #[doc = include_str!("../docs/first-programs.md")]
+    struct FirstPrograms;
+}
 
 /// Compiles the program in the guide to sessions.
 #[cfg(all(doctest, feature = "node", feature = "mobility"))]

@@ -163,14 +163,14 @@ fn a_slow_viewer_gets_the_latest_of_large_images() {
 }
 
 #[test]
-fn the_readme_shows_the_sensor_and_the_client_as_they_are() {
-    let readme = include_str!("../../README.md");
+fn the_guide_shows_the_sensor_and_the_client_as_they_are() {
+    let guide = include_str!("../../docs/first-programs.md");
     let examples = [
         include_str!("../../examples/sensor.rs"),
         include_str!("../../examples/client.rs"),
     ];
     for example in examples {
         let (_about, program) = example.split_once("\n\n").expect("a head");
-        assert!(readme.contains(program), "not in the README:\n{program}");
+        assert!(guide.contains(program), "not in the guide:\n{program}");
     }
 }

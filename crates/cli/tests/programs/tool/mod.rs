@@ -20,6 +20,8 @@ mod network;
 mod ping;
 mod record;
 mod send;
+mod shell;
 mod subscribe;
+mod texts;
 mod vehicle;
 mod watch;
