@@ -163,14 +163,15 @@ fn a_slow_viewer_gets_the_latest_of_large_images() {
 }
 
 #[test]
-fn the_guide_shows_the_sensor_and_the_client_as_they_are() {
+fn the_texts_show_the_examples_as_they_are() {
+    let readme = include_str!("../../README.md");
     let guide = include_str!("../../docs/first-programs.md");
-    let examples = [
-        include_str!("../../examples/sensor.rs"),
-        include_str!("../../examples/client.rs"),
-    ];
-    for example in examples {
+    for (text, example) in [
+        (readme, include_str!("../../examples/accelerometer.rs")),
+        (guide, include_str!("../../examples/sensor.rs")),
+        (guide, include_str!("../../examples/client.rs")),
+    ] {
         let (_about, program) = example.split_once("\n\n").expect("a head");
-        assert!(guide.contains(program), "not in the guide:\n{program}");
+        assert!(text.contains(program), "not in the text:\n{program}");
     }
 }
