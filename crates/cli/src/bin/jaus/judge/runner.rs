@@ -14,7 +14,7 @@ use tokio::time::{Instant, sleep_until};
 use super::judge_nodes::{Heard, JudgeNodes};
 use super::memory::Memory;
 use super::step::{
-    Act, Check, Exchange, Expectation, Form, Reach, Speaker, Step, Throughout, Until,
+    Act, Check, Exchange, Expectation, Form, Name, Reach, Speaker, Step, Throughout, Until,
 };
 use super::subject::Subject;
 use super::verdict::{ObservedMessage, Proceeding, StepResult, Verdict};
@@ -28,6 +28,8 @@ pub(super) struct Runner {
     limit: Duration,
     /// The current step, for the recording.
     step: String,
+    /// The step at which the subject ceased to answer.
+    silent_since: Option<Name>,
 }
 
 /// Result of an act: the check, or a failure of the judge itself.
@@ -41,12 +43,14 @@ impl Runner {
             memory,
             limit,
             step: String::new(),
+            silent_since: None,
         }
     }
 
     /// Starts a form: resets the state and uses the form for all further messages.
     pub(super) fn begin(&mut self, form: Form) {
         self.judge_nodes.use_form(form);
+        self.silent_since = None;
         self.memory = Memory::new(self.memory.subject, self.judge_nodes.ids());
     }
 
@@ -63,10 +67,12 @@ impl Runner {
         let verdict = if let Some(urn) = subject.lacks(&step.needs) {
             let service = urn.rsplit(':').next().unwrap_or(urn);
             Verdict::Skipped(format!("{service} is not offered"))
+        } else if let Some(since) = self.silent_since {
+            Verdict::Skipped(format!("silent since {since}"))
         } else {
             match self.act(step, &mut proceedings).await? {
                 Ok(()) => Verdict::Passed,
-                Err(reason) => Verdict::Failed(reason),
+                Err(reason) => self.failed(step, reason, &proceedings).await?,
             }
         };
         Ok(StepResult {
@@ -77,6 +83,24 @@ impl Runner {
             took: start.elapsed(),
             proceedings,
         })
+    }
+
+    /// The verdict of a step that failed. If nothing was heard in it, the subject may have ended or
+    /// hang; then the steps to come would fail for that reason alone.
+    async fn failed(
+        &mut self,
+        step: &Step,
+        reason: String,
+        proceedings: &[Proceeding],
+    ) -> Result<Verdict, Failure> {
+        let was_silent = proceedings.iter().all(|it| it.received.is_empty());
+        if !was_silent || Subject::answers(&mut self.judge_nodes, self.limit).await? {
+            return Ok(Verdict::Failed(reason));
+        }
+        self.silent_since = Some(step.name);
+        Ok(Verdict::Failed(format!(
+            "{reason}; it answers no query any more: it hangs, or has ended"
+        )))
     }
 
     async fn act(&mut self, step: &Step, proceedings: &mut Vec<Proceeding>) -> Came {

@@ -69,6 +69,31 @@ impl Subject {
         Ok(is_there.then_some(Self { id, name, services }))
     }
 
+    /// Whether the subject still answers any query.
+    pub(super) async fn answers(
+        judge_nodes: &mut JudgeNodes,
+        limit: Duration,
+    ) -> Result<bool, Failure> {
+        let identify = QueryIdentification {
+            query_type: QueryType::SUBSYSTEM_IDENTIFICATION,
+        };
+        let code = ReportIdentification::CODE;
+        let answer = ask_again(judge_nodes, &identify, code, limit).await?;
+        if answer.is_some() {
+            return Ok(true);
+        }
+        let code = ReportHeartbeatPulse::CODE;
+        let answer = ask(
+            judge_nodes,
+            Speaker::Main,
+            &QueryHeartbeatPulse,
+            code,
+            limit,
+        )
+        .await?;
+        Ok(answer.is_some())
+    }
+
     /// The version of an offered service.
     pub(super) fn version(&self, urn: &str) -> Option<(u8, u8)> {
         self.services.as_ref()?.get(urn).copied()

@@ -50,6 +50,9 @@ pub(crate) struct Peer {
     answers: BTreeMap<u16, Vec<Vec<Answer>>>,
     delay: Duration,
     behaviour: Option<Behaviour>,
+    /// The request after which it answers nothing.
+    silenced_by: Option<u16>,
+    is_silent: bool,
 }
 
 /// Handles a message before the peer looks for a listed answer.
@@ -88,6 +91,12 @@ impl Peer {
     pub(crate) fn answers_to<Q: Message>(mut self, to: JausId, answer: &impl Message) -> Self {
         let answers = self.answers.entry(Q::CODE).or_default();
         answers.push(vec![(Some(to), answer.encode().unwrap())]);
+        self
+    }
+
+    /// Answers neither this request nor any after it, as a process that hangs.
+    pub(crate) fn falls_silent_at<Q: Message>(mut self) -> Self {
+        self.silenced_by = Some(Q::CODE);
         self
     }
 
@@ -145,10 +154,14 @@ impl Peer {
     }
 
     async fn answer(&mut self, request: &Received) -> Vec<Answer> {
+        let code = u16::from_le_bytes(*request.payload.first_chunk().unwrap());
+        self.is_silent |= self.silenced_by == Some(code);
+        if self.is_silent {
+            return Vec::new();
+        }
         if let Some(octets) = self.behaviour.as_mut().and_then(|it| it(request)) {
             return vec![(None, octets)];
         }
-        let code = u16::from_le_bytes(*request.payload.first_chunk().unwrap());
         if let Some(answers) = self.answers.get_mut(&code) {
             tokio::time::sleep(self.delay).await;
             let last = answers.len() == 1;

@@ -67,6 +67,44 @@ fn silence_is_told_with_who_had_to_say_what_to_whom_and_how_long_was_waited() {
 }
 
 #[test]
+fn a_peer_that_falls_silent_is_said_to_and_no_later_step_fails() {
+    let peer = Peer::offering(&[access_control::URN]).falls_silent_at::<QueryControl>();
+    let flags = network();
+    let _peer = peer.start(&flags);
+    let network: Vec<&str> = flags.iter().map(String::as_str).collect();
+    let judge = ["judge", "105.1.1", "--unicast", "--timeout", "1s", "--json"];
+    let run = run(
+        &[&judge, &["--only", "B1-B16"][..], &*network].concat(),
+        b"",
+    );
+    let lines = run.json();
+    let failed: Vec<_> = lines
+        .iter()
+        .filter(|it| it["verdict"] == "failed")
+        .collect();
+    let silenced = failed.last().unwrap_or_else(|| panic!("{run:?}"));
+    let reason = silenced["reason"].as_str().unwrap();
+    assert!(
+        reason.ends_with("; it answers no query any more: it hangs, or has ended"),
+        "{reason}"
+    );
+    let place = lines.iter().position(|it| it == *silenced).unwrap();
+    let later = lines[place + 1..]
+        .iter()
+        .filter(|it| it["step"].is_string());
+    let reasons: Vec<_> = later.map(|it| it["reason"].as_str().unwrap()).collect();
+    let since = format!("silent since {}", silenced["step"].as_str().unwrap());
+    assert!(!reasons.is_empty(), "{run:?}");
+    assert!(
+        reasons
+            .iter()
+            .all(|it| *it == since || it.ends_with("is not offered")),
+        "{reasons:?}"
+    );
+    assert_eq!(run.status, 1);
+}
+
+#[test]
 fn an_answer_after_the_limit_is_none() {
     let peer = Peer::offering(&[access_control::URN])
         .answers::<QueryControl>(&in_control(JausId::new(0, 0, 0), 0))
