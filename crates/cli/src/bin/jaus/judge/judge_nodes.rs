@@ -8,12 +8,12 @@ use std::time::Duration;
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::{Message, report_code};
-use jaus::endpoint::{Outgoing, Received};
+use jaus::endpoint::{Event, Outgoing, Received};
 use jaus::messages::core::{
     QueryHeartbeatPulse, QueryIdentification, ReportHeartbeatPulse, ReportIdentification,
     report_identification::Type,
 };
-use jaus::node::{Config, Node, Port};
+use jaus::node::{Config, Events, Node, Port};
 use jaus::wire::Broadcast;
 use jaus_cli::failure::Failure;
 use tokio::time::{Instant, timeout_at};
@@ -28,6 +28,8 @@ const NAME: &str = "jaus judge";
 /// The five components, on two nodes.
 pub(super) struct JudgeNodes {
     nodes: [Node; 2],
+    /// Of the two nodes: others that have their ids.
+    events: [Events; 2],
     /// In the order of [`Speaker::ALL`].
     ports: [Port; 5],
     subject: JausId,
@@ -85,6 +87,7 @@ impl JudgeNodes {
             attach(&other, 4)?,
         ];
         Ok(Self {
+            events: [main.events(), other.events()],
             nodes: [main, other],
             ports,
             subject,
@@ -150,7 +153,14 @@ impl JudgeNodes {
         step: &str,
     ) -> Result<Option<Heard>, Failure> {
         loop {
-            let Ok(received) = timeout_at(deadline, self.receive()).await else {
+            let [main, other] = &mut self.events;
+            let received = tokio::select! {
+                biased;
+                failure = id_taken(main) => return Err(failure),
+                failure = id_taken(other) => return Err(failure),
+                received = timeout_at(deadline, receive(&mut self.ports)) => received,
+            };
+            let Ok(received) = received else {
                 return Ok(None);
             };
             let (to, received) = received?;
@@ -177,21 +187,6 @@ impl JudgeNodes {
     pub(super) async fn clear(&mut self, step: &str) -> Result<(), Failure> {
         while self.hear(Instant::now(), step).await?.is_some() {}
         Ok(())
-    }
-
-    /// The next message to any of the five components.
-    async fn receive(&mut self) -> Result<(Speaker, Received), Failure> {
-        let ports = &mut self.ports;
-        let next = std::future::poll_fn(|cx| {
-            for (speaker, port) in Speaker::ALL.into_iter().zip(ports.iter_mut()) {
-                if let Poll::Ready(received) = port.poll_recv(cx) {
-                    return Poll::Ready(received.map(|received| (speaker, received)));
-                }
-            }
-            Poll::Pending
-        });
-        let next = next.await;
-        next.ok_or_else(|| Failure::new("the judge's node has stopped"))
     }
 
     /// Answers a query that every component may receive. Returns whether it was one.
@@ -231,6 +226,38 @@ impl JudgeNodes {
             node.shutdown().await;
         }
         recording.map_or(Ok(()), Recording::end)
+    }
+}
+
+/// The next message to any of the five components.
+async fn receive(ports: &mut [Port; 5]) -> Result<(Speaker, Received), Failure> {
+    let next = std::future::poll_fn(|cx| {
+        for (speaker, port) in Speaker::ALL.into_iter().zip(ports.iter_mut()) {
+            if let Poll::Ready(received) = port.poll_recv(cx) {
+                return Poll::Ready(received.map(|received| (speaker, received)));
+            }
+        }
+        Poll::Pending
+    });
+    let next = next.await;
+    next.ok_or_else(|| Failure::new("the judge's node has stopped"))
+}
+
+/// Waits until another node sends with an id of the judge: answers may go there, and the subject
+/// would be blamed.
+async fn id_taken(events: &mut Events) -> Failure {
+    loop {
+        match events.recv().await {
+            Some(Event::IdConflict { id, path }) => {
+                return Failure::new(format!(
+                    "the node at {} also has the judge's id {id}, so answers may go there: choose \
+                     another subsystem with --id",
+                    path.peer
+                ));
+            }
+            Some(_) => {}
+            None => std::future::pending().await,
+        }
     }
 }
 

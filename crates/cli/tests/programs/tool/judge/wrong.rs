@@ -1,10 +1,14 @@
 //! The judge reports every fault of a peer with the right reason.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::Message;
+use jaus::endpoint::Outgoing;
+use jaus::link::Group;
 use jaus::messages::core::confirm_control::ResponseCode;
 use jaus::messages::core::report_status::Status;
 use jaus::messages::core::{
@@ -16,6 +20,7 @@ use jaus::messages::mobility::{
     QueryLocalPose, QueryVelocityState, QueryWrenchEffort, ReportLocalPose, ReportVelocityState,
     ReportWrenchEffort, local_pose_sensor, primitive_driver, velocity_state_sensor,
 };
+use jaus::node::{Config, Node};
 
 use crate::support::run;
 use crate::tool::judge::peer::{Peer, network};
@@ -102,6 +107,40 @@ fn a_peer_that_falls_silent_is_said_to_and_no_later_step_fails() {
         "{reasons:?}"
     );
     assert_eq!(run.status, 1);
+}
+
+#[test]
+fn another_node_with_the_judge_s_id_is_named_instead_of_blaming_the_subject() {
+    let flags = network();
+    let _peer = Peer::offering(&[liveness::URN]).start(&flags);
+    let group: Group = flags.last().unwrap().parse().unwrap();
+    let over = Arc::new(AtomicBool::new(false));
+    let is_over = over.clone();
+    let other = std::thread::spawn(move || {
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build();
+        runtime.unwrap().block_on(async {
+            let node = Node::start(Config::loopback(42, 1).group(group)).unwrap();
+            let port = node.attach(1).unwrap();
+            let pulse = QueryHeartbeatPulse.encode().unwrap();
+            while !is_over.load(Ordering::Relaxed) {
+                let said = Outgoing::new(port.id(), JausId::EVERYONE, pulse.clone());
+                port.send(said).unwrap();
+                tokio::time::sleep(Duration::from_millis(20)).await;
+            }
+        });
+    });
+    let network: Vec<&str> = flags.iter().map(String::as_str).collect();
+    let judge = ["judge", "105.1.1", "--id", "42.1.1"];
+    let run = run(&[&judge, &*network].concat(), b"");
+    over.store(true, Ordering::Relaxed);
+    other.join().unwrap();
+    assert!(
+        run.stderr.contains("also has the judge's id 42.1.1"),
+        "{run:?}"
+    );
+    assert_eq!(run.status, 2, "{run:?}");
 }
 
 #[test]
