@@ -1,6 +1,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use jaus_test_kit::snapshot;
+
 use super::super::*;
 
 /// The table of all departures, as Markdown.
@@ -70,18 +72,10 @@ fn each_departure_names_a_file_and_a_test_that_are_there() {
     }
 }
 
-/// The environment variable that makes the test rewrite the page.
-const RENEW: &str = "JAUS_RENEW_SNAPSHOTS";
-
 #[test]
 fn the_page_shows_the_table_as_it_is() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/peer/departures.md");
-    let table = table();
-    if std::env::var_os(RENEW).is_some() {
-        fs::write(&page, &table).unwrap();
-    }
-    let shown = fs::read_to_string(page).unwrap();
-    assert!(shown == table, "set {RENEW} to write it anew");
+    snapshot::check(page, &table());
 }
 
 #[test]

@@ -9,6 +9,7 @@ use std::time::Duration;
 use jaus::address::JausId;
 use jaus::peer::{Certainty, Peer};
 use jaus_cli::failure::Outcome;
+use jaus_test_kit::snapshot;
 
 use super::case::Settings;
 use super::exchange::Exchange;
@@ -67,18 +68,10 @@ fn check(name: &str, settings: Settings, peer: &mut dyn air::Scripted) -> Outcom
     outcome
 }
 
-/// With `JAUS_BLESS` set, replaces the text of this name by the output.
 #[track_caller]
 fn check_text(name: &str, text: &str) {
-    let file = format!(
-        "{}/src/bin/jaus/examine/tests/{name}.txt",
-        env!("CARGO_MANIFEST_DIR")
-    );
-    if std::env::var_os("JAUS_BLESS").is_some() {
-        std::fs::write(&file, text).unwrap();
-    }
-    let expected = std::fs::read_to_string(&file).unwrap_or_default();
-    assert_eq!(text, expected, "{file}");
+    let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/src/bin/jaus/examine/tests");
+    snapshot::check(format!("{directory}/{name}.txt"), text);
 }
 
 /// The first failed exchange.
