@@ -32,6 +32,9 @@ use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 use tokio_tungstenite::tungstenite::{Error, Message};
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
 
+/// Attempts at a step that must reach the station before the previous one expires.
+pub(crate) const ATTEMPTS: u32 = 20;
+
 /// A vehicle that is one component, and a station that observes it.
 pub(crate) struct Scene {
     pub(crate) vehicle: Vehicle,
