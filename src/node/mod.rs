@@ -34,6 +34,7 @@
 //! ```
 
 mod awaiting;
+mod clock;
 mod components;
 mod config;
 mod core;
@@ -56,9 +57,9 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+pub use self::clock::{now, sleep_until, time_of_day};
 pub use self::components::{ComponentEvent, Departure};
 pub use self::config::{Config, ConfigError, Delivery, Peer, Tcp, units};
-pub use self::core::now;
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::events::EventStream;
 pub use self::host::{Host, HostEvent, HostEvents};

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::str::FromStr;
+use std::time::Duration;
 
 const NANOS_PER_SECOND: u32 = 1_000_000_000;
 const SECONDS_PER_DAY: i64 = 86_400;
@@ -28,6 +29,12 @@ impl Timestamp {
             nanos: nanos % NANOS_PER_SECOND,
             decimals: decimals.min(9),
         }
+    }
+
+    /// Creates a time stamp from the time since the beginning of 1970 (UTC); see [`new`](Self::new).
+    pub fn since_1970(time: Duration, decimals: u8) -> Self {
+        let seconds = i64::try_from(time.as_secs()).unwrap_or(i64::MAX);
+        Self::new(seconds, time.subsec_nanos(), decimals)
     }
 
     /// Whole seconds since 1970.

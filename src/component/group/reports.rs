@@ -15,9 +15,8 @@ use tokio::sync::watch;
 use super::member_table::MemberTable;
 use crate::address::JausId;
 use crate::codec::Message;
-use crate::component::driver::sleep_until;
 use crate::component::{Component, SubscribeError, Subscription, Update};
-use crate::node::now;
+use crate::node::{now, sleep_until};
 use crate::service::Audience;
 use crate::service::{Outage, Topic};
 

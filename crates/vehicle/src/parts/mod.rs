@@ -28,10 +28,9 @@ mod velocity_sensor;
 
 use std::convert::Infallible;
 use std::future::Future;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use jaus::component::{self, Builder, Component, Kind};
-use jaus::node::{Node, Port};
+use jaus::node::{Node, Port, time_of_day};
 use jaus::service::TimeOfDay;
 
 pub use communicator::{Communicator, DEBUG_ADDRESS};
@@ -91,7 +90,7 @@ impl Slot {
             node: node.into(),
             kind,
             name: name.into(),
-            time: TimeOfDay::new(since_1970),
+            time: TimeOfDay::new(time_of_day),
         }
     }
 
@@ -122,14 +121,4 @@ pub enum PartError {
     /// operator.
     #[error("{0}")]
     Broken(String),
-}
-
-/// The host's time of day. Clocks before 1970 yield 1970.
-#[expect(
-    clippy::disallowed_methods,
-    reason = "parts run in real time, and their reports carry the time of day"
-)]
-fn since_1970() -> Duration {
-    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
-    since_1970.unwrap_or_default()
 }

@@ -4,7 +4,7 @@
     reason = "the simulation runs in real time and reports the time of day"
 )]
 
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use jaus::address::JausId;
@@ -12,7 +12,7 @@ use jaus::component::{
     AccessControl, Builder, Component, Condition, Kind, Management, Standing, State, Time,
     TimeOfDay,
 };
-use jaus::node::Node;
+use jaus::node::{Node, time_of_day};
 use jaus::service::{MotionPolicy, StopCause};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
@@ -287,12 +287,6 @@ fn drivable(
         .offer(vehicle.global_waypoint_driver().only_newest())
         .offer(vehicle.global_waypoint_list_driver().only_newest())
         .offer(vehicle.global_path_segment_driver().only_newest())
-}
-
-/// Time since the beginning of 1970; 0 if the clock is earlier.
-fn time_of_day() -> Duration {
-    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
-    since_1970.unwrap_or_default()
 }
 
 /// Describes changes of the component's state and controller.
