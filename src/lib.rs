@@ -30,6 +30,8 @@ pub mod messages;
 #[cfg(feature = "node")]
 pub mod node;
 pub mod peer;
+#[doc(hidden)]
+pub mod random;
 pub mod service;
 pub mod wire;
 

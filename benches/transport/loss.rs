@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use jaus::endpoint::Outgoing;
 use jaus::link::Group;
 use jaus::node::{Config, Node};
+use jaus::random::Random;
 
 use crate::Effort;
 use crate::baseline::Flow;
@@ -118,25 +119,17 @@ fn pass_on(from: &UdpSocket, to: UdpSocket, percent: u8, seed: u64) {
             let _ = to.send(&datagram);
         }
     });
-    let (mut buffer, mut state) = ([0; 65_536], seed);
+    let (mut buffer, mut random) = ([0; 65_536], Random::new(seed));
     loop {
         // An error reports that an earlier datagram found no node.
         let Ok(length) = from.recv(&mut buffer) else {
             continue;
         };
-        if next(&mut state) % 100 >= u64::from(percent) {
+        if random.number() % 100 >= u64::from(percent) {
             let datagram = buffer[..length].to_vec();
             if sender.send((Instant::now() + DELAY, datagram)).is_err() {
                 return;
             }
         }
     }
-}
-
-/// SplitMix64.
-fn next(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let mixed = (*state ^ (*state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    mixed ^ (mixed >> 31)
 }

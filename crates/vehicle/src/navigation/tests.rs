@@ -7,7 +7,7 @@
 use std::time::{Duration, Instant};
 
 use super::*;
-use crate::motion::{Frame, Gone, Pose, Random, wrap};
+use crate::motion::{Frame, Gone, Pose, Noise, wrap};
 
 const HERE: Frame = Frame {
     latitude: 52.5,
@@ -22,7 +22,7 @@ struct Journey {
     now: Instant,
     steps: u32,
     truth: Pose,
-    random: Random,
+    noise: Noise,
     has_gnss: bool,
     has_wheels: bool,
     /// The bias of the gyroscope in radians per second, if there is one.
@@ -40,7 +40,7 @@ impl Journey {
             now: Instant::now(),
             steps: 0,
             truth: Pose::default(),
-            random: Random::new(seed),
+            noise: Noise::new(seed),
             has_gnss: true,
             has_wheels: true,
             gyro: None,
@@ -63,14 +63,14 @@ impl Journey {
         self.truth.x += speed * seconds * self.truth.yaw.cos();
         self.truth.y += speed * seconds * self.truth.yaw.sin();
         if let Some(bias) = self.gyro {
-            let noise = 0.002 * self.random.normal();
+            let noise = 0.002 * self.noise.normal();
             self.estimator.handle_rate(self.now, rate + bias + noise);
         }
         if self.has_wheels {
             let slip = if speed == 0.0 {
                 0.0
             } else {
-                0.01 * self.random.normal()
+                0.01 * self.noise.normal()
             };
             let gone = Gone {
                 forward: speed * seconds * (1.0 + slip),
@@ -87,7 +87,7 @@ impl Journey {
                 } else {
                     0.0
                 };
-            let noise = 0.05 * self.random.normal();
+            let noise = 0.05 * self.noise.normal();
             self.estimator.handle_course(
                 self.now,
                 &Course {
@@ -99,7 +99,7 @@ impl Journey {
     }
 
     fn fix(&mut self) -> Fix {
-        let noise = [0.5 * self.random.normal(), 0.5 * self.random.normal()];
+        let noise = [0.5 * self.noise.normal(), 0.5 * self.noise.normal()];
         let place = Pose::at(
             self.truth.x + noise[0],
             self.truth.y + noise[1] + self.offset,
