@@ -19,6 +19,15 @@ impl Text {
         Self(Bytes::from_static(text.as_bytes()))
     }
 
+    /// The longest prefix of `text` of at most `octets` octets, to fit a field with that limit.
+    pub fn prefix(text: &str, octets: usize) -> &str {
+        let mut end = octets.min(text.len());
+        while !text.is_char_boundary(end) {
+            end -= 1;
+        }
+        &text[..end]
+    }
+
     /// The octets.
     pub fn as_bytes(&self) -> &[u8] {
         &self.0
@@ -121,6 +130,13 @@ mod tests {
                 (octets.len(), octets.is_empty())
             );
             assert_eq!(Bytes::from(text), octets);
+        }
+    }
+
+    #[test]
+    fn a_prefix_has_whole_characters_only() {
+        for (octets, prefix) in [(0, ""), (1, "q"), (2, "q"), (3, "qü"), (4, "qüi"), (9, "qüi")] {
+            assert_eq!(Text::prefix("qüi", octets), prefix, "{octets}");
         }
     }
 

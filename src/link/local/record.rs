@@ -31,6 +31,7 @@ use deku::no_std_io::{Read, Seek, Write};
 use deku::prelude::*;
 
 use crate::address::JausId;
+use crate::codec::Text;
 use crate::endpoint::{LinkId, Path, Remote, Shortfall};
 use crate::wire::Flags;
 
@@ -203,11 +204,7 @@ impl Record {
     /// With a name or an explanation, of which at most 255 octets are kept.
     #[must_use]
     pub fn with_text(head: Head, text: &str) -> Self {
-        let mut end = text.len().min(LONGEST_TEXT);
-        while !text.is_char_boundary(end) {
-            end -= 1;
-        }
-        let payload = Bytes::copy_from_slice(&text.as_bytes()[..end]);
+        let payload = Text::from(Text::prefix(text, LONGEST_TEXT)).into();
         Self { head, payload }
     }
 
