@@ -84,14 +84,14 @@ fn row(side: usize, name: &str, ground: Ground) {
     };
     let mut times = Vec::new();
     let mut memory = 0;
-    let mut told = String::new();
+    let mut result = String::new();
     for _ in 0..RUNS {
         let before = reset_peak();
         let begin = Instant::now();
         let path = plan(&terrain, &thin, (0.05, 0.05), (end, end));
         times.push(begin.elapsed());
         memory = memory.max(peak().saturating_sub(before));
-        told = match path {
+        result = match path {
             Ok(path) => format!("{} | {:.1} m", path.segments().len(), path.length()),
             Err(_) => "none | none".to_owned(),
         };
@@ -99,7 +99,7 @@ fn row(side: usize, name: &str, ground: Ground) {
     times.sort();
     let time: Duration = times[RUNS / 2];
     println!(
-        "| {side} x {side} | {} | {name} | {:.1} ms | {:.1} MiB | {told} |",
+        "| {side} x {side} | {} | {name} | {:.1} ms | {:.1} MiB | {result} |",
         side * side,
         time.as_secs_f64() * 1e3,
         memory as f64 / 1024.0

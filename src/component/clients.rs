@@ -165,13 +165,13 @@ impl Clients {
             } => {
                 let now = now();
                 let id = stack.begin_session(now, audience, settings, patience);
-                let (state, told) = watch::channel(SessionState::Seeking);
+                let (state, states) = watch::channel(SessionState::Seeking);
                 self.sessions.insert(id, state);
                 let ticket = self.ticket(Instruction::EndSession(id));
                 let begun = Begun {
                     id,
                     ticket,
-                    state: told,
+                    state: states,
                 };
                 // An unclaimed ticket cancels.
                 drop(reply.send(begun));
@@ -214,9 +214,9 @@ impl Clients {
                 let Some(reply) = self.asking.remove(&id) else {
                     return;
                 };
-                let (condition, told) = watch::channel(Condition::Held(None));
+                let (condition, conditions) = watch::channel(Condition::Held(None));
                 self.controls.insert(id, condition);
-                let _ = reply.send(Ok((self.ticket(Instruction::EndControl(id)), told)));
+                let _ = reply.send(Ok((self.ticket(Instruction::EndControl(id)), conditions)));
             }
             ControlNews::Refused(why) => {
                 if let Some(reply) = self.asking.remove(&id) {
@@ -242,8 +242,8 @@ impl Clients {
     }
 
     pub(super) fn tell_session(&mut self, id: SessionId, state: SessionState) {
-        if let Some(told) = self.sessions.get(&id) {
-            told.send_replace(state);
+        if let Some(states) = self.sessions.get(&id) {
+            states.send_replace(state);
         }
         if state == SessionState::Released {
             self.sessions.remove(&id);

@@ -200,9 +200,9 @@ impl Sender {
     /// [`Undelivered`] tells what was not acknowledged, and why.
     pub async fn deliver(&self, mut message: Outgoing) -> Result<(), Undelivered> {
         message.acknowledge = true;
-        let (tell, told) = oneshot::channel();
-        self.transmit(message, Some(Waiter::Here(tell)))?;
-        told.await.unwrap_or(Err(Undelivered::Lost))
+        let (sender, outcome) = oneshot::channel();
+        self.transmit(message, Some(Waiter::Here(sender)))?;
+        outcome.await.unwrap_or(Err(Undelivered::Lost))
     }
 
     /// Waits until all messages sent so far are written to the connection to the host's node, or it

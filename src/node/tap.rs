@@ -332,8 +332,8 @@ mod tests {
             let one = framing.encode(&frame).unwrap();
             let mut content = vec![(one.clone(), None, 1)];
             if framing == Framing::Judp {
-                let train = [&one[..], &one[..]].concat();
-                content.push((train.into(), Some(one.len()), 2));
+                let batch = [&one[..], &one[..]].concat();
+                content.push((batch.into(), Some(one.len()), 2));
             }
             for (octets, segment, count) in content {
                 let passage = Passage {

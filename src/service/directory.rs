@@ -187,8 +187,8 @@ impl Directory {
     }
 
     /// Sets the identification at one level of a known component. Returns whether it has changed.
-    pub(super) fn identify(&mut self, level: Level, id: JausId, told: Identification) -> bool {
-        if self.identification(level, id) == Some(&told) {
+    pub(super) fn identify(&mut self, level: Level, id: JausId, new: Identification) -> bool {
+        if self.identification(level, id) == Some(&new) {
             return false;
         }
         let slot = match level {
@@ -199,7 +199,7 @@ impl Directory {
         let Some(slot) = slot else {
             return false;
         };
-        *slot = Some(told);
+        *slot = Some(new);
         true
     }
 

@@ -33,18 +33,18 @@ impl Scene {
     fn new() -> Self {
         let group = own_group();
         let start = |subsystem| Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
-        let (desk, vehicle) = (start(42), start(101));
+        let (station, vehicle) = (start(42), start(101));
         let operator = Component::builder(Kind::OperatorControlUnit, "Operator")
             .patience(Patience {
                 tries: 2,
                 interval: Duration::from_millis(100),
             })
-            .attach(&desk, 1)
+            .attach(&station, 1)
             .unwrap();
         Self {
             operator,
             peer: Puppet(vehicle.attach(33).unwrap()),
-            _nodes: [desk, vehicle],
+            _nodes: [station, vehicle],
         }
     }
 
@@ -369,8 +369,8 @@ async fn what_the_node_holds_ends_with_it() {
     let mut scene = Scene::new();
     let mut subscription = scene.subscribed().await;
     let mut control = scene.controlled().await;
-    let [desk, _vehicle] = scene._nodes;
-    within_limit(desk.shutdown()).await;
+    let [station, _vehicle] = scene._nodes;
+    within_limit(station.shutdown()).await;
     while let Some(update) = within_limit(subscription.next()).await {
         assert!(matches!(update, Update::Down { .. }), "{update:?}");
     }

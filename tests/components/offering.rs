@@ -197,9 +197,9 @@ async fn a_service_can_be_offered_and_withdrawn_while_the_component_runs() {
 #[tokio::test]
 async fn a_heartbeat_goes_out_without_being_asked_for() {
     let group = own_group();
-    let desk = start(42, group);
+    let station = start(42, group);
     let operator = Component::builder(Kind::OperatorControlUnit, "Operator")
-        .attach(&desk, 1)
+        .attach(&station, 1)
         .unwrap();
     let mut messages = operator.messages();
     let _rover = Component::builder(Kind::Vehicle, "Rover")

@@ -115,7 +115,7 @@ impl Picture {
     }
 
     pub(super) fn mission(&self) -> Option<&Mission> {
-        self.mission.as_ref().map(|told| &told.what)
+        self.mission.as_ref().map(|known| &known.what)
     }
 
     /// The component that stores the maps.
@@ -283,8 +283,8 @@ impl Picture {
     /// The planner, if it was lost while it drove. When all parts are silent, the network is to
     /// blame, and the planner does not count as lost.
     pub(super) fn lost_planner(&self, now: Instant) -> Option<(JausId, Absence)> {
-        let told = self.mission.as_ref();
-        let planner = told.filter(|it| it.what.stage.is_driven())?.by;
+        let known = self.mission.as_ref();
+        let planner = known.filter(|it| it.what.stage.is_driven())?.by;
         if self.gone.get(planner).is_some() {
             return Some((planner, Absence::Gone));
         }
@@ -337,13 +337,13 @@ impl Picture {
         Some(state::Vehicle {
             subsystem: self.vehicle,
             name: self.name.clone(),
-            pose: self.pose.map(|told| state::Pose {
-                age_ms: age(now, told.at),
-                ..told.what
+            pose: self.pose.map(|known| state::Pose {
+                age_ms: age(now, known.at),
+                ..known.what
             }),
-            velocity: self.velocity.map(|told| state::Velocity {
-                age_ms: age(now, told.at),
-                ..told.what
+            velocity: self.velocity.map(|known| state::Velocity {
+                age_ms: age(now, known.at),
+                ..known.what
             }),
             parts: parts.into_iter().map(describe).collect(),
             missing: self.missing_state(now),
@@ -378,7 +378,7 @@ impl Picture {
             name: self.name.clone(),
             selected,
             presence,
-            state: status.map(|told| state_name(told.what)),
+            state: status.map(|known| state_name(known.what)),
             controller: holder.map(|(id, _)| id.to_string()),
             authority: holder.map(|(_, authority)| authority),
             held,
@@ -417,13 +417,13 @@ impl Picture {
         part: &Part,
         obstacle: Option<String>,
     ) -> state::Part {
-        let controller = part.controller.and_then(|told| told.what);
+        let controller = part.controller.and_then(|known| known.what);
         state::Part {
             id: id.to_string(),
             role: part.role.name(),
             managed: part.managed,
-            state: part.status.map(|told| state_name(told.what)),
-            state_age_ms: part.status.map(|told| age(now, told.at)),
+            state: part.status.map(|known| state_name(known.what)),
+            state_age_ms: part.status.map(|known| age(now, known.at)),
             controller: controller.map(|(id, _)| id.to_string()),
             authority: controller.map(|(_, authority)| authority),
             ours: controller.is_some_and(|(id, _)| id == self.own),
@@ -436,18 +436,18 @@ impl Picture {
     /// Snapshot of the mission with its path, also of a planner lost while driving. `told_to_stop`
     /// states whether the drivers were stopped for that reason.
     pub(super) fn mission_state(&self, now: Instant, told_to_stop: bool) -> Option<state::Mission> {
-        let told = self.mission.as_ref()?;
+        let known = self.mission.as_ref()?;
         let lost = self.lost_planner(now).map(|(id, how)| state::LostPlanner {
             id: id.to_string(),
             how: how.name(),
             told_to_stop,
         });
-        let is_known = lost.is_some() || self.parts.contains_key(&told.by);
+        let is_known = lost.is_some() || self.parts.contains_key(&known.by);
         is_known.then(|| state::Mission {
             path: self.path.clone(),
-            age_ms: age(now, told.at),
+            age_ms: age(now, known.at),
             lost,
-            ..told.what.state()
+            ..known.what.state()
         })
     }
 

@@ -123,7 +123,7 @@ mod tests {
         let results = of_each(members(20), 3, work).await;
         assert_eq!((results.len(), most.get()), (20, 3));
         assert_eq!(results.successes().count(), 10);
-        assert!(results.failures().all(|(member, told)| member == *told));
+        assert!(results.failures().all(|(member, other)| member == *other));
         let order: Vec<JausId> = results.iter().map(|(member, _)| member).collect();
         assert_eq!(order, members(20));
     }

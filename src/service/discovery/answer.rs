@@ -46,7 +46,7 @@ impl Discovery {
             // A call also announces its sender.
             self.known.lock().admit(now, received);
         }
-        let told = match query.query_type.0 {
+        let own = match query.query_type.0 {
             1 => self.profile.system(),
             2 => self.profile.identification(Level::Subsystem),
             3 => self.profile.identification(Level::Node),
@@ -54,11 +54,11 @@ impl Discovery {
             _ => return,
         };
         // A component without a configured name leaves the answer to others.
-        if !told.name.is_empty() && self.may_answer(now, received) {
+        if !own.name.is_empty() && self.may_answer(now, received) {
             let report = ReportIdentification {
                 query_type: query.query_type.0.into(),
-                r#type: told.kind.code().into(),
-                identification: Text::from(told.name),
+                r#type: own.kind.code().into(),
+                identification: Text::from(own.name),
             };
             out.reply(received, &report);
         }
@@ -190,8 +190,8 @@ impl Discovery {
         let known = self.known.lock();
         let subsystem = directory.subsystem(own.subsystem()).into_iter();
         let members = subsystem.flat_map(Subsystem::components);
-        let told = |it: &&Component| it.id == own || !together && known.is_heard(it.id);
-        members.filter(told).collect()
+        let is_listed = |it: &&Component| it.id == own || !together && known.is_heard(it.id);
+        members.filter(is_listed).collect()
     }
 }
 

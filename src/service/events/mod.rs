@@ -286,7 +286,7 @@ impl Events {
             kind,
             query: trial.query.clone(),
             sequence,
-            told: None,
+            reported: None,
             next: None,
             expires: self.expiry(now),
             request_id: trial.request_id,
@@ -360,9 +360,9 @@ impl Events {
     pub(super) fn expire(&mut self, now: Instant, out: &mut Outbox) {
         self.expire_commands(now, out);
         for (name, ended) in self.table.take_expired(now) {
-            let mut told = confirmation(ended.request_id, name.1);
-            set_rate(&mut told, &ended);
-            out.send(name.0, &told);
+            let mut confirmed = confirmation(ended.request_id, name.1);
+            set_rate(&mut confirmed, &ended);
+            out.send(name.0, &confirmed);
         }
     }
 
@@ -389,7 +389,7 @@ impl Events {
         };
         self.table.reschedule(due, now, |subscription| {
             let news = matches!(subscription.kind, Kind::Periodic { .. })
-                || subscription.told.as_ref().map(|(_, told)| told) != Some(&report);
+                || subscription.reported.as_ref().map(|(_, last)| last) != Some(&report);
             if news {
                 send(now, subscription, due.name, report, out);
             }
@@ -520,7 +520,7 @@ fn send(
     };
     subscription.sequence = subscription.sequence.wrapping_add(1);
     if matches!(subscription.kind, Kind::EveryChange { .. }) {
-        subscription.told = Some((now, report));
+        subscription.reported = Some((now, report));
     }
     out.send(name.0, &event);
 }

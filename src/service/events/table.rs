@@ -47,7 +47,7 @@ pub(super) struct Subscription {
     pub(super) query: Bytes,
     pub(super) sequence: u8,
     /// For events on change, the last report and its time.
-    pub(super) told: Option<(Instant, Bytes)>,
+    pub(super) reported: Option<(Instant, Bytes)>,
     /// When the next report is due; `None` while there is no change to report.
     pub(super) next: Option<Instant>,
     pub(super) expires: Option<Instant>,
@@ -74,8 +74,8 @@ impl Due {
 impl Subscription {
     /// The earliest time from `now` on at which a change may be reported.
     fn after_its_pause(&self, now: Instant) -> Instant {
-        match (self.kind, &self.told) {
-            (Kind::EveryChange { pause }, Some((told, _))) => now.max(*told + pause),
+        match (self.kind, &self.reported) {
+            (Kind::EveryChange { pause }, Some((reported, _))) => now.max(*reported + pause),
             _ => now,
         }
     }

@@ -119,11 +119,11 @@ impl Part {
     }
 
     pub(crate) fn controller(&self) -> Option<JausId> {
-        self.told_controller()?
+        self.reported_controller()?
     }
 
     /// The reported client in control, which may be none; `None` before a report.
-    pub(crate) fn told_controller(&self) -> Option<Option<JausId>> {
+    pub(crate) fn reported_controller(&self) -> Option<Option<JausId>> {
         Some(self.controller?.what.map(|(id, _)| id))
     }
 }

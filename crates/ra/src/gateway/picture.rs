@@ -33,14 +33,14 @@ pub(super) fn draw(
 ) -> Option<Picture> {
     let subsystem = directory.subsystem(number)?;
     let id = u8::try_from(ids.subsystem(Side::Jaus, number).ok()?).ok()?;
-    let told = subsystem.identification();
-    let is_operator = told.is_some_and(|it| it.kind == Kind::OperatorControlUnit);
-    let name = |told: Option<&jaus::service::Identification>| {
-        told.map_or_else(String::new, |it| cut(&it.name))
+    let identification = subsystem.identification();
+    let is_operator = identification.is_some_and(|it| it.kind == Kind::OperatorControlUnit);
+    let name = |identification: Option<&jaus::service::Identification>| {
+        identification.map_or_else(String::new, |it| cut(&it.name))
     };
     let mut picture = Picture::default();
     picture.subsystem.id = id;
-    picture.subsystem.name = name(told);
+    picture.subsystem.name = name(identification);
     for (node_number, jaus_node) in subsystem.nodes() {
         let mut node = node::Node {
             id: node_number,
@@ -106,8 +106,8 @@ impl Picture {
 
 /// The name of a component; with several component types, the type is part of it.
 fn name(component: &Component, part: RaComponent, several: bool) -> String {
-    let told = component.identification.as_ref().map(|it| it.name.as_str());
-    match told.filter(|name| !name.is_empty()) {
+    let name = component.identification.as_ref().map(|it| it.name.as_str());
+    match name.filter(|name| !name.is_empty()) {
         Some(name) if several => cut(&format!("{name}: {part}")),
         Some(name) => cut(name),
         None => part.to_string(),

@@ -147,7 +147,7 @@ impl Running {
                 }
                 _ = looks.tick() => {}
             }
-            if let Some(pose) = self.observed.take_told_global() {
+            if let Some(pose) = self.observed.take_set_global_pose() {
                 self.navigator.set_heading(pose.yaw);
             }
             self.publish().await;

@@ -268,14 +268,15 @@ async fn write(
 #[derive(Debug)]
 struct Trouble {
     may_try: bool,
-    told: bool,
+    /// Whether the trouble was logged.
+    is_logged: bool,
 }
 
 impl Default for Trouble {
     fn default() -> Self {
         Self {
             may_try: true,
-            told: false,
+            is_logged: false,
         }
     }
 }
@@ -285,14 +286,14 @@ impl Trouble {
     fn note(&mut self, directory: &Path, result: io::Result<()>) -> bool {
         match result {
             Ok(()) => {
-                if self.may_try && std::mem::take(&mut self.told) {
+                if self.may_try && std::mem::take(&mut self.is_logged) {
                     tracing::info!("the log in {} is written again", directory.display());
                 }
                 true
             }
             Err(error) => {
                 self.may_try = false;
-                if !std::mem::replace(&mut self.told, true) {
+                if !std::mem::replace(&mut self.is_logged, true) {
                     let directory = directory.display();
                     tracing::warn!(
                         "the log in {directory} cannot be written, and is tried again: {error}"

@@ -172,12 +172,12 @@ impl<T: FnMut(&Step)> Running<'_, T> {
         })
         .await?;
         self.step(async {
-            let mut told = Vec::new();
+            let mut shown = Vec::new();
             for driver in cast.drivers {
                 let report = ask(component, driver, &QueryStage {}).await?;
-                told.push(format!("{driver} {:?}", report.state));
+                shown.push(format!("{driver} {:?}", report.state));
             }
-            Ok(((), told.join(", ")))
+            Ok(((), shown.join(", ")))
         })
         .await
     }
@@ -457,21 +457,21 @@ async fn approve(
     let seen = reports.until(Stage::DRIVING, reports.patience * 3).await?;
     let mut stages: Vec<_> = seen.iter().map(|report| report.stage).collect();
     stages.dedup();
-    let told: Vec<_> = stages.iter().map(|&stage| name(stage)).collect();
+    let shown: Vec<_> = stages.iter().map(|&stage| name(stage)).collect();
     let attempts = seen.last().map_or(0, |last| last.attempt);
     if attempts == 1 && !stages.is_sorted() {
-        return Err(format!("out of order: {}", told.join(", ")));
+        return Err(format!("out of order: {}", shown.join(", ")));
     }
-    Ok(((), format!("{} (attempt {attempts})", told.join(", "))))
+    Ok(((), format!("{} (attempt {attempts})", shown.join(", "))))
 }
 
 async fn look_at_chain(component: &Component, cast: &Cast) -> Result<((), String), String> {
     let [path, vector, primitive] = cast.drivers;
-    let mut told = Vec::new();
+    let mut shown = Vec::new();
     for (driver, commander) in [(path, cast.planner), (vector, path), (primitive, vector)] {
         let report = ask(component, driver, &QueryControl {}).await?;
         match chain::controller(&report) {
-            Some(client) if client == commander => told.push(format!("{client} → {driver}")),
+            Some(client) if client == commander => shown.push(format!("{client} → {driver}")),
             Some(client) => {
                 return Err(format!(
                     "{driver} is controlled by {client}, not by {commander}"
@@ -480,7 +480,7 @@ async fn look_at_chain(component: &Component, cast: &Cast) -> Result<((), String
             None => return Err(format!("{driver} is not controlled")),
         }
     }
-    Ok(((), told.join(", ")))
+    Ok(((), shown.join(", ")))
 }
 
 async fn arrive(

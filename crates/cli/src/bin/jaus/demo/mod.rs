@@ -133,10 +133,10 @@ impl Demo {
         let vehicle = system.node(VEHICLE, 1)?;
         let wheels = system.node(VEHICLE, 2)?;
         let mind = system.node(VEHICLE, 3)?;
-        let desk = system.node(OPERATOR, 1)?;
+        let console = system.node(OPERATOR, 1)?;
         let communicator = Communicator {
             debug: (!self.headless).then_some(system.debug_address()),
-            beside: vec![wheels.clone(), mind.clone(), desk.clone()],
+            beside: vec![wheels.clone(), mind.clone(), console.clone()],
             ..Communicator::default()
         };
         start_part(system, story, &vehicle, 35, "communicator", communicator)?;
@@ -197,14 +197,14 @@ impl Demo {
         if !self.headless {
             let station = Station::default().open().await.map_err(Failure::of)?;
             let urls = station.urls();
-            start_part(system, story, &desk, 1, "operator's page", station)?;
+            start_part(system, story, &console, 1, "operator's page", station)?;
             for url in urls {
                 story.tell(Who::Operator, format_args!("the page is at {url}"))?;
             }
         }
         Component::builder(Kind::OperatorControlUnit, "Operator")
             .component_name("Demo")
-            .attach(&desk, 2)
+            .attach(&console, 2)
             .map_err(Failure::of)
     }
 
