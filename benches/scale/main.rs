@@ -10,7 +10,7 @@
 
 use std::time::{Duration, Instant};
 
-use jaus_vehicle::mission::{Terrain, Vehicle, plan};
+use jaus_vehicle::mission::{Footprint, Terrain, plan};
 
 const RUNS: usize = 3;
 
@@ -77,10 +77,10 @@ fn row(side: usize, name: &str, ground: Ground) {
         return;
     };
     let end = side as f64 * 0.1 - 0.05;
-    let thin = Vehicle {
+    let thin = Footprint {
         width: 0.1,
         margin: 0.0,
-        ..Vehicle::default()
+        ..Footprint::default()
     };
     let mut times = Vec::new();
     let mut memory = 0;

@@ -77,7 +77,7 @@ fn flow(length: usize, percent: u8, seed: u64, time: Duration) -> Flow {
 pub(crate) fn settings(
     id: jaus::address::JausId,
     at: SocketAddr,
-    peer: jaus::node::Peer,
+    peer: jaus::node::PeerAddress,
 ) -> Config {
     Config::loopback(id.subsystem(), id.node())
         .port(at.port())

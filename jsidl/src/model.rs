@@ -302,7 +302,11 @@ pub(crate) fn shortened(value: f64, places: usize) -> f64 {
     let scale = 10_f64.powi(i32::try_from(places).unwrap_or(i32::MAX));
     let shortened = (value * scale).round() / scale;
     let is_close = (shortened - value).abs() < 1.0 / scale;
-    if shortened != 0.0 && is_close { shortened } else { value }
+    if shortened != 0.0 && is_close {
+        shortened
+    } else {
+        value
+    }
 }
 
 /// `value_enum`.

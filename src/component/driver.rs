@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bytes::Bytes;
 use tokio::sync::{mpsc, oneshot, watch};
@@ -359,4 +359,3 @@ fn transmit(stack: &mut Stack, port: &Port, probes: &mut Probes) -> Result<(), n
     }
     result
 }
-

@@ -580,7 +580,7 @@ struct Others<'a> {
 /// The first of them that will do.
 fn who(
     others: &Others<'_>,
-    will_do: impl Fn(&crate::service::Component) -> bool,
+    will_do: impl Fn(&crate::service::ComponentEntry) -> bool,
 ) -> Option<JausId> {
     let mut components = others.directory.components();
     let found = components.find(|it| it.id != others.own && will_do(it));

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::link::Link;
-use super::{Config, Peer, StartError};
+use super::{Config, PeerAddress, StartError};
 use crate::endpoint::{LinkId, Path, StaticPeer};
 #[cfg(unix)]
 use crate::link::junior::JuniorLink;
@@ -168,7 +168,7 @@ impl Links {
             .map(|peer| (peer, self.link_to(peer.address()), true));
         // Broadcasts go to all connections anyway.
         let by_tcp = by_tcp.iter().map(|peer| (peer, tcp, false));
-        let named = |(peer, link, gets_broadcasts): (&Peer, Option<LinkId>, bool)| {
+        let named = |(peer, link, gets_broadcasts): (&PeerAddress, Option<LinkId>, bool)| {
             let (id, link, peer) = (peer.id()?, link?, peer.address().into());
             Some(StaticPeer {
                 id,
@@ -217,7 +217,7 @@ impl Links {
 /// A configured peer's address, and the local address on the route to it, if there is one at
 /// present. Ensures that its interface is selected.
 fn route_to(
-    peer: Peer,
+    peer: PeerAddress,
     wanted: &Interfaces,
     chosen: &mut Vec<Interface>,
 ) -> Result<Option<(SocketAddr, IpAddr)>, StartError> {
@@ -262,7 +262,7 @@ mod tests {
         }
     }
 
-    fn peer() -> Peer {
+    fn peer() -> PeerAddress {
         "127.0.0.1:9".parse().unwrap()
     }
 

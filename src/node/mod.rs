@@ -59,7 +59,7 @@ use std::sync::Arc;
 
 pub use self::clock::{now, sleep_until, time_of_day};
 pub use self::components::{ComponentEvent, Departure};
-pub use self::config::{Config, ConfigError, Delivery, Peer, Tcp, units};
+pub use self::config::{Config, ConfigError, Delivery, PeerAddress, Tcp, units};
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::events::EventStream;
 pub use self::host::{Host, HostEvent, HostEvents};

@@ -1,6 +1,6 @@
 //! The behaviour that depends on a known peer: limits, rates and wire variants.
 
-use super::Peer;
+use super::Implementation;
 use crate::address::JausId;
 
 /// How a sender cuts large messages for AS5669A.
@@ -24,7 +24,7 @@ pub struct Pacing {
     pub rate: u64,
 }
 
-impl Peer {
+impl Implementation {
     /// How it cuts large messages and expects them to be cut; `None` if unknown.
     #[must_use]
     pub const fn large_style(self) -> Option<LargeStyle> {
@@ -96,10 +96,10 @@ impl Peer {
     ///
     /// ```
     /// use jaus::address::JausId;
-    /// use jaus::peer::Peer;
+    /// use jaus::peer::Implementation;
     ///
     /// let (one, other) = (JausId::new(1, 1, 1), JausId::new(513, 1, 1));
-    /// assert!(Peer::Jts.confuses(one, other) && !Peer::Junior.confuses(one, other));
+    /// assert!(Implementation::Jts.confuses(one, other) && !Implementation::Junior.confuses(one, other));
     /// ```
     #[must_use]
     pub fn confuses(self, one: JausId, other: JausId) -> bool {

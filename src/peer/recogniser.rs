@@ -5,7 +5,7 @@ use std::fmt;
 use super::habits::{JAUSPP_FRAGMENT, JUNIOR_PAYLOAD};
 use super::numbers::Numbers;
 use super::sign::Signs;
-use super::{LargeStyle, Peer, Sign};
+use super::{Implementation, LargeStyle, Sign};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::messages::core::{QueryIdentification, RegisterServices};
@@ -47,8 +47,8 @@ impl fmt::Display for Certainty {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Verdict {
-    /// The most likely peer; [`Peer::Standard`] without evidence.
-    pub peer: Peer,
+    /// The most likely peer; [`Implementation::Standard`] without evidence.
+    pub peer: Implementation,
     /// How certain that is. An uncertain result changes how a peer is treated only where a wrong
     /// guess does little harm.
     pub certainty: Certainty,
@@ -63,7 +63,7 @@ pub struct Verdict {
 pub struct Recogniser {
     signs: Signs,
     /// The peer recognised with certainty.
-    certain: Peer,
+    certain: Implementation,
     begun: bool,
     numbers: Numbers,
     large: Option<Large>,
@@ -174,9 +174,9 @@ impl Recogniser {
         }
     }
 
-    /// The peer recognised with certainty; otherwise [`Peer::Standard`].
+    /// The peer recognised with certainty; otherwise [`Implementation::Standard`].
     #[must_use]
-    pub const fn certain(&self) -> Peer {
+    pub const fn certain(&self) -> Implementation {
         self.certain
     }
 
@@ -185,20 +185,23 @@ impl Recogniser {
     /// an unknown id or sends fragments of Junior's length. A node of ours may do either of the
     /// latter, but does not begin with 1.
     #[must_use]
-    pub fn presumed(&self) -> Peer {
+    pub fn presumed(&self) -> Implementation {
         let has = |sign| self.signs.has(sign);
         let is_like_junior =
             has(Sign::BeginsWithOne) && (has(Sign::CallsUnknownIds) || has(Sign::LongFragments));
-        if self.certain == Peer::Standard && is_like_junior && self.best().0 == Peer::Junior {
-            Peer::Junior
+        if self.certain == Implementation::Standard
+            && is_like_junior
+            && self.best().0 == Implementation::Junior
+        {
+            Implementation::Junior
         } else {
             self.certain
         }
     }
 
     /// The peer with the most evidence, and its certainty; the first if several are equal.
-    fn best(&self) -> (Peer, Certainty) {
-        let weighed = Peer::ALL.map(|peer| (self.signs.weight(peer), peer));
+    fn best(&self) -> (Implementation, Certainty) {
+        let weighed = Implementation::ALL.map(|peer| (self.signs.weight(peer), peer));
         let most = weighed.into_iter().rev().max_by_key(|&(weight, _)| weight);
         let (weight, peer) = most.unwrap_or_default();
         let certainty = match weight {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::Peer;
+use super::Implementation;
 
 /// Defines the signs. Each has the peer that it points to, its weight, and its description.
 macro_rules! signs {
@@ -20,9 +20,9 @@ macro_rules! signs {
 
             /// The peer that it points to.
             #[must_use]
-            pub const fn peer(self) -> Peer {
+            pub const fn peer(self) -> Implementation {
                 match self {
-                    $(Self::$sign => Peer::$peer,)+
+                    $(Self::$sign => Implementation::$peer,)+
                 }
             }
 
@@ -118,7 +118,7 @@ impl Signs {
 
     /// The total weight for a peer. Signs of Junior also count for a fork of it, if at least one
     /// sign points to that fork alone.
-    pub(super) fn weight(self, peer: Peer) -> u8 {
+    pub(super) fn weight(self, peer: Implementation) -> u8 {
         let of_it = self.iter().filter(|sign| sign.peer() == peer);
         let alone = of_it.map(Sign::weight).sum();
         match peer.fork_of() {

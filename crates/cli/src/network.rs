@@ -12,7 +12,7 @@ use jaus::link::junior::DEFAULT_FOLDER;
 use jaus::link::local::record::Reason;
 use jaus::link::udp::PortTaken;
 use jaus::link::{Group, Interfaces};
-use jaus::node::{Address, Config, Host, HostError, Node, Peer, Port, Sender};
+use jaus::node::{Address, Config, Host, HostError, Node, PeerAddress, Port, Sender};
 
 use super::failure::Failure;
 use super::identity::OwnId;
@@ -56,7 +56,7 @@ pub struct Network {
     ///
     /// ADDRESS, ADDRESS:PORT or ID@ADDRESS:PORT, for example 192.168.7.2 or 102.255.255@192.168.7.2
     #[arg(long, value_name = "PEER")]
-    peer: Vec<Peer>,
+    peer: Vec<PeerAddress>,
 
     /// Attach to this host's node (`jaus node --local`) instead of running our own; ADDRESS is its
     /// local link's [default: the usual place]

@@ -135,7 +135,14 @@ mod tests {
 
     #[test]
     fn a_prefix_has_whole_characters_only() {
-        for (octets, prefix) in [(0, ""), (1, "q"), (2, "q"), (3, "qü"), (4, "qüi"), (9, "qüi")] {
+        for (octets, prefix) in [
+            (0, ""),
+            (1, "q"),
+            (2, "q"),
+            (3, "qü"),
+            (4, "qüi"),
+            (9, "qüi"),
+        ] {
             assert_eq!(Text::prefix("qüi", octets), prefix, "{octets}");
         }
     }

@@ -14,7 +14,7 @@ use super::role::Role;
 use super::sample_clock::{SampleClock, Stamp};
 use super::state;
 use jaus::address::JausId;
-use jaus::service::{Component, Directory, State};
+use jaus::service::{ComponentEntry, Directory, State};
 use jaus_vehicle::messages::handoff::enhanced_access_control;
 
 /// The known state of a vehicle.
@@ -144,7 +144,11 @@ impl Picture {
     }
 
     /// Replaces the components of the vehicle.
-    fn set_parts<'c>(&mut self, now: Instant, components: impl Iterator<Item = &'c Component>) {
+    fn set_parts<'c>(
+        &mut self,
+        now: Instant,
+        components: impl Iterator<Item = &'c ComponentEntry>,
+    ) {
         let mut parts = BTreeMap::new();
         for component in components {
             let before = self.parts.remove(&component.id);
@@ -323,7 +327,7 @@ impl Picture {
         now: Instant,
         emergency_wanted: bool,
         obstacle: impl Fn(JausId) -> Option<String>,
-    ) -> Option<state::Vehicle> {
+    ) -> Option<state::VehicleState> {
         let is_known = self.directory.subsystem(self.vehicle).is_some();
         if !is_known && self.is_empty() {
             return None;
@@ -334,7 +338,7 @@ impl Picture {
             |(id, part): (&JausId, &Part)| self.part_state(now, *id, part, obstacle(*id));
         let any = self.in_emergency().next().is_some();
         let all = any && self.not_in_emergency(now).next().is_none();
-        Some(state::Vehicle {
+        Some(state::VehicleState {
             subsystem: self.vehicle,
             name: self.name.clone(),
             pose: self.pose.map(|known| state::Pose {

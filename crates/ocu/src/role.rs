@@ -5,7 +5,7 @@ use jaus::messages::mobility::{
     local_path_segment_driver, local_pose_sensor, local_vector_driver, primitive_driver,
     velocity_state_sensor,
 };
-use jaus::service::{Component, Kind, Subsystem};
+use jaus::service::{ComponentEntry, Kind, SubsystemEntry};
 use jaus_vehicle::messages::ground::{mission_planner, raster_maps, stage};
 
 /// Role of a component. A component with several roles has the first of them.
@@ -35,7 +35,7 @@ impl Role {
     ];
 
     /// The role of a component; `None` if it is irrelevant to an operator.
-    pub(super) fn of(component: &Component) -> Option<Self> {
+    pub(super) fn of(component: &ComponentEntry) -> Option<Self> {
         let known = Self::ALL.iter().find(|(_, urn)| component.offers(urn));
         let other = || is_managed(component).then_some(Self::Other);
         known.map(|(role, _)| *role).or_else(other)
@@ -92,27 +92,27 @@ impl Role {
 }
 
 /// Whether a component offers Management, and so can enter emergency.
-pub(super) fn is_managed(component: &Component) -> bool {
+pub(super) fn is_managed(component: &ComponentEntry) -> bool {
     component.offers(management::URN)
 }
 
 /// Whether a component reports its stage.
-pub(super) fn tells_stage(component: &Component) -> bool {
+pub(super) fn tells_stage(component: &ComponentEntry) -> bool {
     component.offers(stage::URN)
 }
 
 /// Whether a component reports the vehicle's pose.
-pub(super) fn reports_pose(component: &Component) -> bool {
+pub(super) fn reports_pose(component: &ComponentEntry) -> bool {
     component.offers(local_pose_sensor::URN)
 }
 
 /// Whether a component reports the vehicle's velocity.
-pub(super) fn reports_velocity(component: &Component) -> bool {
+pub(super) fn reports_velocity(component: &ComponentEntry) -> bool {
     component.offers(velocity_state_sensor::URN)
 }
 
 /// Whether a subsystem has components that an operator can use, and is not another operator's.
-pub(super) fn is_vehicle(subsystem: &Subsystem) -> bool {
+pub(super) fn is_vehicle(subsystem: &SubsystemEntry) -> bool {
     let kind = subsystem.identification().map(|it| it.kind);
     kind != Some(Kind::OperatorControlUnit)
         && subsystem.components().any(|it| Role::of(it).is_some())

@@ -13,7 +13,7 @@ pub struct State {
     /// The operator's own JAUS id.
     pub operator: String,
     /// The selected vehicle.
-    pub vehicle: Option<Vehicle>,
+    pub vehicle: Option<VehicleState>,
     /// Control of the vehicle.
     pub control: Control,
     /// Manual drive.
@@ -63,12 +63,12 @@ pub struct FleetVehicle {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Tree {
     /// All known subsystems.
-    pub subsystems: Vec<Subsystem>,
+    pub subsystems: Vec<TreeSubsystem>,
 }
 
 /// A subsystem of the tree.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Subsystem {
+pub struct TreeSubsystem {
     /// Subsystem number.
     pub subsystem: u16,
     /// Name.
@@ -76,34 +76,34 @@ pub struct Subsystem {
     /// Kind, for example `vehicle`.
     pub kind: String,
     /// Nodes of the subsystem.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<TreeNode>,
 }
 
 /// A node of the tree.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Node {
+pub struct TreeNode {
     /// Node number.
     pub node: u8,
     /// Name.
     pub name: String,
     /// Components of the node.
-    pub components: Vec<Component>,
+    pub components: Vec<TreeComponent>,
 }
 
 /// A component of the tree.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Component {
+pub struct TreeComponent {
     /// JAUS id.
     pub id: String,
     /// Name.
     pub name: String,
     /// Services offered.
-    pub services: Vec<Service>,
+    pub services: Vec<TreeService>,
 }
 
 /// A service that a component offers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Service {
+pub struct TreeService {
     /// URN.
     pub urn: String,
     /// Major and minor version, as `1.0`.
@@ -112,7 +112,7 @@ pub struct Service {
 
 /// The selected vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Vehicle {
+pub struct VehicleState {
     /// Subsystem number.
     pub subsystem: u16,
     /// Name.

@@ -1,6 +1,6 @@
 //! The tree of subsystems, nodes, components and services for pages.
 
-use super::state::{Component, Node, Service, Subsystem, Tree};
+use super::state::{Tree, TreeComponent, TreeNode, TreeService, TreeSubsystem};
 use jaus::service::{self, Directory, Identification, Offer};
 
 /// Maximum number of components in a snapshot.
@@ -15,9 +15,9 @@ pub(super) fn of(directory: &Directory) -> Tree {
     }
 }
 
-fn subsystem(id: u16, known: &service::Subsystem, left: &mut usize) -> Subsystem {
+fn subsystem(id: u16, known: &service::SubsystemEntry, left: &mut usize) -> TreeSubsystem {
     let identification = known.identification();
-    Subsystem {
+    TreeSubsystem {
         subsystem: id,
         name: name(identification),
         kind: identification.map_or_else(String::new, |it| it.kind.to_string()),
@@ -28,26 +28,26 @@ fn subsystem(id: u16, known: &service::Subsystem, left: &mut usize) -> Subsystem
     }
 }
 
-fn node(id: u8, known: &service::Node, left: &mut usize) -> Node {
+fn node(id: u8, known: &service::NodeEntry, left: &mut usize) -> TreeNode {
     let components: Vec<_> = known.components().take(*left).map(component).collect();
     *left -= components.len();
-    Node {
+    TreeNode {
         node: id,
         name: name(known.identification()),
         components,
     }
 }
 
-fn component(known: &service::Component) -> Component {
-    Component {
+fn component(known: &service::ComponentEntry) -> TreeComponent {
+    TreeComponent {
         id: known.id.to_string(),
         name: name(known.identification.as_ref()),
         services: known.offered().map(offer).collect(),
     }
 }
 
-fn offer(offer: &Offer) -> Service {
-    Service {
+fn offer(offer: &Offer) -> TreeService {
+    TreeService {
         urn: offer.urn.clone(),
         version: format!("{}.{}", offer.major, offer.minor),
     }

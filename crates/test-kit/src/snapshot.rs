@@ -37,7 +37,9 @@ fn difference(expected: &str, text: &str) -> Option<String> {
         .find(|(_, expected, is)| expected != is)?;
     let shown = |line: Option<&str>| line.map_or("no line".to_owned(), |line| format!("{line:?}"));
     let (expected, is) = (shown(expected), shown(is));
-    Some(format!("line {number}\n expected {expected}\n      got {is}"))
+    Some(format!(
+        "line {number}\n expected {expected}\n      got {is}"
+    ))
 }
 
 #[cfg(test)]
@@ -48,8 +50,16 @@ mod tests {
     fn the_first_line_that_differs_is_named() {
         assert_eq!(difference("a\nb\n", "a\nb\n"), None);
         for (expected, text, difference) in [
-            ("a\nb\n", "a\nc\n", "line 2\n expected \"b\\n\"\n      got \"c\\n\""),
-            ("a\n", "a\nb\n", "line 2\n expected no line\n      got \"b\\n\""),
+            (
+                "a\nb\n",
+                "a\nc\n",
+                "line 2\n expected \"b\\n\"\n      got \"c\\n\"",
+            ),
+            (
+                "a\n",
+                "a\nb\n",
+                "line 2\n expected no line\n      got \"b\\n\"",
+            ),
             ("a\n", "a", "line 1\n expected \"a\\n\"\n      got \"a\""),
             ("", "a", "line 1\n expected no line\n      got \"a\""),
         ] {
@@ -60,7 +70,10 @@ mod tests {
     #[test]
     #[should_panic(expected = "JAUS_ACCEPT_SNAPSHOTS=1")]
     fn a_file_that_is_missing_fails_the_test() {
-        assert!(env::var_os(ACCEPT).is_none(), "unset JAUS_ACCEPT_SNAPSHOTS=1");
+        assert!(
+            env::var_os(ACCEPT).is_none(),
+            "unset JAUS_ACCEPT_SNAPSHOTS=1"
+        );
         check("no-such-folder/snapshot.txt", "text");
     }
 }

@@ -241,7 +241,9 @@ impl Service for Handoff {
             confirm(ended.client, ended.id, Answer::TIMEOUT, context);
         }
         let left = self.requests.len();
-        let is_due = self.notified.is_none_or(|notified| now >= notified + Self::REPEAT);
+        let is_due = self
+            .notified
+            .is_none_or(|notified| now >= notified + Self::REPEAT);
         if left < before || (left > 0 && is_due) {
             self.notify_controller(now, context);
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use jaus::address::JausId;
 use jaus::component::{Change, Directory, Identification, Kind, Level, Loss, Offer};
-use jaus::service::Component;
+use jaus::service::ComponentEntry;
 use serde_json::{Map, Value as Json, json};
 
 /// Formats the tree as indented lines, without the observing component `left_out`.
@@ -64,7 +64,7 @@ pub fn introduction(Identification { kind, name }: &Identification) -> String {
 }
 
 /// One line per service, with its versions aligned in a column.
-fn services(component: &Component) -> Vec<String> {
+fn services(component: &ComponentEntry) -> Vec<String> {
     let Some(offers) = &component.services else {
         return vec!["(services not yet reported)".to_owned()];
     };
@@ -111,7 +111,7 @@ pub fn json(directory: &Directory, own: JausId) -> Json {
     json!({ "subsystems": subsystems })
 }
 
-fn component_json(component: &Component) -> Json {
+fn component_json(component: &ComponentEntry) -> Json {
     let id = json!(component.id.to_string());
     let mut object = named_json("component", id, component.identification.as_ref());
     if let Some(offers) = &component.services {

@@ -142,8 +142,11 @@ mod toml_files {
         let config: Config = toml::from_str(text).unwrap();
         let endpoint = config.endpoint(0);
         let found = |id: &str| Assignment::find(&endpoint.profiles, id.parse().unwrap());
-        assert_eq!(found("7.1.33"), Some(crate::peer::Peer::JausPlusPlus));
-        assert_eq!(found("8.1.1"), Some(crate::peer::Peer::Iop));
+        assert_eq!(
+            found("7.1.33"),
+            Some(crate::peer::Implementation::JausPlusPlus)
+        );
+        assert_eq!(found("8.1.1"), Some(crate::peer::Implementation::Iop));
         assert_eq!(found("8.1.2"), None);
         let wrong = error("[[profile]]\nid = \"7.1.1\"\nprofile = \"jauspp\"");
         assert!(

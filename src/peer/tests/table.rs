@@ -80,15 +80,15 @@ fn the_page_shows_the_table_as_it_is() {
 
 #[test]
 fn each_peer_but_the_standard_one_departs_somewhere() {
-    for peer in Peer::ALL {
+    for peer in Implementation::ALL {
         assert_eq!(
             peer.departures().count() == 0,
-            peer == Peer::Standard,
+            peer == Implementation::Standard,
             "{peer}"
         );
         assert_eq!(peer.name().parse(), Ok(peer));
     }
-    let error = "jaus".parse::<Peer>().unwrap_err().to_string();
+    let error = "jaus".parse::<Implementation>().unwrap_err().to_string();
     assert!(
         error.contains("`jaus`") && error.contains("\"jaus++\""),
         "{error}"

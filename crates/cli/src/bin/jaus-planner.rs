@@ -7,7 +7,7 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus_cli::failure::Failure;
 use jaus_cli::{Ready, launch, runtime};
-use jaus_vehicle::mission::{LostLink, Settings, Vehicle};
+use jaus_vehicle::mission::{Footprint, LostLink, Settings};
 use jaus_vehicle::parts::{Part, Planner};
 
 #[derive(Args)]
@@ -88,7 +88,7 @@ impl Ready for Flags {
 
     fn part(self) -> Result<impl Part, Failure> {
         Ok(Planner {
-            vehicle: Vehicle {
+            vehicle: Footprint {
                 width: self.width,
                 margin: self.margin,
                 turning_radius: self.turning_radius,

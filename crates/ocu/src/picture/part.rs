@@ -7,7 +7,7 @@ use crate::role::{self, Role};
 use crate::sample_clock::SampleClock;
 use crate::state;
 use jaus::address::JausId;
-use jaus::service::{Component, State};
+use jaus::service::{ComponentEntry, State};
 
 /// Which reports of the vehicle's parts are expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,7 +80,7 @@ impl Part {
     }
 
     /// Updates the part from discovery data.
-    pub(super) fn describe(&mut self, component: &Component, role: Role) {
+    pub(super) fn describe(&mut self, component: &ComponentEntry, role: Role) {
         self.role = role;
         self.managed = role::is_managed(component);
         self.reports_pose = role::reports_pose(component);

@@ -13,7 +13,7 @@ use crate::picture::Depth;
 use crate::role;
 use crate::state;
 use jaus::component::Component;
-use jaus::service::{Directory, Kind, Subsystem};
+use jaus::service::{Directory, Kind, SubsystemEntry};
 
 /// The vehicles of the station.
 pub(super) struct Fleet {
@@ -121,7 +121,7 @@ impl Fleet {
         joined
     }
 
-    fn may_join(&self, number: u16, known: &Subsystem) -> bool {
+    fn may_join(&self, number: u16, known: &SubsystemEntry) -> bool {
         self.chosen.is_empty() && !self.contains(number) && role::is_vehicle(known)
     }
 
@@ -146,7 +146,7 @@ impl Fleet {
     fn first(&self) -> Option<u16> {
         let is_named = |number: &&u16| {
             let known = self.directory.subsystem(**number);
-            let identification = known.and_then(Subsystem::identification);
+            let identification = known.and_then(SubsystemEntry::identification);
             identification.is_some_and(|it| it.kind == Kind::Vehicle)
         };
         let named = self.vehicles.keys().find(is_named);

@@ -16,7 +16,7 @@ use jaus::codec::Query;
 use jaus::component::{Component, SubscribeError, Update, When};
 use jaus::messages::core::{QueryControl, QueryStatus, access_control};
 use jaus::messages::mobility::{QueryLocalPose, QueryVelocityState};
-use jaus::service::Component as Known;
+use jaus::service::ComponentEntry;
 use jaus_vehicle::messages::ground::{
     QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, mission_planner, raster_maps,
 };
@@ -60,14 +60,14 @@ const BRIEF_STATUS: When = When::hz(1.0);
 const PAUSE: Duration = Duration::from_secs(1);
 
 impl Topics {
-    fn of(part: &Known, picture: &Picture) -> Self {
+    fn of(part: &ComponentEntry, picture: &Picture) -> Self {
         match picture.depth() {
             Depth::Brief => Self::brief(part, picture.principal()),
             Depth::Full => Self::full(part),
         }
     }
 
-    fn brief(part: &Known, principal: Option<JausId>) -> Self {
+    fn brief(part: &ComponentEntry, principal: Option<JausId>) -> Self {
         Self {
             status: (principal == Some(part.id)).then_some(BRIEF_STATUS),
             control: principal == Some(part.id) || part.offers(mission_planner::URN),
@@ -76,7 +76,7 @@ impl Topics {
         }
     }
 
-    fn full(part: &Known) -> Self {
+    fn full(part: &ComponentEntry) -> Self {
         Self {
             status: role::is_managed(part).then_some(STATUS),
             control: role::is_managed(part) || part.offers(access_control::URN),

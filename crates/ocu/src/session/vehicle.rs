@@ -210,7 +210,7 @@ impl Vehicle {
         self.picture.fleet_state(now, selected, (held, requested))
     }
 
-    pub(super) fn state(&self, now: Instant) -> Option<state::Vehicle> {
+    pub(super) fn state(&self, now: Instant) -> Option<state::VehicleState> {
         let obstacle = |part| self.lease.obstacle(part);
         self.picture
             .vehicle_state(now, self.alarm.is_wanted(), obstacle)

@@ -148,7 +148,9 @@ async fn of_two_pages_one_drives_and_the_other_is_told_so() {
     // On a busy machine the first command expires (300 ms) before the second arrives.
     let mut attempts = 0..ATTEMPTS;
     let refused = loop {
-        attempts.next().expect("the first command expired each time");
+        attempts
+            .next()
+            .expect("the first command expired each time");
         driver.ask(request.clone()).await.unwrap();
         if let Err(refused) = other.ask(request.clone()).await {
             break refused;

@@ -9,7 +9,7 @@ pub type Point = (f64, f64);
 
 /// Dimensions of the vehicle for planning.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Vehicle {
+pub struct Footprint {
     /// Width in metres.
     pub width: f64,
     /// Clearance on each side in metres.
@@ -18,7 +18,7 @@ pub struct Vehicle {
     pub turning_radius: f64,
 }
 
-impl Default for Vehicle {
+impl Default for Footprint {
     fn default() -> Self {
         Self {
             width: 0.6,
@@ -28,7 +28,7 @@ impl Default for Vehicle {
     }
 }
 
-impl Vehicle {
+impl Footprint {
     /// Minimum distance of the vehicle's centre from obstacles, in metres.
     #[must_use]
     pub fn clearance(&self) -> f64 {
@@ -217,7 +217,7 @@ impl std::fmt::Display for At {
 #[must_use]
 pub fn blocked_after(
     terrain: &Terrain,
-    vehicle: &Vehicle,
+    vehicle: &Footprint,
     here: Point,
     path: &Path,
     segment: usize,
@@ -275,7 +275,7 @@ fn last_clear(is_clear: impl Fn(f64) -> bool) -> f64 {
 /// [`NoPath`] with the cause and a remedy.
 pub fn plan(
     terrain: &Terrain,
-    vehicle: &Vehicle,
+    vehicle: &Footprint,
     start: Point,
     destination: Point,
 ) -> Result<Path, NoPath> {

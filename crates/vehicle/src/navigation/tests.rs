@@ -7,7 +7,7 @@
 use std::time::{Duration, Instant};
 
 use super::*;
-use crate::motion::{Frame, Gone, Pose, Noise, wrap};
+use crate::motion::{Frame, Gone, Noise, Pose, wrap};
 
 const HERE: Frame = Frame {
     latitude: 52.5,

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{Ray, Scan};
-use crate::motion::{Pose, Noise};
+use crate::motion::{Noise, Pose};
 use crate::zones::Point;
 
 /// A round obstacle.

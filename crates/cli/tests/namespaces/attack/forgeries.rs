@@ -15,7 +15,10 @@ fn a_forged_id_takes_nothing_from_a_client() {
             "| {} packets in the client's id | {seen:?}, {attack:?} |",
             attack["packets"]
         );
-        assert!(seen["lost"] <= 2 && seen["answers_between"] < ANSWERS, "{seen:?}");
+        assert!(
+            seen["lost"] <= 2 && seen["answers_between"] < ANSWERS,
+            "{seen:?}"
+        );
         // Challenges and similar messages, but no stream.
         assert!(attack["octets"] < 40_000, "{attack:?}");
     });

@@ -24,7 +24,10 @@ fn a_forged_id_takes_nothing_from_a_client() {
         let seen = scene.client();
         let attack = figures(&attacker.says("attack"));
         println!("| IPv6: packets in the client's id | {seen:?}, {attack:?} |");
-        assert!(seen["lost"] <= 2 && seen["answers_between"] < ANSWERS, "{seen:?}");
+        assert!(
+            seen["lost"] <= 2 && seen["answers_between"] < ANSWERS,
+            "{seen:?}"
+        );
         assert!(attack["octets"] < 40_000, "{attack:?}");
     });
 }

@@ -2,7 +2,7 @@
 //! covers every peer with a profile.
 
 use crate::support::run;
-use jaus::peer::Peer;
+use jaus::peer::Implementation;
 use jaus_cli::settings;
 
 const PAGE: &str = include_str!("../../../../../docs/interoperability.md");
@@ -68,7 +68,10 @@ fn every_command_and_flag_is_there() {
 
 #[test]
 fn every_profile_has_its_row() {
-    for peer in Peer::ALL.into_iter().filter(|&peer| peer != Peer::Standard) {
+    for peer in Implementation::ALL
+        .into_iter()
+        .filter(|&peer| peer != Implementation::Standard)
+    {
         assert!(PAGE.contains(&format!("| `{peer}` |")), "{peer}");
     }
 }

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use crate::mission::ground::Ground;
-use crate::mission::{NoPath, Path, Point, Terrain, Vehicle, plan, search, sight};
+use crate::mission::{Footprint, NoPath, Path, Point, Terrain, plan, search, sight};
 
 /// A map of 1 m cells from text whose first line is the south: `#` is closed, `.` open. The lower a
 /// digit, the worse the ground.
@@ -19,14 +19,14 @@ fn map(picture: &[&str]) -> Terrain {
 }
 
 /// A vehicle that fits within its cell.
-const THIN: Vehicle = Vehicle {
+const THIN: Footprint = Footprint {
     width: 0.0,
     margin: 0.0,
     turning_radius: 0.0,
 };
 
-fn wide(width: f64) -> Vehicle {
-    Vehicle { width, ..THIN }
+fn wide(width: f64) -> Footprint {
+    Footprint { width, ..THIN }
 }
 
 /// Distance of the path from the nearest centre of a closed cell.
@@ -56,7 +56,7 @@ fn closest(path: &Path, terrain: &Terrain) -> f64 {
 #[test]
 fn over_open_ground_the_path_is_one_straight_segment() {
     let terrain = map(&["................"; 16]);
-    let path = plan(&terrain, &Vehicle::default(), (0.5, 0.5), (14.2, 9.7)).unwrap();
+    let path = plan(&terrain, &Footprint::default(), (0.5, 0.5), (14.2, 9.7)).unwrap();
     assert_eq!(path.points(), [(0.5, 0.5), (14.2, 9.7)]);
     assert!((path.length() - 13.7_f64.hypot(9.2)).abs() < 1e-9);
 }
@@ -95,7 +95,7 @@ fn a_gap_is_taken_only_by_a_vehicle_that_fits() {
         ".........",
         ".........",
     ]);
-    let go = |vehicle: Vehicle| plan(&terrain, &vehicle, (1.5, 4.5), (5.5, 4.5));
+    let go = |vehicle: Footprint| plan(&terrain, &vehicle, (1.5, 4.5), (5.5, 4.5));
     assert_eq!(go(wide(0.9)).unwrap().points().len(), 2);
     assert!(matches!(go(wide(1.4)), Err(NoPath::Unreachable { .. })));
 }

@@ -14,7 +14,7 @@ use crate::messages::ground::{
     ApproveMission, QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, ReportMission,
     SetDestination, mission_planner, raster_maps,
 };
-use crate::mission::{Link, Path, Point, Vehicle, plan};
+use crate::mission::{Footprint, Link, Path, Point, plan};
 use crate::parts::planner::{chain, map};
 use jaus::address::JausId;
 use jaus::codec::Query;
@@ -410,9 +410,9 @@ async fn set_out(
 async fn choose(component: &Component, store: JausId, from: Point) -> Result<Point, String> {
     const AWAY: f64 = 4.0;
     let map = map::fetch_from(component, store, "traversability", None).await?;
-    let room = Vehicle {
+    let room = Footprint {
         margin: 0.3,
-        ..Vehicle::default()
+        ..Footprint::default()
     };
     let directions = (0..16).map(|turn| std::f64::consts::TAU * f64::from(turn) / 16.0);
     let places = [AWAY, AWAY / 2.0, AWAY * 2.0].map(|away| {

@@ -18,7 +18,7 @@ use jaus_vehicle::messages::ground::{
     QueryMission, QueryRasterCells, QueryRasterMaps, QueryStage, ReportMission, ReportRasterCells,
     ReportRasterMaps, ReportStage, SetDestination, mission_planner, raster_maps, stage,
 };
-use jaus_vehicle::mission::{Settings, Vehicle as Size};
+use jaus_vehicle::mission::{Footprint, Settings};
 use jaus_vehicle::mobility::Vehicle;
 use jaus_vehicle::motion::{Frame, Limits, Pilot, SkidSteer, SkidSteerConfig};
 use jaus_vehicle::parts::{Part, Planner, Slot};
@@ -247,10 +247,10 @@ async fn planner_of(operator: &Component, subsystem: u16) -> JausId {
 
 fn settings() -> Planner {
     Planner {
-        vehicle: Size {
+        vehicle: Footprint {
             width: 0.6,
             margin: 0.1,
-            ..Size::default()
+            ..Footprint::default()
         },
         mission: Settings {
             pause: Duration::from_millis(200),

@@ -1,6 +1,6 @@
 //! Recognises known peers, with the evidence.
 
-use jaus::peer::{Certainty, LargeStyle, Peer, Recogniser, Sign, Verdict};
+use jaus::peer::{Certainty, Implementation, LargeStyle, Recogniser, Sign, Verdict};
 use jaus::wire::{Version, ra::RaId};
 use serde_json::{Value as Json, json};
 
@@ -90,7 +90,7 @@ impl Profile {
             Self::As5669a(verdict) => verdict,
         };
         let peer = verdict.peer;
-        if peer == Peer::Standard {
+        if peer == Implementation::Standard {
             return vec!["none: it looks like a peer that conforms to the standard".to_owned()];
         }
         let mut lines = vec![format!("{} ({})", peer.title(), verdict.certainty)];

@@ -7,7 +7,7 @@ mod scripted;
 use std::time::Duration;
 
 use jaus::address::JausId;
-use jaus::peer::{Certainty, Peer};
+use jaus::peer::{Certainty, Implementation};
 use jaus_cli::failure::Outcome;
 use jaus_test_kit::snapshot;
 
@@ -219,16 +219,24 @@ fn junior_without_services_acknowledges_and_no_more() {
 fn junior_is_told_by_the_message_types_that_it_takes_and_its_fork_by_zeros() {
     type Knob = fn(&mut Vehicle);
     let juniors: fn(u8) -> bool = |kind| kind & 0b11 == 0;
-    let cases: [(Knob, Peer, Certainty); 5] = [
-        (|_| {}, Peer::Standard, Certainty::Unknown),
+    let cases: [(Knob, Implementation, Certainty); 5] = [
+        (|_| {}, Implementation::Standard, Certainty::Unknown),
         (
             |v| v.takes_type = |_| true,
-            Peer::Standard,
+            Implementation::Standard,
             Certainty::Unknown,
         ),
-        (|v| v.zero_is_all = true, Peer::Standard, Certainty::Unknown),
-        (|_| {}, Peer::Junior, Certainty::Certain),
-        (|v| v.zero_is_all = true, Peer::Jts, Certainty::Certain),
+        (
+            |v| v.zero_is_all = true,
+            Implementation::Standard,
+            Certainty::Unknown,
+        ),
+        (|_| {}, Implementation::Junior, Certainty::Certain),
+        (
+            |v| v.zero_is_all = true,
+            Implementation::Jts,
+            Certainty::Certain,
+        ),
     ];
     for (number, (knob, peer, certainty)) in cases.into_iter().enumerate() {
         let mut scripted = Vehicle::sound();
