@@ -248,7 +248,7 @@ impl Case {
     }
 
     /// Messages from the peer's component to us since a mark.
-    pub(super) fn told(&self, mark: usize) -> impl DoubleEndedIterator<Item = &Heard> {
+    pub(super) fn received(&self, mark: usize) -> impl DoubleEndedIterator<Item = &Heard> {
         let (own, id) = (self.settings.own, self.id);
         self.seen.since(mark).iter().filter(move |heard| {
             heard.frame.destination == own
@@ -266,7 +266,7 @@ impl Case {
     /// All decodable reports of a kind.
     pub(super) fn reports<M: Message>(&self, mark: usize) -> impl Iterator<Item = M> {
         let of_kind = self
-            .told(mark)
+            .received(mark)
             .filter(|heard| heard.code() == Some(M::CODE));
         of_kind.filter_map(|heard| M::decode(&heard.frame.payload).ok())
     }
@@ -274,7 +274,7 @@ impl Case {
     /// The error of the first malformed report of a kind.
     pub(super) fn unreadable<M: Message>(&self, mark: usize) -> Option<String> {
         let mut of_kind = self
-            .told(mark)
+            .received(mark)
             .filter(|heard| heard.code() == Some(M::CODE));
         of_kind
             .find_map(|heard| M::decode(&heard.frame.payload).err())

@@ -62,7 +62,7 @@ pub(super) fn not_identified(case: &Case, mark: usize) -> Verdict {
     }
     let what = format!("{id} does not answer Query Identification");
     let cause = "the component has no Discovery service (a bare Junior client has no services)";
-    if case.told(0).next().is_some() {
+    if case.received(0).next().is_some() {
         return Verdict::failed(
             what,
             cause,
@@ -117,8 +117,8 @@ pub(super) fn multicast_answered(case: &mut Case, mark: usize) -> Judgement {
     if case.seen.since(mark).iter().any(|heard| answers(&heard)) {
         return Judgement::Over(Verdict::ok("a broadcast query is answered"));
     }
-    let mut told = case.told(mark);
-    if told.any(|heard| heard.frame.flags.acknowledgement().is_answer()) {
+    let mut received = case.received(mark);
+    if received.any(|heard| heard.frame.flags.acknowledgement().is_answer()) {
         return Judgement::Over(Verdict::ok("a broadcast message is acknowledged"));
     }
     Judgement::Wait

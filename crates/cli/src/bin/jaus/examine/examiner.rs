@@ -28,7 +28,7 @@ pub(super) struct Examiner {
     plan: std::array::IntoIter<Exchange, 33>,
     running: Option<Running>,
     /// Number of trials returned so far.
-    told: usize,
+    returned: usize,
     done: bool,
 }
 
@@ -38,7 +38,7 @@ impl Examiner {
             case: Case::new(settings),
             plan: Exchange::ALL.into_iter(),
             running: None,
-            told: 0,
+            returned: 0,
             done: false,
         }
     }
@@ -101,9 +101,9 @@ impl Examiner {
 
     /// The next completed exchange, and the one before it.
     pub(super) fn poll_trial(&mut self) -> Option<(&Trial, Option<&Trial>)> {
-        let trial = self.case.trials.get(self.told)?;
-        let before = self.told.checked_sub(1);
-        self.told += 1;
+        let trial = self.case.trials.get(self.returned)?;
+        let before = self.returned.checked_sub(1);
+        self.returned += 1;
         Some((
             trial,
             before.and_then(|before| self.case.trials.get(before)),

@@ -398,7 +398,7 @@ pub(super) fn source_port(case: &mut Case) -> Begin {
     let (Some(address), Some(id)) = (case.address, case.id) else {
         return Begin::Over(Verdict::skipped("no answer"));
     };
-    let Some(from) = case.told(0).map(|heard| heard.from).next() else {
+    let Some(from) = case.received(0).map(|heard| heard.from).next() else {
         return Begin::Over(Verdict::skipped("nothing arrived by unicast"));
     };
     if from == address {
@@ -429,7 +429,7 @@ fn other_address(address: SocketAddr, from: SocketAddr, id: JausId) -> Verdict {
 }
 
 pub(super) fn asked_at_its_source(case: &mut Case, mark: usize) -> Judgement {
-    let Some(heard) = case.told(mark).next() else {
+    let Some(heard) = case.received(mark).next() else {
         return Judgement::Wait;
     };
     let (from, id) = (heard.from, heard.frame.source);
@@ -453,7 +453,7 @@ pub(super) fn deaf_source(case: &Case) -> Verdict {
         return Verdict::skipped("no answer");
     };
     let from = case
-        .told(0)
+        .received(0)
         .map(|heard| heard.from.port())
         .next()
         .unwrap_or(0);
