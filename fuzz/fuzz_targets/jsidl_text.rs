@@ -4,6 +4,7 @@
 
 use jaus_fuzz::{octets_come_back, with_code};
 use jsidl::docs::{self, Format};
+use jsidl::model::Service;
 use jsidl::{Library, Loader, lua, rust, schema};
 use libfuzzer_sys::fuzz_target;
 
@@ -15,20 +16,24 @@ const LONGEST: usize = 16 << 10;
 
 /// Runs every emitter: for Rust, Wireshark, pages and JSON Schema.
 fn emit(library: &Library) {
-    let services: Vec<_> = library.services().map(AsRef::as_ref).collect();
+    let services: Vec<&Service> = library.services().map(AsRef::as_ref).collect();
     let module = rust::module(library, services.iter().copied(), "::jaus::codec");
     let script = lua::dissector(library);
     assert!(!module.is_empty() && !script.is_empty());
     for format in [Format::Html, Format::Markdown] {
         let pages = docs::pages(library, |_| true, format);
         assert_eq!(pages.len(), 1 + services.len());
-        assert!(pages.iter().all(|page| !page.path.contains('/')), "{pages:?}");
+        assert!(
+            pages.iter().all(|page| !page.path.contains('/')),
+            "{pages:?}"
+        );
     }
     let schemas = schema::files(library, |_| true);
     assert_eq!(schemas.len(), services.len());
     for (service, (_, schema)) in services.iter().zip(schemas) {
         let text = schema.to_string();
-        assert_eq!(serde_json::from_str(&text).ok(), Some(schema), "{}", service.id);
+        let read = serde_json::from_str::<serde_json::Value>(&text).ok();
+        assert_eq!(read, Some(schema), "{}", service.id);
     }
 }
 

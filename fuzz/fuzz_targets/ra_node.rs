@@ -15,7 +15,7 @@ use jaus::wire::Acknowledgement;
 use jaus::wire::ra::{Fields, Header, PREFIX};
 use jaus_ra::RaId;
 use jaus_ra::connection::{self, Connections};
-use jaus_ra::node::{RaComponentEntry, Event, RaNodeEntry, RaNode, Settings, RaSubsystemEntry};
+use jaus_ra::node::{Event, RaComponentEntry, RaNode, RaNodeEntry, RaSubsystemEntry, Settings};
 use libfuzzer_sys::fuzz_target;
 
 /// Time zero of every input.

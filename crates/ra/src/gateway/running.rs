@@ -1,5 +1,6 @@
 //! Runs the gateway: the socket of the RA network, the JAUS node with the attached proxies, and one
 //! task that drives the [`Gateway`].
+
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::future::poll_fn;

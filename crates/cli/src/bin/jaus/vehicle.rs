@@ -1,8 +1,4 @@
 //! `jaus vehicle`: reference vehicle, a simulated platform with its JAUS services.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "the simulation runs in real time and reports the time of day"
-)]
 
 use std::time::Duration;
 
