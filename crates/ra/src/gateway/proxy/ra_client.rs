@@ -216,7 +216,7 @@ impl RaClient {
                     Some(places) => place_report(places, &report),
                     None => self.words(request.destination, peer.minor).to_ra(&report),
                 };
-                let answer = answer(now, &request, (&report, converted), tally);
+                let answer = to_answer(now, &request, (&report, converted), tally);
                 self.said.extend(answer);
             }
             Err(none) => tally.refuse(now, Counter::Unanswered, request.code, none.peer),
@@ -234,7 +234,7 @@ impl RaClient {
     ) {
         let request = Message::new(to, from, 0, Bytes::new());
         let converted = self.words(from, minor).to_ra(report);
-        let answer = answer(now, &request, (report, converted), tally);
+        let answer = to_answer(now, &request, (report, converted), tally);
         self.said.extend(answer);
     }
 
@@ -447,7 +447,7 @@ impl RaClient {
 }
 
 /// Converts a JAUS report to the answer to an RA message.
-fn answer(
+fn to_answer(
     now: Instant,
     request: &Message,
     (report, converted): (&Bytes, Result<(u16, Bytes), Refusal>),
