@@ -235,6 +235,35 @@ fn a_jump_is_rejected_and_counts_as_uncertainty_until_it_lasts() {
 }
 
 #[test]
+fn two_jumps_with_silence_between_them_do_not_move_the_estimate() {
+    let mut journey = Journey::new(8);
+    journey.drive(1.0, 0.0, 30.0);
+    journey.offset = 40.0;
+    for _ in 0..3 {
+        journey.drive(1.0, 0.0, 0.2);
+        journey.has_gnss = false;
+        journey.drive(1.0, 0.0, 5.0);
+        journey.has_gnss = true;
+    }
+    let (missed, _, estimate) = journey.error();
+    assert!(missed < 2.0, "{missed}");
+    assert!(estimate.position_rms > 30.0, "in doubt: {estimate:?}");
+}
+
+#[test]
+fn rejected_positions_at_different_places_do_not_move_the_estimate() {
+    let mut journey = Journey::new(9);
+    journey.drive(1.0, 0.0, 30.0);
+    for step in 0..50 {
+        journey.offset = if step % 2 == 0 { 40.0 } else { -40.0 };
+        journey.drive(1.0, 0.0, 0.2);
+    }
+    let (missed, _, estimate) = journey.error();
+    assert!(missed < 2.0, "{missed}");
+    assert!(estimate.position_rms > 30.0, "in doubt: {estimate:?}");
+}
+
+#[test]
 fn without_wheels_the_position_follows_the_receiver() {
     let mut journey = Journey::new(5);
     journey.has_wheels = false;
@@ -267,8 +296,9 @@ fn inputs_that_are_no_numbers_change_nothing() {
         forward: f64::NAN,
         turn: 0.0,
     };
-    journey.estimator.handle_travel(journey.now, bad);
-    journey.estimator.handle_rate(journey.now, f64::INFINITY);
+    let later = journey.now + Duration::from_secs(1);
+    journey.estimator.handle_travel(later, bad);
+    journey.estimator.handle_rate(later, f64::INFINITY);
     journey.estimator.set_heading(f64::NAN);
     assert_eq!(journey.estimator.estimate(), Some(before));
 }
