@@ -231,8 +231,8 @@ pub struct Control {
 /// Another operator's request for control.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct HandoverRequest {
-    /// Number of the request.
-    pub id: u8,
+    /// JAUS id of the part of the vehicle that has passed it on.
+    pub part: String,
     /// JAUS id of the operator.
     pub operator: String,
     /// Authority of the operator.

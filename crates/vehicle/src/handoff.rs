@@ -118,9 +118,14 @@ impl Handoff {
         confirm(client, id, answer, context);
     }
 
-    const fn next_id(&mut self) -> u8 {
-        self.last_id = self.last_id.wrapping_add(1);
-        self.last_id
+    /// A number that no undecided request has.
+    fn next_id(&mut self) -> u8 {
+        loop {
+            self.last_id = self.last_id.wrapping_add(1);
+            if self.requests.iter().all(|it| it.id != self.last_id) {
+                return self.last_id;
+            }
+        }
     }
 
     /// Handles the withdrawal of a request.

@@ -1,11 +1,11 @@
 // Handing over control between operators: shows another operator's request, takes the answer, and
 // tells how control changed hands.
 
-import { get, list, number, plain, say, show, toast } from "./dom.js";
+import { get, list, plain, say, show, toast } from "./dom.js";
 
 export class Handover {
   #ask;
-  #request = null;
+  #request = null; // the operator's request that is shown
   #told = "";
 
   /** Sends answers by `ask`. */
@@ -22,14 +22,14 @@ export class Handover {
     if (ending && ending !== this.#told) toast("warn", ending.replace(/^./, (letter) => letter.toUpperCase()));
     this.#told = ending;
     const [first] = list(requests, 8);
-    this.#request = number(first?.id);
+    this.#request = first ? { part: plain(first.part, 16), operator: plain(first.operator, 16) } : null;
     show(get("handover"), operable && this.#request !== null);
     if (this.#request === null) return;
     const why = plain(first.explanation, 120);
-    say(get("handover-text"), `${plain(first.operator, 16)} requests control (authority ${first.authority})${why ? `: ${why}` : ""}`);
+    say(get("handover-text"), `${this.#request.operator} requests control (authority ${first.authority})${why ? `: ${why}` : ""}`);
   }
 
   #answer(grant) {
-    if (this.#request !== null) this.#ask({ type: "handover", request: this.#request, grant });
+    if (this.#request !== null) this.#ask({ type: "handover", ...this.#request, grant });
   }
 }
