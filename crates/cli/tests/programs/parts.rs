@@ -199,6 +199,7 @@ fn flags_of_motors_and_receivers_out_of_their_range_are_told_with_the_range() {
         ("--outage 10", "units us, ms, s, min and h"),
         ("--max-rms 0", "write a number from 0.01 to 100"),
         ("--gyro-inverted", "--gyro"),
+        ("--imu --gyro /dev/null", "cannot be used with"),
         ("--baud 1", "1 is not in 300..=4000000"),
     ] {
         refused("jaus-global-pose-sensor", flags, told);

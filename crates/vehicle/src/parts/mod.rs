@@ -23,6 +23,7 @@ mod primitive_driver;
 mod range_sensor;
 mod stop_line;
 pub mod tester;
+mod turn_rates;
 mod vector_driver;
 mod velocity_sensor;
 
@@ -44,7 +45,7 @@ pub use hardware::GpioMotors;
 #[cfg(feature = "serial")]
 pub use hardware::Sabertooth;
 pub use hardware::{Drives, HBridgeMotors, Hardware, Motors, Servo, SteeringGear, Stop};
-pub use iio_device::IioDevice;
+pub use iio_device::{IioDevice, Reading, Readings};
 pub use imu_sensor::ImuSensor;
 pub use knowledge_store::{Broken, KnowledgeStore};
 pub use path_driver::PathDriver;
@@ -52,6 +53,7 @@ pub use planner::Planner;
 pub use pose_sensor::PoseSensor;
 pub use primitive_driver::PrimitiveDriver;
 pub use range_sensor::RangeSensor;
+pub use turn_rates::Gyro;
 pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
 
