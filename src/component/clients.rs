@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use tokio::sync::{mpsc, oneshot, watch};
 
-use super::feed::Feed;
+use super::feed::{Feed, Reader};
 use crate::address::JausId;
 use crate::node;
 use crate::node::now;
@@ -76,7 +76,7 @@ pub(super) struct Begun {
 }
 
 /// The result of a request for a subscription.
-pub(super) type Subscribed = Result<(Ticket, Arc<Feed>), NotSubscribed>;
+pub(super) type Subscribed = Result<(Ticket, Reader), NotSubscribed>;
 
 /// Why there is no subscription.
 pub(super) enum NotSubscribed {
@@ -198,10 +198,10 @@ impl Clients {
                 let _ = reply.send(Err(NotSubscribed::Ended(end)));
                 return;
             }
-            let feed = Arc::new(Feed::new());
-            self.feeds.insert(id, feed.clone());
+            let (feed, reader) = Reader::new();
+            self.feeds.insert(id, feed);
             // An unclaimed ticket cancels.
-            let _ = reply.send(Ok((self.ticket(Instruction::EndSubscription(id)), feed)));
+            let _ = reply.send(Ok((self.ticket(Instruction::EndSubscription(id)), reader)));
         }
         if let Some(feed) = self.feeds.get(&id) {
             feed.tell(now(), news);

@@ -369,7 +369,7 @@ impl Component {
         let peer = topic.peer;
         let subscribed = self.hold(|reply| Hold::Subscribe { topic, reply }).await;
         match subscribed.ok_or(SubscribeError::Stopped)? {
-            Ok((ticket, feed)) => Ok(Subscription::new(ticket, self.clone(), peer, feed)),
+            Ok((ticket, reader)) => Ok(Subscription::new(ticket, self.clone(), peer, reader)),
             Err(NotSubscribed::Impossible(why)) => {
                 Err(SubscribeError::Impossible { peer, query, why })
             }

@@ -72,6 +72,10 @@ impl Session {
 
     /// Makes the peer ready, now and after restarts, and waits until it is.
     ///
+    /// This is a decision about the peer as it is: while the peer is lost, the state in which it will
+    /// be found again is not known, so the target state stays as it is. An application that decides
+    /// in advance uses [`set_target`](Self::set_target).
+    ///
     /// # Errors
     /// [`SessionError::State`] if the peer is lost or disabled at present, for instance because of
     /// an emergency. Otherwise as [`ready`](Self::ready).
@@ -105,8 +109,9 @@ impl Session {
         .await
     }
 
-    /// Brings the peer into this state, now and after restarts, without waiting for it. Ready is
-    /// refused while the peer reports an emergency.
+    /// Brings the peer into this state, now and after restarts, without waiting for it. While the peer
+    /// is lost, it is brought into this state when it is under control again. Ready has no effect
+    /// while an emergency is the last that the peer has reported.
     ///
     /// # Errors
     /// [`SessionError::Stopped`].

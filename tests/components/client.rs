@@ -7,7 +7,8 @@ use jaus::address::JausId;
 use jaus::codec::{Message, ServiceId};
 use jaus::component::{
     Component, Control, ControlError, ControlLost, FindError, Handlers, Kind, ManageError,
-    Management, Outage, Patience, SubscribeError, Subscription, SubscriptionEnd, Update, When,
+    Management, Outage, Patience, SessionError, SessionState, SubscribeError, Subscription,
+    SubscriptionEnd, Update, When,
 };
 use jaus::endpoint::{Outgoing, Received};
 use jaus::messages::core::{
@@ -124,6 +125,27 @@ fn status(code: u8) -> ReportStatus {
         status: code.into(),
         reserved: 0,
     }
+}
+
+#[tokio::test]
+async fn a_subscription_is_shared_and_ends_with_its_last_reader() {
+    let mut scene = Scene::new();
+    let mut first = scene.subscribed().await;
+    let mut second = first.share().depth(1);
+    scene.peer.fire(7, 0, &status(1));
+    scene.peer.fire(7, 2, &status(2));
+    let next = async |of: &mut Subscription<ReportStatus>| within_limit(of.report()).await;
+    assert_eq!(next(&mut first).await, Some(status(1)));
+    assert_eq!(next(&mut first).await, Some(status(2)));
+    assert_eq!(next(&mut second).await, Some(status(2)), "the latest");
+    assert_eq!((first.missed(), second.missed()), (0, 1));
+    assert_eq!((first.lost(), second.lost()), (1, 1));
+    drop(first);
+    scene.peer.fire(7, 3, &status(3));
+    assert_eq!(next(&mut second).await, Some(status(3)));
+    drop(second);
+    let end: CancelEvent = within_limit(scene.peer.expect()).await;
+    assert_eq!(end.event_id, 7);
 }
 
 #[tokio::test]
@@ -311,6 +333,36 @@ async fn resume_waits_until_the_peer_says_that_it_is_ready() {
     assert_eq!(
         refused.to_string(),
         "101.1.33 was set to the state standby, but reports the status 1"
+    );
+}
+
+#[tokio::test]
+async fn a_session_does_not_resume_a_peer_that_is_lost() {
+    let Scene {
+        operator,
+        mut peer,
+        _nodes,
+    } = Scene::new();
+    let mut session = within_limit(operator.session(peer.id(), 127))
+        .await
+        .unwrap();
+    within_limit(peer.expect::<RequestControl>()).await;
+    peer.say(&ConfirmControl::default());
+    within_limit(peer.expect::<Resume>()).await;
+    peer.say(&RejectControl::default());
+    within_limit(async {
+        loop {
+            let state = session.changed().await.unwrap();
+            if matches!(state, SessionState::Lost { continues, .. } if continues) {
+                break;
+            }
+        }
+    })
+    .await;
+    let refused = within_limit(session.resume()).await.unwrap_err();
+    assert!(
+        matches!(refused, SessionError::State(SessionState::Lost { .. })),
+        "{refused}"
     );
 }
 

@@ -58,6 +58,26 @@ async fn an_operator_finds_a_rover_and_asks_for_its_speed() {
 }
 
 #[tokio::test]
+async fn a_component_with_a_query_that_is_neither_answered_nor_declined_is_not_attached() {
+    let node = start(101, own_group());
+    let attach = |handlers: Handlers| {
+        Component::builder(Kind::Vehicle, "Rover")
+            .offer(handlers)
+            .attach(&node, 33)
+    };
+    let speedometer =
+        || Handlers::new(velocity_state_sensor::LATEST).publishes::<QueryVelocityState>();
+    let refused = attach(speedometer()).unwrap_err();
+    assert!(matches!(refused, AttachError::Unsafe(_)), "{refused}");
+    let text = refused.to_string();
+    assert!(
+        text.contains(".declines::<QueryVelocityStateExt>()"),
+        "{text}"
+    );
+    attach(speedometer().declines::<QueryVelocityStateExt>()).unwrap();
+}
+
+#[tokio::test]
 async fn queries_at_the_same_time_all_get_their_answers() {
     let (rover, operator) = rover_and_operator();
     let beat = || operator.query(rover.id(), &QueryHeartbeatPulse {});
