@@ -153,13 +153,40 @@ fn the_group_stops_all_vehicles_when_one_is_too_fast() {
 
 #[cfg(feature = "every-set")]
 #[test]
-fn a_slow_viewer_gets_the_latest_of_large_images() {
+fn two_viewers_share_large_images_and_only_the_slow_one_misses_some() {
     let mut images = Example::start("images");
-    images.expect("1048576 octets, ");
-    images.expect(" old, 0 lost, ");
-    images.expect_line("that the viewer missed images", |line| {
-        !line.ends_with(" 0 missed")
+    images.expect("fast: 1048576 octets, ");
+    images.expect_line("that the slow viewer missed images", |line| {
+        line.starts_with("slow: 1048576 octets") && !line.ends_with(" 0 missed")
     });
+    let mut fast = images.seen().iter().filter(|it| it.starts_with("fast"));
+    assert!(
+        fast.all(|it| it.ends_with(" 0 missed")),
+        "{:#?}",
+        images.seen()
+    );
+}
+
+#[test]
+fn every_example_is_shown_and_has_fewer_than_60_lines() {
+    let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");
+    let page = include_str!("../../docs/examples.md");
+    // Shown elsewhere.
+    let others = ["accelerometer.rs", "sensor.rs", "client.rs"];
+    for entry in std::fs::read_dir(directory).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|it| it != "rs") {
+            continue;
+        }
+        let name = path.file_name().unwrap().to_str().unwrap();
+        let lines = std::fs::read_to_string(&path).unwrap().lines().count();
+        assert!(lines < 60, "{name} has {lines} lines");
+        let include = format!("{{{{#include ../examples/{name}}}}}");
+        assert!(
+            others.contains(&name) || page.contains(&include),
+            "docs/examples.md does not show {name}"
+        );
+    }
 }
 
 #[test]
