@@ -42,14 +42,13 @@ pub use jaus_codec as codec;
 mod texts {
     #[doc = include_str!("../README.md")]
     struct Readme;
-    #[doc = include_str!("../docs/first-programs.md")]
-    struct FirstPrograms;
+    #[doc = include_str!("../docs/safety.md")]
+    struct Safety;
+    #[doc = include_str!("../docs/sessions.md")]
+    struct Sessions;
+    #[doc = include_str!("../docs/tutorial.md")]
+    struct Tutorial;
 }
-
-/// Compiles the program in the guide to sessions.
-#[cfg(all(doctest, feature = "node", feature = "mobility"))]
-#[doc = include_str!("../docs/sessions.md")]
-struct Sessions;
 
 /// Compiles the programs in the guide to JSIDL.
 #[cfg(doctest)]

@@ -20,7 +20,6 @@ mod network;
 mod ping;
 mod record;
 mod send;
-mod shell;
 mod subscribe;
 mod texts;
 mod vehicle;

@@ -1,14 +1,16 @@
-//! Runs the README's shell session: what it shows is what comes.
+//! Runs the sessions that texts show: the programs print what is shown.
 
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 
+use super::{Block, blocks, root, texts};
 use crate::support::own_group;
 
-const README: &str = include_str!("../../../../../README.md");
-/// Stands before each command in the output of the session.
+/// Stands before each command of a session.
 const PROMPT: &str = "$ ";
+/// The texts whose sessions build programs or need several hosts; `.ci/tutorial` runs those.
+const TUTORIALS: [&str; 2] = ["docs/getting-started.md", "docs/tutorial.md"];
 
 /// Numbers and the space between columns differ from run to run.
 fn shape(line: &str) -> String {
@@ -42,14 +44,26 @@ fn parts(session: &str) -> Vec<(&str, Vec<&str>)> {
 }
 
 #[test]
-fn the_shell_alone_discovers_drives_stops_and_records_a_vehicle() {
-    let session = README.split("```console\n").nth(1).unwrap();
-    let session = session.split("```").next().unwrap();
-    let commands = parts(session);
-    assert!(commands.len() >= 8, "{commands:?}");
+fn every_session_prints_what_is_shown() {
+    let mut with_sessions = Vec::new();
+    for text in texts() {
+        let sessions = blocks(&text.content).into_iter().filter(|it| it.info == "console");
+        for session in sessions {
+            with_sessions.push(text.name());
+            if !TUTORIALS.contains(&text.name().as_str()) {
+                run(&session, &format!("{}:{}", text.name(), session.line));
+            }
+        }
+    }
+    for name in TUTORIALS.iter().chain(&["README.md", "docs/jsidl.md"]) {
+        assert!(with_sessions.iter().any(|it| it == name), "no session in {name}");
+    }
+}
 
-    // The session gets a directory, a network and the programs of this build.
-    let directory = std::env::temp_dir().join(format!("jaus-shell-{}", std::process::id()));
+/// Runs the commands of a session in a shell with a directory, a network and the programs of this build.
+fn run(session: &Block, place: &str) {
+    let commands = parts(&session.content);
+    let directory = std::env::temp_dir().join(format!("jaus-session-{}", std::process::id()));
     std::fs::create_dir_all(&directory).unwrap();
     let network = own_group().join(" ");
     let group = network.split(' ').next_back().unwrap();
@@ -72,7 +86,7 @@ fn the_shell_alone_discovers_drives_stops_and_records_a_vehicle() {
 
     let printed = String::from_utf8_lossy(&run.stdout);
     let printed_parts = parts(&printed);
-    assert_eq!(printed_parts.len(), commands.len(), "{printed}");
+    assert_eq!(printed_parts.len(), commands.len(), "{place}: {printed}");
     for ((command, shown), (_, lines)) in commands.iter().zip(printed_parts) {
         let mut lines = lines.iter().map(|line| shape(line));
         // An ellipsis stands for lines that are left out.
@@ -80,8 +94,18 @@ fn the_shell_alone_discovers_drives_stops_and_records_a_vehicle() {
             let wanted = shape(line);
             assert!(
                 lines.any(|line| line == wanted),
-                "`{line}` does not follow `{command}` in {printed}"
+                "{place}: `{line}` does not follow `{command}` in {printed}"
             );
         }
+    }
+}
+
+#[test]
+fn the_readme_discovers_drives_stops_and_records_a_vehicle() {
+    let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
+    let sessions = blocks(&readme).into_iter().filter(|it| it.info == "console");
+    let shown: String = sessions.map(|it| it.content).collect();
+    for command in ["vehicle", "record", "discover", "send", "subscribe", "control", "watch"] {
+        assert!(shown.contains(&format!("{PROMPT}jaus {command} ")), "no {command}");
     }
 }
