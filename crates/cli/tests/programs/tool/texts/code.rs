@@ -82,7 +82,10 @@ fn every_rust_block_is_compiled_by_a_doctest_or_needs_generated_types() {
         let page = place.split(':').next().unwrap();
         let is_ignored = block.info.contains("ignore");
         let is_listed = WITH_GENERATED_TYPES.contains(&page);
-        assert!(is_listed || !is_ignored, "{place}: ignored without a reason");
+        assert!(
+            is_listed || !is_ignored,
+            "{place}: ignored without a reason"
+        );
         let is_compiled = sources.contains(&format!("/{page}\")]"));
         assert!(is_ignored || is_compiled, "{place}: in no doctest");
     }

@@ -116,12 +116,19 @@ fn every_command_has_the_shown_flags() {
                 continue;
             }
             words.retain(|it| it != "--help");
-            let run = Command::new(folder.join(name)).args(&words).arg("--help").output();
+            let run = Command::new(folder.join(name))
+                .args(&words)
+                .arg("--help")
+                .output();
             let run = run.unwrap_or_else(|error| panic!("{}: {name}: {error}", text.name()));
             if !run.status.success() {
                 let error = String::from_utf8_lossy(&run.stderr);
                 let error = error.lines().next().unwrap_or_default().to_owned();
-                wrong.push(format!("{}: {name} {}: {error}", text.name(), words.join(" ")));
+                wrong.push(format!(
+                    "{}: {name} {}: {error}",
+                    text.name(),
+                    words.join(" ")
+                ));
             }
             count += 1;
         }
@@ -132,7 +139,8 @@ fn every_command_has_the_shown_flags() {
 
 #[test]
 fn commands_are_split_as_a_shell_splits_them() {
-    let found = commands("ssh gbat jaus send 1.1.1 X '{\"A\": 1}' --hz 5 > log & kill %1; jaus list # all");
+    let found =
+        commands("ssh gbat jaus send 1.1.1 X '{\"A\": 1}' --hz 5 > log & kill %1; jaus list # all");
     let expected = [
         vec!["jaus", "send", "1.1.1", "X", "{\"A\": 1}", "--hz", "5"],
         vec!["jaus", "list"],

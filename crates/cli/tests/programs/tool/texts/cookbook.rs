@@ -18,7 +18,8 @@ fn every_recipe_is_accepted_and_generates_the_shown_rust() {
     for recipe in page.split("\n## ").skip(1) {
         let (name, _) = recipe.split_once('\n').unwrap();
         let blocks = blocks(recipe);
-        let (definitions, rust): (Vec<_>, Vec<_>) = blocks.into_iter().partition(|it| it.info == "xml");
+        let (definitions, rust): (Vec<_>, Vec<_>) =
+            blocks.into_iter().partition(|it| it.info == "xml");
         if definitions.is_empty() {
             continue;
         }
@@ -27,7 +28,10 @@ fn every_recipe_is_accepted_and_generates_the_shown_rust() {
         std::fs::remove_dir_all(&folder).unwrap();
         for block in rust {
             for word in generated_names(&block.content) {
-                assert!(generated.contains(word), "{name}: `{word}` is not generated");
+                assert!(
+                    generated.contains(word),
+                    "{name}: `{word}` is not generated"
+                );
             }
         }
         count += 1;
@@ -37,7 +41,11 @@ fn every_recipe_is_accepted_and_generates_the_shown_rust() {
 
 /// Writes the definitions of a recipe to a folder: whole files, and messages within the frame.
 fn written(frame: &str, definitions: &[Block]) -> PathBuf {
-    let name = format!("jaus-cookbook-{}-{}", std::process::id(), definitions[0].line);
+    let name = format!(
+        "jaus-cookbook-{}-{}",
+        std::process::id(),
+        definitions[0].line
+    );
     let folder = std::env::temp_dir().join(name);
     std::fs::create_dir_all(&folder).unwrap();
     let mut framed = frame.to_owned();
@@ -47,7 +55,11 @@ fn written(frame: &str, definitions: &[Block]) -> PathBuf {
             std::fs::write(folder.join(format!("{number}.xml")), text).unwrap();
             continue;
         }
-        let place = if text.contains("message_id=\"F") { REPORTS } else { QUERIES };
+        let place = if text.contains("message_id=\"F") {
+            REPORTS
+        } else {
+            QUERIES
+        };
         framed = framed.replace(place, &format!("{text}{place}"));
     }
     if framed != frame {
@@ -62,7 +74,10 @@ fn compiled(folder: &Path, name: &str) -> String {
     let checked = run(&["jsidl", "check", "--deny-warnings", path], b"");
     assert_eq!(checked.status, 0, "{name}: {}", checked.stdout);
     let output = folder.join("out");
-    let emitted = run(&["jsidl", "rust", path, "-o", output.to_str().unwrap()], b"");
+    let emitted = run(
+        &["jsidl", "rust", path, "-o", output.to_str().unwrap()],
+        b"",
+    );
     assert_eq!(emitted.status, 0, "{name}: {}", emitted.stderr);
     std::fs::read_to_string(output.join("messages.rs")).unwrap()
 }
@@ -71,10 +86,24 @@ fn compiled(folder: &Path, name: &str) -> String {
 /// and methods on messages. Those of the library and of the reader's own code are left out.
 fn generated_names(snippet: &str) -> impl Iterator<Item = &str> {
     const NOT_GENERATED: [&str; 14] = [
-        "Call", "Duration", "Some", "Handlers", "Option", "Bytes", "changed", "raise_after", "raw",
-        "default", "into", "relay", "and_version", "new",
+        "Call",
+        "Duration",
+        "Some",
+        "Handlers",
+        "Option",
+        "Bytes",
+        "changed",
+        "raise_after",
+        "raw",
+        "default",
+        "into",
+        "relay",
+        "and_version",
+        "new",
     ];
-    let code = snippet.lines().map(|line| line.split("//").next().unwrap_or(line));
+    let code = snippet
+        .lines()
+        .map(|line| line.split("//").next().unwrap_or(line));
     let words = code.flat_map(|line| {
         let outside_text = line.split('"').step_by(2);
         outside_text.flat_map(|it| it.split(|c: char| !c.is_alphanumeric() && c != '_'))

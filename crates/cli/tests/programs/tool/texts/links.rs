@@ -49,8 +49,9 @@ fn every_link_between_texts_leads_to_a_file_and_a_heading() {
                 "" => text.path.clone(),
                 file => text.path.parent().unwrap().join(file),
             };
-            let has_heading =
-                || fs::read_to_string(&target).is_ok_and(|it| fragments(&prose(&it)).contains(heading));
+            let has_heading = || {
+                fs::read_to_string(&target).is_ok_and(|it| fragments(&prose(&it)).contains(heading))
+            };
             if !target.exists() || !heading.is_empty() && !has_heading() {
                 broken.push(format!("{}: {link}", text.name()));
             }

@@ -34,7 +34,11 @@ struct Text {
 impl Text {
     /// The file's name with the folder, such as `docs/safety.md`.
     fn name(&self) -> String {
-        self.path.strip_prefix(root()).unwrap().display().to_string()
+        self.path
+            .strip_prefix(root())
+            .unwrap()
+            .display()
+            .to_string()
     }
 }
 

@@ -47,7 +47,9 @@ fn parts(session: &str) -> Vec<(&str, Vec<&str>)> {
 fn every_session_prints_what_is_shown() {
     let mut with_sessions = Vec::new();
     for text in texts() {
-        let sessions = blocks(&text.content).into_iter().filter(|it| it.info == "console");
+        let sessions = blocks(&text.content)
+            .into_iter()
+            .filter(|it| it.info == "console");
         for session in sessions {
             with_sessions.push(text.name());
             if !TUTORIALS.contains(&text.name().as_str()) {
@@ -56,7 +58,10 @@ fn every_session_prints_what_is_shown() {
         }
     }
     for name in TUTORIALS.iter().chain(&["README.md", "docs/jsidl.md"]) {
-        assert!(with_sessions.iter().any(|it| it == name), "no session in {name}");
+        assert!(
+            with_sessions.iter().any(|it| it == name),
+            "no session in {name}"
+        );
     }
 }
 
@@ -103,9 +108,22 @@ fn run(session: &Block, place: &str) {
 #[test]
 fn the_readme_discovers_drives_stops_and_records_a_vehicle() {
     let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
-    let sessions = blocks(&readme).into_iter().filter(|it| it.info == "console");
+    let sessions = blocks(&readme)
+        .into_iter()
+        .filter(|it| it.info == "console");
     let shown: String = sessions.map(|it| it.content).collect();
-    for command in ["vehicle", "record", "discover", "send", "subscribe", "control", "watch"] {
-        assert!(shown.contains(&format!("{PROMPT}jaus {command} ")), "no {command}");
+    for command in [
+        "vehicle",
+        "record",
+        "discover",
+        "send",
+        "subscribe",
+        "control",
+        "watch",
+    ] {
+        assert!(
+            shown.contains(&format!("{PROMPT}jaus {command} ")),
+            "no {command}"
+        );
     }
 }
