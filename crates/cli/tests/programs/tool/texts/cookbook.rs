@@ -82,36 +82,29 @@ fn compiled(folder: &Path, name: &str) -> String {
     std::fs::read_to_string(output.join("messages.rs")).unwrap()
 }
 
-/// The names in a snippet that the compiler must have generated: types, their constants and fields,
-/// and methods on messages. Those of the library and of the reader's own code are left out.
+/// The names in a snippet that the compiler must have generated: types with their constants, and
+/// fields and methods of several words. Those of the library and of the reader are left out.
 fn generated_names(snippet: &str) -> impl Iterator<Item = &str> {
-    const NOT_GENERATED: [&str; 14] = [
+    const OTHERS: [&str; 9] = [
         "Call",
         "Duration",
         "Some",
         "Handlers",
         "Option",
         "Bytes",
-        "changed",
         "raise_after",
-        "raw",
-        "default",
-        "into",
-        "relay",
         "and_version",
-        "new",
+        "from_secs",
     ];
     let code = snippet
         .lines()
         .map(|line| line.split("//").next().unwrap_or(line));
-    let words = code.flat_map(|line| {
-        let outside_text = line.split('"').step_by(2);
-        outside_text.flat_map(|it| it.split(|c: char| !c.is_alphanumeric() && c != '_'))
-    });
+    let outside_strings = code.flat_map(|line| line.split('"').step_by(2));
+    let words = outside_strings.flat_map(|it| it.split(|c: char| !c.is_alphanumeric() && c != '_'));
     words.filter(|word| {
-        let is_type = word.starts_with(|c: char| c.is_ascii_uppercase()) && word.len() > 1;
+        let is_type = word.starts_with(|c: char| c.is_ascii_uppercase());
         let is_method = word.contains('_') && word.len() > 1;
-        let is_own = word.starts_with("My") || matches!(*word, "switch_off" | "from_secs");
-        (is_type || is_method) && !is_own && !NOT_GENERATED.contains(word)
+        let is_of_the_reader = word.starts_with("My") || *word == "switch_off";
+        (is_type || is_method) && !is_of_the_reader && !OTHERS.contains(word)
     })
 }
