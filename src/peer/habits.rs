@@ -2,6 +2,8 @@
 
 use super::Peer;
 use crate::address::JausId;
+use crate::codec::Message;
+use crate::messages::core::UpdateEvent;
 
 /// How a sender cuts large messages for AS5669A.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -83,6 +85,12 @@ impl Peer {
     #[must_use]
     pub const fn reads_zero_as_wildcard(self) -> bool {
         matches!(self, Self::Iop | Self::Jts)
+    }
+
+    /// Whether its process ends when it receives a message with this code.
+    #[must_use]
+    pub const fn crashes_on(self, code: u16) -> bool {
+        matches!(self, Self::JausPlusPlus) && code == UpdateEvent::CODE
     }
 
     /// Whether answers on the TCP connections that it opened are lost, so that answers must go by

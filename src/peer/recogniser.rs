@@ -52,7 +52,8 @@ pub struct Verdict {
     /// How certain that is. An uncertain result changes how a peer is treated only where a wrong
     /// guess does little harm.
     pub certainty: Certainty,
-    /// All observed signs, including those that point to other peers.
+    /// All observed signs, including those that point to other peers, and those that are no
+    /// evidence by themselves.
     pub reasons: Vec<Sign>,
 }
 
@@ -181,18 +182,17 @@ impl Recogniser {
     }
 
     /// The peer recognised with certainty; otherwise a presumption, for uses where a wrong guess
-    /// does little harm. A peer is presumed to be Junior if it begins with number 1, and then calls
-    /// an unknown id or sends fragments of Junior's length. A node of ours may do either of the
-    /// latter, but does not begin with 1.
+    /// does little harm. A peer is presumed to be Junior if that is likely: it begins with number
+    /// 1, and then calls an unknown id or sends fragments of Junior's length. A peer that shows no
+    /// other evidence, but offers services of the interoperability profiles, is presumed to follow
+    /// them in all.
     #[must_use]
     pub fn presumed(&self) -> Peer {
-        let has = |sign| self.signs.has(sign);
-        let is_like_junior =
-            has(Sign::BeginsWithOne) && (has(Sign::CallsUnknownIds) || has(Sign::LongFragments));
-        if self.certain == Peer::Standard && is_like_junior && self.best().0 == Peer::Junior {
-            Peer::Junior
-        } else {
-            self.certain
+        match self.best() {
+            _ if self.certain != Peer::Standard => self.certain,
+            (Peer::Junior, Certainty::Likely) => Peer::Junior,
+            (Peer::Standard, _) if self.signs.has(Sign::IopService) => Peer::Iop,
+            _ => Peer::Standard,
         }
     }
 

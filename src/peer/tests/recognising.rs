@@ -118,20 +118,22 @@ fn stale_octets_make_jauspp_likely_and_a_registration_from_elsewhere_makes_it_ce
 
 #[test]
 fn services_tell_jauspp_and_the_profiles() {
-    let verdict = |services: &[(&str, u8, u8)]| {
+    let after = |services: &[(&str, u8, u8)]| {
         let mut recogniser = Recogniser::default();
         recogniser.handle_services(services.iter().copied());
-        recogniser.certain()
+        recogniser
     };
-    assert_eq!(
-        verdict(&[("urn:jaus:jss:jpp:extras:Video", 1, 0)]),
-        Peer::JausPlusPlus
-    );
-    assert_eq!(verdict(&[("urn:jaus:jss:iop:CostMap2D", 1, 1)]), Peer::Iop);
-    assert_eq!(
-        verdict(&[("urn:jaus:jss:core:Events", 1, 0)]),
-        Peer::Standard
-    );
+    let of_jauspp = after(&[("urn:jaus:jss:jpp:extras:Video", 1, 0)]);
+    assert_eq!(of_jauspp.certain(), Peer::JausPlusPlus);
+    // Anybody may offer these, for instance our own vehicle.
+    let mut of_profile = after(&[("urn:jaus:jss:iop:CostMap2D", 1, 1)]);
+    assert_eq!(of_profile.verdict().certainty, Certainty::Unknown);
+    assert_eq!(of_profile.presumed(), Peer::Iop, "a 0 of it means all");
+    of_profile.note(Sign::ZeroInDestination);
+    assert_eq!(of_profile.certain(), Peer::Iop);
+    let of_core = after(&[("urn:jaus:jss:core:Events", 1, 0)]);
+    assert_eq!(of_core.certain(), Peer::Standard);
+    assert_eq!(of_core.presumed(), Peer::Standard);
 }
 
 #[test]
@@ -163,7 +165,7 @@ fn junior_is_likely_by_its_first_call_and_certain_by_its_fault() {
     };
     assert_eq!(
         after([&ours]).certainty,
-        Certainty::Guess,
+        Certainty::Unknown,
         "we call like that too"
     );
     let fault = Frame {
@@ -223,6 +225,60 @@ fn the_judging_tool_is_told_by_how_it_counts_and_whom_it_asks() {
         Certainty::Unknown,
         "one counter for all"
     );
+}
+
+#[test]
+fn a_node_of_ours_is_not_taken_for_another_implementation() {
+    let node = US.whole_node();
+    let to_all = |destination, number| Frame {
+        flags: Flags::default().with_broadcast(Broadcast::Global),
+        ..to(destination, number)
+    };
+    let whole_nodes = [to_all(node, 31_361), to_all(node, 31_362)];
+    let long = Frame {
+        flags: Flags::default().with_data(DataControl::First),
+        payload: vec![1; 4079].into(),
+        ..frame(31_362, b"")
+    };
+    let call = Frame {
+        flags: Flags::default()
+            .with_broadcast(Broadcast::Global)
+            .with_acknowledgement(Acknowledgement::Request),
+        ..frame(31_363, QUERY)
+    };
+    for frames in [&whole_nodes[..], &[long, call]] {
+        let verdict = after(frames);
+        assert!(!verdict.reasons.is_empty(), "the test shows no sign");
+        assert_eq!(
+            (verdict.peer, verdict.certainty),
+            (Peer::Standard, Certainty::Unknown),
+            "{:?}",
+            verdict.reasons
+        );
+    }
+}
+
+#[test]
+fn messages_out_of_order_are_no_count_per_destination() {
+    let other = JausId::new(101, 1, 2);
+    let retransmitted = [
+        (US, 500),
+        (other, 501),
+        (US, 502),
+        (other, 501),
+        (US, 503),
+        (other, 501),
+        (US, 504),
+    ];
+    let early = [(US, 500), (other, 502), (US, 501), (other, 504), (US, 502)];
+    let late = [(US, 501), (other, 500), (US, 502), (other, 498), (US, 503)];
+    for order in [&retransmitted[..], &early, &late] {
+        let frames: Vec<_> = order.iter().map(|&(id, number)| to(id, number)).collect();
+        assert_eq!(after(&frames), Verdict::default(), "{order:?}");
+    }
+    let far = [(US, 500), (other, 9), (US, 501), (other, 10), (US, 502)];
+    let frames: Vec<_> = far.iter().map(|&(id, number)| to(id, number)).collect();
+    assert_eq!(after(&frames).reasons, [Sign::NumbersByDestination]);
 }
 
 #[test]
