@@ -89,8 +89,8 @@ pub fn say(words: impl Display) {
 
 /// The same, for a program other than `jaus`.
 pub fn say_as(program: &str, words: impl Display) {
-    let words = harmless(&words.to_string());
-    let _ = writeln!(io::stderr().lock(), "{program}: {words}");
+    let words = words.to_string();
+    let _ = writeln!(io::stderr().lock(), "{program}: {}", harmless(&words));
 }
 
 /// Escapes characters that disturb a terminal as in JSON, so that JSON stays the same value; except
