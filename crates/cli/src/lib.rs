@@ -11,7 +11,6 @@
 pub mod failure;
 mod fence;
 mod identity;
-pub mod junit;
 mod launch;
 pub mod logging;
 pub mod network;

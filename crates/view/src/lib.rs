@@ -13,6 +13,7 @@ mod definition;
 mod dictionary;
 mod hex;
 mod journal;
+pub mod junit;
 mod large;
 mod line;
 mod log;

@@ -1,6 +1,6 @@
 //! Writes the run as JUnit XML: a suite per form, a case per step.
 
-use jaus_cli::junit::{self, Case, CaseResult, Suite};
+use jaus_view::junit::{self, Case, CaseResult, Suite};
 
 use super::report::Report;
 use super::step::Form;
@@ -31,7 +31,7 @@ fn case(report: &Report<'_>, subject: &Subject, result: &StepResult) -> Case {
         class: format!("jaus.judge.{}.{}", subject.id, result.form.name()),
         took: result.took,
         result: match &result.verdict {
-            Verdict::Passed => CaseResult::Passed,
+            Verdict::Passed => CaseResult::Passed(None),
             Verdict::Skipped(reason) => CaseResult::Skipped(reason.clone()),
             Verdict::Failed(reason) => CaseResult::Failed {
                 reason: reason.clone(),

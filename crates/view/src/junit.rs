@@ -1,4 +1,4 @@
-//! Writes results as JUnit XML for build servers.
+//! Results of tests as JUnit XML, for build servers.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -28,15 +28,15 @@ pub struct Case {
 /// Result of a test case.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CaseResult {
-    /// Passed.
-    Passed,
+    /// Passed, with what was observed, if that is of interest.
+    Passed(Option<String>),
     /// Skipped, for this reason.
     Skipped(String),
     /// Failed.
     Failed {
         /// The reason, in one line.
         reason: String,
-        /// The proceedings, in any number of lines.
+        /// The proceedings, in any number of lines; may be empty.
         details: String,
     },
 }
@@ -69,8 +69,14 @@ fn case(xml: &mut String, case: &Case) {
     let took = seconds(case.took);
     let open = format!("<testcase name=\"{name}\" classname=\"{class}\" time=\"{took}\"");
     let inside = match &case.result {
-        CaseResult::Passed => return element(xml, 2, &format!("{open}/>")),
+        CaseResult::Passed(None) => return element(xml, 2, &format!("{open}/>")),
+        CaseResult::Passed(Some(observed)) => {
+            format!("<system-out>{}</system-out>", escaped(observed))
+        }
         CaseResult::Skipped(reason) => format!("<skipped message=\"{}\"/>", escaped(reason)),
+        CaseResult::Failed { reason, details } if details.is_empty() => {
+            format!("<failure message=\"{}\"/>", escaped(reason))
+        }
         CaseResult::Failed { reason, details } => format!(
             "<failure message=\"{}\">{}</failure>",
             escaped(reason),
@@ -89,7 +95,7 @@ fn counts<'c>(cases: impl IntoIterator<Item = &'c Case>) -> String {
         all += 1;
         took += case.took;
         match case.result {
-            CaseResult::Passed => {}
+            CaseResult::Passed(_) => {}
             CaseResult::Skipped(_) => skipped += 1,
             CaseResult::Failed { .. } => failed += 1,
         }
@@ -110,7 +116,8 @@ fn element(xml: &mut String, depth: usize, text: &str) {
 }
 
 /// Escapes text for XML: peers choose their names, and XML forbids most control characters.
-fn escaped(text: &str) -> String {
+#[must_use]
+pub fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {
@@ -151,7 +158,7 @@ mod tests {
         let suite = Suite {
             name: "one".into(),
             cases: vec![
-                case(CaseResult::Passed),
+                case(CaseResult::Passed(Some("5 > 4 Hz".into()))),
                 case(CaseResult::Skipped("not offered".into())),
                 case(CaseResult::Failed {
                     reason: "silence".into(),
@@ -171,5 +178,6 @@ mod tests {
         );
         assert!(xml.contains("<failure message=\"silence\">asked &gt; heard nothing</failure>"));
         assert!(xml.contains("<skipped message=\"not offered\"/>"));
+        assert!(xml.contains("<system-out>5 &gt; 4 Hz</system-out>"));
     }
 }
