@@ -23,6 +23,8 @@ pub(super) struct Settings {
     pub(super) target: Target,
     /// Our own id.
     pub(super) own: JausId,
+    /// The sequence number before our first. A peer may take a node that begins with 1 for Junior.
+    pub(super) last_number: u16,
     /// The intended id of our node, if one is chosen.
     pub(super) wanted: Option<JausId>,
     /// Our port.
@@ -132,6 +134,8 @@ pub(super) struct Case {
     pub(super) reserved: Reserved,
     /// Whether a program there echoes messages without effect.
     pub(super) echoes: bool,
+    /// Whether it has not answered in time, so that the cause is searched for.
+    pub(super) is_silent: bool,
     pub(super) unsent: VecDeque<Send>,
     sequence: u16,
 }
@@ -141,6 +145,7 @@ impl Case {
         Self {
             address: settings.target.address(),
             id: settings.target.id,
+            sequence: settings.last_number,
             settings,
             link: None,
             seen: Seen::default(),
@@ -153,8 +158,8 @@ impl Case {
             transfer: None,
             reserved: Reserved::default(),
             echoes: false,
+            is_silent: false,
             unsent: VecDeque::new(),
-            sequence: 0,
         }
     }
 

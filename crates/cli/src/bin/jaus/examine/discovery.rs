@@ -38,7 +38,8 @@ pub(super) fn identified(case: &mut Case, mark: usize) -> Judgement {
         Type::OTHER_SUBSYSTEM => "another subsystem".to_owned(),
         other => format!("of type {}", other.0),
     };
-    let verdict = Verdict::ok(format!("\"{name}\", {kind}"));
+    // Quoted, so that control characters are escaped.
+    let verdict = Verdict::ok(format!("{name:?}, {kind}"));
     case.name = Some(name);
     Judgement::Over(verdict)
 }
@@ -96,18 +97,29 @@ pub(super) fn multicast(case: &mut Case) -> Begin {
     if let Some(why) = &case.settings.no_group {
         return Begin::Over(Verdict::skipped(format!("no multicast here: {why}")));
     }
+    Begin::Ask(Question::silence(LATE))
+}
+
+/// Timeout of answers to earlier queries, which are the same as those to the multicast.
+const LATE: Duration = Duration::from_millis(250);
+
+/// After the silence: queries by multicast.
+pub(super) fn ask_by_multicast(case: &mut Case) -> Question {
     let mut sends = vec![case.ask_everybody(&query_identification())];
     if !case.went_well(Exchange::Identification) {
         sends.extend(case.call_alone());
     }
-    Begin::Ask(Question {
+    Question {
         sends,
         again: Some(Duration::from_millis(700)),
         patience: Duration::from_secs(2),
-    })
+    }
 }
 
-pub(super) fn multicast_answered(case: &mut Case, mark: usize) -> Judgement {
+pub(super) fn multicast_answered(case: &mut Case, mark: usize, stage: u8) -> Judgement {
+    if stage == 0 {
+        return Judgement::Wait;
+    }
     // Any component of its node may answer for all.
     let (own, id) = (case.settings.own, case.id);
     let answers = |heard: &&Heard| {

@@ -22,6 +22,7 @@ fn settings(target: &str) -> Settings {
     Settings {
         target: target.parse().unwrap(),
         own: OWN,
+        last_number: 0,
         wanted: None,
         port: 3794,
         no_group: None,
@@ -129,6 +130,38 @@ fn a_silent_host_and_a_closed_port_are_told_apart() {
         check("closed", settings("10.0.0.2"), &mut closed),
         Outcome::Incomplete
     );
+}
+
+#[test]
+fn a_program_that_holds_its_port_and_reads_nothing_is_said_to_hang() {
+    let mut hung = Silent {
+        hangs: true,
+        ..Silent::default()
+    };
+    let outcome = check("hung", settings("10.0.0.2"), &mut hung);
+    assert_eq!(outcome, Outcome::Incomplete);
+}
+
+#[test]
+fn a_peer_that_moved_is_named_with_its_new_address_whether_or_not_its_id_is_given() {
+    for (target, told) in [
+        (
+            "10.0.0.9",
+            "use its address: jaus examine 77.1.1@10.0.0.2:3794",
+        ),
+        (
+            "77.1.1@10.0.0.9",
+            "use that: jaus examine 77.1.1@10.0.0.2:3794",
+        ),
+    ] {
+        let mut peer = Vehicle::sound();
+        // It sends nothing by itself.
+        peer.calls = false;
+        let (text, outcome) = words(settings(target), &mut peer);
+        assert_eq!(outcome, Outcome::Incomplete);
+        assert!(text.contains(told), "{text}");
+        assert!(text.contains("the peer has another address"), "{text}");
+    }
 }
 
 #[test]
@@ -288,6 +321,15 @@ fn each_exchange_that_fails_is_the_first_to_be_named() {
         told.push('\n');
     }
     check_text("failures", &told);
+}
+
+#[test]
+fn a_name_cannot_forge_a_line_of_the_report() {
+    let mut peer = Vehicle::sound();
+    peer.name = "Mule\u{1b}[2J\nfailed\u{202e}";
+    let (text, _) = printed(settings("10.0.0.2"), &mut peer);
+    let told = r#"identification     "Mule\u{1b}[2J\nfailed\u{202e}", a vehicle"#;
+    assert!(text.contains(told), "{text}");
 }
 
 #[test]
