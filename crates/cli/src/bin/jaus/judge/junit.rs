@@ -32,7 +32,9 @@ fn case(report: &Report<'_>, subject: &Subject, result: &StepResult) -> Case {
         took: result.took,
         result: match &result.verdict {
             Verdict::Passed => CaseResult::Passed(None),
-            Verdict::Skipped(reason) => CaseResult::Skipped(reason.clone()),
+            Verdict::Skipped(reason) | Verdict::LeftOut(reason) => {
+                CaseResult::Skipped(reason.clone())
+            }
             Verdict::Failed(reason) => CaseResult::Failed {
                 reason: reason.clone(),
                 details: report.step(result, true).join("\n"),

@@ -1,6 +1,7 @@
 //! `jaus judge` against correct, faulty, slow and silent peers.
 
 mod examples;
+mod hazard;
 mod outputs;
 mod peer;
 mod replay;
