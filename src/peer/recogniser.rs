@@ -183,15 +183,17 @@ impl Recogniser {
 
     /// The peer recognised with certainty; otherwise a presumption, for uses where a wrong guess
     /// does little harm. A peer is presumed to be Junior if that is likely: it begins with number
-    /// 1, and then calls an unknown id or sends fragments of Junior's length. A peer that shows no
-    /// other evidence, but offers services of the interoperability profiles, is presumed to follow
-    /// them in all.
+    /// 1, and then calls an unknown id or sends fragments of Junior's length. A peer of which
+    /// nothing else is likely, but that offers services of the interoperability profiles, is
+    /// presumed to follow them in all.
     #[must_use]
     pub fn presumed(&self) -> Peer {
         match self.best() {
             _ if self.certain != Peer::Standard => self.certain,
             (Peer::Junior, Certainty::Likely) => Peer::Junior,
-            (Peer::Standard, _) if self.signs.has(Sign::IopService) => Peer::Iop,
+            (_, Certainty::Unknown | Certainty::Guess) if self.signs.has(Sign::IopService) => {
+                Peer::Iop
+            }
             _ => Peer::Standard,
         }
     }

@@ -21,17 +21,18 @@ pub(super) fn findings(heard: &Heard) -> Vec<Finding> {
         return vec![alone(heard)];
     }
     let here = interface::list().unwrap_or_default();
-    let (mut findings, mut others) = (Vec::new(), Vec::new());
+    let (mut warnings, mut others) = (Vec::new(), Vec::new());
     for peer in &heard.peers {
         match out_of_reach(heard, peer, &here) {
-            Some(warning) => findings.push(warning),
-            None => others.push(peer),
+            Some(warning) => warnings.push(warning),
+            None => others.push(present(heard, peer)),
         }
     }
     // Warnings first, so that a large fleet does not hide them.
+    let mut findings: Vec<Finding> = warnings.into_iter().chain(others).collect();
+    let more = findings.len().saturating_sub(MOST);
     findings.truncate(MOST);
-    findings.extend(others.iter().take(MOST).map(|peer| present(heard, peer)));
-    if let Some(more) = others.len().checked_sub(MOST).filter(|&more| more > 0) {
+    if more > 0 {
         let words = format!("{more} more were found; `jaus discover` lists them");
         findings.push(Finding::ok(CHECK, words));
     }
