@@ -125,7 +125,7 @@ fn services_tell_jauspp_and_the_profiles() {
     };
     let of_jauspp = after(&[("urn:jaus:jss:jpp:extras:Video", 1, 0)]);
     assert_eq!(of_jauspp.certain(), Peer::JausPlusPlus);
-    // Anybody may offer these, for instance our own vehicle.
+    // Any peer may offer these, for instance our own vehicle.
     let mut of_profile = after(&[("urn:jaus:jss:iop:CostMap2D", 1, 1)]);
     assert_eq!(of_profile.verdict().certainty, Certainty::Unknown);
     assert_eq!(of_profile.presumed(), Peer::Iop, "a 0 of it means all");

@@ -136,6 +136,8 @@ pub(super) struct Case {
     pub(super) echoes: bool,
     /// Whether it has not answered in time, so that the cause is searched for.
     pub(super) is_silent: bool,
+    /// Whether it was queried by multicast.
+    pub(super) multicast_asked: bool,
     pub(super) unsent: VecDeque<Send>,
     sequence: u16,
 }
@@ -159,6 +161,7 @@ impl Case {
             reserved: Reserved::default(),
             echoes: false,
             is_silent: false,
+            multicast_asked: false,
             unsent: VecDeque::new(),
         }
     }

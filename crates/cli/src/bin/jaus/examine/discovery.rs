@@ -97,14 +97,21 @@ pub(super) fn multicast(case: &mut Case) -> Begin {
     if let Some(why) = &case.settings.no_group {
         return Begin::Over(Verdict::skipped(format!("no multicast here: {why}")));
     }
-    Begin::Ask(Question::silence(LATE))
+    // An answer to an earlier query looks like one to the multicast, so it must have arrived. "any
+    // answer" and "identification" have sent a query each.
+    let answers = case.reports::<ReportIdentification>(0).count();
+    if case.went_well(Exchange::Identification) && answers < 2 {
+        return Begin::Ask(Question::silence(LATE));
+    }
+    Begin::Ask(ask_by_multicast(case))
 }
 
-/// Timeout of answers to earlier queries, which are the same as those to the multicast.
+/// Timeout of an answer to an earlier query.
 const LATE: Duration = Duration::from_millis(250);
 
-/// After the silence: queries by multicast.
+/// The query by multicast.
 pub(super) fn ask_by_multicast(case: &mut Case) -> Question {
+    case.multicast_asked = true;
     let mut sends = vec![case.ask_everybody(&query_identification())];
     if !case.went_well(Exchange::Identification) {
         sends.extend(case.call_alone());
@@ -116,8 +123,8 @@ pub(super) fn ask_by_multicast(case: &mut Case) -> Question {
     }
 }
 
-pub(super) fn multicast_answered(case: &mut Case, mark: usize, stage: u8) -> Judgement {
-    if stage == 0 {
+pub(super) fn multicast_answered(case: &mut Case, mark: usize) -> Judgement {
+    if !case.multicast_asked {
         return Judgement::Wait;
     }
     // Any component of its node may answer for all.

@@ -247,7 +247,7 @@ fn judge(exchange: Exchange, case: &mut Case, mark: usize, stage: u8, now: Durat
         Exchange::Framing => ra::named(case),
         Exchange::SourcePort => reach::asked_at_its_source(case, mark),
         Exchange::Identification => discovery::identified(case, mark),
-        Exchange::Multicast => discovery::multicast_answered(case, mark, stage),
+        Exchange::Multicast => discovery::multicast_answered(case, mark),
         Exchange::MulticastBack => discovery::heard_by_multicast(case),
         Exchange::Heartbeat => standing::beats(case, mark),
         Exchange::Acknowledgement => standing::acknowledged(case, mark),
@@ -276,7 +276,7 @@ fn judge(exchange: Exchange, case: &mut Case, mark: usize, stage: u8, now: Durat
 fn at_the_end(exchange: Exchange, case: &mut Case, mark: usize, stage: u8) -> Judgement {
     Judgement::Over(match exchange {
         Exchange::Answer => return silence::unanswered(case),
-        Exchange::Multicast if stage == 0 => {
+        Exchange::Multicast if !case.multicast_asked => {
             return Judgement::Ask(discovery::ask_by_multicast(case));
         }
         Exchange::Find => reach::not_found(case),

@@ -95,7 +95,7 @@ impl Profile {
         match verdict.certainty {
             Certainty::Unknown => {
                 lines.push("none: it looks like a peer that conforms to the standard".to_owned());
-                lines.extend(reasons.map(|reason| format!("although {reason}, which alone is no evidence")));
+                lines.extend(reasons.map(|reason| format!("although {reason}: no evidence alone")));
                 return lines;
             }
             Certainty::Guess => {
