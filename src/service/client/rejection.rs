@@ -65,7 +65,8 @@ impl fmt::Display for Rejection {
             write!(f, " (code {code})")?;
         }
         match &self.text {
-            Some(text) => write!(f, ": \"{text}\""),
+            // Escaped: it comes from the peer.
+            Some(text) => write!(f, ": {text:?}"),
             None => Ok(()),
         }
     }
@@ -95,6 +96,20 @@ mod tests {
     fn a_code_that_the_presence_vector_does_not_tell_of_is_one_too_low() {
         let (request, reason) = read(&[0xF4, 0x01, 0, 9, 4]);
         assert_eq!((request, reason.code), (9, Some(5)));
+    }
+
+    #[test]
+    fn a_peers_text_is_shown_on_one_line_without_control_characters() {
+        let text = b"\x1b[2Jno\r\nfake \xe2\x80\xae";
+        let mut octets = vec![0xF4, 0x01, 3, 9, 5];
+        octets.push(text.len() as u8);
+        octets.extend_from_slice(text);
+        let (_, reason) = Rejection::read(&octets.into()).expect("a rejection");
+        let shown = reason.to_string();
+        assert!(
+            shown.ends_with(r#": "\u{1b}[2Jno\r\nfake \u{202e}""#),
+            "{shown}"
+        );
     }
 
     #[test]

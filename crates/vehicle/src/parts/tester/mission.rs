@@ -152,7 +152,7 @@ impl<T: FnMut(&Step)> Running<'_, T> {
             let maps: Vec<_> = maps
                 .map(|map| {
                     format!(
-                        "\"{}\" {} x {}",
+                        "{:?} {} x {}",
                         map.name.to_string_lossy(),
                         map.rows,
                         map.columns
@@ -279,14 +279,14 @@ impl<'a> Reports<'a> {
                 }
                 if last.stage > Stage::ARRIVED {
                     return Err(format!(
-                        "{}: {}",
+                        "{}: {:?}",
                         name(last.stage),
                         last.reason.to_string_lossy()
                     ));
                 }
                 if now() > deadline {
                     return Err(format!(
-                        "still {} after {} s {}",
+                        "still {} after {} s {:?}",
                         name(last.stage),
                         limit.as_secs(),
                         last.reason.to_string_lossy()
