@@ -70,12 +70,14 @@ impl Station {
         let address = listener
             .local_addr()
             .map_err(|error| PartError::Broken(error.to_string()))?;
-        if self.token.is_none() && !address.ip().is_loopback() {
-            let made_up = Token::generate();
-            self.token = Some(made_up.map_err(|error| PartError::Broken(error.to_string()))?);
+        let generates_token = self.token.is_none() && !address.ip().is_loopback();
+        if generates_token {
+            let generated = Token::generate();
+            self.token = Some(generated.map_err(|error| PartError::Broken(error.to_string()))?);
         }
         Ok(OpenStation {
             station: self,
+            generates_token,
             listener,
             address,
         })
@@ -86,6 +88,8 @@ impl Station {
 #[derive(Debug)]
 pub struct OpenStation {
     station: Station,
+    /// Whether the token was generated at this start.
+    generates_token: bool,
     listener: TcpListener,
     address: SocketAddr,
 }
@@ -97,11 +101,25 @@ impl OpenStation {
         self.address
     }
 
-    /// URLs of the page, including the token if one is needed, for the user who starts the station.
+    /// URLs of the page, without a token.
     #[must_use]
     pub fn urls(&self) -> Vec<String> {
-        let token = self.station.token.as_ref();
-        let token = token.map_or_else(String::new, |it| format!("#token={}", it.reveal()));
+        self.urls_with("")
+    }
+
+    /// URLs of the page with the token that was generated at this start; none if the token came from
+    /// the caller. They are for the user who starts the station, not for a log.
+    #[must_use]
+    pub fn secret_urls(&self) -> Vec<String> {
+        match &self.station.token {
+            Some(token) if self.generates_token => {
+                self.urls_with(&format!("#token={}", token.reveal()))
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn urls_with(&self, token: &str) -> Vec<String> {
         let port = self.address.port();
         let url = |ip: IpAddr| format!("http://{}/{token}", SocketAddr::new(ip, port));
         if self.address.ip().is_unspecified() {
@@ -124,9 +142,7 @@ impl Part for OpenStation {
             tracing::info!("the operator's page is at {url}");
         }
         let Self {
-            station,
-            listener,
-            address: _,
+            station, listener, ..
         } = self;
         let node = slot.node.clone();
         let component = slot.component("Operator").live_on(slot.port)?;

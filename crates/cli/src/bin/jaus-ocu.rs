@@ -1,5 +1,7 @@
 //! `jaus-ocu`: the operator's station and its page.
 
+use std::convert::Infallible;
+use std::io::{self, IsTerminal};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -7,9 +9,10 @@ use std::process::ExitCode;
 use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
+use jaus_cli::output::Output;
 use jaus_cli::{Failure, Ready, launch};
 use jaus_ocu::{Listen, Station, Token};
-use jaus_vehicle::parts::Part;
+use jaus_vehicle::parts::{Part, PartError, Slot};
 
 #[derive(Args)]
 struct Flags {
@@ -27,8 +30,8 @@ struct Flags {
     #[arg(long, value_name = "ADDRESS")]
     listen: Option<SocketAddr>,
 
-    /// Read the token from this one-line file and require it on the loopback interface too
-    /// [default: a generated token, printed if one is needed]
+    /// Read the token from this one-line file and require it on the loopback interface too; it is
+    /// never printed [default: a generated token, printed on standard output if one is needed]
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
 
@@ -65,14 +68,46 @@ impl Ready for Flags {
                  a file that holds one",
             ));
         }
-        Ok(Station {
+        Ok(Announced(Station {
             vehicles: self.vehicle,
             authority: self.authority,
             listen,
             token,
             token_to_read: self.token_to_read,
             hosts: self.host,
-        })
+        }))
+    }
+}
+
+/// A station that prints a generated token.
+struct Announced(Station);
+
+impl Part for Announced {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
+        let station = self.0.open().await?;
+        announce(&station.secret_urls());
+        station.run(slot).await
+    }
+}
+
+/// Environment variable of systemd: the output goes to its journal.
+const JOURNAL: &str = "JOURNAL_STREAM";
+
+/// Prints the addresses with the token, unless the output is a log.
+fn announce(secret_urls: &[String]) {
+    if secret_urls.is_empty() {
+        return;
+    }
+    if std::env::var_os(JOURNAL).is_some() && !io::stdout().is_terminal() {
+        tracing::warn!(
+            "the generated token is not written to the journal: choose one with --token-file"
+        );
+        return;
+    }
+    let mut output = Output::new();
+    for url in secret_urls {
+        // A closed standard output does not stop the station.
+        let _ = output.line(format_args!("to control vehicles, open {url}"));
     }
 }
 

@@ -26,8 +26,14 @@ struct Program {
 
 impl Program {
     fn start(flags: &[&str], environment: &[(&str, &str)]) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_jaus-primitive-driver"));
+        let driver = env!("CARGO_BIN_EXE_jaus-primitive-driver");
+        Self::start_as(driver, flags, environment)
+    }
+
+    fn start_as(program: &str, flags: &[&str], environment: &[(&str, &str)]) -> Self {
+        let mut command = Command::new(program);
         command.arg("--loopback").args(flags).stderr(Stdio::piped());
+        command.stdout(Stdio::piped());
         command.env_remove("JAUS_LOG");
         command.envs(environment.iter().copied());
         let mut child = command.spawn().unwrap();
@@ -47,14 +53,24 @@ impl Program {
         assert!(sent.unwrap().success());
     }
 
-    /// Waits for a line with this text.
-    fn says(&self, text: &str) {
+    /// Waits for a line with this text, and returns all lines up to it.
+    fn says(&self, text: &str) -> String {
+        let mut said = String::new();
         while let Ok(line) = self.lines.recv_timeout(LIMIT) {
-            if line.contains(text) {
-                return;
+            said += &(line + "\n");
+            if said.contains(text) {
+                return said;
             }
         }
-        panic!("it does not say \"{text}\"");
+        panic!("it does not say \"{text}\": {said}");
+    }
+
+    /// The first line of its standard output, or all of it if that has no line.
+    fn prints(&mut self) -> String {
+        let mut line = String::new();
+        let output = self.child.stdout.take().unwrap();
+        BufReader::new(output).read_line(&mut line).unwrap();
+        line
     }
 }
 
@@ -135,6 +151,44 @@ async fn emergencies_and_the_stop_input_are_logged_without_a_flag() {
     program.signal("TERM");
     let mut program = program;
     assert!(program.child.wait().unwrap().success());
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn the_operators_token_is_never_logged_and_printed_only_if_it_was_generated() {
+    const TOKEN: &str = "0123456789abcdef-of-the-file";
+    let directory = scratch("token");
+    let file = directory.join("token");
+    std::fs::write(&file, TOKEN).unwrap();
+    let group = group_flag(own_group());
+    let station = env!("CARGO_BIN_EXE_jaus-ocu");
+    let flags = ["--group", &group, "--listen"];
+    let from_file = ["127.0.0.1:0", "--token-file", file.to_str().unwrap()];
+    let flags_of = |more: &[&str]| -> Vec<String> {
+        flags.iter().chain(more).map(|&it| it.to_owned()).collect()
+    };
+    for (more, generates) in [(&from_file[..], false), (&["0.0.0.0:0"][..], true)] {
+        let flags = flags_of(more);
+        let flags: Vec<_> = flags.iter().map(String::as_str).collect();
+        let mut program = Program::start_as(station, &flags, &[]);
+        let said = program.says("the operator's page is at http://");
+        assert!(!said.contains(TOKEN) && !said.contains("token="), "{said}");
+        if generates {
+            let printed = program.prints();
+            assert!(printed.contains("/#token="), "{printed}");
+        } else {
+            program.signal("TERM");
+            assert_eq!(program.prints(), "");
+        }
+    }
+    // The journal is a log too.
+    let flags = flags_of(&["0.0.0.0:0"]);
+    let flags: Vec<_> = flags.iter().map(String::as_str).collect();
+    let mut program = Program::start_as(station, &flags, &[("JOURNAL_STREAM", "8:1")]);
+    let said = program.says("the operator's page is at http://");
+    assert!(said.contains("--token-file"), "{said}");
+    program.signal("TERM");
+    assert_eq!(program.prints(), "");
     std::fs::remove_dir_all(directory).unwrap();
 }
 
