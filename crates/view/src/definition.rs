@@ -8,11 +8,13 @@ use std::sync::Arc;
 use bytes::Bytes;
 use jsidl::dynamic;
 use jsidl::model::{Id, Message, Version};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use serde_json::Value as Json;
 
 use jaus::codec::view::Value;
 use jaus::codec::{AnyMessage, DecodeError, MessageInfo, ServiceId};
+
+use super::named::{ByName, name_values};
 
 /// Why octets cannot be read, or JSON cannot be written, as a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -56,15 +58,23 @@ enum Codec {
     Dynamic(Arc<Message>),
 }
 
-/// A message's fields, which serialize as people see them.
-#[derive(Debug, Clone, Serialize)]
-#[serde(untagged)]
+/// A message's fields. Enumerated values serialize by name, if they have one.
+#[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Body {
     /// Read by a generated type.
     Generated(Value),
     /// Read by a definition loaded at run time.
     Dynamic(Json),
+}
+
+impl Serialize for Body {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Generated(value) => ByName(value).serialize(serializer),
+            Self::Dynamic(json) => json.serialize(serializer),
+        }
+    }
 }
 
 /// A service as people name it: `urn:jaus:jss:core:Events`, or with its version
@@ -198,9 +208,10 @@ impl Definition {
             Codec::Dynamic(message) => {
                 let value = dynamic::decode(message, octets)
                     .map_err(|error| Unreadable::new(error.to_string(), error.offset))?;
-                dynamic::to_json(message, &value)
-                    .map(Body::Dynamic)
-                    .map_err(|error| Unreadable::new(error.to_string(), 0))
+                let mut view = dynamic::to_json(message, &value)
+                    .map_err(|error| Unreadable::new(error.to_string(), 0))?;
+                name_values(message, &mut view);
+                Ok(Body::Dynamic(view))
             }
         }
     }
