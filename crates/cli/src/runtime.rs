@@ -103,6 +103,15 @@ pub fn duration_within(text: &str, least: &str, most: &str) -> Result<Duration, 
     }
 }
 
+/// Parses a flag's size, such as `1500`, `64 KiB` or `1.5MB`, within bounds in octets.
+pub fn size_within(text: &str, least: usize, most: usize) -> Result<usize, String> {
+    let size = units::size(text).map_err(|error| error.to_string())?;
+    match (least..=most).contains(&size) {
+        true => Ok(size),
+        false => Err(format!("write a size from {least} to {most} octets")),
+    }
+}
+
 /// Parses a flag's control timeout as Access Control reports it: whole seconds, 0 for `never`.
 pub fn control_timeout(text: &str) -> Result<u8, String> {
     if text == "never" {

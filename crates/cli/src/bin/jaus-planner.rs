@@ -47,7 +47,7 @@ struct Flags {
 
     /// The time a stage may take to start or to recover
     #[arg(long, value_name = "DURATION", default_value = "15s", value_parser = runtime::duration)]
-    patience: Duration,
+    timeout: Duration,
 
     /// The time the vehicle may drive without progress
     #[arg(long, value_name = "DURATION", default_value = "1min", value_parser = runtime::duration)]
@@ -96,7 +96,7 @@ impl Ready for Flags {
             mission: Settings {
                 attempts: self.attempts,
                 pause: self.pause,
-                patience: self.patience,
+                patience: self.timeout,
                 stall: self.stall,
                 detours: self.detours,
                 speed: self.speed,

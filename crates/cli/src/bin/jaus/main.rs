@@ -14,6 +14,7 @@ mod doctor;
 #[cfg(target_os = "linux")]
 mod drive;
 mod encode;
+mod events;
 mod examine;
 mod jsidl;
 mod judge;

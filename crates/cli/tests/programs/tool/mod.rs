@@ -6,6 +6,8 @@ mod damage;
 mod doctor;
 #[cfg(target_os = "linux")]
 mod drive;
+mod escaping;
+mod events;
 mod examine;
 mod golden;
 mod interoperability;
