@@ -282,7 +282,8 @@ impl Network {
 
 /// What a user can do when a component does not answer.
 pub const REMEDY: &str = "List components with `jaus discover`, choose the network with \
-    --interface, or name a host that multicast does not reach with --peer";
+    --interface, or name a host that multicast does not reach with --peer; `jaus doctor` finds out \
+    what is wrong";
 
 /// Parses the id of a single component.
 pub fn one_component(text: &str) -> Result<JausId, String> {
