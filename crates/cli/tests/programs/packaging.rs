@@ -69,6 +69,24 @@ fn the_system_for_one_machine_has_nothing_wrong_and_every_part_that_is_a_service
 }
 
 #[test]
+fn the_system_for_one_machine_has_the_ids_of_the_demo() {
+    let demo = run(&["demo", "--headless", "--seconds", "1"], b"").stdout;
+    let system = packaging("system.toml");
+    let system = run(&["up", system.to_str().unwrap(), "--check"], b"").stdout;
+    let starts = demo.lines().filter_map(|line| line.split_once(" starts "));
+    let mut parts = 0;
+    for (_, start) in starts {
+        let (id, name) = start.split_once(", the ").unwrap();
+        let begin = format!("{}: ", name.replace(' ', "-"));
+        let line = system.lines().find(|line| line.starts_with(&begin));
+        let line = line.unwrap_or_else(|| panic!("no {begin} in {system}"));
+        assert!(line.contains(&format!("--id={id}")), "{id}: {line}");
+        parts += 1;
+    }
+    assert_eq!(parts, 9, "{demo}");
+}
+
+#[test]
 fn the_unit_of_the_motors_reaches_every_kind_of_them() {
     let unit = "systemd/jaus@primitive-driver.service.d/10-hardware.conf";
     let unit = std::fs::read_to_string(packaging(unit)).unwrap();
