@@ -41,6 +41,24 @@ fn parts(session: &str) -> Vec<(&str, Vec<&str>)> {
     parts
 }
 
+/// Commands that the session does not show, but the test needs: after a command that begins with the
+/// first, the second.
+const BESIDES: [(&str, &str); 3] = [
+    ("jaus send", "send=$!"),
+    ("jaus subscribe", "wait $send; echo $? >> statuses"),
+    (
+        "jaus control",
+        "jaus query 101.1.1 QueryVelocityState --fields Velocity_X --loopback > stopped",
+    ),
+];
+
+/// The speeds in the output of `jaus subscribe`.
+fn speeds(printed: &str) -> Vec<f64> {
+    let values = printed.split("Velocity_X ").skip(1);
+    let numbers = values.filter_map(|it| it.split_whitespace().next()?.parse().ok());
+    numbers.collect()
+}
+
 #[test]
 fn the_shell_alone_discovers_drives_stops_and_records_a_vehicle() {
     let session = README.split("```console\n").nth(1).unwrap();
@@ -53,11 +71,24 @@ fn the_shell_alone_discovers_drives_stops_and_records_a_vehicle() {
     std::fs::create_dir_all(&directory).unwrap();
     let network = own_group().join(" ");
     let group = network.split(' ').next_back().unwrap();
+    let on_own_network = |command: &str| {
+        let recording = format!("--interface lo --group {group}");
+        let command = command.replace("--interface lo", &recording);
+        // The shell forgets a job that has ended, and this test runs beside others.
+        let command = command.replace("--for 10s", "--for 20s");
+        command.replace("--loopback", &network)
+    };
     let mut script = "exec 2>&1\n".to_owned();
     for (command, _) in &commands {
-        let command = command.replace("--interface lo", &format!("--interface lo --group {group}"));
-        let command = command.replace("--loopback", &network);
-        writeln!(script, "cat <<'END'\n{PROMPT}{command}\nEND\n{command}").unwrap();
+        let own = on_own_network(command);
+        writeln!(
+            script,
+            "cat <<'END'\n{PROMPT}{own}\nEND\n{own}\necho $? >> statuses"
+        )
+        .unwrap();
+        for (_, besides) in BESIDES.iter().filter(|(part, _)| command.starts_with(part)) {
+            writeln!(script, "{}", on_own_network(besides)).unwrap();
+        }
     }
     let tool = Path::new(env!("CARGO_BIN_EXE_jaus")).parent().unwrap();
     let path = format!("{}:{}", tool.display(), std::env::var("PATH").unwrap());
@@ -68,9 +99,25 @@ fn the_shell_alone_discovers_drives_stops_and_records_a_vehicle() {
         .env_remove("JAUS_LOG")
         .output()
         .unwrap();
+    let written = |name| std::fs::read_to_string(directory.join(name)).unwrap();
+    let (statuses, stopped) = (written("statuses"), written("stopped"));
     std::fs::remove_dir_all(&directory).unwrap();
 
     let printed = String::from_utf8_lossy(&run.stdout);
+    let driven = speeds(&printed);
+    let rises = driven.windows(2).take_while(|it| it[0] < it[1]).count();
+    assert!(
+        rises >= 3 && driven[rises] > 0.2,
+        "it does not drive: {driven:?} in {printed}"
+    );
+    let last: serde_json::Value = serde_json::from_str(&stopped).unwrap();
+    assert_eq!(
+        last["body"]["Velocity_X"], 0.0,
+        "it is not stopped: {stopped}"
+    );
+    assert_eq!(statuses.lines().count(), commands.len() + 1, "{printed}");
+    assert!(statuses.lines().all(|it| it == "0"), "{statuses}{printed}");
+
     let printed_parts = parts(&printed);
     assert_eq!(printed_parts.len(), commands.len(), "{printed}");
     for ((command, shown), (_, lines)) in commands.iter().zip(printed_parts) {
