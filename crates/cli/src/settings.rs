@@ -358,7 +358,9 @@ mod tests {
             assert!(said.chars().count() < 1200, "{} octets", said.len());
         }
         let spaces = " ".repeat(400_000);
-        let said = mistake(&format!("mailbox = {{ messages = 1, {spaces}mesages = 4 }}"));
+        let said = mistake(&format!(
+            "mailbox = {{ messages = 1, {spaces}mesages = 4 }}"
+        ));
         assert!(said.contains("  mesages = 4 }`: "), "{said}");
         assert_eq!(
             mistake(&format!("   ttl = 300 # {long}"))
