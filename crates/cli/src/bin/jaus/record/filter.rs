@@ -169,9 +169,10 @@ mod tests {
         packet(octets)
     }
 
-    /// A segment of a connection from one port to another.
+    /// A segment of a connection from one port to another. The host of port 5000 is another one.
     fn tcp([from, to]: [u16; 2], is_first: bool, payload: &[u8]) -> Packet {
-        let ip = PacketBuilder::ipv4([10, 0, 0, 1], [10, 0, 0, 2], 16);
+        let host = |port| [10, 0, 0, if port == 5000 { 2 } else { 1 }];
+        let ip = PacketBuilder::ipv4(host(from), host(to), 16);
         let segment = ip.tcp(from, to, 7, 1024);
         let segment = if is_first { segment.syn() } else { segment };
         let mut octets = Vec::new();
