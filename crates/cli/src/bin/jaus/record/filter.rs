@@ -212,7 +212,7 @@ mod tests {
         assert_eq!(recorded(&mut filter, &request), 0);
         let amid = tcp([40_002, 5000], false, &DATAGRAM[1..]);
         assert_eq!(recorded(&mut filter, &amid), 1, "it was open before");
-        for port in 0..10_000 {
+        for port in 10_000..20_000 {
             assert_eq!(recorded(&mut filter, &tcp([port, 80], true, b"")), 0);
         }
         assert_eq!(
