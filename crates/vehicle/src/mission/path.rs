@@ -205,7 +205,7 @@ struct At(Point);
 impl std::fmt::Display for At {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self((x, y)) = *self;
-        write!(f, "x {x:.2} m, y {y:.2} m")
+        write!(f, "north {x:.2} m, east {y:.2} m")
     }
 }
 

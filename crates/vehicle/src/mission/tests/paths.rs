@@ -140,8 +140,8 @@ fn each_mistake_is_told_with_what_to_do() {
         (
             inside,
             (3.5, 0.5),
-            "the destination at x 3.50 m, y 0.50 m is outside the map, which extends from x 0.00 \
-             m, y 0.00 m to x 3.00 m, y 3.00 m: choose one on the map",
+            "the destination at north 3.50 m, east 0.50 m is outside the map, which extends from \
+             north 0.00 m, east 0.00 m to north 3.00 m, east 3.00 m: choose one on the map",
         ),
         (inside, (f64::NAN, 0.5), "is outside the map"),
         (
@@ -152,7 +152,7 @@ fn each_mistake_is_told_with_what_to_do() {
         (
             (-0.1, 0.5),
             inside,
-            "the vehicle at x -0.10 m, y 0.50 m is outside the map",
+            "the vehicle at north -0.10 m, east 0.50 m is outside the map",
         ),
         (
             (1.5, 1.5),
