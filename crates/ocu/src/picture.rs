@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 pub(super) use self::part::{Depth, Part};
+use super::georeference::Georeference;
 use super::missing::{Absence, GonePart, GoneParts};
 use super::report::{Mission, MissionStage, Report};
 use super::role::Role;
@@ -29,6 +30,7 @@ pub(super) struct Picture {
     parts: BTreeMap<JausId, Part>,
     gone: GoneParts,
     pose: Option<Sample<state::Pose>>,
+    georeference: Georeference,
     velocity: Option<Sample<state::Velocity>>,
     mission: Option<Sample<Mission>>,
     path: Vec<[f64; 2]>,
@@ -48,6 +50,8 @@ struct Sample<T> {
 impl Picture {
     /// Manual drive requires pose, velocity and status younger than this.
     const DRIVABLE: Duration = Duration::from_secs(1);
+    /// A local pose of the same time as a global one is younger than this.
+    const PAIR: Duration = Duration::from_millis(300);
     /// A planner that is silent for this time while other parts report is lost.
     const LOST: Duration = Duration::from_secs(2);
 
@@ -62,6 +66,7 @@ impl Picture {
             parts: BTreeMap::new(),
             gone: GoneParts::default(),
             pose: None,
+            georeference: Georeference::default(),
             velocity: None,
             mission: None,
             path: Vec::new(),
@@ -92,6 +97,7 @@ impl Picture {
         self.parts.values_mut().for_each(Part::forget);
         (self.pose, self.velocity, self.mission) = (None, None, None);
         (self.path, self.maps, self.store) = (Vec::new(), Vec::new(), None);
+        self.georeference = Georeference::default();
     }
 
     pub(super) const fn parts(&self) -> &BTreeMap<JausId, Part> {
@@ -192,6 +198,11 @@ impl Picture {
                 let at = sampled_at(&mut part.pose_clock, now, stamp);
                 self.pose = Some(Sample { what, by, at });
             }
+            Report::GlobalPose(fix) => {
+                let fresh = |it: &&Sample<_>| now.saturating_duration_since(it.at) < Self::PAIR;
+                let local = self.pose.as_ref().filter(fresh).map(|it| &it.what);
+                self.georeference.handle_fix(now, fix, local);
+            }
             Report::Velocity(what, stamp) => {
                 let at = sampled_at(&mut part.velocity_clock, now, stamp);
                 // An inertial measurement unit reports turn rates without a speed.
@@ -262,6 +273,15 @@ impl Picture {
         });
         let silent = silent.map(|(id, part)| (*id, &*part.name, Absence::Silent));
         gone.chain(silent)
+    }
+
+    /// The condition of any component of the vehicle that discovery knows, for the tree.
+    pub(super) fn condition(&self, now: Instant, id: JausId) -> &'static str {
+        match self.parts.get(&id) {
+            Some(part) if part.is_silent(now, self.depth.silent()) => Absence::Silent.name(),
+            Some(part) => part.status.map_or(PRESENT, |told| state_name(told.what)),
+            None => PRESENT,
+        }
     }
 
     fn missing_state(&self, now: Instant) -> Vec<state::Missing> {
@@ -341,6 +361,7 @@ impl Picture {
                 age_ms: age(now, told.at),
                 ..told.what
             }),
+            place: self.georeference.state(now),
             velocity: self.velocity.map(|told| state::Velocity {
                 age_ms: age(now, told.at),
                 ..told.what
@@ -459,6 +480,9 @@ impl Picture {
     }
 }
 
+/// Condition of a component without a known state.
+pub(super) const PRESENT: &str = "present";
+
 /// Sample time of a report that arrives now.
 fn sampled_at(clock: &mut Option<SampleClock>, now: Instant, stamp: Option<Stamp>) -> Instant {
     match (stamp, clock) {
@@ -479,7 +503,7 @@ fn state_name(code: u8) -> &'static str {
 }
 
 /// Milliseconds since `then`.
-fn age(now: Instant, then: Instant) -> u64 {
+pub(super) fn age(now: Instant, then: Instant) -> u64 {
     let age = now.saturating_duration_since(then).as_millis();
     u64::try_from(age).unwrap_or(u64::MAX)
 }

@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_frame_is_no_wish() {
+    fn an_invalid_frame_is_no_request() {
         for text in [
             "",
             "{}",

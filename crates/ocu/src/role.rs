@@ -2,8 +2,8 @@
 
 use jaus::messages::core::management;
 use jaus::messages::mobility::{
-    local_path_segment_driver, local_pose_sensor, local_vector_driver, primitive_driver,
-    velocity_state_sensor,
+    global_pose_sensor, local_path_segment_driver, local_pose_sensor, local_vector_driver,
+    primitive_driver, velocity_state_sensor,
 };
 use jaus::service::{Component, Kind, Subsystem};
 use jaus_vehicle::messages::ground::{mission_planner, raster_maps, stage};
@@ -17,6 +17,7 @@ pub(super) enum Role {
     Planner,
     VelocitySensor,
     PoseSensor,
+    GlobalPoseSensor,
     Store,
     /// Another component with Management.
     Other,
@@ -24,13 +25,14 @@ pub(super) enum Role {
 
 impl Role {
     /// In the order of the chain of command.
-    const ALL: [(Self, &'static str); 7] = [
+    const ALL: [(Self, &'static str); 8] = [
         (Self::PrimitiveDriver, primitive_driver::URN),
         (Self::VectorDriver, local_vector_driver::URN),
         (Self::PathDriver, local_path_segment_driver::URN),
         (Self::Planner, mission_planner::URN),
         (Self::VelocitySensor, velocity_state_sensor::URN),
         (Self::PoseSensor, local_pose_sensor::URN),
+        (Self::GlobalPoseSensor, global_pose_sensor::URN),
         (Self::Store, raster_maps::URN),
     ];
 
@@ -49,6 +51,7 @@ impl Role {
             Self::Planner => "planner",
             Self::VelocitySensor => "velocity_sensor",
             Self::PoseSensor => "pose_sensor",
+            Self::GlobalPoseSensor => "global_pose_sensor",
             Self::Store => "knowledge_store",
             Self::Other => "other",
         }
@@ -63,6 +66,7 @@ impl Role {
             Self::Planner => "the planner",
             Self::VelocitySensor => "the velocity sensor",
             Self::PoseSensor => "the pose sensor",
+            Self::GlobalPoseSensor => "the global pose sensor",
             Self::Store => "the knowledge store",
             Self::Other => "the component",
         }
@@ -77,6 +81,7 @@ impl Role {
             Self::Planner => Some("Planner"),
             Self::VelocitySensor => Some("Velocity Sensor"),
             Self::PoseSensor => Some("Pose Sensor"),
+            Self::GlobalPoseSensor => Some("Global Pose Sensor"),
             Self::Store => Some("Knowledge Store"),
             Self::Other => None,
         }
@@ -104,6 +109,11 @@ pub(super) fn tells_stage(component: &Component) -> bool {
 /// Whether a component reports the vehicle's pose.
 pub(super) fn reports_pose(component: &Component) -> bool {
     component.offers(local_pose_sensor::URN)
+}
+
+/// Whether a component reports the vehicle's pose on the globe.
+pub(super) fn reports_global_pose(component: &Component) -> bool {
+    component.offers(global_pose_sensor::URN)
 }
 
 /// Whether a component reports the vehicle's velocity.

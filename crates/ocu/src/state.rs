@@ -97,6 +97,9 @@ pub struct Component {
     pub id: String,
     /// Name.
     pub name: String,
+    /// Management state, for example `ready`, if it reports it to this station; otherwise
+    /// `present`. `silent` if its reports have ceased, `gone` if discovery has lost it.
+    pub state: &'static str,
     /// Services offered.
     pub services: Vec<Service>,
 }
@@ -119,6 +122,8 @@ pub struct Vehicle {
     pub name: String,
     /// Pose.
     pub pose: Option<Pose>,
+    /// Where its local frame is on the globe; `null` if it has reported no global pose.
+    pub place: Option<Place>,
     /// Velocity.
     pub velocity: Option<Velocity>,
     /// Components that offer Management or matter to the operator.
@@ -143,6 +148,36 @@ pub struct Pose {
     pub yaw: Option<f64>,
     /// Milliseconds since the sample was taken according to its time stamp, or since the report
     /// arrived without a stamp.
+    pub age_ms: u64,
+}
+
+/// The origin of the local frame on the globe (WGS 84).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Place {
+    /// Degrees north.
+    pub latitude: f64,
+    /// Degrees east.
+    pub longitude: f64,
+    /// Direction of X in radians clockwise from true north.
+    pub heading: f64,
+    /// The last reported global pose; `null` if it is unknown now.
+    pub fix: Option<Fix>,
+}
+
+/// A global pose of the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Fix {
+    /// Degrees north.
+    pub latitude: f64,
+    /// Degrees east.
+    pub longitude: f64,
+    /// The same position in the frame of [`Place`], in metres along X.
+    pub x: f64,
+    /// Metres along Y.
+    pub y: f64,
+    /// Radians clockwise from X; `null` if unknown.
+    pub yaw: Option<f64>,
+    /// Milliseconds since the report.
     pub age_ms: u64,
 }
 

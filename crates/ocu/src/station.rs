@@ -5,6 +5,7 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 use tokio::net::TcpListener;
 
+use super::base_map::BaseMap;
 use super::server::{Admission, Server};
 use super::session::Session;
 use super::token::Token;
@@ -28,6 +29,8 @@ pub struct Station {
     pub token_to_read: bool,
     /// Host names of the page, in addition to `localhost` and the addresses of this machine.
     pub hosts: Vec<String>,
+    /// The geographic map behind a vehicle that reports its global pose.
+    pub base_map: Option<BaseMap>,
 }
 
 /// Address of the page.
@@ -56,6 +59,7 @@ impl Default for Station {
             token: None,
             token_to_read: false,
             hosts: Vec::new(),
+            base_map: None,
         }
     }
 }
@@ -136,6 +140,7 @@ impl Part for OpenStation {
             token: station.token,
             token_to_read: station.token_to_read,
             hosts: station.hosts,
+            base_map: station.base_map,
             node,
         };
         let (session, access) = Session::new(component, station.vehicles, station.authority);

@@ -15,6 +15,7 @@ pub mod example;
 pub mod group;
 #[cfg(target_os = "linux")]
 pub mod hosts;
+pub mod map_file;
 pub mod random;
 pub mod rover;
 pub mod tools;

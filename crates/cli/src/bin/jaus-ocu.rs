@@ -1,14 +1,14 @@
 //! `jaus-ocu`: the operator's station and its page.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus_cli::{Failure, Ready, launch};
-use jaus_ocu::{Listen, Station, Token};
+use jaus_ocu::{BaseMap, Listen, Station, Token};
 use jaus_vehicle::parts::Part;
 
 #[derive(Args)]
@@ -39,6 +39,11 @@ struct Flags {
     /// A host name by which browsers reach this machine, besides its addresses (repeatable)
     #[arg(long, value_name = "NAME")]
     host: Vec<String>,
+
+    /// A geographic map to show behind a vehicle that reports its global pose: a PMTiles file
+    /// (version 3) with vector tiles or pictures
+    #[arg(long, value_name = "FILE.pmtiles")]
+    map: Option<PathBuf>,
 }
 
 impl Ready for Flags {
@@ -49,7 +54,8 @@ impl Ready for Flags {
         jaus-ocu --loopback                        for a vehicle on this computer\n  \
         jaus-ocu --listen 0.0.0.0:8080             for tablets; prints the address with a token\n  \
         jaus-ocu --listen 0.0.0.0:8080 --token-file /etc/jaus/token --host ocu.local\n  \
-        jaus-ocu --vehicle 101 --vehicle 102 --interface eth0";
+        jaus-ocu --vehicle 101 --vehicle 102 --interface eth0\n  \
+        jaus-ocu --map /srv/maps/berlin.pmtiles    behind vehicles with a global pose";
     const ID: JausId = JausId::new(42, 1, 1);
     const KIND: Kind = Kind::OperatorControlUnit;
     const SUBSYSTEM: &'static str = "Operator";
@@ -65,6 +71,7 @@ impl Ready for Flags {
                  a file that holds one",
             ));
         }
+        let base_map = self.map.as_deref().map(open_map).transpose()?;
         Ok(Station {
             vehicles: self.vehicle,
             authority: self.authority,
@@ -72,8 +79,13 @@ impl Ready for Flags {
             token,
             token_to_read: self.token_to_read,
             hosts: self.host,
+            base_map,
         })
     }
+}
+
+fn open_map(path: &Path) -> Result<BaseMap, Failure> {
+    BaseMap::open(path).map_err(|error| Failure::new(format!("--map {}: {error}", path.display())))
 }
 
 fn main() -> ExitCode {

@@ -1,12 +1,12 @@
 // Handing over control between operators: shows another operator's request, takes the answer, and
-// tells how control changed hands.
+// shows how control changed.
 
 import { get, list, number, plain, say, show, toast } from "./dom.js";
 
 export class Handover {
   #ask;
   #request = null;
-  #told = "";
+  #shown = "";
 
   /** Sends answers by `ask`. */
   constructor(ask) {
@@ -19,8 +19,8 @@ export class Handover {
   update(state, operable) {
     const { requests, handover } = state.control ?? {};
     const ending = plain(handover, 200);
-    if (ending && ending !== this.#told) toast("warn", ending.replace(/^./, (letter) => letter.toUpperCase()));
-    this.#told = ending;
+    if (ending && ending !== this.#shown) toast("warn", ending.replace(/^./, (letter) => letter.toUpperCase()));
+    this.#shown = ending;
     const [first] = list(requests, 8);
     this.#request = number(first?.id);
     show(get("handover"), operable && this.#request !== null);

@@ -15,7 +15,7 @@ use jaus::address::JausId;
 use jaus::codec::Query;
 use jaus::component::{Component, SubscribeError, Update, When};
 use jaus::messages::core::{QueryControl, QueryStatus, access_control};
-use jaus::messages::mobility::{QueryLocalPose, QueryVelocityState};
+use jaus::messages::mobility::{QueryGlobalPose, QueryLocalPose, QueryVelocityState};
 use jaus::service::Component as Known;
 use jaus_vehicle::messages::ground::{
     QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, mission_planner, raster_maps,
@@ -44,6 +44,7 @@ struct Topics {
     control: bool,
     stage: bool,
     pose: bool,
+    global_pose: bool,
     velocity: bool,
     mission: bool,
     path: bool,
@@ -52,6 +53,8 @@ struct Topics {
 
 /// Rate of pose and velocity reports.
 const MOTION: When = When::hz(10.0);
+/// Rate of global pose reports.
+const GLOBAL_POSE: When = When::hz(5.0);
 /// Rate of status reports.
 const STATUS: When = When::hz(4.0);
 /// Rate of status reports of a vehicle that is only in the list.
@@ -82,6 +85,7 @@ impl Topics {
             control: role::is_managed(part) || part.offers(access_control::URN),
             stage: role::tells_stage(part),
             pose: role::reports_pose(part),
+            global_pose: role::reports_global_pose(part),
             velocity: role::reports_velocity(part),
             mission: part.offers(mission_planner::URN),
             path: part.offers(mission_planner::URN),
@@ -129,6 +133,10 @@ impl Following {
         if topics.pose {
             let query = QueryLocalPose::all();
             tasks.spawn(self.ask(peer, query, MOTION));
+        }
+        if topics.global_pose {
+            let query = QueryGlobalPose::all();
+            tasks.spawn(self.ask(peer, query, GLOBAL_POSE));
         }
         if topics.velocity {
             let query = QueryVelocityState::all();

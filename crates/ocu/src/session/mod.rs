@@ -28,11 +28,10 @@ use self::vehicle::Vehicle;
 use super::answer::Said;
 use super::picture::Depth;
 use super::request::OperatorRequest;
-use super::state::{Control, Drive, State};
+use super::state::{Control, Drive, State, Tree};
 use super::stick::PageId;
 use super::stick::{Push, Stick};
 use jaus::component::{Component, Handlers};
-use jaus::service::Directory;
 use jaus_vehicle::parts::PartError;
 use jaus_view::Timestamp;
 
@@ -149,8 +148,8 @@ pub(super) struct Session {
     /// The service that receives the notices, until it is offered.
     handoff: Option<Handlers>,
     publisher: Publisher,
-    /// The directory whose tree was published.
-    published: Arc<Directory>,
+    /// The tree that was published.
+    published: Option<Tree>,
     seq: u64,
 }
 
@@ -183,7 +182,7 @@ impl Session {
             notices,
             handoff: Some(handover::service(noticed)),
             publisher,
-            published: Arc::default(),
+            published: None,
             seq: 0,
         };
         (session, Access { orders, snapshots })
@@ -325,9 +324,10 @@ impl Session {
     fn publish_fleet(&mut self, now: Instant) {
         let fleet = self.fleet.state(now);
         publish(&self.publisher.fleet, &Said::Fleet(&fleet));
-        if !Arc::ptr_eq(&self.published, self.fleet.directory()) {
-            self.published = Arc::clone(self.fleet.directory());
-            publish(&self.publisher.tree, &Said::Tree(&self.fleet.tree()));
+        let tree = self.fleet.tree(now);
+        if self.published.as_ref() != Some(&tree) {
+            publish(&self.publisher.tree, &Said::Tree(&tree));
+            self.published = Some(tree);
         }
     }
 

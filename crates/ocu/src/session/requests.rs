@@ -421,7 +421,8 @@ impl Vehicle {
             Err(why) => return reply(Err(why)),
         };
         if !x.is_finite() || !y.is_finite() || speed.is_some_and(|it| !(it > 0.0 && it <= 100.0)) {
-            let why = "a destination has x and y in metres, and a speed above 0 and up to 100 m/s";
+            let why =
+                "a destination has metres north and east, and a speed above 0 and up to 100 m/s";
             return reply(Err(why.to_owned()));
         }
         let mut destination = SetDestination {
