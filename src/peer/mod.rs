@@ -57,7 +57,8 @@ pub(crate) use recogniser::is_priority_fault;
 pub use recogniser::{Certainty, Recogniser, Verdict};
 pub use sign::Sign;
 
-/// A JAUS implementation whose departures are known.
+/// A JAUS implementation whose departures are known. Settings name it `standard`, `jaus++`,
+/// `junior`, `jts`, `fkie`, `openjaus-sdk` or `iop`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Peer {

@@ -16,6 +16,7 @@ mod launch;
 pub mod logging;
 pub mod network;
 pub mod output;
+pub mod reference;
 pub mod runtime;
 pub mod settings;
 pub mod statistics;

@@ -17,6 +17,7 @@ pub mod group;
 pub mod hosts;
 pub mod random;
 pub mod rover;
+pub mod snapshot;
 pub mod tools;
 pub mod vehicle_process;
 pub mod waiting;

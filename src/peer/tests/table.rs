@@ -70,18 +70,10 @@ fn each_departure_names_a_file_and_a_test_that_are_there() {
     }
 }
 
-/// The environment variable that makes the test rewrite the page.
-const RENEW: &str = "JAUS_RENEW_SNAPSHOTS";
-
 #[test]
 fn the_page_shows_the_table_as_it_is() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/peer/departures.md");
-    let table = table();
-    if std::env::var_os(RENEW).is_some() {
-        fs::write(&page, &table).unwrap();
-    }
-    let shown = fs::read_to_string(page).unwrap();
-    assert!(shown == table, "set {RENEW} to write it anew");
+    jaus_test_kit::snapshot::check(&page, &table());
 }
 
 #[test]

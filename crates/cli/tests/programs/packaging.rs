@@ -33,7 +33,7 @@ const ELSEWHERE: [&str; 4] = [
 ];
 
 /// Names of our programs without `jaus-`.
-fn programs() -> BTreeSet<String> {
+pub(crate) fn programs() -> BTreeSet<String> {
     named(&workspace("crates/cli/src/bin"), "jaus-", ".rs")
 }
 

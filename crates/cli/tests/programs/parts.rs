@@ -230,3 +230,20 @@ fn a_can_bus_that_does_not_exist_is_told_with_the_remedy() {
     let program = Program::start(&["--can", "nocan7", "--can-counts-per-metre", "200"], &[]);
     program.says("bring it up with `ip link set nocan7 up type can bitrate 500000`");
 }
+
+#[cfg(not(any(feature = "can", feature = "gpio")))]
+#[test]
+fn motors_that_a_build_does_not_support_are_refused_with_the_remedy() {
+    for (flags, feature) in [
+        (&["--can", "can0", "--can-counts-per-metre", "200"][..], "can"),
+        (&["--gpio", "/dev/gpiochip0", "--left", "17,27", "--right", "23,24"], "gpio"),
+        (&["--stop-line", "/dev/gpiochip0:5"], "gpio"),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_jaus-primitive-driver"));
+        let output = command.args(flags).output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains(flags[0]), "{error}");
+        assert!(error.contains(&format!("--features {feature}")), "{error}");
+    }
+}

@@ -100,6 +100,8 @@ enum Command {
     Jsidl(jsidl::Jsidl),
     Completions(manual::Completions),
     Man(manual::Man),
+    #[command(hide = true)]
+    Reference(manual::Reference),
 }
 
 impl Command {
@@ -138,6 +140,7 @@ impl Command {
             Self::Jsidl(jsidl) => return jsidl.run(),
             Self::Completions(completions) => completions.run(Cli::command()),
             Self::Man(man) => man.run(Cli::command()),
+            Self::Reference(reference) => reference.run(Cli::command()),
         };
         outcome.map(ExitCode::from)
     }

@@ -4,6 +4,7 @@
 mod air;
 mod scripted;
 
+use std::path::Path;
 use std::time::Duration;
 
 use jaus::address::JausId;
@@ -67,18 +68,11 @@ fn check(name: &str, settings: Settings, peer: &mut dyn air::Scripted) -> Outcom
     outcome
 }
 
-/// With `JAUS_BLESS` set, replaces the text of this name by the output.
+/// Compares an output with the text of this name.
 #[track_caller]
 fn check_text(name: &str, text: &str) {
-    let file = format!(
-        "{}/src/bin/jaus/examine/tests/{name}.txt",
-        env!("CARGO_MANIFEST_DIR")
-    );
-    if std::env::var_os("JAUS_BLESS").is_some() {
-        std::fs::write(&file, text).unwrap();
-    }
-    let expected = std::fs::read_to_string(&file).unwrap_or_default();
-    assert_eq!(text, expected, "{file}");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/bin/jaus/examine/tests");
+    jaus_test_kit::snapshot::check(&folder.join(format!("{name}.txt")), text);
 }
 
 /// The first failed exchange.

@@ -33,8 +33,6 @@ const CONTEST: [&str; 11] = [
     "LocalPoseSensor",
     "PrimitiveDriver",
 ];
-/// Variable that makes the test rewrite the files; review them afterwards.
-const RENEW: &str = "JAUS_RENEW_SNAPSHOTS";
 /// Short pauses: still long enough for a reset, during which the tool waited 1.5 s.
 const SHORT: Pauses = Pauses(Duration::from_millis(20));
 /// Pauses of the tool.
@@ -60,19 +58,10 @@ fn check(exchanges: &[Exchange], snapshot: &str) {
         .iter()
         .map(|exchange| line(&dictionary, exchange).to_string())
         .collect();
-    let path = kept(snapshot);
-    if std::env::var_os(RENEW).is_some() {
-        std::fs::write(&path, lines.join("\n") + "\n").unwrap();
-    }
     for (exchange, line) in exchanges.iter().zip(&lines) {
         assert!(is_answered(exchange), "no answer: {line}");
     }
-    let kept = std::fs::read_to_string(&path).unwrap();
-    let kept: Vec<&str> = kept.lines().collect();
-    for (number, (is, was)) in lines.iter().zip(&kept).enumerate() {
-        assert_eq!(is, was, "exchange {} of {}", number + 1, path.display());
-    }
-    assert_eq!(lines.len(), kept.len(), "exchanges in {}", path.display());
+    jaus_test_kit::snapshot::check(&kept(snapshot), &(lines.join("\n") + "\n"));
 }
 
 fn kept(snapshot: &str) -> PathBuf {
