@@ -8,13 +8,14 @@ use std::time::{Duration, Instant};
 use jaus::endpoint::Outgoing;
 use jaus::link::Group;
 use jaus::node::{Config, Node};
+use jaus_test_kit::figures::Figures;
 
 use crate::Effort;
 use crate::baseline::Flow;
 use crate::child::Process;
 use crate::one_way::{self, Manner};
 use crate::placement::{Placement, Side};
-use crate::report::{self, ratio, spread};
+use crate::report::{quotient, ratio, spread};
 use crate::roles::{self, CODE, Role};
 use crate::setting::Setting;
 
@@ -22,12 +23,14 @@ use crate::setting::Setting;
 const LENGTHS: [usize; 3] = [64, 64 << 10, 1 << 20];
 /// Share of lost datagrams, in percent.
 const LOSSES: [u8; 2] = [0, 5];
+/// The aim: the least share of the rate without loss.
+const AIM: f64 = 0.5;
 /// Delay of each datagram.
 const DELAY: Duration = Duration::from_millis(5);
 /// With loss, the mean needs more time to settle than in the other measurements.
 const SECONDS: f64 = 3.0;
 
-pub(crate) fn measure(effort: Effort) {
+pub(crate) fn measure(effort: Effort, figures: &mut Figures) {
     let time = Duration::from_secs_f64(effort.seconds * SECONDS);
     for length in LENGTHS {
         let mut rates = [const { Vec::new() }; LOSSES.len()];
@@ -36,19 +39,21 @@ pub(crate) fn measure(effort: Effort) {
                 rates.push(flow(length, percent, run as u64, time).rate());
             }
         }
-        report::head(
+        figures.table(
             &format!("Acknowledged, {length} octets, round trip of 10 ms"),
             ["loss each way", "messages/s", "MB/s", "to no loss"],
         );
         for (all, percent) in rates.iter().zip(LOSSES) {
             let megabytes: Vec<_> = all.iter().map(|it| it * length as f64 / 1e6).collect();
-            report::row([
+            figures.row([
                 &format!("{percent} %"),
                 &spread(all, 1),
                 &spread(&megabytes, 2),
                 &ratio(all, &rates[0]),
             ]);
         }
+        let is_met = quotient(&rates[1], &rates[0]) >= AIM;
+        figures.aim("at least half of the rate without loss", [("", is_met)]);
     }
 }
 

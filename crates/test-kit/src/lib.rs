@@ -12,6 +12,7 @@
 
 pub mod evidence;
 pub mod example;
+pub mod figures;
 pub mod group;
 #[cfg(target_os = "linux")]
 pub mod hosts;
