@@ -28,6 +28,20 @@ use crate::service::{
 use crate::wire::Priority;
 
 /// A component on a node. Cheap to clone; it stops when the last clone is dropped.
+///
+/// ```no_run
+/// # use jaus::component::{Component, Kind};
+/// # use jaus::messages::mobility::{QueryVelocityState, velocity_state_sensor};
+/// # use jaus::node::{Config, Node};
+/// # async fn example() -> Result<(), Box<dyn std::error::Error>> {
+/// let node = Node::start(Config::new(42, 1))?;
+/// let operator = Component::builder(Kind::OperatorControlUnit, "Operator").attach(&node, 1)?;
+/// let sensor = operator.find(velocity_state_sensor::URN).await?;
+/// let report = operator.query(sensor, &QueryVelocityState::all()).await?;
+/// println!("{sensor}: {:?} m/s", report.velocity_x_m_per_s());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 pub struct Component {
     pub(super) shared: Arc<Shared>,

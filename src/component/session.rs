@@ -27,6 +27,20 @@ const STATUS_LIMIT: Duration = Duration::from_millis(500);
 ///
 /// To control one component without a search and without beginning anew, see
 /// [`Control`](super::Control).
+///
+/// ```no_run
+/// # use jaus::component::{Component, Session, SessionError, SessionState};
+/// # use jaus::messages::mobility::SetWrenchEffort;
+/// # async fn example(mut session: Session) -> Result<(), SessionError> {
+/// loop {
+///     match session.state() {
+///         SessionState::Ready(_) => session.send(&SetWrenchEffort::default())?,
+///         other => println!("no commands now: {other:?}"),
+///     }
+///     session.changed().await?;
+/// }
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Session {
     /// Dropped before the component.

@@ -55,6 +55,20 @@ pub struct Subscription<R> {
 }
 
 /// An item of a subscription's stream.
+///
+/// ```no_run
+/// # use jaus::component::{Subscription, Update};
+/// # use jaus::messages::mobility::ReportVelocityState;
+/// # async fn example(mut speeds: Subscription<ReportVelocityState>) {
+/// while let Some(update) = speeds.next().await {
+///     match update {
+///         Update::Report(report) => println!("{:?} m/s", report.velocity_x_m_per_s()),
+///         Update::Down { why, .. } => println!("no reports: {why}"),
+///         Update::Up => println!("reports again"),
+///     }
+/// }
+/// # }
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub enum Update<R> {
     /// A report.

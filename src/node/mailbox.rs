@@ -22,6 +22,14 @@ use crate::wire::Priority;
 const SIGNAL_READ: usize = 128;
 
 /// The limits of a mailbox.
+///
+/// ```
+/// use jaus::node::{Config, MailboxLimits};
+///
+/// let mut config = Config::new(101, 1);
+/// config.mailbox = MailboxLimits { messages: 256, octets: 1 << 20 };
+/// assert_eq!(config.validate(), Ok(()));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]

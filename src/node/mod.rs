@@ -89,6 +89,20 @@ use crate::link::{Interface, tcp, udp};
 ///
 /// The node runs until [`shutdown`](Self::shutdown), or until its last handle and its last
 /// [`Port`] are dropped.
+///
+/// ```
+/// use jaus::node::{Config, Node};
+///
+/// # #[tokio::main(flavor = "current_thread")]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let node = Node::start(Config::loopback(101, 1))?;
+/// let driver = node.attach(33)?;
+/// assert_eq!(driver.id().to_string(), "101.1.33");
+/// assert!(!node.links().is_empty());
+/// node.shutdown().await;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Node {
     guard: Arc<Guard>,

@@ -10,6 +10,14 @@ use bytes::Bytes;
 /// JSIDL specifies no character set, so the octets are kept unchanged. [`as_str`](Self::as_str) and
 /// [`to_string_lossy`](Self::to_string_lossy) interpret them as UTF-8. A received text shares the
 /// memory of its message.
+///
+/// ```
+/// use jaus_codec::Text;
+///
+/// let name = Text::from("Rover");
+/// assert_eq!(name.as_str(), Some("Rover"));
+/// assert_eq!(name, "Rover");
+/// ```
 #[derive(Clone, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Text(Bytes);
 

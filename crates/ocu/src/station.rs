@@ -12,6 +12,21 @@ use jaus::link::interface;
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
 /// An operator station with its page.
+///
+/// ```no_run
+/// # use jaus::component::Kind;
+/// # use jaus::node::{Config, Node};
+/// # use jaus_ocu::Station;
+/// # use jaus_vehicle::parts::{Part, Slot};
+/// # async fn example() -> Result<(), Box<dyn std::error::Error>> {
+/// let node = Node::start(Config::new(42, 1))?;
+/// let slot = Slot::new(node.attach(1)?, node, Kind::OperatorControlUnit, "Operator");
+/// let station = Station { vehicles: vec![101], ..Station::default() }.open().await?;
+/// println!("the page is at {}", station.urls().join(" "));
+/// station.run(slot).await?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 pub struct Station {
     /// The vehicles to show, by subsystem number; the first is selected at the start. Empty for all

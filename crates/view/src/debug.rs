@@ -43,6 +43,18 @@ const LONGEST: usize = 1024;
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// What passes nodes, to be looked at.
+///
+/// ```no_run
+/// # use jaus::component::Component;
+/// # use jaus::node::Node;
+/// # use jaus_view::{Dictionary, debug::DebugView};
+/// # async fn example(node: Node, component: Component) -> std::io::Result<()> {
+/// let view = DebugView::new([node], component, Dictionary::new());
+/// let listener = tokio::net::TcpListener::bind("127.0.0.1:8794").await?;
+/// view.serve(listener).await?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 pub struct DebugView(Arc<Inner>);
 

@@ -10,6 +10,15 @@ const SECONDS_PER_DAY: i64 = 86_400;
 ///
 /// [`Display`](fmt::Display) writes RFC 3339 in UTC, with as many decimals as the capture has:
 /// `2015-06-07T14:03:21.068150Z`.
+///
+/// ```
+/// use jaus_view::Timestamp;
+///
+/// let time: Timestamp = "2015-06-07T14:03:21.068150Z".parse()?;
+/// assert_eq!((time.seconds(), time.subsec_nanos()), (1_433_685_801, 68_150_000));
+/// assert_eq!(time.to_string(), "2015-06-07T14:03:21.068150Z");
+/// # Ok::<(), jaus_view::InvalidTime>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Timestamp {
     seconds: i64,

@@ -7,6 +7,20 @@ use std::task::Poll;
 use crate::address::JausId;
 
 /// The result at each member of a group, in order of their ids.
+///
+/// ```no_run
+/// # use jaus::component::{Audience, Component};
+/// # use jaus::messages::core::QueryIdentification;
+/// # use jaus::messages::mobility::primitive_driver;
+/// # async fn example(operator: Component) {
+/// let drivers = Audience::from(primitive_driver::LATEST);
+/// let results = operator.query_all(drivers, &QueryIdentification::default()).await;
+/// for (member, error) in results.failures() {
+///     eprintln!("{member}: {error}");
+/// }
+/// assert_eq!(results.is_complete(), results.successes().count() == results.len());
+/// # }
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[must_use = "a group does not fail as a whole: check each member's result"]
 pub struct Results<T, E>(Vec<(JausId, Result<T, E>)>);

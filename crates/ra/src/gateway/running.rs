@@ -26,6 +26,20 @@ use jaus::wire::Priority;
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
 /// Configuration of a running gateway between RA systems and JAUS.
+///
+/// ```no_run
+/// # use jaus::component::Kind;
+/// # use jaus::node::{Config, Node};
+/// # use jaus_ra::gateway::RaGateway;
+/// # use jaus_vehicle::parts::{Part, Slot};
+/// # async fn example() -> Result<(), Box<dyn std::error::Error>> {
+/// let node = Node::start(Config::new(250, 1).port(3795))?;
+/// let slot = Slot::new(node.attach(1)?, node, Kind::OtherSubsystem, "RA gateway");
+/// let gateway = RaGateway { interface: Some("eth1".to_owned()), ..RaGateway::default() };
+/// gateway.run(slot).await?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 pub struct RaGateway {
     /// Gateway settings.

@@ -56,6 +56,22 @@ pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
 
 /// A complete component, configured but not yet running.
+///
+/// ```no_run
+/// # use jaus::component::Kind;
+/// # use jaus::node::{Config, Node};
+/// # use jaus_vehicle::parts::{Part, Planner, Slot};
+/// # async fn example() -> Result<(), Box<dyn std::error::Error>> {
+/// let node = Node::start(Config::new(101, 36))?;
+/// let slot = Slot::new(node.attach(36)?, node, Kind::Vehicle, "Rover");
+/// let error = match Planner::default().run(slot).await {
+///     Ok(never) => match never {},
+///     Err(error) => error,
+/// };
+/// eprintln!("the planner has stopped: {error}");
+/// # Ok(())
+/// # }
+/// ```
 pub trait Part: Send + 'static {
     /// Runs the component. Ends only when it cannot continue. Dropping the future stops the
     /// component.

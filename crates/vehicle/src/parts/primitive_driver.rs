@@ -32,6 +32,18 @@ use jaus::service::{MotionPolicy, StopCause};
 /// crosses an edge, whatever its client commands.
 ///
 /// It offers Primitive Driver, Wheel Odometry and Stage, with Management and Access Control.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use jaus_vehicle::parts::{Motors, PrimitiveDriver};
+///
+/// let driver = PrimitiveDriver {
+///     silence: Duration::from_millis(300),
+///     ..PrimitiveDriver::default()
+/// };
+/// assert!(matches!(driver.motors, Motors::Simulated(_)));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrimitiveDriver {
     /// The motors.

@@ -134,6 +134,17 @@ struct Numbers {
 }
 
 /// A log that is being written. Dropping it writes what waits and ends it.
+///
+/// ```no_run
+/// # use jaus::node::Node;
+/// # use jaus_view::{Dictionary, Journal, JournalError, JournalSettings};
+/// # fn example(node: &Node) -> Result<(), JournalError> {
+/// let settings = JournalSettings::new("/var/log/jaus").limited_to(200 << 20);
+/// let journal = Journal::start(node, &settings, Dictionary::new())?;
+/// println!("{} packets written", journal.counters().written);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Journal {
     numbers: Arc<Numbers>,

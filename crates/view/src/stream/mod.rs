@@ -29,6 +29,17 @@ pub(super) use passage::timestamp;
 pub(super) use seen::Seen;
 
 /// Converts traffic to entries.
+///
+/// ```
+/// use jaus_view::{Dictionary, Filter, MessageStream};
+///
+/// let filter: Filter = "message=ReportVelocityState".parse()?;
+/// let dictionary = Dictionary::new();
+/// let stream = MessageStream::new(&dictionary, filter);
+/// assert!(stream.read_json(r#"{"message": "ReportVelocityState"}"#)?.is_some());
+/// assert!(stream.read_json(r#"{"message": "QueryVelocityState"}"#)?.is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct MessageStream<'d> {
     messages: MessageLog<'d>,
