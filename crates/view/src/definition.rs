@@ -1,5 +1,5 @@
-//! One layout of a message: what it is called, which services define it so, and how its octets and
-//! its JSON are made of one another.
+//! One layout of a message: its name, the services that define it, and the conversion between
+//! octets and JSON.
 
 use std::fmt;
 use std::str::FromStr;
@@ -14,12 +14,12 @@ use serde_json::Value as Json;
 use jaus::codec::view::Value;
 use jaus::codec::{AnyMessage, DecodeError, MessageInfo, ServiceId};
 
-/// Why octets cannot be read, or JSON cannot be written, as a message.
+/// Why octets cannot be decoded, or JSON cannot be encoded, as a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unreadable {
-    /// A sentence.
+    /// The problem, as a sentence.
     pub problem: String,
-    /// Where: the octet, counted from the first of the message code, or the column of a line.
+    /// The position: the octet, counted from the message code, or the column of a line.
     pub offset: usize,
 }
 
@@ -56,24 +56,24 @@ enum Codec {
     Dynamic(Arc<Message>),
 }
 
-/// A message's fields, which serialize as people see them.
+/// The fields of a message. They serialize with units and names of values.
 #[derive(Debug, Clone, Serialize)]
 #[serde(untagged)]
 #[non_exhaustive]
 pub enum Body {
-    /// Read by a generated type.
+    /// Decoded by a generated type.
     Generated(Value),
-    /// Read by a definition loaded at run time.
+    /// Decoded by a definition loaded at run time.
     Dynamic(Json),
 }
 
-/// A service as people name it: `urn:jaus:jss:core:Events`, or with its version
+/// The name of a service in flags and requests: `urn:jaus:jss:core:Events`, or with its version
 /// `urn:jaus:jss:core:Events@1.0`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ServiceName {
     /// The URN.
     pub urn: String,
-    /// The version; any, if not given.
+    /// The version; `None` for any.
     pub version: Option<Version>,
 }
 
