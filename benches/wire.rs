@@ -157,15 +157,31 @@ const STEPS: [(&str, &str, &str); 12] = [
     ("header", "as5669a/decode", "read a header"),
     ("header", "as5669a/decode by hand", "the same by hand"),
     ("header", "as5669a/encode", "write a header"),
-    ("header", "ra/decode", "read a header of the Reference Architecture"),
+    (
+        "header",
+        "ra/decode",
+        "read a header of the Reference Architecture",
+    ),
     ("datagram", "read/50", "read a datagram of 50 octets"),
     ("datagram", "read/1425", "read a datagram of 1425 octets"),
     ("datagram", "write/50", "write a datagram of 50 octets"),
     ("datagram", "write/1425", "write a datagram of 1425 octets"),
-    ("endpoint", "receive/50", "receive 50 octets through an endpoint"),
-    ("endpoint", "receive/1425", "receive 1425 octets through an endpoint"),
+    (
+        "endpoint",
+        "receive/50",
+        "receive 50 octets through an endpoint",
+    ),
+    (
+        "endpoint",
+        "receive/1425",
+        "receive 1425 octets through an endpoint",
+    ),
     ("endpoint", "send/50", "send 50 octets through an endpoint"),
-    ("endpoint", "send/1425", "send 1425 octets through an endpoint"),
+    (
+        "endpoint",
+        "send/1425",
+        "send 1425 octets through an endpoint",
+    ),
 ];
 
 /// The aim for receiving a small message, in nanoseconds.

@@ -163,7 +163,10 @@ criterion_group! {
 
 /// The messages by their group of benchmarks.
 const MESSAGES: [(&str, &str); 7] = [
-    ("pose32", "ReportGlobalPose, all 9 optional fields, 32 octets"),
+    (
+        "pose32",
+        "ReportGlobalPose, all 9 optional fields, 32 octets",
+    ),
     ("pose16", "the same with 4 of them"),
     ("wrench26", "SetWrenchEffort, all 12"),
     ("services", "ReportServices, 4 components of 6 services"),

@@ -128,7 +128,9 @@ fn print(
     }
     let copy = format!("{:.0}", median(copies));
     figures.row(["copy in memory", "", &copy, "", "", ""]);
-    let own = flows.iter().find(|(name, _)| name == Setting::OwnNodes.name());
+    let own = flows
+        .iter()
+        .find(|(name, _)| name == Setting::OwnNodes.name());
     if let Some((name, flows)) = own.filter(|_| length == LENGTHS[0]) {
         let is_met = median(&rates(flows)) >= AIM;
         figures.aim("2000 thousand/s", [(name.as_str(), is_met)]);

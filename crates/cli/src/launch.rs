@@ -5,6 +5,7 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
+use clap::builder::Resettable;
 use clap::{ArgMatches, Args, Command, CommandFactory, FromArgMatches, Parser};
 
 use super::failure::{Failure, Outcome};
@@ -52,7 +53,7 @@ struct Program<F: Args> {
     flags: F,
 
     /// The subsystem's name, the same for all its components
-    #[arg(long)]
+    #[arg(long, help_heading = Resettable::Reset)]
     name: Option<String>,
 
     #[command(flatten)]

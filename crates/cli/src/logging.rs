@@ -1,6 +1,7 @@
 //! Sends the library's tracing to standard error, at the chosen level.
 
 use clap::Args;
+use clap::builder::Resettable;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::layer::SubscriberExt as _;
 use tracing_subscriber::util::SubscriberInitExt as _;
@@ -15,7 +16,13 @@ pub struct Logging {
     ///
     /// The environment variable JAUS_LOG sets levels by module, for example
     /// JAUS_LOG=jaus::endpoint=trace.
-    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
+    #[arg(
+        short,
+        long,
+        action = clap::ArgAction::Count,
+        global = true,
+        help_heading = Resettable::Reset
+    )]
     verbose: u8,
 }
 

@@ -297,8 +297,7 @@ mod tests {
             "",
             &mut text,
         );
-        let expected =
-            "Examples:\n\n```text\nrun <x>\n\nrun *\n```\n\nThe end\\_of `a_b`.\n";
+        let expected = "Examples:\n\n```text\nrun <x>\n\nrun *\n```\n\nThe end\\_of `a_b`.\n";
         assert_eq!(text, expected);
     }
 }

@@ -9,6 +9,7 @@ use std::future::Future;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use clap::builder::Resettable;
 use jaus::node::units;
 use tokio::runtime::Builder;
 
@@ -46,7 +47,12 @@ pub async fn end(limit: Option<Duration>) {
 )]
 pub struct RunFor {
     /// End after this time, such as 10s [default: at Ctrl-C]
-    #[arg(long = "for", value_name = "DURATION", value_parser = duration)]
+    #[arg(
+        long = "for",
+        value_name = "DURATION",
+        value_parser = duration,
+        help_heading = Resettable::Reset
+    )]
     duration: Option<Duration>,
 }
 

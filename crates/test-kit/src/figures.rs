@@ -140,7 +140,10 @@ fn load() -> String {
 /// The commit, and whether anything but other figures differs from it.
 fn commit() -> String {
     let commit = output("git", &["rev-parse", "--short", "HEAD"]);
-    let changes = output("git", &["status", "--porcelain", "--", ".", ":!docs/figures"]);
+    let changes = output(
+        "git",
+        &["status", "--porcelain", "--", ".", ":!docs/figures"],
+    );
     let commit = commit.unwrap_or_else(|| "unknown".to_owned());
     match changes {
         Some(changes) if !changes.is_empty() => format!("{commit} with changes"),

@@ -319,10 +319,6 @@ mod can {
 
     #[derive(Args)]
     #[command(next_help_heading = "VESC motor controllers on a CAN bus")]
-    #[cfg_attr(
-        not(all(feature = "can", target_os = "linux")),
-        expect(dead_code, reason = "every build knows the flags")
-    )]
     pub(super) struct Can {
         /// The network interface of the bus, such as can0 [default: simulated motors]
         #[arg(
@@ -385,10 +381,6 @@ mod gpio {
 
     #[derive(Args)]
     #[command(next_help_heading = "Stepper motors on GPIO lines")]
-    #[cfg_attr(
-        not(all(feature = "gpio", target_os = "linux")),
-        expect(dead_code, reason = "every build knows the flags")
-    )]
     pub(super) struct Gpio {
         /// The GPIO chip of the motor drivers, such as /dev/gpiochip0 [default: simulated motors]
         #[arg(long, value_name = "CHIP", requires_all = ["left", "right"], group = "motors")]

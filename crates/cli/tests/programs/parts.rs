@@ -235,8 +235,21 @@ fn a_can_bus_that_does_not_exist_is_told_with_the_remedy() {
 #[test]
 fn motors_that_a_build_does_not_support_are_refused_with_the_remedy() {
     for (flags, feature) in [
-        (&["--can", "can0", "--can-counts-per-metre", "200"][..], "can"),
-        (&["--gpio", "/dev/gpiochip0", "--left", "17,27", "--right", "23,24"], "gpio"),
+        (
+            &["--can", "can0", "--can-counts-per-metre", "200"][..],
+            "can",
+        ),
+        (
+            &[
+                "--gpio",
+                "/dev/gpiochip0",
+                "--left",
+                "17,27",
+                "--right",
+                "23,24",
+            ],
+            "gpio",
+        ),
         (&["--stop-line", "/dev/gpiochip0:5"], "gpio"),
     ] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_jaus-primitive-driver"));

@@ -106,7 +106,11 @@ fn write_section(section: &Section, flags: &[(String, BTreeSet<String>)], page: 
     if let Some(flag) = flag(&section.name, flags).filter(|_| section.is_list) {
         let _ = writeln!(page, "Flag: {flag}.\n");
     }
-    write_keys(&section.keys, |key| flag(key, flags).unwrap_or_default(), page);
+    write_keys(
+        &section.keys,
+        |key| flag(key, flags).unwrap_or_default(),
+        page,
+    );
 }
 
 fn write_keys(keys: &[Key], flag: impl Fn(&str) -> String, page: &mut String) {
@@ -187,8 +191,14 @@ fn write_system(page: &mut String) {
     let Shape::Choice(restarts) = source.find("Restart").unwrap().shape else {
         panic!("there are several restarts");
     };
-    for (section, keys) in [("all", source.texts("ALL")), ("parts.NAME", source.texts("PART"))] {
-        let _ = writeln!(page, "### [{section}]\n\n| key | value | description |\n|---|---|---|");
+    for (section, keys) in [
+        ("all", source.texts("ALL")),
+        ("parts.NAME", source.texts("PART")),
+    ] {
+        let _ = writeln!(
+            page,
+            "### [{section}]\n\n| key | value | description |\n|---|---|---|"
+        );
         for key in keys {
             let mut fields = common.iter().chain(&part);
             let field = fields.find(|field| field.name == key);

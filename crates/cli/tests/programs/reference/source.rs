@@ -18,8 +18,8 @@ pub(super) struct Field {
 #[derive(Clone, Debug)]
 pub(super) enum Kind {
     Plain(String),
-    List(Box<Kind>),
-    Optional(Box<Kind>),
+    List(Box<Self>),
+    Optional(Box<Self>),
     /// A table with keys of the user's choice.
     Map,
 }
@@ -187,7 +187,7 @@ fn kebab(name: &str) -> String {
 impl Kind {
     fn new(it: &Type) -> Self {
         let Type::Path(path) = it else {
-            panic!("a setting has a type that is no path");
+            return Self::Plain("other".to_owned());
         };
         let last = path.path.segments.last().unwrap();
         let inner = || match &last.arguments {
@@ -259,7 +259,9 @@ fn without_links(text: &str) -> String {
 
 /// Attributes other than documentation, as text.
 fn attributes(attributes: &[Attribute]) -> String {
-    let lists = attributes.iter().filter_map(|it| it.meta.require_list().ok());
+    let lists = attributes
+        .iter()
+        .filter_map(|it| it.meta.require_list().ok());
     lists.map(|list| format!("{} ", list.tokens)).collect()
 }
 
@@ -268,7 +270,10 @@ fn links_to_items_become_their_texts() {
     for (text, expected) in [
         ("see [`Pacing`].", "see `Pacing`."),
         ("[known](crate::peer::Recogniser) peers", "known peers"),
-        ("a list [\"eth0\"] and [a page](tool.md)", "a list [\"eth0\"] and [a page](tool.md)"),
+        (
+            "a list [\"eth0\"] and [a page](tool.md)",
+            "a list [\"eth0\"] and [a page](tool.md)",
+        ),
         ("[delivery]", "[delivery]"),
     ] {
         assert_eq!(without_links(text), expected);
