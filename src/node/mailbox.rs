@@ -21,7 +21,7 @@ use crate::wire::Priority;
 /// Progress of the reader is signalled when the number of waiting messages is a multiple of this.
 const SIGNAL_READ: usize = 128;
 
-/// The limits of a mailbox.
+/// The limits of the mailbox of each component.
 ///
 /// ```
 /// use jaus::node::{Config, MailboxLimits};

@@ -160,7 +160,7 @@ impl FromStr for Peer {
 
 serde_as_text!(Peer);
 
-/// Assigns a profile to an id. It overrides what the recogniser observes.
+/// Assigns a profile to an id. It takes precedence over the recognition of the peer.
 ///
 /// ```toml
 /// [[profile]]
@@ -173,7 +173,7 @@ serde_as_text!(Peer);
 pub struct Assignment {
     /// The id, which may hold the wildcards 65535 and 255.
     pub id: JausId,
-    /// The profile. [`Peer::Standard`] prevents the peer from being recognised as anything else.
+    /// The profile. `standard` prevents the peer from being recognised as anything else.
     pub profile: Peer,
 }
 

@@ -10,10 +10,9 @@ use crate::as_text::serde_as_text;
 use crate::link::Place;
 
 /// A peer to send to by unicast from the start: `10.0.0.2`, which means port 3794, `10.0.0.2:3795`,
-/// `[fe80::2%eth0]:3794`, or with its id in front `102.1.1@10.0.0.2`.
-///
-/// With an id (which may have the wildcards 65535 and 255), messages for it go there before it has
-/// sent any, and its address is never learned again.
+/// `[fe80::2%eth0]:3794`, or with its id in front `102.1.1@10.0.0.2`. With an id (which may have the
+/// wildcards 65535 and 255), messages for it go there before it has sent any, and its address is
+/// never learned again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Peer {
     id: Option<JausId>,

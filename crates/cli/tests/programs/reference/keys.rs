@@ -280,6 +280,7 @@ impl Value {
             Self::Word(word) => (*word).to_owned(),
         };
         match kind {
+            Kind::List(_) if words.contains("s]") => format!("list of {words}"),
             Kind::List(_) => format!("list of {words}s"),
             _ => words,
         }

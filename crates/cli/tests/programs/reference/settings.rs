@@ -78,7 +78,7 @@ pub(super) fn page() -> String {
     page.push_str("## Values\n\n");
     write_units(&mut page);
     for (name, (about, keys)) in &types.values {
-        let _ = writeln!(page, "### {name}\n\n{}\n", without_code(about));
+        let _ = writeln!(page, "### {name}\n\n{}\n", summary(about));
         if !keys.is_empty() {
             write_keys(keys, |_| String::new(), &mut page);
         }
@@ -101,30 +101,31 @@ fn write_section(section: &Section, flags: &[(String, BTreeSet<String>)], page: 
         }
     }
     if !section.about.is_empty() {
-        let _ = writeln!(page, "{}\n", section.about);
+        let _ = writeln!(page, "{}\n", with_settings_only(&section.about));
     }
     if let Some(flag) = flag(&section.name, flags).filter(|_| section.is_list) {
         let _ = writeln!(page, "Flag: {flag}.\n");
     }
-    write_keys(
-        &section.keys,
-        |key| flag(key, flags).unwrap_or_default(),
-        page,
-    );
+    let flag = |key: &str| match section.name.as_str() {
+        "" => flag(key, flags),
+        _ => flag_against(key, flags),
+    };
+    write_keys(&section.keys, |key| flag(key).unwrap_or_default(), page);
 }
 
 fn write_keys(keys: &[Key], flag: impl Fn(&str) -> String, page: &mut String) {
-    page.push_str("| key | value | default | flag | description |\n|---|---|---|---|---|\n");
+    let has_flags = keys.iter().any(|key| !flag(&key.name).is_empty());
+    let (column, line) = if has_flags { (" flag |", "---|") } else { ("", "") };
+    let _ = writeln!(page, "| key | value | default |{column} description |");
+    let _ = writeln!(page, "|---|---|---|---|{line}");
     for key in keys {
         let about = key.about.replace('|', "\\|");
-        let _ = writeln!(
-            page,
-            "| `{}` | {} | {} | {} | {about} |",
-            key.name,
-            key.value,
-            key.default,
-            flag(&key.name)
-        );
+        let (name, value, default) = (&key.name, &key.value, &key.default);
+        let flag = match has_flags {
+            true => format!(" {} |", flag(&key.name)),
+            false => String::new(),
+        };
+        let _ = writeln!(page, "| `{name}` | {value} | {default} |{flag} {about} |");
     }
     page.push('\n');
 }
@@ -147,13 +148,19 @@ fn flags() -> Vec<(String, BTreeSet<String>)> {
     COMMANDS.into_iter().map(of).collect()
 }
 
-/// The flag that is named like a key: for one of its values, or with `no-`.
+/// The flag that is named like a key, or like one of its values.
 fn flag(key: &str, flags: &[(String, BTreeSet<String>)]) -> Option<String> {
-    let names = [
-        key.replace('_', "-"),
-        key.trim_end_matches('s').to_owned(),
-        format!("no-{key}"),
-    ];
+    let single = key.trim_end_matches('s').to_owned();
+    named(&[key.replace('_', "-"), single], flags)
+}
+
+/// The flag that switches a key off.
+fn flag_against(key: &str, flags: &[(String, BTreeSet<String>)]) -> Option<String> {
+    named(&[format!("no-{key}")], flags)
+}
+
+/// The first command with a flag of these names.
+fn named(names: &[String], flags: &[(String, BTreeSet<String>)]) -> Option<String> {
     flags.iter().find_map(|(command, flags)| {
         let name = names.iter().find(|name| flags.contains(*name))?;
         Some(match command.as_str() {
@@ -175,9 +182,22 @@ fn write_units(page: &mut String) {
     }
 }
 
-/// A description without the examples for programmers.
-fn without_code(about: &str) -> &str {
-    about.split("```").next().unwrap_or(about).trim_end()
+/// The first paragraph of a description. The others are for programmers.
+fn summary(about: &str) -> &str {
+    about.split("\n\n").next().unwrap_or(about)
+}
+
+/// A description without examples for programmers.
+fn with_settings_only(about: &str) -> String {
+    let mut kept = String::new();
+    for (index, piece) in about.split("```").enumerate() {
+        match index % 2 {
+            0 => kept.push_str(piece.trim_end_matches('\n')),
+            _ if piece.starts_with("toml") => kept.push_str(&format!("\n\n```{piece}```")),
+            _ => {}
+        }
+    }
+    kept
 }
 
 /// The keys of the file of `jaus up`.

@@ -133,8 +133,8 @@ struct Common {
     /// The working directory, relative to the file; `~` is the home directory. It is created if
     /// it is missing. The default is that of `jaus up`.
     directory: Option<PathBuf>,
-    /// Whether a part restarts after it has ended. It waits longer after each failure, up to 30 s,
-    /// and never restarts after exit status 2, which reports wrong flags.
+    /// Whether a part restarts after it has ended. The delay grows with each failure, up to 30 s.
+    /// After exit status 2, which reports wrong flags, a part never restarts.
     restart: Restart,
 }
 
