@@ -22,7 +22,6 @@ use crate::service::{
 ///
 /// ```no_run
 /// # use jaus::component::{Component, Handlers, Kind, Management};
-/// # use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
 /// # fn example(node: &jaus::node::Node, driver: Handlers) -> Result<(), jaus::component::AttachError> {
 /// let driver = Component::builder(Kind::Vehicle, "Rover")
 ///     .component_name("Wheels")

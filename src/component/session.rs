@@ -29,7 +29,7 @@ const STATUS_LIMIT: Duration = Duration::from_millis(500);
 /// [`Control`](super::Control).
 ///
 /// ```no_run
-/// # use jaus::component::{Component, Session, SessionError, SessionState};
+/// # use jaus::component::{Session, SessionError, SessionState};
 /// # use jaus::messages::mobility::SetWrenchEffort;
 /// # async fn example(mut session: Session) -> Result<(), SessionError> {
 /// loop {

@@ -12,9 +12,9 @@ use jaus::wire::ra::{CODE_LEN, RaId};
 /// ```
 /// use bytes::Bytes;
 /// use jaus::messages::core::QueryHeartbeatPulse;
-/// use jaus_ra::Message;
+/// use jaus_ra::{Message, RaId};
 ///
-/// let (ours, theirs) = ("32.1.32.1".parse()?, "20.1.33.1".parse()?);
+/// let (ours, theirs): (RaId, RaId) = ("32.1.32.1".parse()?, "20.1.33.1".parse()?);
 /// let query = Message::new(ours, theirs, 0x2202, Bytes::new());
 /// assert_eq!(query.body::<QueryHeartbeatPulse>()?, QueryHeartbeatPulse);
 /// assert_eq!(query.answer(0x4202, Bytes::new()).destination, ours);

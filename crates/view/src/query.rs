@@ -19,7 +19,8 @@ use super::request::Request;
 /// use jaus_view::{Dictionary, Request};
 ///
 /// let request = Request::new("QueryVelocityState", serde_json::json!({}));
-/// let query = Dictionary::new().query(&request, &["velocity_x".to_owned()])?;
+/// let dictionary = Dictionary::new().with_catalogue();
+/// let query = dictionary.query(&request, &["velocity_x".to_owned()])?;
 /// assert_eq!((query.name.as_str(), query.report), ("QueryVelocityState", 0x4404));
 /// # Ok::<(), jaus_view::Unreadable>(())
 /// ```

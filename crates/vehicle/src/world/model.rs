@@ -22,6 +22,7 @@ use crate::zones::ZoneId;
 ///
 /// ```no_run
 /// # use std::path::Path;
+/// # use bytes::Bytes;
 /// # use jaus_vehicle::world::{Change, Raster, World};
 /// # fn example() -> Result<(), Box<dyn std::error::Error>> {
 /// let mut world = World::open(Path::new("/var/lib/jaus/world.redb"))?;
@@ -35,7 +36,7 @@ use crate::zones::ZoneId;
 ///     fill: 255,
 ///     revision: 0,
 /// };
-/// world.apply(vec![Change::AddRaster(map, Vec::new().into())])?;
+/// world.apply(vec![Change::AddRaster(map, Bytes::new())])?;
 /// println!("{} maps", world.rasters().len());
 /// # Ok(())
 /// # }

@@ -115,7 +115,11 @@ fn write_section(section: &Section, flags: &[(String, BTreeSet<String>)], page: 
 
 fn write_keys(keys: &[Key], flag: impl Fn(&str) -> String, page: &mut String) {
     let has_flags = keys.iter().any(|key| !flag(&key.name).is_empty());
-    let (column, line) = if has_flags { (" flag |", "---|") } else { ("", "") };
+    let (column, line) = if has_flags {
+        (" flag |", "---|")
+    } else {
+        ("", "")
+    };
     let _ = writeln!(page, "| key | value | default |{column} description |");
     let _ = writeln!(page, "|---|---|---|---|{line}");
     for key in keys {
