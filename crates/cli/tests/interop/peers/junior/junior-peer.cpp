@@ -1,0 +1,308 @@
+// A client of Junior's library with a run-time engine of its own, for the interoperability suite: it echoes
+// test messages, or sends them and expects them back. ../../README.md describes its commands.
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <initializer_list>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include <fcntl.h>
+#include <sched.h>
+#include <signal.h>
+#include <sys/mount.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <JuniorAPI.h>
+
+#include "../test-message.h"
+
+// The commit of the library, set by the build.
+#ifndef JUNIOR_VERSION
+#define JUNIOR_VERSION "version not known"
+#endif
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+// Pause between two looks at the queue: the library does not block.
+constexpr auto LOOK = 1ms;
+// Time without an echo after which a possibly lost message is sent again.
+constexpr auto AGAIN = 3s;
+// Interval of the messages of `keep`.
+constexpr auto BEAT = 200ms;
+// Attempts to send an echo: the library leaves retransmission to its client once it has given up.
+constexpr int ATTEMPTS = 3;
+// Longest message that is received.
+constexpr unsigned LONGEST = 2 << 20;
+// Where the engine and its clients have their sockets and their settings.
+constexpr const char* SOCKETS = "/tmp";
+constexpr const char* SETTINGS = "/tmp/interop.xml";
+constexpr const char* ENGINE = "JuniorRTE";
+
+void say(const std::string& line)
+{
+    std::printf("%s\n", line.c_str());
+    std::fflush(stdout);
+}
+
+std::runtime_error failure(const std::string& what)
+{
+    return std::runtime_error(what + ": " + std::strerror(errno));
+}
+
+unsigned number(const std::string& text)
+{
+    std::size_t end = 0;
+    const unsigned long value = std::stoul(text, &end);
+    if (end != text.size())
+        throw std::runtime_error(text + " is not a number");
+    return static_cast<unsigned>(value);
+}
+
+// SUBSYSTEM.NODE.COMPONENT as one number.
+unsigned id_of(const std::string& text)
+{
+    unsigned subsystem, node, component;
+    char rest;
+    if (std::sscanf(text.c_str(), "%u.%u.%u%c", &subsystem, &node, &component, &rest) != 3)
+        throw std::runtime_error(text + " is not an id; write it as in 201.1.1");
+    return subsystem << 16 | node << 8 | component;
+}
+
+// What the settings of the engine depend on.
+struct Links {
+    bool udp;
+    bool tcp;
+    // The one peer that is reached by TCP: it has no discovery.
+    std::string address_book;
+};
+
+Links links(const std::string& by, unsigned other, const std::string& address)
+{
+    if (by != "udp" && by != "tcp" && by != "both")
+        throw std::runtime_error(by + " is no transport; there are udp, tcp and both");
+    Links links{by != "tcp", by != "udp", ""};
+    if (links.tcp && !address.empty())
+        links.address_book = "J" + std::to_string(other) + "=\"" + address + ":3794\"";
+    return links;
+}
+
+// 1 MiB needs 258 fragments of 4079 octets or 736 of ours in the history, and buffers that hold it at once.
+void write_settings(const Links& links)
+{
+    std::ofstream file(SETTINGS);
+    file << "<JrXmlConfig>\n"
+            "<API_Configuration MaxMsgHistory=\"1000\" OldMsgTimeout=\"3\" DropDuplicateMsgs=\"1\"\n"
+            " MTU_Size=\"4079\" MaxAckNakRetries=\"10\" AckTimeout=\"100\" ConnectionTimeout=\"1000\"/>\n"
+            "<Log_Configuration LogFileName=\"\" LogMsgLevel=\"0\"/>\n"
+            "<RTE_Configuration AllowRelay=\"0\" RTE_CycleTime=\"1\" NumSerialInterfaces=\"0\"\n"
+            " EnableUDPInterface=\""
+         << links.udp << "\" EnableTCPInterface=\"" << links.tcp
+         << "\"/>\n"
+            "<UDP_Configuration UDP_Port=\"3794\" MulticastAddr=\"239.255.0.1\" MulticastTTL=\"16\"\n"
+            " MaxBufferSize=\"4000000\"/>\n"
+            "<TCP_Configuration TCP_Port=\"3794\" MaxBufferSize=\"4000000\"/>\n"
+            "<AddressBook "
+         << links.address_book << "/>\n</JrXmlConfig>\n";
+    if (!file.flush())
+        throw failure(SETTINGS);
+}
+
+// The directory of the engine: JUNIOR_RTE, or the one on the PATH. Returns a descriptor of it.
+int engine_directory()
+{
+    const char* wanted = std::getenv("JUNIOR_RTE");
+    std::string path = wanted ? wanted : std::getenv("PATH") ? std::getenv("PATH") : "";
+    for (std::size_t start = 0; start <= path.size();) {
+        const std::size_t end = std::min(path.find(':', start), path.size());
+        const std::string directory = path.substr(start, end - start);
+        if (access((directory + "/" + ENGINE).c_str(), X_OK) == 0)
+            return open(directory.c_str(), O_PATH | O_DIRECTORY);
+        start = end + 1;
+    }
+    throw std::runtime_error("there is no JuniorRTE on the PATH, nor in the directory JUNIOR_RTE");
+}
+
+// Hides the sockets of this engine from those on other hosts: network namespaces share the file system.
+void hide_sockets()
+{
+    if (unshare(CLONE_NEWNS) != 0 || mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
+        throw failure("a mount namespace");
+    if (mount("tmpfs", SOCKETS, "tmpfs", 0, nullptr) != 0)
+        throw failure("a private /tmp");
+}
+
+// Starts the engine; it ends with this process. Writing to a closed TCP connection must not end it.
+void start_engine(int directory)
+{
+    const pid_t child = fork();
+    if (child < 0)
+        throw failure("fork");
+    if (child > 0)
+        return;
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    signal(SIGPIPE, SIG_IGN);
+    // By the descriptor: the private /tmp may cover the path.
+    const std::string program = "/proc/self/fd/" + std::to_string(directory) + "/" + ENGINE;
+    execl(program.c_str(), ENGINE, SETTINGS, nullptr);
+    std::perror(ENGINE);
+    _exit(1);
+}
+
+struct Message {
+    unsigned source;
+    Octets octets;
+};
+
+// A client of the engine.
+class Client {
+public:
+    explicit Client(unsigned id) : buffer_(LONGEST)
+    {
+        const JrErrorCode code = JrConnect(id, SETTINGS, &handle_);
+        if (code != Ok)
+            throw std::runtime_error("JrConnect: error " + std::to_string(code));
+    }
+
+    ~Client() { JrDisconnect(handle_); }
+    Client(const Client&) = delete;
+    Client& operator=(const Client&) = delete;
+
+    // False if acknowledgement was requested and did not come.
+    bool send(unsigned to, const Octets& message, bool acknowledge)
+    {
+        const char* octets = reinterpret_cast<const char*>(message.data());
+        const int flags = acknowledge ? GuaranteeDelivery : 0;
+        const JrErrorCode code = JrSend(handle_, to, message.size(), octets, 6, flags);
+        if (code != Ok && code != Timeout)
+            throw std::runtime_error("JrSend: error " + std::to_string(code));
+        return code == Ok;
+    }
+
+    // The next test message, if one comes before the deadline.
+    std::optional<Message> receive(Clock::time_point deadline)
+    {
+        do {
+            Message message{};
+            unsigned size = buffer_.size();
+            const JrErrorCode code = JrReceive(handle_, &message.source, &size, buffer_.data());
+            if (code == Ok) {
+                message.octets.assign(buffer_.begin(), buffer_.begin() + size);
+                if (is_test_message(message.octets))
+                    return message;
+            } else if (code == NoMessages) {
+                std::this_thread::sleep_for(LOOK);
+            } else {
+                throw std::runtime_error("JrReceive: error " + std::to_string(code));
+            }
+        } while (Clock::now() < deadline);
+        return std::nullopt;
+    }
+
+    // Whether this message comes back in time; another one of its size is an error.
+    bool returns(unsigned from, const Octets& message, Clock::time_point deadline)
+    {
+        while (const auto received = receive(deadline)) {
+            if (received->source != from || received->octets.size() != message.size())
+                continue;
+            if (received->octets != message)
+                throw std::runtime_error("what came back is not the same");
+            return true;
+        }
+        return false;
+    }
+
+private:
+    long handle_ = 0;
+    std::vector<char> buffer_;
+};
+
+[[noreturn]] void echo(Client& client, bool acknowledge)
+{
+    say("connected");
+    for (;;) {
+        const auto message = client.receive(Clock::now() + AGAIN);
+        if (!message)
+            continue;
+        say(std::to_string(message->octets.size()) + " octets");
+        int attempts = ATTEMPTS;
+        while (!client.send(message->source, message->octets, acknowledge) && --attempts > 0)
+            say("the echo was not acknowledged");
+    }
+}
+
+void there_and_back(Client& client, unsigned other, std::size_t size, bool acknowledge, Clock::time_point deadline)
+{
+    const Octets message = test_message(size);
+    while (Clock::now() < deadline) {
+        if (!client.send(other, message, acknowledge))
+            say("not acknowledged");
+        else if (client.returns(other, message, std::min(deadline, Clock::now() + AGAIN)))
+            return say(std::to_string(size) + " octets there and back");
+        else
+            say("nothing came back yet");
+    }
+    throw std::runtime_error(std::to_string(size) + " octets did not come back");
+}
+
+[[noreturn]] void keep(Client& client, unsigned other)
+{
+    const Octets message = test_message(GREETING);
+    for (;;) {
+        client.send(other, message, false);
+        const bool returned = client.returns(other, message, Clock::now() + AGAIN);
+        say(returned ? "report: it came back" : "nothing came back");
+        std::this_thread::sleep_for(BEAT);
+    }
+}
+
+void run(const std::vector<std::string>& words)
+{
+    if (words == std::vector<std::string>{"version"})
+        return say(JUNIOR_VERSION);
+    const std::string act = words.size() > 2 ? words[2] : "";
+    const bool is_echo = act == "echo" && words.size() == 4;
+    const bool is_send = act == "send" && words.size() == 8;
+    const bool is_keep = act == "keep" && words.size() == 5;
+    if (!is_echo && !is_send && !is_keep)
+        throw std::runtime_error("version | ID BY echo ACK | ID BY send OTHER ADDRESS SIZE ACK SECONDS | "
+                                 "ID BY keep OTHER ADDRESS");
+    const unsigned id = id_of(words[0]);
+    const unsigned other = is_echo ? 0 : id_of(words[3]);
+    const Links used = links(words[1], other, is_echo ? "" : words[4]);
+
+    const int engine = engine_directory();
+    hide_sockets();
+    write_settings(used);
+    start_engine(engine);
+    Client client(id);
+    if (is_echo)
+        echo(client, words[3] == "1");
+    if (is_keep)
+        keep(client, other);
+    const auto deadline = Clock::now() + std::chrono::seconds(number(words[7]));
+    there_and_back(client, other, GREETING, false, deadline);
+    there_and_back(client, other, number(words[5]), words[6] == "1", deadline);
+}
+
+} // namespace
+
+int main(int count, char** words)
+{
+    try {
+        run(std::vector<std::string>(words + 1, words + count));
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "junior-peer: %s\n", error.what());
+        return 1;
+    }
+    return 0;
+}
