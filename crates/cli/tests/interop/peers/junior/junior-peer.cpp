@@ -24,8 +24,8 @@
 #include "../test-message.h"
 
 // The commit of the library, set by the build.
-#ifndef JUNIOR_VERSION
-#define JUNIOR_VERSION "version not known"
+#ifndef PEER_VERSION
+#define PEER_VERSION "version not known"
 #endif
 
 namespace {
@@ -268,7 +268,7 @@ void there_and_back(Client& client, unsigned other, std::size_t size, bool ackno
 void run(const std::vector<std::string>& words)
 {
     if (words == std::vector<std::string>{"version"})
-        return say(JUNIOR_VERSION);
+        return say(PEER_VERSION);
     const std::string act = words.size() > 2 ? words[2] : "";
     const bool is_echo = act == "echo" && words.size() == 4;
     const bool is_send = act == "send" && words.size() == 8;
