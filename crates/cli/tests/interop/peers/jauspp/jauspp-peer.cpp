@@ -331,10 +331,13 @@ public:
         }
     }
 
-    // Starts the component, which must have all its callbacks by now, and waits until JAUS++'s discovery has the services of the other component, by which its address is known too.
+    // Starts the component, which must have all its callbacks by now.
+    void begin() { start(component, id_, JAUS::Subsystem::OCU); }
+
+    // Starts it, and waits until the library's discovery has the services of the other component.
     void find()
     {
-        start(component, id_, JAUS::Subsystem::OCU);
+        begin();
         wait_until([&] { return !services().empty(); }, other_.ToString() + " was not found");
     }
 
@@ -507,7 +510,8 @@ public:
         : client_(client), id_(id), other_(other), listener_([this](const TestMessage& message) { hear(message); })
     {
         client.component.TransportService()->RegisterCallback(TEST_CODE, &listener_);
-        client.find();
+        // An echo need not have services: its address is known once it has sent anything.
+        client.begin();
     }
 
     // False if nothing of this size comes back in time.
