@@ -97,10 +97,9 @@ void wait_until(const std::function<bool()>& is_so, const std::string& otherwise
         require(Clock::now() < deadline, otherwise);
 }
 
-// Runs `ip` with these arguments.
-void ip(const std::string& arguments)
+bool succeeds(const std::string& command)
 {
-    require(std::system(("ip " + arguments).c_str()) == 0, "ip " + arguments + " failed");
+    return std::system(command.c_str()) == 0;
 }
 
 // ---- the door: tells what the node manager lists, and where it is
@@ -258,18 +257,20 @@ pid_t start_manager()
     char octet;
     require(read(steps[0], &octet, 1) == 1, "the node manager does not start");
     const std::string network = std::to_string(manager);
-    ip("link add " + OUTER_LINK + " type veth peer name " + INNER_LINK + " netns " + network);
-    ip("address add " + OUTER_ADDRESS + "/24 brd + dev " + OUTER_LINK);
-    ip("link set " + OUTER_LINK + " up");
-    const std::string inside = "nsenter --net=/proc/" + network + "/ns/net ip ";
-    for (const std::string command :
-         {"link set lo up", "address add INNER/24 brd + dev LINK", "link set LINK up", "route add 224.0.0.0/4 dev LINK"}) {
-        std::string filled = command;
-        for (const auto& [word, value] : {std::pair{"INNER", INNER_ADDRESS}, std::pair{"LINK", INNER_LINK}})
-            for (std::size_t at; (at = filled.find(word)) != std::string::npos;)
-                filled.replace(at, std::strlen(word), value);
-        require(std::system((inside + filled).c_str()) == 0, filled + " failed");
-    }
+    // The link of an OpenJAUS that was killed goes some time after it.
+    const std::string link = "ip link add " + OUTER_LINK + " type veth peer name " + INNER_LINK + " netns " + network;
+    wait_until([&] { return succeeds(link); }, link + " failed");
+    const std::string inside = "nsenter --net=/proc/" + network + "/ns/net ";
+    const std::string commands[] = {
+        "ip address add " + OUTER_ADDRESS + "/24 brd + dev " + OUTER_LINK,
+        "ip link set " + OUTER_LINK + " up",
+        inside + "ip link set lo up",
+        inside + "ip address add " + INNER_ADDRESS + "/24 brd + dev " + INNER_LINK,
+        inside + "ip link set " + INNER_LINK + " up",
+        inside + "ip route add 224.0.0.0/4 dev " + INNER_LINK,
+    };
+    for (const std::string& command : commands)
+        require(succeeds(command), command + " failed");
     require(write(links[1], "", 1) == 1, "the node manager has ended");
     close(links[0]);
     return manager;
