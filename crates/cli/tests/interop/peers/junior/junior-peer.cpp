@@ -12,11 +12,13 @@
 #include <string>
 #include <thread>
 
+#include <arpa/inet.h>
 #include <fcntl.h>
 #include <sched.h>
 #include <signal.h>
 #include <sys/mount.h>
 #include <sys/prctl.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <JuniorAPI.h>
@@ -47,6 +49,7 @@ constexpr unsigned LONGEST = 2 << 20;
 constexpr const char* SOCKETS = "/tmp";
 constexpr const char* SETTINGS = "/tmp/interop.xml";
 constexpr const char* ENGINE = "JuniorRTE";
+constexpr unsigned short PORT = 3794;
 
 void say(const std::string& line)
 {
@@ -139,6 +142,22 @@ void hide_sockets()
         throw failure("a mount namespace");
     if (mount("tmpfs", SOCKETS, "tmpfs", 0, nullptr) != 0)
         throw failure("a private /tmp");
+}
+
+// Waits until the engine of a process that was killed has left the port: the next one would run without UDP.
+void await_free_port()
+{
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(PORT);
+    for (const auto deadline = Clock::now() + AGAIN; Clock::now() < deadline; std::this_thread::sleep_for(LOOK)) {
+        const int probe = socket(AF_INET, SOCK_DGRAM, 0);
+        const bool is_free = bind(probe, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+        close(probe);
+        if (is_free)
+            return;
+    }
+    throw std::runtime_error("another program holds UDP port " + std::to_string(PORT));
 }
 
 // Starts the engine; it ends with this process. Writing to a closed TCP connection must not end it.
@@ -283,6 +302,8 @@ void run(const std::vector<std::string>& words)
     const int engine = engine_directory();
     hide_sockets();
     write_settings(used);
+    if (used.udp)
+        await_free_port();
     start_engine(engine);
     Client client(id);
     if (is_echo)
