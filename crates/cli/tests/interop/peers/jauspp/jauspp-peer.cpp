@@ -2,26 +2,20 @@
 // client that does one thing. ../../README.md describes its commands.
 
 #include <atomic>
-#include <cmath>
-#include <cstdio>
+#include <chrono>
 #include <functional>
-#include <memory>
 #include <mutex>
+#include <set>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
-#include <unistd.h>
-
-#include <jaus/core/component.h>
 #include <jaus/core/control/querycontrol.h>
 #include <jaus/core/control/reportcontrol.h>
-#include <jaus/mobility/drivers/primitivedriver.h>
-#include <jaus/mobility/sensors/globalposesensor.h>
-#include <jaus/mobility/sensors/localposesensor.h>
-#include <jaus/mobility/sensors/velocitystatesensor.h>
 
-#include "../test-message.h"
+#include "component.h"
+#include "vehicle.h"
 
 // The commit of the library and the origin of CxUtils, set by the build.
 #ifndef PEER_VERSION
@@ -32,18 +26,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
-
-// Update rate of the vehicle's sensors.
-constexpr double VEHICLE_HZ = 25;
-// Speed at full effort in m/s, and the change of speed in m/s².
-constexpr double FASTEST = 2;
-constexpr double ACCELERATION = 1.5;
-// Turn rate at full effort, in rad/s.
-constexpr double TURN = 0.5;
-// Where the vehicle starts, in radians.
-constexpr double LATITUDE = 0.6;
-constexpr double LONGITUDE = -1.4;
-constexpr double EARTH_RADIUS = 6371008.8;
 
 // Rate of the periodic reports, and the least that is accepted.
 constexpr double HZ = 10;
@@ -65,92 +47,6 @@ constexpr auto ECHO_BEAT = 200ms;
 constexpr auto AGAIN = 3s;
 // Timeout of one query, in ms.
 constexpr unsigned WAIT = 1000;
-
-void say(const std::string& line)
-{
-    std::printf("%s\n", line.c_str());
-    std::fflush(stdout);
-}
-
-// Ends the process without the library's shutdown, which may fail after all is done.
-[[noreturn]] void leave(int status)
-{
-    std::fflush(stdout);
-    _exit(status);
-}
-
-void require(bool is_so, const std::string& otherwise)
-{
-    if (!is_so)
-        throw std::runtime_error(otherwise);
-}
-
-JAUS::Address address(const std::string& text)
-{
-    unsigned subsystem, node, component;
-    char rest;
-    require(std::sscanf(text.c_str(), "%u.%u.%u%c", &subsystem, &node, &component, &rest) == 3,
-            text + " is not an id; write it as in 77.1.1");
-    return JAUS::Address(subsystem, node, component);
-}
-
-// A test message of any size.
-class TestMessage : public JAUS::Message {
-public:
-    TestMessage(const JAUS::Address& to = {}, const JAUS::Address& from = {}) : Message(TEST_CODE, to, from) {}
-
-    bool IsCommand() const override { return false; }
-    Message* Clone() const override { return new TestMessage(*this); }
-    JAUS::UInt GetPresenceVector() const override { return 0; }
-    JAUS::UInt GetPresenceVectorSize() const override { return 0; }
-    JAUS::UInt GetPresenceVectorMask() const override { return 0; }
-    JAUS::UShort GetMessageCodeOfResponse() const override { return 0; }
-    std::string GetMessageName() const override { return "Test"; }
-    void ClearMessageBody() override { body.clear(); }
-    bool IsLargeDataSet(unsigned longest) const override { return body.size() + JAUS::USHORT_SIZE > longest; }
-
-    int WriteMessageBody(JAUS::Packet& packet) const override { return packet.Write(body.data(), body.size()); }
-
-    int ReadMessageBody(const JAUS::Packet& packet) override
-    {
-        // The body of a single message ends before its sequence number; that of a merged one has none, and the
-        // header before it has the size of an empty message.
-        const unsigned char* octets = packet.Ptr();
-        const bool is_single = (octets[1] | octets[2] << 8) == static_cast<int>(packet.Length());
-        const unsigned end = packet.Length() - (is_single ? JAUS::USHORT_SIZE : 0);
-        require(end >= packet.GetReadPos(), "a test message shorter than its header");
-        body.resize(end - packet.GetReadPos());
-        packet.Read(body.data(), body.size());
-        return body.size();
-    }
-
-    // What follows the code.
-    Octets body;
-};
-
-// A test message of this many octets, its code included.
-TestMessage test(std::size_t size, const JAUS::Address& to, const JAUS::Address& from)
-{
-    TestMessage message(to, from);
-    const Octets octets = test_message(size);
-    message.body.assign(octets.begin() + JAUS::USHORT_SIZE, octets.end());
-    return message;
-}
-
-// Gives every message of a kind to a function, in the thread that receives it.
-class Listener : public JAUS::Transport::Callback {
-public:
-    explicit Listener(std::function<void(const TestMessage&)> hear) : hear_(std::move(hear)) {}
-
-    void ProcessMessage(const JAUS::Message* message) override
-    {
-        if (const auto* test = dynamic_cast<const TestMessage*>(message))
-            hear_(*test);
-    }
-
-private:
-    std::function<void(const TestMessage&)> hear_;
-};
 
 // Counts the velocity reports of a producer.
 class Reports : public JAUS::Events::Callback {
@@ -188,107 +84,6 @@ public:
     std::atomic<bool> is_lost{false};
 };
 
-void start(JAUS::Component& component, const JAUS::Address& id, JAUS::Subsystem::Type type)
-{
-    JAUS::Discovery& discovery = *component.DiscoveryService();
-    discovery.SetSubsystemIdentification(type, type == JAUS::Subsystem::Vehicle ? "Simulation" : "Operator");
-    discovery.SetNodeIdentification("Host");
-    discovery.SetComponentIdentification("Interoperability");
-    component.TransportService()->AddMessageTemplate(new TestMessage());
-    require(component.Initialize(id), id.ToString() + " could not be initialized");
-}
-
-// ---- the answering sides
-
-// Keeps the last effort of its controller.
-class Driver : public JAUS::PrimitiveDriver {
-public:
-    bool SetWrenchEffort(const JAUS::SetWrenchEffort* command) override
-    {
-        const auto share = [](double percent) { return std::max(-100.0, std::min(percent, 100.0)) / 100; };
-        if (command->IsFieldPresent(JAUS::SetWrenchEffort::PresenceVector::PropulsiveLinearEffortX))
-            push = share(command->GetPropulsiveLinearEffortX());
-        if (command->IsFieldPresent(JAUS::SetWrenchEffort::PresenceVector::PropulsiveRotationalEffortZ))
-            turn = share(command->GetPropulsiveRotationalEffortZ());
-        return true;
-    }
-
-    bool Reset() override
-    {
-        push = turn = 0;
-        return PrimitiveDriver::Reset();
-    }
-
-    // Shares of full effort.
-    std::atomic<double> push{0};
-    std::atomic<double> turn{0};
-};
-
-struct Motion {
-    double velocity = 0;
-    double turn_rate = 0;
-    double heading = 0;
-    double north = 0;
-    double east = 0;
-
-    void move(double push, double turn, double seconds)
-    {
-        const double change = ACCELERATION * seconds;
-        velocity += std::max(-change, std::min(push * FASTEST - velocity, change));
-        turn_rate = turn * TURN;
-        heading = std::remainder(heading + turn_rate * seconds, 2 * CxUtils::CX_PI);
-        north += velocity * std::cos(heading) * seconds;
-        east += velocity * std::sin(heading) * seconds;
-    }
-};
-
-[[noreturn]] void vehicle(const JAUS::Address& id)
-{
-    // The component owns its services.
-    JAUS::Component component;
-    auto* global = new JAUS::GlobalPoseSensor();
-    auto* local = new JAUS::LocalPoseSensor();
-    auto* velocity = new JAUS::VelocityStateSensor();
-    auto* driver = new Driver();
-    global->SetSensorUpdateRate(VEHICLE_HZ);
-    local->SetSensorUpdateRate(VEHICLE_HZ);
-    velocity->SetSensorUpdateRate(VEHICLE_HZ);
-    for (JAUS::Service* service : {static_cast<JAUS::Service*>(global), static_cast<JAUS::Service*>(local),
-                                   static_cast<JAUS::Service*>(velocity), static_cast<JAUS::Service*>(driver)})
-        require(component.AddService(service), "a service could not be added");
-    start(component, id, JAUS::Subsystem::Vehicle);
-    component.ManagementService()->SetStatus(JAUS::Management::Status::Standby);
-    say("listening");
-
-    Motion motion;
-    for (;;) {
-        const bool is_ready = component.ManagementService()->GetStatus() == JAUS::Management::Status::Ready;
-        motion.move(is_ready ? driver->push.load() : 0, is_ready ? driver->turn.load() : 0, 1 / VEHICLE_HZ);
-        const JAUS::Time now(true);
-        JAUS::GlobalPose global_pose;
-        global_pose.SetLatitude(CxUtils::CxToDegrees(LATITUDE + motion.north / EARTH_RADIUS));
-        global_pose.SetLongitude(
-            CxUtils::CxToDegrees(LONGITUDE + motion.east / (EARTH_RADIUS * std::cos(LATITUDE))));
-        global_pose.SetAltitude(0);
-        global_pose.SetYaw(motion.heading);
-        global_pose.SetTimeStamp(now);
-        JAUS::LocalPose local_pose;
-        local_pose.SetX(motion.north);
-        local_pose.SetY(motion.east);
-        local_pose.SetZ(0);
-        local_pose.SetYaw(motion.heading);
-        local_pose.SetTimeStamp(now);
-        JAUS::VelocityState state;
-        state.SetVelocityX(motion.velocity);
-        state.SetYawRate(motion.turn_rate);
-        state.SetTimeStamp(now);
-        global->SetGlobalPose(global_pose);
-        local->SetLocalPose(local_pose);
-        velocity->SetVelocityState(state);
-        std::this_thread::sleep_for(std::chrono::duration<double>(1 / VEHICLE_HZ));
-    }
-}
-
 [[noreturn]] void echo(const JAUS::Address& id)
 {
     JAUS::Component component;
@@ -318,7 +113,6 @@ public:
         // What a component without such a sensor cannot read by itself.
         component.TransportService()->AddMessageTemplate(new JAUS::ReportVelocityState());
     }
-
 
     bool has_time() const { return Clock::now() < deadline_; }
 
@@ -452,7 +246,8 @@ private:
 }
 
 // Takes control, and loses it to a component with more authority, which releases it.
-[[noreturn]] void control(Client& client, const JAUS::Address& id, const JAUS::Address& other, Clock::time_point deadline)
+[[noreturn]] void control(Client& client, const JAUS::Address& id, const JAUS::Address& other,
+                          Clock::time_point deadline)
 {
     LossOfControl loss;
     loss.of = other;

@@ -1,16 +1,17 @@
 // A client of Junior's library with a run-time engine of its own, for the interoperability suite: it echoes
 // test messages, or sends them and expects them back. ../../README.md describes its commands.
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <initializer_list>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <arpa/inet.h>
 #include <fcntl.h>
