@@ -1,12 +1,17 @@
 // A client of Junior's library with a run-time engine of its own, for the interoperability suite: it echoes
-// test messages, or sends them and expects them back. ../../README.md describes its commands.
+// test messages, or sends them and expects them back. With JUNIOR_JTS defined, the library is that of the JAUS
+// Tool Set. ../../README.md describes its commands.
 
 #include <algorithm>
 #include <chrono>
+#include <condition_variable>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <deque>
 #include <fstream>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -36,7 +41,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-// Pause between two looks at the queue: the library does not block.
+// Pause between two looks, where the library does not block.
 constexpr auto LOOK = 1ms;
 // Time without an echo after which a possibly lost message is sent again.
 constexpr auto AGAIN = 3s;
@@ -49,7 +54,13 @@ constexpr unsigned LONGEST = 2 << 20;
 // Where the engine and its clients have their sockets and their settings.
 constexpr const char* SOCKETS = "/tmp";
 constexpr const char* SETTINGS = "/tmp/interop.xml";
+#ifdef JUNIOR_JTS
+constexpr const char* ENGINE = "NodeManager";
+using Handle = std::int64_t;
+#else
 constexpr const char* ENGINE = "JuniorRTE";
+using Handle = long;
+#endif
 constexpr unsigned short PORT = 3794;
 
 void say(const std::string& line)
@@ -133,7 +144,7 @@ int engine_directory()
             return open(directory.c_str(), O_PATH | O_DIRECTORY);
         start = end + 1;
     }
-    throw std::runtime_error("there is no JuniorRTE on the PATH, nor in the directory JUNIOR_RTE");
+    throw std::runtime_error(std::string("there is no ") + ENGINE + " on the PATH, nor in the directory JUNIOR_RTE");
 }
 
 // Hides the sockets of this engine from those on other hosts: network namespaces share the file system.
@@ -183,19 +194,89 @@ struct Message {
     Octets octets;
 };
 
-// A client of the engine.
-class Client {
+#ifdef JUNIOR_JTS
+
+// The messages that have arrived. A thread of its own receives them: the library sees acknowledgements only while
+// it receives, and its sender waits for them.
+class Inbox {
 public:
-    explicit Client(unsigned id) : buffer_(LONGEST)
+    explicit Inbox(Handle handle)
     {
-        const JrErrorCode code = JrConnect(id, SETTINGS, &handle_);
-        if (code != Ok)
-            throw std::runtime_error("JrConnect: error " + std::to_string(code));
+        std::thread([this, handle] {
+            for (;;)
+                receive(handle);
+        }).detach();
     }
 
-    ~Client() { JrDisconnect(handle_); }
-    Client(const Client&) = delete;
-    Client& operator=(const Client&) = delete;
+    std::optional<Message> next(Clock::time_point deadline)
+    {
+        std::unique_lock<std::mutex> lock(mutex_);
+        if (!arrived_.wait_until(lock, deadline, [this] { return !messages_.empty(); }))
+            return std::nullopt;
+        Message message = std::move(messages_.front());
+        messages_.pop_front();
+        return message;
+    }
+
+private:
+    void receive(Handle handle)
+    {
+        unsigned source = 0, size = 0;
+        char* octets = nullptr;
+        if (JrReceive(handle, &source, &size, &octets) != Ok)
+            return std::this_thread::sleep_for(LOOK);
+        std::lock_guard<std::mutex> lock(mutex_);
+        messages_.push_back({source, Octets(octets, octets + size)});
+        delete[] octets;
+        arrived_.notify_one();
+    }
+
+    std::mutex mutex_;
+    std::condition_variable arrived_;
+    std::deque<Message> messages_;
+};
+
+#else
+
+// The messages that have arrived. The library does not block.
+class Inbox {
+public:
+    explicit Inbox(Handle handle) : handle_(handle), buffer_(LONGEST) {}
+
+    std::optional<Message> next(Clock::time_point deadline)
+    {
+        do {
+            unsigned source = 0, size = buffer_.size();
+            const JrErrorCode code = JrReceive(handle_, &source, &size, buffer_.data());
+            if (code == Ok)
+                return Message{source, Octets(buffer_.begin(), buffer_.begin() + size)};
+            if (code != NoMessages)
+                throw std::runtime_error("JrReceive: error " + std::to_string(code));
+            std::this_thread::sleep_for(LOOK);
+        } while (Clock::now() < deadline);
+        return std::nullopt;
+    }
+
+private:
+    const Handle handle_;
+    std::vector<char> buffer_;
+};
+
+#endif
+
+Handle connect(unsigned id)
+{
+    Handle handle = 0;
+    const JrErrorCode code = JrConnect(id, SETTINGS, &handle);
+    if (code != Ok)
+        throw std::runtime_error("JrConnect: error " + std::to_string(code));
+    return handle;
+}
+
+// A client of the engine. It is never disconnected: the engine ends with this process.
+class Client {
+public:
+    explicit Client(unsigned id) : handle_(connect(id)), inbox_(handle_) {}
 
     // False if acknowledgement was requested and did not come.
     bool send(unsigned to, const Octets& message, bool acknowledge)
@@ -211,20 +292,9 @@ public:
     // The next test message, if one comes before the deadline.
     std::optional<Message> receive(Clock::time_point deadline)
     {
-        do {
-            Message message{};
-            unsigned size = buffer_.size();
-            const JrErrorCode code = JrReceive(handle_, &message.source, &size, buffer_.data());
-            if (code == Ok) {
-                message.octets.assign(buffer_.begin(), buffer_.begin() + size);
-                if (is_test_message(message.octets))
-                    return message;
-            } else if (code == NoMessages) {
-                std::this_thread::sleep_for(LOOK);
-            } else {
-                throw std::runtime_error("JrReceive: error " + std::to_string(code));
-            }
-        } while (Clock::now() < deadline);
+        while (auto message = inbox_.next(deadline))
+            if (is_test_message(message->octets))
+                return message;
         return std::nullopt;
     }
 
@@ -242,8 +312,8 @@ public:
     }
 
 private:
-    long handle_ = 0;
-    std::vector<char> buffer_;
+    const Handle handle_;
+    Inbox inbox_;
 };
 
 [[noreturn]] void echo(Client& client, bool acknowledge)
@@ -306,7 +376,8 @@ void run(const std::vector<std::string>& words)
     if (used.udp)
         await_free_port();
     start_engine(engine);
-    Client client(id);
+    // Not destroyed, because a thread may receive for it until the end.
+    Client& client = *new Client(id);
     if (is_echo)
         echo(client, words[3] == "1");
     if (is_keep)
@@ -320,11 +391,14 @@ void run(const std::vector<std::string>& words)
 
 int main(int count, char** words)
 {
+    int status = 0;
     try {
         run(std::vector<std::string>(words + 1, words + count));
     } catch (const std::exception& error) {
         std::fprintf(stderr, "junior-peer: %s\n", error.what());
-        return 1;
+        status = 1;
     }
-    return 0;
+    // The receiving thread may still run.
+    std::fflush(stdout);
+    _exit(status);
 }
