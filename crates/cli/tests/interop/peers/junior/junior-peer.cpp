@@ -1,6 +1,6 @@
 // A client of Junior's library with a run-time engine of its own, for the interoperability suite: it echoes
-// test messages, or sends them and expects them back. With JUNIOR_JTS defined, the library is that of the JAUS
-// Tool Set. ../../README.md describes its commands.
+// test messages, or sends them and expects them back. If JUNIOR_ENGINE is defined, it is the engine of a fork: of
+// the JAUS Tool Set, or of fkie's IOP packages. ../../README.md describes the commands.
 
 #include <algorithm>
 #include <chrono>
@@ -54,8 +54,8 @@ constexpr unsigned LONGEST = 2 << 20;
 // Where the engine and its clients have their sockets and their settings.
 constexpr const char* SOCKETS = "/tmp";
 constexpr const char* SETTINGS = "/tmp/interop.xml";
-#ifdef JUNIOR_JTS
-constexpr const char* ENGINE = "NodeManager";
+#ifdef JUNIOR_ENGINE
+constexpr const char* ENGINE = JUNIOR_ENGINE;
 using Handle = std::int64_t;
 #else
 constexpr const char* ENGINE = "JuniorRTE";
@@ -112,12 +112,14 @@ Links links(const std::string& by, unsigned other, const std::string& address)
 }
 
 // 1 MiB needs 258 fragments of 4079 octets or 736 of ours in the history, and buffers that hold it at once.
+// EnableUDPforLocal and SockPath are for fkie's engine, which otherwise exchanges messages with its clients by UDP.
 void write_settings(const Links& links)
 {
     std::ofstream file(SETTINGS);
     file << "<JrXmlConfig>\n"
             "<API_Configuration MaxMsgHistory=\"1000\" OldMsgTimeout=\"3\" DropDuplicateMsgs=\"1\"\n"
-            " MTU_Size=\"4079\" MaxAckNakRetries=\"10\" AckTimeout=\"100\" ConnectionTimeout=\"1000\"/>\n"
+            " MTU_Size=\"4079\" MaxAckNakRetries=\"10\" AckTimeout=\"100\" ConnectionTimeout=\"1000\"\n"
+            " EnableUDPforLocal=\"0\" SockPath=\"/tmp/\"/>\n"
             "<Log_Configuration LogFileName=\"\" LogMsgLevel=\"0\"/>\n"
             "<RTE_Configuration AllowRelay=\"0\" RTE_CycleTime=\"1\" NumSerialInterfaces=\"0\"\n"
             " EnableUDPInterface=\""
@@ -194,9 +196,9 @@ struct Message {
     Octets octets;
 };
 
-#ifdef JUNIOR_JTS
+#ifdef JUNIOR_ENGINE
 
-// The messages that have arrived. A thread of its own receives them: the library sees acknowledgements only while
+// The messages that have arrived. A thread of its own receives them: a fork's library sees acknowledgements only while
 // it receives, and its sender waits for them.
 class Inbox {
 public:
