@@ -280,7 +280,7 @@ class Client {
 public:
     explicit Client(unsigned id) : handle_(connect(id)), inbox_(handle_) {}
 
-    // False if acknowledgement was requested and did not come.
+    // False if acknowledgement was requested and did not come, or if the library's queue is full.
     bool send(unsigned to, const Octets& message, bool acknowledge)
     {
         const char* octets = reinterpret_cast<const char*>(message.data());
@@ -288,6 +288,8 @@ public:
         const JrErrorCode code = JrSend(handle_, to, message.size(), octets, 6, flags);
         if (code != Ok && code != Timeout)
             throw std::runtime_error("JrSend: error " + std::to_string(code));
+        if (code == Timeout)
+            std::this_thread::sleep_for(BEAT);
         return code == Ok;
     }
 
