@@ -77,6 +77,7 @@ use self::links::Links;
 use self::local::serve;
 use crate::address::JausId;
 use crate::endpoint::{self, Event, LinkId};
+use crate::link::custom::CustomLink;
 use crate::link::interface::Changes;
 #[cfg(unix)]
 use crate::link::junior;
@@ -110,10 +111,19 @@ impl Node {
     /// # Errors
     /// [`StartError`] gives the reason and the remedy. Nothing is left running.
     pub fn start(config: Config) -> Result<Self, StartError> {
+        Self::start_with(config, Vec::new())
+    }
+
+    /// Starts the node with links of other crates, in addition to those of its configuration. An
+    /// empty list of interfaces then leaves it with these alone.
+    ///
+    /// # Errors
+    /// As [`start`](Self::start).
+    pub fn start_with(config: Config, links: Vec<Box<dyn CustomLink>>) -> Result<Self, StartError> {
         config.validate()?;
         let runtime = tokio::runtime::Handle::try_current().map_err(|_| StartError::NoRuntime)?;
         let config = Arc::new(config);
-        let links = Links::open(&config)?;
+        let links = Links::open(&config, links)?;
         let listener = match &config.local {
             Local::Off => None,
             Local::At(address) => Some(Listener::open(address)?),

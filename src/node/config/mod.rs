@@ -341,13 +341,13 @@ impl Config {
     }
 
     /// Whether UDP is in use. Junior replaces it, and an empty list of interfaces disables it if
-    /// another link or a local address is configured.
-    pub(super) fn uses_udp(&self) -> bool {
+    /// another link or a local address is configured, or the node `has_custom` links.
+    pub(super) fn uses_udp(&self, has_custom: bool) -> bool {
         #[cfg(unix)]
         if self.junior.is_some() {
             return false;
         }
-        let another_way = self.has_streams() || matches!(self.local, Local::At(_));
+        let another_way = has_custom || self.has_streams() || matches!(self.local, Local::At(_));
         self.interfaces != Interfaces::Only(Vec::new()) || !another_way
     }
 
