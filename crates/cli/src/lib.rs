@@ -17,6 +17,8 @@ pub mod logging;
 pub mod network;
 pub mod output;
 pub mod runtime;
+#[cfg(feature = "secure")]
+pub mod secure;
 pub mod settings;
 pub mod statistics;
 mod systemd;

@@ -18,11 +18,32 @@ const OWN: [&str; 3] = ["id", "name", "kind"];
 
 /// The table with the flags of a single-component program.
 const COMPONENT: &str = "component";
+/// The table with the settings of the secure link.
+const SECURE: &str = "secure";
 
 /// Reads a settings file: identity and settings of the node.
 pub fn read(path: &Path) -> Result<(Identity, Config), Failure> {
     let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
     parse(&text).map_err(|mistake| Failure::new(format!("{}:{mistake}", path.display())))
+}
+
+/// The table `[secure]` of a settings file, or the default without one.
+///
+/// # Errors
+/// An unreadable file, or an invalid table.
+#[cfg(feature = "secure")]
+pub fn secure<T: serde::de::DeserializeOwned + Default>(path: &Path) -> Result<T, Failure> {
+    let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
+    let read = || {
+        let mut table = DeTable::parse(&text)?;
+        let secure = table.get_mut().remove(SECURE);
+        let read = secure.map(|secure| T::deserialize(toml::de::ValueDeserializer::from(secure)));
+        read.unwrap_or_else(|| Ok(T::default()))
+    };
+    read().map_err(|error: Error| {
+        let mistake = Mistake::of(&error, &text);
+        Failure::new(format!("{}:{mistake}", path.display()))
+    })
 }
 
 /// The flags in the table `[component]` of a settings file, as command line arguments: a key is a
@@ -89,13 +110,15 @@ fn parse(text: &str) -> Result<(Identity, Config), Mistake> {
     let wrong = |error: Error| Mistake::of(&error, text);
     let table = DeTable::parse(text).map_err(wrong)?;
     let known = serde_json::to_value(Config::default()).unwrap_or_default();
-    let besides = [&OWN[..], &[COMPONENT]].concat();
+    let besides = [&OWN[..], &[COMPONENT, SECURE]].concat();
     if let Some(unknown) = unknown_key(table.get_ref(), &known, &besides, "") {
         return Err(unknown.in_text(text));
     }
     let place = table.span();
     let mut table = table;
-    table.get_mut().remove(COMPONENT);
+    for other in [COMPONENT, SECURE] {
+        table.get_mut().remove(other);
+    }
     let is_own = |(key, _): &(Spanned<DeString<'_>>, _)| OWN.contains(&key.get_ref().as_ref());
     let (own, node): (Vec<_>, Vec<_>) = table.into_inner().into_iter().partition(is_own);
     let part = |entries: Vec<_>| {

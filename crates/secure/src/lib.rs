@@ -34,6 +34,7 @@
 //! The protocol logic ([`transport`]) does no I/O and reads no clock; [`SecureLink`] adds the socket.
 #![forbid(unsafe_code)]
 
+pub mod edit;
 mod key;
 mod link;
 mod tls;

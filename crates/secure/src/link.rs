@@ -81,6 +81,7 @@ impl SecureLink {
         let address = settings.listen;
         let socket = bind(address).map_err(|source| OpenError { address, source })?;
         tracing::info!(listening = ?socket.local_addr().ok(), key = %key.public(), "secure link opened");
+        trust.follow();
         Ok(Self {
             socket,
             transport: Transport::new(key, trust, settings.connect),

@@ -12,12 +12,15 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{Arc, PoisonError, RwLock, Weak};
+use std::time::{Duration, SystemTime};
 
 use jaus::address::JausId;
 
 use crate::key::PublicKey;
 
+/// How often a running node looks whether its trust file has changed.
+const FOLLOW_INTERVAL: Duration = Duration::from_secs(1);
 /// The longest trust file, in octets: some ten thousand keys.
 const LONGEST: u64 = 1 << 20;
 
@@ -157,13 +160,22 @@ fn parse_line(line: usize, text: &str) -> Result<Peer, TrustError> {
     })
 }
 
+/// The line of a peer in a trust file.
+pub(crate) fn line_of(peer: &Peer) -> String {
+    let ids: Vec<_> = peer.ids.iter().map(JausId::to_string).collect();
+    format!("{} {} {}\n", peer.name, peer.key, ids.join(","))
+}
+
 /// The trust of a running node, shared by its link and its handshakes. Replacing it takes effect at
 /// once: the link closes the sessions of keys that are no longer trusted.
 #[derive(Clone, Debug, Default)]
 pub struct TrustFile {
-    trust: Arc<RwLock<(u64, Trust)>>,
+    trust: Shared,
     path: Option<PathBuf>,
 }
+
+/// The trust, and how often it was replaced.
+type Shared = Arc<RwLock<(u64, Trust)>>;
 
 impl TrustFile {
     /// Shares a trust that is not in a file.
@@ -197,6 +209,14 @@ impl TrustFile {
         Ok(())
     }
 
+    /// Reads the file again whenever it has changed, as long as the trust is in use. Must be called
+    /// within a tokio runtime. A file that has become unusable changes nothing, and is logged.
+    pub fn follow(&self) {
+        if let Some(path) = &self.path {
+            tokio::spawn(follow(Arc::downgrade(&self.trust), path.clone()));
+        }
+    }
+
     /// Replaces the trust.
     pub fn replace(&self, trust: Trust) {
         let mut inner = self.trust.write().unwrap_or_else(PoisonError::into_inner);
@@ -215,6 +235,38 @@ impl TrustFile {
         let inner = self.trust.read().unwrap_or_else(PoisonError::into_inner);
         inner.0
     }
+}
+
+#[expect(
+    clippy::disallowed_methods,
+    reason = "looks at a file in real time, also while a test pauses the clock"
+)]
+async fn follow(trust: Weak<RwLock<(u64, Trust)>>, path: PathBuf) {
+    let mut seen = modified(&path);
+    loop {
+        tokio::time::sleep(FOLLOW_INTERVAL).await;
+        let Some(trust) = trust.upgrade() else {
+            return;
+        };
+        let now = modified(&path);
+        if now == seen {
+            continue;
+        }
+        seen = now;
+        let file = TrustFile {
+            trust,
+            path: Some(path.clone()),
+        };
+        match file.reload() {
+            Ok(()) => tracing::info!(path = %path.display(), "trust file read again"),
+            Err(error) => tracing::error!(%error, "the previous trust stays in force"),
+        }
+    }
+}
+
+/// When the file was changed last; `None` if it is not there.
+fn modified(path: &Path) -> Option<SystemTime> {
+    fs::metadata(path).and_then(|it| it.modified()).ok()
 }
 
 fn read(path: &Path) -> Result<Trust, TrustError> {

@@ -17,6 +17,8 @@ mod encode;
 mod examine;
 mod jsidl;
 mod judge;
+#[cfg(feature = "secure")]
+mod keys;
 mod lease;
 mod list;
 mod load;
@@ -73,6 +75,8 @@ enum Command {
     #[cfg(target_os = "linux")]
     #[command(name = up::warden::NAME, hide = true)]
     Warden(up::warden::Warden),
+    #[cfg(feature = "secure")]
+    Keys(keys::Keys),
     Node(node::NodeCommand),
     Vehicle(vehicle::VehicleCommand),
     Monitor(monitor::Monitor),
@@ -112,6 +116,8 @@ impl Command {
             Self::Leash(leash) => leash.run(),
             #[cfg(target_os = "linux")]
             Self::Warden(warden) => warden.run(),
+            #[cfg(feature = "secure")]
+            Self::Keys(keys) => keys.run(),
             Self::Node(node) => node.run(),
             Self::Vehicle(vehicle) => vehicle.run(),
             Self::Monitor(monitor) => monitor.run(),

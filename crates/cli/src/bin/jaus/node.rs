@@ -78,7 +78,7 @@ impl NodeCommand {
         let name = self.name.clone().or(identity.name);
         let name = name.unwrap_or_else(|| "jaus node".to_owned());
         runtime::run(async {
-            let node = Node::start(config).map_err(Failure::of)?;
+            let node = self.network.start(config)?;
             let events = (node.events(), node.component_events());
             let component = Component::builder(kind, name)
                 .attach(&node, id.component())

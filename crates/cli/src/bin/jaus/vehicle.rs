@@ -132,7 +132,7 @@ impl VehicleCommand {
         let name = name.unwrap_or_else(|| "Rover".to_owned());
         let navigation = self.navigation(id)?;
         runtime::run(async {
-            let node = Node::start(config).map_err(Failure::of)?;
+            let node = self.network.start(config)?;
             let time = TimeOfDay::new(time_of_day);
             let vehicle = self.simulation.vehicle().with_clock(time.clone());
             let vehicle = vehicle.motion_policy(self.motion_policy());

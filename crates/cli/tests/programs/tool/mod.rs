@@ -13,6 +13,7 @@ mod jsidl;
 mod jsidl_explain;
 mod jsidl_make;
 mod judge;
+mod keys;
 mod list;
 mod manual;
 mod monitor;

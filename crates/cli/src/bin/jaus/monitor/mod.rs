@@ -94,7 +94,7 @@ impl Monitor {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         runtime::run(async {
             let (id, config) = self.network.for_own_node("jaus monitor")?;
-            let node = Node::start(config).map_err(Failure::of)?;
+            let node = self.network.start(config)?;
             let port = node.attach(id.component()).map_err(Failure::of)?;
             let mut probe = self.probe.then(|| Probe::new(port.sender())).transpose()?;
             let component = Component::builder(Kind::OtherSubsystem, "jaus monitor")

@@ -2,7 +2,7 @@
 
 mod examples;
 mod outputs;
-mod peer;
+pub(super) mod peer;
 mod replay;
 mod right;
 mod safety;
