@@ -1,4 +1,5 @@
-//! The cost of a datagram: its header alone, the whole frame, and its way through an endpoint.
+//! The cost of a datagram: its header alone, the whole frame, and its way through an endpoint. With
+//! `JAUS_WRITE_FIGURES` set, the table is written to `docs/figures/wire.md`.
 
 #![expect(clippy::expect_used, reason = "a benchmark")]
 
@@ -7,10 +8,11 @@ use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
-use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BatchSize, Criterion, Throughput, criterion_group};
 use jaus::address::JausId;
 use jaus::endpoint::{Config, Endpoint, LinkId, LinkProfile, Outgoing, Path, StaticPeer};
 use jaus::wire::{Flags, Frame, as5669a, judp, ra};
+use jaus_test_kit::figures::Figures;
 
 const US: JausId = JausId::new(101, 1, 1);
 const PEER: JausId = JausId::new(42, 1, 1);
@@ -149,4 +151,55 @@ fn through_an_endpoint(c: &mut Criterion) {
 }
 
 criterion_group!(benches, header, datagram, through_an_endpoint);
-criterion_main!(benches);
+
+/// Steps by their group and name among the benchmarks.
+const STEPS: [(&str, &str, &str); 12] = [
+    ("header", "as5669a/decode", "read a header"),
+    ("header", "as5669a/decode by hand", "the same by hand"),
+    ("header", "as5669a/encode", "write a header"),
+    (
+        "header",
+        "ra/decode",
+        "read a header of the Reference Architecture",
+    ),
+    ("datagram", "read/50", "read a datagram of 50 octets"),
+    ("datagram", "read/1425", "read a datagram of 1425 octets"),
+    ("datagram", "write/50", "write a datagram of 50 octets"),
+    ("datagram", "write/1425", "write a datagram of 1425 octets"),
+    (
+        "endpoint",
+        "receive/50",
+        "receive 50 octets through an endpoint",
+    ),
+    (
+        "endpoint",
+        "receive/1425",
+        "receive 1425 octets through an endpoint",
+    ),
+    ("endpoint", "send/50", "send 50 octets through an endpoint"),
+    (
+        "endpoint",
+        "send/1425",
+        "send 1425 octets through an endpoint",
+    ),
+];
+
+/// The aim for receiving a small message, in nanoseconds.
+const AIM: f64 = 400.0;
+
+fn main() {
+    let mut figures = Figures::new("wire", "cargo bench --bench wire");
+    benches();
+    let measured = STEPS.map(|(group, function, step)| (step, figures.criterion(group, function)));
+    let received = measured[8].1;
+    // Otherwise arguments have selected some of the benchmarks.
+    if measured.iter().all(|(_, time)| time.is_some()) {
+        figures.table("Median time of a datagram", ["step", "time"]);
+        for (step, time) in measured {
+            figures.row([step, &format!("{:.1} ns", time.unwrap_or_default())]);
+        }
+        let is_met = received.is_some_and(|time| time <= AIM);
+        figures.aim("a small message received within 0.4 µs", [("", is_met)]);
+        figures.finish();
+    }
+}

@@ -15,8 +15,12 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut speeds = client.subscribe(sensor, &query, When::hz(5.0)).await?;
     while let Some(update) = speeds.next().await {
         match update {
-            Update::Up => println!("{sensor} reports its speed at {:.1?} Hz", speeds.hz()),
-            Update::Report(report) => println!("{:.2?} m/s", report.velocity_x_m_per_s()),
+            Update::Up => println!("{sensor} reports its speed"),
+            Update::Report(report) => {
+                if let Some(speed) = report.velocity_x_m_per_s() {
+                    println!("{speed:.2} m/s");
+                }
+            }
             Update::Down { why, .. } => println!("{sensor} is down: {why}"),
         }
     }

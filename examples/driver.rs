@@ -49,7 +49,10 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
             _ = tokio::signal::ctrl_c() => break,
             Ok(()) = standing.changed() => {
                 let now = rover.standing();
-                println!("{} now, controlled by {:?}", now.state, now.controller);
+                match now.controller {
+                    Some(client) => println!("{} now, controlled by {}", now.state, client.id),
+                    None => println!("{} now, not controlled", now.state),
+                }
             }
         }
     }

@@ -12,7 +12,8 @@ use deku::ctx::Endian;
 use deku::no_std_io::{Read, Seek, Write};
 use deku::prelude::*;
 
-/// The id of a component or, as a destination, a pattern of ids.
+/// The id of a component, such as `101.1.33`, or, as a destination, a pattern of ids, such as
+/// `101.255.255` for all components of subsystem 101.
 ///
 /// Any 32 bits make a `JausId`, because any 32 bits can arrive; [`is_unicast`](Self::is_unicast)
 /// checks that it names one component. Ordering is by subsystem, then node, then component.

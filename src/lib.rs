@@ -30,6 +30,8 @@ pub mod messages;
 #[cfg(feature = "node")]
 pub mod node;
 pub mod peer;
+#[doc(hidden)]
+pub mod random;
 pub mod service;
 pub mod wire;
 
@@ -42,14 +44,13 @@ pub use jaus_codec as codec;
 mod texts {
     #[doc = include_str!("../README.md")]
     struct Readme;
-    #[doc = include_str!("../docs/first-programs.md")]
-    struct FirstPrograms;
+    #[doc = include_str!("../docs/safety.md")]
+    struct Safety;
+    #[doc = include_str!("../docs/sessions.md")]
+    struct Sessions;
+    #[doc = include_str!("../docs/tutorial.md")]
+    struct Tutorial;
 }
-
-/// Compiles the program in the guide to sessions.
-#[cfg(all(doctest, feature = "node", feature = "mobility"))]
-#[doc = include_str!("../docs/sessions.md")]
-struct Sessions;
 
 /// Compiles the programs in the guide to JSIDL.
 #[cfg(doctest)]

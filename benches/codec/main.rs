@@ -13,7 +13,8 @@
 //!
 //! Each figure is the *shortest* time per operation over short batches: the time that the code
 //! takes while no other process uses the processor. `encode` appends to an existing buffer; `bytes`
-//! allocates new shared octets.
+//! allocates new shared octets. With `JAUS_WRITE_FIGURES` set, the table is written to
+//! `docs/figures/codec.md`.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a benchmark")]
 
 mod handwritten;
@@ -24,8 +25,9 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use criterion::measurement::WallTime;
-use criterion::{Bencher, BenchmarkGroup, Criterion, criterion_group, criterion_main};
+use criterion::{Bencher, BenchmarkGroup, Criterion, criterion_group};
 use jaus::codec::Message;
+use jaus_test_kit::figures::Figures;
 
 /// Runs in batches and takes the time of the shortest one for each of them.
 fn least<T>(bencher: &mut Bencher<'_>, mut operation: impl FnMut() -> T) {
@@ -158,4 +160,63 @@ criterion_group! {
         .sample_size(10);
     targets = benches
 }
-criterion_main!(all);
+
+/// The messages by their group of benchmarks.
+const MESSAGES: [(&str, &str); 7] = [
+    (
+        "pose32",
+        "ReportGlobalPose, all 9 optional fields, 32 octets",
+    ),
+    ("pose16", "the same with 4 of them"),
+    ("wrench26", "SetWrenchEffort, all 12"),
+    ("services", "ReportServices, 4 components of 6 services"),
+    ("elements", "SetElement, 32 elements"),
+    ("time10", "ReportTime, two bit fields"),
+    ("event64k", "Event with 64 KiB"),
+];
+
+const COLUMNS: [&str; 5] = [
+    "encode",
+    "encode by hand",
+    "decode",
+    "decode by hand",
+    "memcpy",
+];
+
+fn main() {
+    let mut figures = Figures::new(
+        "codec",
+        "cargo bench --bench codec --no-default-features --features mobility",
+    );
+    all();
+    let cells = |group| COLUMNS.map(|function| figures.criterion(group, function).map(time));
+    let rows = MESSAGES.map(|(group, message)| (message, cells(group)));
+    if rows.iter().any(|(_, cells)| cells[0].is_none()) {
+        // Arguments have selected some of the benchmarks.
+        return;
+    }
+    let title = "Least time for a message";
+    figures.table(
+        title,
+        [
+            "message",
+            "encode",
+            "by hand",
+            "decode",
+            "by hand",
+            "copy of the octets",
+        ],
+    );
+    for (message, cells) in &rows {
+        let [a, b, c, d, e] = cells.each_ref().map(|it| it.as_deref().unwrap_or_default());
+        figures.row([message, a, b, c, d, e]);
+    }
+    figures.finish();
+}
+
+fn time(nanoseconds: f64) -> String {
+    match nanoseconds {
+        short if short < 1000.0 => format!("{short:.1} ns"),
+        long => format!("{:.2} µs", long / 1000.0),
+    }
+}

@@ -10,16 +10,23 @@ use jaus::endpoint::Received;
 use jaus::messages::core::{CreateEvent, QueryHeartbeatPulse};
 use jaus::service::{Discovery, Kind, Liveness, Profile, Scope, Stack, Timing, Transport};
 use jaus::wire::{Broadcast, Priority};
+use jaus_test_kit::figures::Figures;
 
 use crate::quantile;
 
 const US: JausId = JausId::new(101, 1, 1);
 const CLIENTS: u16 = 10;
 
-pub(crate) fn measure(turns: usize) {
-    println!("## Cost of a message, without a network\n");
-    println!("| subscriptions | answer to a query (ns) | report of an event (ns) | ratio |");
-    println!("|--:|--:|--:|--:|");
+pub(crate) fn measure(turns: usize, figures: &mut Figures) {
+    figures.table(
+        "Processor time of a message, without a network",
+        [
+            "subscriptions",
+            "answer to a query (ns)",
+            "report of an event (ns)",
+            "ratio",
+        ],
+    );
     for subscriptions in [1, 100, 1000] {
         let (mut queries, mut events) = (Vec::new(), Vec::new());
         for _turn in 0..=turns {
@@ -30,12 +37,13 @@ pub(crate) fn measure(turns: usize) {
             times.sort_by(f64::total_cmp);
             quantile(&times, 0.5)
         });
-        println!(
-            "| {subscriptions} | {query:.0} | {event:.0} | {:.2} |",
-            event / query
-        );
+        figures.row([
+            &subscriptions.to_string(),
+            &format!("{query:.0}"),
+            &format!("{event:.0}"),
+            &format!("{:.2}", event / query),
+        ]);
     }
-    println!();
 }
 
 fn stack(now: Instant) -> Stack {

@@ -3,6 +3,7 @@
 //! ```sh
 //! cargo bench --bench events               # a little over a minute
 //! cargo bench --bench events -- --quick    # ten seconds of it
+//! JAUS_WRITE_FIGURES=1 cargo bench --bench events    # also writes docs/figures/events.md
 //! ```
 //!
 //! *Cost* is measured without a network: a component answers a query, or fires a subscription to
@@ -22,10 +23,17 @@ mod rate;
 
 use std::time::Duration;
 
+use jaus_test_kit::figures::Figures;
+
 fn main() {
     let quick = std::env::args().any(|argument| argument == "--quick");
-    cost::measure(if quick { 5 } else { 15 });
-    rate::measure(Duration::from_secs(if quick { 10 } else { 60 }));
+    let mut figures = Figures::new("events", "cargo bench --bench events");
+    cost::measure(if quick { 5 } else { 15 }, &mut figures);
+    rate::measure(
+        Duration::from_secs(if quick { 10 } else { 60 }),
+        &mut figures,
+    );
+    figures.finish();
 }
 
 /// A quantile of the sorted values.

@@ -10,6 +10,7 @@ use jaus::messages::mobility::{
     QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, velocity_state_sensor,
 };
 use jaus::node::{Config, Node, Port};
+use jaus_test_kit::figures::Figures;
 
 use crate::quantile;
 
@@ -23,22 +24,30 @@ struct Seen {
     lost: u32,
 }
 
-pub(crate) fn measure(time: Duration) {
-    println!("## Rates over {} s, all four at once\n", time.as_secs());
-    println!(
-        "| asked for (Hz) | confirmed | kept | error | median jitter (ms) | p99 (ms) | most (ms) | lost |"
+pub(crate) fn measure(time: Duration, figures: &mut Figures) {
+    figures.table(
+        &format!("Rates over {} s, all four at once", time.as_secs()),
+        [
+            "requested (Hz)",
+            "confirmed",
+            "kept",
+            "error",
+            "median jitter (ms)",
+            "p99 (ms)",
+            "most (ms)",
+            "lost",
+        ],
     );
-    println!("|--:|--:|--:|--:|--:|--:|--:|--:|");
     let (started, ready) = std::sync::mpsc::channel();
     std::thread::spawn(move || runtime().block_on(sensor(&started)));
     ready.recv().expect("a sensor");
     let seen = runtime().block_on(listen(time));
     for (rate, seen) in RATES.iter().zip(&seen) {
-        row(*rate, seen);
+        row(*rate, seen, figures);
     }
 }
 
-fn row(rate: f64, seen: &Seen) {
+fn row(rate: f64, seen: &Seen, figures: &mut Figures) {
     let period = 1.0 / seen.confirmed;
     let intervals = seen.arrivals.windows(2).map(|pair| pair[1] - pair[0]);
     let mut jitter: Vec<f64> = intervals
@@ -47,15 +56,17 @@ fn row(rate: f64, seen: &Seen) {
     jitter.sort_by(f64::total_cmp);
     let (first, last) = (seen.arrivals[0], seen.arrivals[seen.arrivals.len() - 1]);
     let kept = (seen.arrivals.len() - 1) as f64 / (last - first).as_secs_f64();
-    println!(
-        "| {rate} | {:.3} | {kept:.3} | {:.3} % | {:.2} | {:.2} | {:.2} | {} |",
-        seen.confirmed,
-        (kept / seen.confirmed - 1.0) * 100.0,
-        quantile(&jitter, 0.5),
-        quantile(&jitter, 0.99),
-        quantile(&jitter, 1.0),
-        seen.lost,
-    );
+    let jitter = |share| format!("{:.2}", quantile(&jitter, share));
+    figures.row([
+        &rate.to_string(),
+        &format!("{:.3}", seen.confirmed),
+        &format!("{kept:.3}"),
+        &format!("{:.3} %", (kept / seen.confirmed - 1.0) * 100.0),
+        &jitter(0.5),
+        &jitter(0.99),
+        &jitter(1.0),
+        &seen.lost.to_string(),
+    ]);
 }
 
 fn runtime() -> tokio::runtime::Runtime {

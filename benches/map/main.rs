@@ -4,6 +4,7 @@
 //! ```sh
 //! cargo bench --bench map               # a quarter of a minute
 //! cargo bench --bench map -- --quick    # some seconds
+//! JAUS_WRITE_FIGURES=1 cargo bench --bench map    # also writes docs/figures/map.md
 //! ```
 //!
 //! Store and client are two nodes on loopback, each with its own thread. The baseline is a
@@ -25,6 +26,7 @@ use jaus::address::JausId;
 use jaus::component::{Component, Handlers, Kind};
 use jaus::node::{Config, Node};
 use jaus::service::Patience;
+use jaus_test_kit::figures::Figures;
 use jaus_vehicle::ground::WorldStore;
 use jaus_vehicle::messages::ground::{
     QueryRasterCells, QueryVksTraversability, ReportRasterCells, ReportRasterChange,
@@ -36,6 +38,8 @@ use jaus_vehicle::world::{Change, Raster, World};
 const STORE: JausId = JausId::new(101, 1, 61);
 const BASELINE: JausId = JausId::new(101, 1, 62);
 const SIDES: [u16; 4] = [16, 64, 256, 1024];
+/// The longest median that is aimed for, in milliseconds, by side length.
+const AIMS: [(u16, f64); 2] = [(16, 2.0), (1024, 250.0)];
 
 fn main() {
     let quick = std::env::args().any(|argument| argument == "--quick");
@@ -44,7 +48,9 @@ fn main() {
     let file = directory.join("world.redb");
     std::thread::spawn(move || runtime().block_on(serve(&file, &started)));
     ready.recv().expect("a store");
-    runtime().block_on(measure(if quick { 20 } else { 200 }));
+    let mut figures = Figures::new("map", "cargo bench --bench map");
+    runtime().block_on(measure(if quick { 20 } else { 200 }, &mut figures));
+    figures.finish();
     std::fs::remove_dir_all(&directory).expect("removed");
 }
 
@@ -111,7 +117,7 @@ fn cells(side: u16) -> Bytes {
     (0..count).map(|i| (i % 255) as u8).collect()
 }
 
-async fn measure(runs: usize) {
+async fn measure(runs: usize, figures: &mut Figures) {
     let node = Node::start(Config::loopback(101, 2)).expect("a node");
     // A repeated query means that no answer arrived in time.
     let patience = Patience {
@@ -123,26 +129,41 @@ async fn measure(runs: usize) {
         .attach(&node, 1)
         .expect("a client");
     client.find(raster_maps::URN).await.expect("a store");
-    println!("| what | median (ms) | p99 (ms) | most (ms) | median from memory (ms) |");
-    println!("|---|--:|--:|--:|--:|");
+    figures.table(
+        "Answers of a knowledge store to a client on another node",
+        [
+            "answer",
+            "median (ms)",
+            "p99 (ms)",
+            "most (ms)",
+            "median from memory (ms)",
+        ],
+    );
+    let mut aims = Vec::new();
     for (map, side) in (1..).zip(SIDES) {
         let runs = if side < 1024 { runs * 5 } else { runs };
         let stored = time(runs, || fetch(&client, STORE, map, side)).await;
         let memory = time(runs, || fetch(&client, BASELINE, map, side)).await;
         let what = format!("cells of a map of {side} x {side}");
-        row(&what, &stored, Some(&memory));
+        row(figures, &what, &stored, Some(&memory));
+        let aim = AIMS.iter().find(|(of, _)| *of == side);
+        aims.extend(aim.map(|(_, most)| (what, quantile(&stored, 0.5) < *most)));
     }
     let objects = time(runs, || traversability(&client)).await;
-    row("the map of 16 x 16 as objects (2423h)", &objects, None);
+    row(
+        figures,
+        "the map of 16 x 16 as objects (2423h)",
+        &objects,
+        None,
+    );
     for (map, side) in (1..).zip(SIDES) {
         let cells = cells(side);
         let written = time(runs.min(100), || set(&client, map, side, cells.clone())).await;
-        row(
-            &format!("a change of {side} x {side} cells, kept"),
-            &written,
-            None,
-        );
+        let what = format!("a change of {side} x {side} cells, stored");
+        row(figures, &what, &written, None);
     }
+    let aims = aims.iter().map(|(what, is_met)| (what.as_str(), *is_met));
+    figures.aim("16 x 16 cells within 2 ms, 1024 x 1024 within 250 ms", aims);
 }
 
 /// Milliseconds of each run, sorted, after five warm-up runs.
@@ -160,18 +181,21 @@ async fn time<F: Future<Output = ()>>(runs: usize, mut run: impl FnMut() -> F) -
     times
 }
 
-fn row(what: &str, times: &[f64], baseline: Option<&[f64]>) {
-    let at = |times: &[f64], share: f64| {
-        let last = times.len() - 1;
-        times[(last as f64 * share).round() as usize]
-    };
-    let baseline = baseline.map_or(String::new(), |it| format!("{:.2}", at(it, 0.5)));
-    println!(
-        "| {what} | {:.2} | {:.2} | {:.2} | {baseline} |",
-        at(times, 0.5),
-        at(times, 0.99),
-        at(times, 1.0)
-    );
+fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let last = sorted.len() - 1;
+    sorted[(last as f64 * share).round() as usize]
+}
+
+fn row(figures: &mut Figures, what: &str, times: &[f64], baseline: Option<&[f64]>) {
+    let at = |times: &[f64], share| format!("{:.2}", quantile(times, share));
+    let baseline = baseline.map_or(String::new(), |it| at(it, 0.5));
+    figures.row([
+        what,
+        &at(times, 0.5),
+        &at(times, 0.99),
+        &at(times, 1.0),
+        &baseline,
+    ]);
 }
 
 async fn fetch(client: &Component, store: JausId, map: u16, side: u16) {

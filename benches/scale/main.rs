@@ -2,6 +2,7 @@
 //!
 //! ```sh
 //! cargo bench --bench scale
+//! JAUS_WRITE_FIGURES=1 cargo bench --bench scale    # also writes docs/figures/planning.md
 //! ```
 //!
 //! Each row is the median of a few runs. Memory is the peak of the process in one run, beyond the
@@ -10,18 +11,23 @@
 
 use std::time::{Duration, Instant};
 
-use jaus_vehicle::mission::{Terrain, Vehicle, plan};
+use jaus_test_kit::figures::Figures;
+use jaus_vehicle::mission::{Footprint, Terrain, plan};
 
 const RUNS: usize = 3;
 
 fn main() {
-    println!("| map | cells | ground | time | memory | segments | length |");
-    println!("|---|---:|---|---:|---:|---:|---:|");
+    let mut figures = Figures::new("planning", "cargo bench --bench scale");
+    figures.table(
+        "A path from corner to corner",
+        ["map and ground", "time", "memory", "segments", "length"],
+    );
     for side in [16, 256, 512, 1024, 4096] {
         for (name, ground) in GROUNDS {
-            row(side, name, ground);
+            row(&mut figures, side, name, ground);
         }
     }
+    figures.finish();
 }
 
 type Ground = fn(usize, usize, usize) -> u8;
@@ -68,7 +74,7 @@ fn random(row: usize, column: usize) -> u8 {
     (seed >> 40) as u8
 }
 
-fn row(side: usize, name: &str, ground: Ground) {
+fn row(figures: &mut Figures, side: usize, name: &str, ground: Ground) {
     let cells = (0..side * side)
         .map(|at| ground(at / side, at % side, side))
         .collect();
@@ -77,33 +83,35 @@ fn row(side: usize, name: &str, ground: Ground) {
         return;
     };
     let end = side as f64 * 0.1 - 0.05;
-    let thin = Vehicle {
+    let thin = Footprint {
         width: 0.1,
         margin: 0.0,
-        ..Vehicle::default()
+        ..Footprint::default()
     };
     let mut times = Vec::new();
     let mut memory = 0;
-    let mut told = String::new();
+    let mut found = ["none".to_owned(), "none".to_owned()];
     for _ in 0..RUNS {
         let before = reset_peak();
         let begin = Instant::now();
         let path = plan(&terrain, &thin, (0.05, 0.05), (end, end));
         times.push(begin.elapsed());
         memory = memory.max(peak().saturating_sub(before));
-        told = match path {
-            Ok(path) => format!("{} | {:.1} m", path.segments().len(), path.length()),
-            Err(_) => "none | none".to_owned(),
-        };
+        if let Ok(path) = path {
+            let length = format!("{:.1} m", path.length());
+            found = [path.segments().len().to_string(), length];
+        }
     }
     times.sort();
     let time: Duration = times[RUNS / 2];
-    println!(
-        "| {side} x {side} | {} | {name} | {:.1} ms | {:.1} MiB | {told} |",
-        side * side,
-        time.as_secs_f64() * 1e3,
-        memory as f64 / 1024.0
-    );
+    let [segments, length] = &found;
+    figures.row([
+        &format!("{side} x {side}, {name}"),
+        &format!("{:.1} ms", time.as_secs_f64() * 1e3),
+        &format!("{:.1} MiB", memory as f64 / 1024.0),
+        segments,
+        length,
+    ]);
 }
 
 /// Resets the peak to the current memory; returns it in KiB.

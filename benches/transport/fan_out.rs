@@ -15,13 +15,14 @@ use jaus::messages::mobility::{
     QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, velocity_state_sensor,
 };
 use jaus::node::{Config, Node, Port};
+use jaus_test_kit::figures::Figures;
 use tokio::time::{sleep, timeout};
 
 use crate::Effort;
 use crate::child::Process;
 use crate::loss::{free_addresses, settings};
 use crate::placement::{Placement, Side};
-use crate::report::{self, ratio, spread};
+use crate::report::{quotient, ratio, spread};
 use crate::roles::{self, Role};
 
 const SENSOR: JausId = JausId::new(101, 1, 1);
@@ -29,10 +30,12 @@ const SENSOR: JausId = JausId::new(101, 1, 1);
 const FIRST: u16 = 200;
 const MOST: usize = 100;
 const COUNTS: [usize; 3] = [1, 10, MOST];
+/// The aim: the greatest ratio of the costs with the most subscribers and with one.
+const AIM: f64 = 15.0;
 /// The interval between two events.
 const PERIOD: Duration = Duration::from_millis(4);
 
-pub(crate) fn measure(effort: Effort) {
+pub(crate) fn measure(effort: Effort, figures: &mut Figures) {
     let placement = *Placement::pinned().last().expect("one at least");
     placement.take();
     let time = Duration::from_secs_f64(effort.seconds);
@@ -43,7 +46,7 @@ pub(crate) fn measure(effort: Effort) {
             costs.push(cost);
         }
     }
-    report::head(
+    figures.table(
         &format!(
             "One event, {} (processor time of its sender)",
             placement.name()
@@ -52,13 +55,15 @@ pub(crate) fn measure(effort: Effort) {
     );
     for (all, subscribers) in costs.iter().zip(COUNTS) {
         let each: Vec<_> = all.iter().map(|cost| cost / subscribers as f64).collect();
-        report::row([
+        figures.row([
             &subscribers.to_string(),
             &spread(all, 1),
             &ratio(all, &costs[0]),
             &spread(&each, 2),
         ]);
     }
+    let is_met = quotient(&costs[2], &costs[0]) <= AIM;
+    figures.aim("100 subscribers cost at most 15 × one", [("", is_met)]);
     Placement::Free.take();
 }
 

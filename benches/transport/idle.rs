@@ -7,12 +7,12 @@ use std::time::Duration;
 use jaus::address::JausId;
 use jaus::component::{Component, Kind};
 use jaus::node::Node;
+use jaus_test_kit::figures::Figures;
 
 use crate::Effort;
 use crate::child::Process;
 use crate::place;
 use crate::placement::{Placement, Side};
-use crate::report;
 use crate::roles::Role;
 
 /// The number of idle components of each measured node.
@@ -33,7 +33,7 @@ pub(crate) async fn stay(components: usize) {
     drop(alive);
 }
 
-pub(crate) fn measure(effort: Effort) {
+pub(crate) fn measure(effort: Effort, figures: &mut Figures) {
     let watch = |components| {
         let process = Process::start(&Role::Idle(components), &Placement::Free.of(Side::Theirs));
         // Discovery sends more at the start.
@@ -43,7 +43,7 @@ pub(crate) fn measure(effort: Effort) {
         let share = 100.0 * (process.processor_time().as_secs_f64() - before) / time;
         (share, resident(process.id()))
     };
-    report::head(
+    figures.table(
         "Idle node",
         [
             "components",
@@ -58,7 +58,7 @@ pub(crate) fn measure(effort: Effort) {
         let each = fewer.map_or(String::new(), |(count, before): (usize, f64)| {
             format!("{:.1} KiB", (kib - before) / (components - count) as f64)
         });
-        report::row([
+        figures.row([
             &components.to_string(),
             &format!("{share:.2} %"),
             &format!("{kib:.0} KiB"),

@@ -8,13 +8,15 @@ use std::time::{Duration, Instant};
 use jaus::endpoint::Outgoing;
 use jaus::link::Group;
 use jaus::node::{Config, Node};
+use jaus::random::Random;
+use jaus_test_kit::figures::Figures;
 
 use crate::Effort;
 use crate::baseline::Flow;
 use crate::child::Process;
 use crate::one_way::{self, Manner};
 use crate::placement::{Placement, Side};
-use crate::report::{self, ratio, spread};
+use crate::report::{quotient, ratio, spread};
 use crate::roles::{self, CODE, Role};
 use crate::setting::Setting;
 
@@ -22,12 +24,14 @@ use crate::setting::Setting;
 const LENGTHS: [usize; 3] = [64, 64 << 10, 1 << 20];
 /// Share of lost datagrams, in percent.
 const LOSSES: [u8; 2] = [0, 5];
+/// The aim: the least share of the rate without loss.
+const AIM: f64 = 0.5;
 /// Delay of each datagram.
 const DELAY: Duration = Duration::from_millis(5);
 /// With loss, the mean needs more time to settle than in the other measurements.
 const SECONDS: f64 = 3.0;
 
-pub(crate) fn measure(effort: Effort) {
+pub(crate) fn measure(effort: Effort, figures: &mut Figures) {
     let time = Duration::from_secs_f64(effort.seconds * SECONDS);
     for length in LENGTHS {
         let mut rates = [const { Vec::new() }; LOSSES.len()];
@@ -36,19 +40,21 @@ pub(crate) fn measure(effort: Effort) {
                 rates.push(flow(length, percent, run as u64, time).rate());
             }
         }
-        report::head(
+        figures.table(
             &format!("Acknowledged, {length} octets, round trip of 10 ms"),
             ["loss each way", "messages/s", "MB/s", "to no loss"],
         );
         for (all, percent) in rates.iter().zip(LOSSES) {
             let megabytes: Vec<_> = all.iter().map(|it| it * length as f64 / 1e6).collect();
-            report::row([
+            figures.row([
                 &format!("{percent} %"),
                 &spread(all, 1),
                 &spread(&megabytes, 2),
                 &ratio(all, &rates[0]),
             ]);
         }
+        let is_met = quotient(&rates[1], &rates[0]) >= AIM;
+        figures.aim("at least half of the rate without loss", [("", is_met)]);
     }
 }
 
@@ -76,7 +82,7 @@ fn flow(length: usize, percent: u8, seed: u64, time: Duration) -> Flow {
 pub(crate) fn settings(
     id: jaus::address::JausId,
     at: SocketAddr,
-    peer: jaus::node::Peer,
+    peer: jaus::node::PeerAddress,
 ) -> Config {
     Config::loopback(id.subsystem(), id.node())
         .port(at.port())
@@ -118,25 +124,17 @@ fn pass_on(from: &UdpSocket, to: UdpSocket, percent: u8, seed: u64) {
             let _ = to.send(&datagram);
         }
     });
-    let (mut buffer, mut state) = ([0; 65_536], seed);
+    let (mut buffer, mut random) = ([0; 65_536], Random::new(seed));
     loop {
         // An error reports that an earlier datagram found no node.
         let Ok(length) = from.recv(&mut buffer) else {
             continue;
         };
-        if next(&mut state) % 100 >= u64::from(percent) {
+        if random.number() % 100 >= u64::from(percent) {
             let datagram = buffer[..length].to_vec();
             if sender.send((Instant::now() + DELAY, datagram)).is_err() {
                 return;
             }
         }
     }
-}
-
-/// SplitMix64.
-fn next(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let mixed = (*state ^ (*state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    mixed ^ (mixed >> 31)
 }

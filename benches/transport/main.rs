@@ -1,16 +1,17 @@
 //! The cost of the transport between processes, compared with the limits of the machine.
 //!
 //! ```text
-//! cargo bench --bench transport                     everything; takes a few minutes
+//! cargo bench --bench transport                     everything; takes ten minutes
 //! cargo bench --bench transport -- round --quick    what has "round" in its name, few repetitions
+//! JAUS_WRITE_FIGURES=1 cargo bench --bench transport    also writes the tables to `docs/figures`
 //! ```
 //!
 //! Every figure stands next to a baseline of the same run (raw UDP, a raw Unix stream, bare relays
 //! with the same number of hops, a copy in memory), because the speed of a shared machine varies:
 //! read the ratios. The program starts itself as child processes for the other components and
-//! nodes, all on loopback, pinned to processors, and prints Markdown. Results, with machine and
-//! date, are kept in `docs/performance.md`. `cargo bench --bench wire` measures the cost of a
-//! message within the endpoint alone.
+//! nodes, all on loopback, pinned to processors, and prints Markdown. `docs/performance.md` shows
+//! the written tables. `cargo bench --bench wire` measures the cost of a message within the endpoint
+//! alone.
 
 #![expect(
     clippy::expect_used,
@@ -37,6 +38,8 @@ mod run;
 mod setting;
 
 use std::env;
+
+use jaus_test_kit::figures::Figures;
 
 /// How much to measure.
 #[derive(Clone, Copy)]
@@ -65,39 +68,40 @@ const QUICK: Effort = Effort {
     idle_seconds: 5.0,
 };
 
+/// A measurement.
+type Measure = fn(Effort, &mut Figures);
+
+/// The measurements by name.
+const PARTS: [(&str, Measure); 5] = [
+    ("round trip", round_trip::measure),
+    ("one way", one_way::measure),
+    ("loss", loss::measure),
+    ("idle", idle::measure),
+    ("fan-out", fan_out::measure),
+];
+
 fn main() {
     if let Some(role) = roles::of_this_process() {
         placement::settle();
         return play::play(role);
     }
-    let mut effort = THOROUGH;
+    let (mut effort, mut quick) = (THOROUGH, "");
     let mut filter = String::new();
     for argument in env::args().skip(1) {
         match argument.as_str() {
-            "--quick" => effort = QUICK,
+            "--quick" => (effort, quick) = (QUICK, " --quick"),
             // Cargo passes it to every benchmark.
             "--bench" => {}
             _ => filter = argument,
         }
     }
-    let wanted = |name: &str| name.contains(&filter);
-    report::machine();
-    if wanted("round trip") {
-        round_trip::measure(effort);
+    for (name, measure) in PARTS.iter().filter(|(name, _)| name.contains(&filter)) {
+        let file = format!("transport-{}", name.replace(' ', "-"));
+        let command = format!("cargo bench --bench transport -- \"{name}\"{quick}");
+        let mut figures = Figures::new(&file, &command);
+        measure(effort, &mut figures);
+        figures.finish();
     }
-    if wanted("one way") {
-        one_way::measure(effort);
-    }
-    if wanted("loss") {
-        loss::measure(effort);
-    }
-    if wanted("idle") {
-        idle::measure(effort);
-    }
-    if wanted("fan-out") {
-        fan_out::measure(effort);
-    }
-    report::machine();
     // Remains if a measurement fails.
     let _ = std::fs::remove_dir_all(run::folder());
 }

@@ -7,13 +7,14 @@ use jaus::address::JausId;
 use jaus::endpoint::Outgoing;
 use jaus::node::{Port, Undelivered};
 use jaus::wire::Priority;
+use jaus_test_kit::figures::Figures;
 use tokio::time::{sleep, timeout};
 
 use crate::Effort;
 use crate::baseline::{self, Flow};
 use crate::child::Process;
 use crate::placement::{Placement, Side};
-use crate::report::{self, median, ratio, spread};
+use crate::report::{median, ratio, spread};
 use crate::roles::{self, Batching, CODE, COUNT, Role};
 use crate::setting::Setting;
 
@@ -21,6 +22,8 @@ use crate::setting::Setting;
 const LENGTHS: [usize; 4] = [64, 1024, 64 << 10, 1 << 20];
 /// Limits of acknowledged messages in flight: octets, and messages.
 const UNDERWAY: (usize, usize) = (4 << 20, 256);
+/// The aim for the shortest messages between two nodes, per second.
+const AIM: f64 = 2e6;
 /// Small messages per second of a paced sender.
 const PACE: f64 = 300_000.0;
 
@@ -43,17 +46,17 @@ impl Manner {
     ];
 }
 
-pub(crate) fn measure(effort: Effort) {
+pub(crate) fn measure(effort: Effort, figures: &mut Figures) {
     for placement in Placement::pinned() {
         placement.take();
         for length in LENGTHS {
-            measure_length(length, placement, effort);
+            measure_length(length, placement, effort, figures);
         }
     }
     Placement::Free.take();
 }
 
-fn measure_length(length: usize, placement: Placement, effort: Effort) {
+fn measure_length(length: usize, placement: Placement, effort: Effort, figures: &mut Figures) {
     let time = Duration::from_secs_f64(effort.seconds);
     // The most that one datagram of ours holds; a larger message takes several.
     let datagram = length.min(1440);
@@ -87,11 +90,17 @@ fn measure_length(length: usize, placement: Placement, effort: Effort) {
         }
         copies.push(baseline::memcpy(length) / 1e6);
     }
-    print(length, placement, &flows, &copies);
+    print(length, placement, &flows, &copies, figures);
 }
 
-fn print(length: usize, placement: Placement, flows: &[(String, Vec<Flow>)], copies: &[f64]) {
-    report::head(
+fn print(
+    length: usize,
+    placement: Placement,
+    flows: &[(String, Vec<Flow>)],
+    copies: &[f64],
+    figures: &mut Figures,
+) {
+    figures.table(
         &format!("One way, {length} octets, {}", placement.name()),
         [
             "between",
@@ -108,7 +117,7 @@ fn print(length: usize, placement: Placement, flows: &[(String, Vec<Flow>)], cop
         let rates = rates(flows);
         let thousands: Vec<_> = rates.iter().map(|rate| rate / 1e3).collect();
         let lost: Vec<_> = flows.iter().map(|flow| flow.lost()).collect();
-        report::row([
+        figures.row([
             name,
             &spread(&thousands, 1),
             &format!("{:.1}", median(&rates) * length as f64 / 1e6),
@@ -118,7 +127,14 @@ fn print(length: usize, placement: Placement, flows: &[(String, Vec<Flow>)], cop
         ]);
     }
     let copy = format!("{:.0}", median(copies));
-    report::row(["copy in memory", "", &copy, "", "", ""]);
+    figures.row(["copy in memory", "", &copy, "", "", ""]);
+    let own = flows
+        .iter()
+        .find(|(name, _)| name == Setting::OwnNodes.name());
+    if let Some((name, flows)) = own.filter(|_| length == LENGTHS[0]) {
+        let is_met = median(&rates(flows)) >= AIM;
+        figures.aim("2000 thousand/s", [(name.as_str(), is_met)]);
+    }
 }
 
 /// Sends for a given time to a child that counts.

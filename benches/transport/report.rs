@@ -1,22 +1,6 @@
-//! Output for readers: medians, ratios and Markdown tables.
+//! Statistics for readers: medians, spreads and ratios.
 
-use std::fs;
 use std::time::Duration;
-
-/// Prints the machine's model and load.
-pub(crate) fn machine() {
-    let model = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = model
-        .lines()
-        .find_map(|line| line.strip_prefix("model name"))
-        .map_or("unknown processor", |rest| {
-            rest.trim_start_matches([' ', '\t', ':'])
-        });
-    let processors = std::thread::available_parallelism().map_or(0, usize::from);
-    let load = fs::read_to_string("/proc/loadavg").unwrap_or_default();
-    let load: Vec<_> = load.split(' ').take(3).collect();
-    println!("{processors} × {model}; load {}\n", load.join(" "));
-}
 
 /// The median; the upper one of an even number of values.
 pub(crate) fn median<T: PartialOrd + Copy>(values: &[T]) -> T {
@@ -44,19 +28,12 @@ pub(crate) fn spread(values: &[f64], digits: usize) -> String {
 }
 
 /// The median over the runs of the quotient within each run.
-pub(crate) fn ratio(values: &[f64], baseline: &[f64]) -> String {
+pub(crate) fn quotient(values: &[f64], baseline: &[f64]) -> f64 {
     let quotients: Vec<_> = values.iter().zip(baseline).map(|(v, b)| v / b).collect();
-    format!("{:.2} ×", median(&quotients))
+    median(&quotients)
 }
 
-/// A table row.
-pub(crate) fn row<const N: usize>(cells: [&str; N]) {
-    println!("| {} |", cells.join(" | "));
-}
-
-/// A table head: the first column is text, the others are numbers.
-pub(crate) fn head<const N: usize>(title: &str, cells: [&str; N]) {
-    println!("\n## {title}\n");
-    row(cells);
-    println!("|---|{}", "--:|".repeat(N - 1));
+/// The same as text.
+pub(crate) fn ratio(values: &[f64], baseline: &[f64]) -> String {
+    format!("{:.2} ×", quotient(values, baseline))
 }

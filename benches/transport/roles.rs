@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use jaus::address::JausId;
 use jaus::endpoint::Received;
-use jaus::node::Peer;
+use jaus::node::PeerAddress;
 
 use crate::place::Place;
 
@@ -47,7 +47,7 @@ pub(crate) enum Role {
     /// A component that counts messages.
     Sink(JausId, Place),
     /// The same on a node at an address, which knows one peer.
-    SinkAt(JausId, SocketAddr, Peer),
+    SinkAt(JausId, SocketAddr, PeerAddress),
     /// A sensor at an address, with its subscribers.
     Sensor(SocketAddr, Vec<SocketAddr>),
     /// A node for other processes that serves this socket.

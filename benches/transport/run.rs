@@ -9,10 +9,10 @@ pub(crate) const VARIABLE: &str = "JAUS_BENCH_RUN";
 
 /// The number of this run: the id of the process that the user started.
 pub(crate) fn number() -> u32 {
-    let told = env::var(VARIABLE)
+    let given = env::var(VARIABLE)
         .ok()
         .and_then(|number| number.parse().ok());
-    told.unwrap_or_else(std::process::id)
+    given.unwrap_or_else(std::process::id)
 }
 
 /// A folder of this run for sockets, shared by all its processes.

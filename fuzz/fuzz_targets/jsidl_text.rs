@@ -1,13 +1,41 @@
-//! Arbitrary text through the loader, which must answer any input with diagnostics; and some octets
-//! through the codec of each definition that it accepts.
+//! Arbitrary text through the loader, which must answer any input with diagnostics; and each
+//! definition that it accepts through the codec, with some octets, and through every emitter.
 #![no_main]
 
 use jaus_fuzz::{octets_come_back, with_code};
-use jsidl::Loader;
+use jsidl::docs::{self, Format};
+use jsidl::model::Service;
+use jsidl::{Library, Loader, lua, rust, schema};
 use libfuzzer_sys::fuzz_target;
 
 /// Message bodies to try: zeros satisfy most fields, ones request large counts.
 const BODIES: [[u8; 32]; 3] = [[0; 32], [1; 32], [0xFF; 32]];
+
+/// Most octets of text that is passed to the emitters: their output is many times as long.
+const LONGEST: usize = 16 << 10;
+
+/// Runs every emitter: for Rust, Wireshark, pages and JSON Schema.
+fn emit(library: &Library) {
+    let services: Vec<&Service> = library.services().map(AsRef::as_ref).collect();
+    let module = rust::module(library, services.iter().copied(), "::jaus::codec");
+    let script = lua::dissector(library);
+    assert!(!module.is_empty() && !script.is_empty());
+    for format in [Format::Html, Format::Markdown] {
+        let pages = docs::pages(library, |_| true, format);
+        assert_eq!(pages.len(), 1 + services.len());
+        assert!(
+            pages.iter().all(|page| !page.path.contains('/')),
+            "{pages:?}"
+        );
+    }
+    let schemas = schema::files(library, |_| true);
+    assert_eq!(schemas.len(), services.len());
+    for (service, (_, schema)) in services.iter().zip(schemas) {
+        let text = schema.to_string();
+        let read = serde_json::from_str::<serde_json::Value>(&text).ok();
+        assert_eq!(read, Some(schema), "{}", service.id);
+    }
+}
 
 fuzz_target!(|text: &str| {
     let mut loader = Loader::new();
@@ -27,5 +55,8 @@ fuzz_target!(|text: &str| {
                 octets_come_back(message, &with_code(message.code, &body[..length]));
             }
         }
+    }
+    if text.len() <= LONGEST {
+        emit(&loaded.library);
     }
 });

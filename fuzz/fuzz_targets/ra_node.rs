@@ -15,7 +15,7 @@ use jaus::wire::Acknowledgement;
 use jaus::wire::ra::{Fields, Header, PREFIX};
 use jaus_ra::RaId;
 use jaus_ra::connection::{self, Connections};
-use jaus_ra::node::{Component, Event, Node, RaNode, Settings, Subsystem};
+use jaus_ra::node::{Event, RaComponentEntry, RaNode, RaNodeEntry, RaSubsystemEntry, Settings};
 use libfuzzer_sys::fuzz_target;
 
 /// Time zero of every input.
@@ -77,17 +77,17 @@ fuzz_target!(|octets: &[u8]| {
     }
 });
 
-fn vehicle() -> Subsystem {
-    Subsystem {
+fn vehicle() -> RaSubsystemEntry {
+    RaSubsystemEntry {
         id: 30,
         name: "Vehicle".into(),
-        nodes: vec![Node {
+        nodes: vec![RaNodeEntry {
             id: 1,
             name: "Main".into(),
-            components: vec![Component {
+            components: vec![RaComponentEntry {
                 component: 33,
                 instance: 1,
-                ..Component::default()
+                ..RaComponentEntry::default()
             }],
         }],
     }

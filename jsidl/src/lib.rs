@@ -30,6 +30,7 @@ pub mod dynamic;
 mod excerpt;
 pub mod explain;
 mod expr;
+mod fingerprint;
 pub mod format;
 mod library;
 mod listing;

@@ -283,6 +283,32 @@ pub struct ValueRange {
     pub interpretation: String,
 }
 
+/// The limits, such as `above 0 to 1`. A precision limits their decimal places.
+impl fmt::Display for ValueRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let limit = |value: f64| match f.precision() {
+            Some(places) => shortened(value, places),
+            None => value,
+        };
+        let above = if self.lower_exclusive { "above " } else { "" };
+        let below = if self.upper_exclusive { "below " } else { "" };
+        let (lower, upper) = (limit(self.lower), limit(self.upper));
+        write!(f, "{above}{lower} to {below}{upper}")
+    }
+}
+
+/// A value with at most so many decimal places, or unchanged if that would change it notably.
+pub(crate) fn shortened(value: f64, places: usize) -> f64 {
+    let scale = 10_f64.powi(i32::try_from(places).unwrap_or(i32::MAX));
+    let shortened = (value * scale).round() / scale;
+    let is_close = (shortened - value).abs() < 1.0 / scale;
+    if shortened != 0.0 && is_close {
+        shortened
+    } else {
+        value
+    }
+}
+
 /// `value_enum`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedValue {

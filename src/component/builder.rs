@@ -19,6 +19,18 @@ use crate::service::{
 
 /// A component that is not attached yet. It always offers Transport, Discovery, Liveness and
 /// Events.
+///
+/// ```no_run
+/// # use jaus::component::{Component, Handlers, Kind, Management};
+/// # fn example(node: &jaus::node::Node, driver: Handlers) -> Result<(), jaus::component::AttachError> {
+/// let driver = Component::builder(Kind::Vehicle, "Rover")
+///     .component_name("Wheels")
+///     .management(Management::default())
+///     .offer(driver)
+///     .attach(node, 33)?;
+/// # Ok(())
+/// # }
+/// ```
 #[must_use = "attach the component to a node"]
 pub struct Builder {
     profile: Profile,

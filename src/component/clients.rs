@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use tokio::sync::{mpsc, oneshot, watch};
 
-use super::feed::Feed;
+use super::feed::{Feed, Reader};
 use crate::address::JausId;
 use crate::node;
 use crate::node::now;
@@ -76,7 +76,7 @@ pub(super) struct Begun {
 }
 
 /// The result of a request for a subscription.
-pub(super) type Subscribed = Result<(Ticket, Arc<Feed>), NotSubscribed>;
+pub(super) type Subscribed = Result<(Ticket, Reader), NotSubscribed>;
 
 /// Why there is no subscription.
 pub(super) enum NotSubscribed {
@@ -165,13 +165,13 @@ impl Clients {
             } => {
                 let now = now();
                 let id = stack.begin_session(now, audience, settings, patience);
-                let (state, told) = watch::channel(SessionState::Seeking);
+                let (state, states) = watch::channel(SessionState::Seeking);
                 self.sessions.insert(id, state);
                 let ticket = self.ticket(Instruction::EndSession(id));
                 let begun = Begun {
                     id,
                     ticket,
-                    state: told,
+                    state: states,
                 };
                 // An unclaimed ticket cancels.
                 drop(reply.send(begun));
@@ -198,10 +198,10 @@ impl Clients {
                 let _ = reply.send(Err(NotSubscribed::Ended(end)));
                 return;
             }
-            let feed = Arc::new(Feed::new());
-            self.feeds.insert(id, feed.clone());
+            let (feed, reader) = Reader::new();
+            self.feeds.insert(id, feed);
             // An unclaimed ticket cancels.
-            let _ = reply.send(Ok((self.ticket(Instruction::EndSubscription(id)), feed)));
+            let _ = reply.send(Ok((self.ticket(Instruction::EndSubscription(id)), reader)));
         }
         if let Some(feed) = self.feeds.get(&id) {
             feed.tell(now(), news);
@@ -214,9 +214,9 @@ impl Clients {
                 let Some(reply) = self.asking.remove(&id) else {
                     return;
                 };
-                let (condition, told) = watch::channel(Condition::Held(None));
+                let (condition, conditions) = watch::channel(Condition::Held(None));
                 self.controls.insert(id, condition);
-                let _ = reply.send(Ok((self.ticket(Instruction::EndControl(id)), told)));
+                let _ = reply.send(Ok((self.ticket(Instruction::EndControl(id)), conditions)));
             }
             ControlNews::Refused(why) => {
                 if let Some(reply) = self.asking.remove(&id) {
@@ -242,8 +242,8 @@ impl Clients {
     }
 
     pub(super) fn tell_session(&mut self, id: SessionId, state: SessionState) {
-        if let Some(told) = self.sessions.get(&id) {
-            told.send_replace(state);
+        if let Some(states) = self.sessions.get(&id) {
+            states.send_replace(state);
         }
         if state == SessionState::Released {
             self.sessions.remove(&id);

@@ -16,6 +16,18 @@ use crate::service::{Rejection, code_of, read};
 
 /// A command that a peer executes, see [`Component::run`]. Dropping it ends the event but not the
 /// command.
+///
+/// ```no_run
+/// # use jaus::component::{RequestError, RunningCommand};
+/// # async fn example(drive: RunningCommand) {
+/// let vehicle = drive.peer();
+/// match drive.end().await {
+///     Ok(()) => println!("{vehicle} has arrived"),
+///     Err(RequestError::Unsuccessful { .. }) => println!("{vehicle} has stopped on the way"),
+///     Err(error) => eprintln!("{error}"),
+/// }
+/// # }
+/// ```
 #[derive(Debug)]
 #[must_use = "the peer reports the end of the command to it"]
 pub struct RunningCommand {

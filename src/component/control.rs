@@ -28,6 +28,19 @@ const STATE_PAUSE: Duration = Duration::from_millis(100);
 ///
 /// While control is held, the peer's status is queried five times a second. After
 /// [`resume`](Self::resume), commands can be sent while the peer reports that it is ready.
+///
+/// ```no_run
+/// # use jaus::address::JausId;
+/// # use jaus::component::Component;
+/// # use jaus::messages::mobility::SetWrenchEffort;
+/// # async fn example(operator: Component, rover: JausId) -> Result<(), Box<dyn std::error::Error>> {
+/// let mut control = operator.control(rover, 127).await?;
+/// control.resume().await?;
+/// control.send(&SetWrenchEffort::default())?;
+/// println!("{}", control.lost().await);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Control {
     /// Dropped before the component.

@@ -67,8 +67,8 @@ impl Membership {
     /// Notifies the other members if there are changes.
     pub(super) fn publish(&self) {
         let now = self.shared.known.change_count();
-        let told = &self.shared.changes;
-        told.send_if_modified(|count| std::mem::replace(count, now) != now);
+        let changes = &self.shared.changes;
+        changes.send_if_modified(|count| std::mem::replace(count, now) != now);
     }
 
     /// Waits until another member has changed the directory.

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bytes::Bytes;
 use tokio::sync::{mpsc, oneshot, watch};
@@ -16,8 +16,7 @@ use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::QueryHeartbeatPulse;
-use crate::node::now;
-use crate::node::{self, Port, Resident};
+use crate::node::{self, Port, Resident, now, sleep_until};
 use crate::service::{
     Change, Condition, Event, Inquiry, NoAnswer, NotPublished, Patience, Publication, QueryOptions,
     Service, Stack, Standing, UnsafeService,
@@ -359,11 +358,4 @@ fn transmit(stack: &mut Stack, port: &Port, probes: &mut Probes) -> Result<(), n
         result = result.and(sent);
     }
     result
-}
-
-pub(super) async fn sleep_until(wake: Option<Instant>) {
-    match wake {
-        Some(wake) => tokio::time::sleep_until(wake.into()).await,
-        None => std::future::pending().await,
-    }
 }

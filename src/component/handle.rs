@@ -28,6 +28,20 @@ use crate::service::{
 use crate::wire::Priority;
 
 /// A component on a node. Cheap to clone; it stops when the last clone is dropped.
+///
+/// ```no_run
+/// # use jaus::component::{Component, Kind};
+/// # use jaus::messages::mobility::{QueryVelocityState, velocity_state_sensor};
+/// # use jaus::node::{Config, Node};
+/// # async fn example() -> Result<(), Box<dyn std::error::Error>> {
+/// let node = Node::start(Config::new(42, 1))?;
+/// let operator = Component::builder(Kind::OperatorControlUnit, "Operator").attach(&node, 1)?;
+/// let sensor = operator.find(velocity_state_sensor::URN).await?;
+/// let report = operator.query(sensor, &QueryVelocityState::all()).await?;
+/// println!("{sensor}: {:?} m/s", report.velocity_x_m_per_s());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 pub struct Component {
     pub(super) shared: Arc<Shared>,
@@ -369,7 +383,7 @@ impl Component {
         let peer = topic.peer;
         let subscribed = self.hold(|reply| Hold::Subscribe { topic, reply }).await;
         match subscribed.ok_or(SubscribeError::Stopped)? {
-            Ok((ticket, feed)) => Ok(Subscription::new(ticket, self.clone(), peer, feed)),
+            Ok((ticket, reader)) => Ok(Subscription::new(ticket, self.clone(), peer, reader)),
             Err(NotSubscribed::Impossible(why)) => {
                 Err(SubscribeError::Impossible { peer, query, why })
             }
@@ -580,7 +594,7 @@ struct Others<'a> {
 /// The first of them that will do.
 fn who(
     others: &Others<'_>,
-    will_do: impl Fn(&crate::service::Component) -> bool,
+    will_do: impl Fn(&crate::service::ComponentEntry) -> bool,
 ) -> Option<JausId> {
     let mut components = others.directory.components();
     let found = components.find(|it| it.id != others.own && will_do(it));

@@ -23,9 +23,9 @@
 //!     )
 //!     .attach(&node, 33)?;
 //!
-//! // At the operator's desk: subsystem 42.
-//! let desk = Node::start(Config::loopback(42, 1))?;
-//! let operator = Component::builder(Kind::OperatorControlUnit, "Operator").attach(&desk, 1)?;
+//! // At the operator station: subsystem 42.
+//! let station = Node::start(Config::loopback(42, 1))?;
+//! let operator = Component::builder(Kind::OperatorControlUnit, "Operator").attach(&station, 1)?;
 //! let sensor = operator.find(velocity_state_sensor::URN).await?;
 //! let query = QueryVelocityState::all();
 //! let report = operator.query(sensor, &query).await?;

@@ -3,11 +3,15 @@
 use std::collections::BTreeSet;
 
 use crate::codec::{Registry, ServiceInfo};
-use crate::service::Component;
+use crate::service::ComponentEntry;
 
 /// The services that receive a message, if the component offers none of them: not even one that
 /// inherits from them. Empty if that is not known for certain.
-pub(super) fn missing_for(registry: &Registry, peer: &Component, code: u16) -> Vec<&'static str> {
+pub(super) fn missing_for(
+    registry: &Registry,
+    peer: &ComponentEntry,
+    code: u16,
+) -> Vec<&'static str> {
     let receives = |urn: &str| {
         let of_this_urn = |info: &&ServiceInfo| info.id.urn == urn;
         let mut heard = registry.services().filter(of_this_urn).peekable();
@@ -45,13 +49,13 @@ mod tests {
     use crate::messages::registry;
     use crate::service::Offer;
 
-    fn peer(offers: Option<&[&str]>) -> Component {
+    fn peer(offers: Option<&[&str]>) -> ComponentEntry {
         let offer = |urn: &&str| Offer {
             urn: (*urn).to_owned(),
             major: 1,
             minor: 0,
         };
-        Component {
+        ComponentEntry {
             id: JausId::new(101, 1, 33),
             identification: None,
             services: offers.map(|urns| urns.iter().map(offer).collect()),

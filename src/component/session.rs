@@ -27,6 +27,20 @@ const STATUS_LIMIT: Duration = Duration::from_millis(500);
 ///
 /// To control one component without a search and without beginning anew, see
 /// [`Control`](super::Control).
+///
+/// ```no_run
+/// # use jaus::component::{Session, SessionError, SessionState};
+/// # use jaus::messages::mobility::SetWrenchEffort;
+/// # async fn example(mut session: Session) -> Result<(), SessionError> {
+/// loop {
+///     match session.state() {
+///         SessionState::Ready(_) => session.send(&SetWrenchEffort::default())?,
+///         other => println!("no commands now: {other:?}"),
+///     }
+///     session.changed().await?;
+/// }
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Session {
     /// Dropped before the component.
@@ -72,6 +86,10 @@ impl Session {
 
     /// Makes the peer ready, now and after restarts, and waits until it is.
     ///
+    /// This is a decision about the peer as it is: while the peer is lost, the state in which it will
+    /// be found again is not known, so the target state stays as it is. An application that decides
+    /// in advance uses [`set_target`](Self::set_target).
+    ///
     /// # Errors
     /// [`SessionError::State`] if the peer is lost or disabled at present, for instance because of
     /// an emergency. Otherwise as [`ready`](Self::ready).
@@ -105,8 +123,9 @@ impl Session {
         .await
     }
 
-    /// Brings the peer into this state, now and after restarts, without waiting for it. Ready is
-    /// refused while the peer reports an emergency.
+    /// Brings the peer into this state, now and after restarts, without waiting for it. While the peer
+    /// is lost, it is brought into this state when it is under control again. Ready has no effect
+    /// while an emergency is the last that the peer has reported.
     ///
     /// # Errors
     /// [`SessionError::Stopped`].

@@ -12,7 +12,7 @@ use futures_core::Stream;
 
 use super::Component;
 use super::clients::Ticket;
-use super::feed::{Feed, Item};
+use super::feed::{Item, Reader};
 use crate::address::JausId;
 use crate::codec::{DecodeError, Message};
 use crate::node::now;
@@ -26,35 +26,55 @@ use crate::service::{Outage, SubscriptionEnd};
 /// 256 updates wait for a slow reader, or fewer as set by [`depth`](Self::depth); then the oldest
 /// report is dropped. It is a [`Stream`] too.
 ///
-/// Several tasks share the latest report through a channel:
+/// Several tasks read one subscription, each at its own pace ([`share`](Self::share)):
 ///
 /// ```no_run
 /// # use jaus::component::Subscription;
 /// # use jaus::messages::mobility::ReportVelocityState;
-/// # fn share(mut speeds: Subscription<ReportVelocityState>) {
-/// let (share, latest) = tokio::sync::watch::channel(None);
+/// # fn share(speeds: Subscription<ReportVelocityState>) {
+/// let mut latest = speeds.share().depth(1);
 /// tokio::spawn(async move {
-///     while let Some(report) = speeds.report().await {
-///         share.send_replace(Some(report));
+///     while let Some(report) = latest.report().await {
+///         println!("{report:?}, {:?} after its arrival", latest.age());
 ///     }
 /// });
-/// let for_another_task = latest.clone();
 /// # }
 /// ```
 #[derive(Debug)]
 pub struct Subscription<R> {
-    /// Dropped before the component.
-    _ticket: Ticket,
-    /// Keeps the component running.
-    _component: Component,
+    /// Shared by all readers.
+    event: Arc<Event>,
     peer: JausId,
-    feed: Arc<Feed>,
+    reader: Reader,
     /// When the report that was read last arrived.
     arrived: Option<Instant>,
     report: PhantomData<fn() -> R>,
 }
 
+/// The event at the peer. It ends with the last reader.
+#[derive(Debug)]
+struct Event {
+    /// Dropped before the component.
+    _ticket: Ticket,
+    /// Keeps the component running.
+    _component: Component,
+}
+
 /// An item of a subscription's stream.
+///
+/// ```no_run
+/// # use jaus::component::{Subscription, Update};
+/// # use jaus::messages::mobility::ReportVelocityState;
+/// # async fn example(mut speeds: Subscription<ReportVelocityState>) {
+/// while let Some(update) = speeds.next().await {
+///     match update {
+///         Update::Report(report) => println!("{:?} m/s", report.velocity_x_m_per_s()),
+///         Update::Down { why, .. } => println!("no reports: {why}"),
+///         Update::Up => println!("reports again"),
+///     }
+/// }
+/// # }
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub enum Update<R> {
     /// A report.
@@ -100,25 +120,17 @@ impl<R: Message> Subscription<R> {
     #[must_use]
     pub fn with_layout<L: Message>(self) -> Subscription<L> {
         const { assert!(L::CODE == R::CODE, "this is a layout of another report") }
-        Subscription::new(self._ticket, self._component, self.peer, self.feed)
+        Subscription::of(self.event, self.peer, self.reader)
     }
 }
 
 impl<R: FromReport> Subscription<R> {
-    pub(super) const fn new(
-        ticket: Ticket,
-        component: Component,
-        peer: JausId,
-        feed: Arc<Feed>,
-    ) -> Self {
-        Self {
+    pub(super) fn new(ticket: Ticket, component: Component, peer: JausId, reader: Reader) -> Self {
+        let event = Event {
             _ticket: ticket,
             _component: component,
-            peer,
-            feed,
-            arrived: None,
-            report: PhantomData,
-        }
+        };
+        Self::of(Arc::new(event), peer, reader)
     }
 
     /// Waits for the next update. `None` at the end, because the component has stopped or for the
@@ -144,7 +156,7 @@ impl<R: FromReport> Stream for Subscription<R> {
 
     fn poll_next(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Update<R>>> {
         loop {
-            let Some(item) = ready!(self.feed.poll_next(cx)) else {
+            let Some(item) = ready!(self.reader.poll_next(cx)) else {
                 return Poll::Ready(None);
             };
             let update = match item {
@@ -156,7 +168,7 @@ impl<R: FromReport> Stream for Subscription<R> {
                         Update::Report(report)
                     }
                     Err(error) => {
-                        self.feed.count_unreadable();
+                        self.reader.count_unreadable();
                         tracing::debug!(peer = %self.peer, %error, "cannot decode the report");
                         continue;
                     }
@@ -168,21 +180,40 @@ impl<R: FromReport> Stream for Subscription<R> {
 }
 
 impl<R> Subscription<R> {
+    const fn of(event: Arc<Event>, peer: JausId, reader: Reader) -> Self {
+        Self {
+            event,
+            peer,
+            reader,
+            arrived: None,
+            report: PhantomData,
+        }
+    }
+
+    /// Another reader of the same event, for another task: the peer sends each report once. It
+    /// starts with the updates that wait for this one and with the same [depth](Self::depth), and
+    /// counts by itself what it misses. The event ends when the last reader is dropped.
+    #[must_use]
+    pub fn share(&self) -> Self {
+        Self::of(self.event.clone(), self.peer, self.reader.share())
+    }
+
     /// Lets at most this many reports wait for a slow reader, 1 to 256, which is the default. With
     /// 1, a reader always gets the latest report. Older ones count as [missed](Self::missed).
     #[must_use]
     pub fn depth(self, reports: usize) -> Self {
-        self.feed.set_depth(reports);
+        self.reader.set_depth(reports);
         self
     }
 
     /// The number of reports that wait to be read.
     #[must_use]
     pub fn waiting(&self) -> usize {
-        self.feed.waiting()
+        self.reader.waiting()
     }
 
-    /// How long ago the report that was read last arrived. `None` before the first.
+    /// How long ago the report that was read last arrived. `None` before the first. The sample in it
+    /// is older, by the time that it took to get here; only a time stamp in the report shows that.
     #[must_use]
     pub fn age(&self) -> Option<Duration> {
         self.arrived.map(|arrived| now() - arrived)
@@ -197,36 +228,36 @@ impl<R> Subscription<R> {
     /// Whether the event is up, as far as known now.
     #[must_use]
     pub fn is_up(&self) -> bool {
-        self.feed.condition().up
+        self.reader.condition().up
     }
 
     /// The rate in hertz that the peer has confirmed; `None` for reports on change.
     #[must_use]
     pub fn hz(&self) -> Option<f64> {
-        self.feed.condition().hz
+        self.reader.condition().hz
     }
 
     /// The number of reports lost in transit, from gaps in the sequence numbers.
     #[must_use]
     pub fn lost(&self) -> u64 {
-        self.feed.condition().lost
+        self.reader.condition().lost
     }
 
     /// The number of reports dropped because [`next`](Self::next) was not called often enough.
     #[must_use]
     pub fn missed(&self) -> u64 {
-        self.feed.condition().missed
+        self.reader.tally().missed
     }
 
     /// The number of reports that did not decode.
     #[must_use]
     pub fn unreadable(&self) -> u64 {
-        self.feed.condition().unreadable
+        self.reader.tally().unreadable
     }
 
     /// Why the peer ended the subscription, if it did.
     #[must_use]
     pub fn end(&self) -> Option<SubscriptionEnd> {
-        self.feed.end()
+        self.reader.end()
     }
 }

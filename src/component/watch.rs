@@ -9,10 +9,32 @@ use crate::endpoint::Received;
 use crate::service::Change;
 
 /// Changes of the directory since its creation.
+///
+/// ```no_run
+/// # async fn example(operator: jaus::component::Component) {
+/// let mut changes = operator.watch();
+/// while let Some(change) = changes.next().await {
+///     println!("{change:?}; {} changes missed", changes.missed());
+/// }
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Watch(Listener<Change>);
 
 /// Messages since its creation that no service of the component handles.
+///
+/// ```no_run
+/// # use jaus::codec::Message;
+/// # use jaus::messages::core::ReportStatus;
+/// # async fn example(operator: jaus::component::Component) {
+/// let mut messages = operator.messages();
+/// while let Some(message) = messages.next().await {
+///     if let Ok(status) = ReportStatus::decode(&message.payload) {
+///         println!("{}: {status:?}", message.source);
+///     }
+/// }
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Messages(Listener<Received>);
 

@@ -51,6 +51,11 @@ impl LinkProfile {
     }
 }
 
+/// Identifies a session of a link whose remote ends authenticate themselves. The link assigns the
+/// numbers; a number is not used twice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SessionId(pub u64);
+
 /// The remote end of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Remote {
@@ -58,6 +63,8 @@ pub enum Remote {
     Socket(SocketAddr),
     /// The remote end of a serial line, or Junior's node manager.
     Line,
+    /// An authenticated session, whatever its network address is at present.
+    Session(SessionId),
 }
 
 impl Remote {
@@ -66,7 +73,7 @@ impl Remote {
     pub const fn socket(self) -> Option<SocketAddr> {
         match self {
             Self::Socket(address) => Some(address),
-            Self::Line => None,
+            Self::Line | Self::Session(_) => None,
         }
     }
 }
@@ -82,6 +89,7 @@ impl fmt::Display for Remote {
         match self {
             Self::Socket(address) => address.fmt(f),
             Self::Line => f.pad("the line"),
+            Self::Session(SessionId(number)) => write!(f, "session {number}"),
         }
     }
 }
@@ -100,7 +108,7 @@ impl Path {
     pub(super) fn is_near(self, other: Self) -> bool {
         match (self.peer.socket(), other.peer.socket()) {
             (Some(one), Some(two)) => one.ip().to_canonical() == two.ip().to_canonical(),
-            (None, None) => self.link == other.link,
+            (None, None) => self == other,
             _ => false,
         }
     }
@@ -144,13 +152,19 @@ mod tests {
     }
 
     #[test]
-    fn one_host_is_near_itself_by_any_link_and_port_and_a_line_by_its_link() {
+    fn a_host_is_near_itself_by_any_port_a_line_by_its_link_and_a_session_by_its_number() {
         let host = path(0, Some("10.0.0.2:3794"));
         assert!(host.is_near(path(1, Some("10.0.0.2:40000"))));
         assert!(host.is_near(path(0, Some("[::ffff:10.0.0.2]:3794"))));
         assert!(!host.is_near(path(0, Some("10.0.0.3:3794"))));
         assert!(!host.is_near(path(0, None)) && !path(0, None).is_near(host));
         assert!(path(0, None).is_near(path(0, None)) && !path(0, None).is_near(path(1, None)));
+        let session = |number| Path {
+            link: LinkId(0),
+            peer: Remote::Session(SessionId(number)),
+        };
+        assert!(session(1).is_near(session(1)) && !session(1).is_near(session(2)));
+        assert!(!session(1).is_near(path(0, None)) && !session(1).is_near(host));
     }
 
     #[test]
@@ -178,5 +192,10 @@ mod tests {
         assert_eq!(shown(Some("10.0.0.2:3794")), "10.0.0.2:3794");
         assert_eq!(shown(None), "the line");
         assert_eq!(path(0, None).peer.socket(), None);
+        let session = Remote::Session(SessionId(7));
+        assert_eq!(
+            (session.to_string().as_str(), session.socket()),
+            ("session 7", None)
+        );
     }
 }

@@ -70,7 +70,7 @@ pub(crate) use egress::MOST_OCTETS;
 pub use egress::Packing;
 pub use event::{AttachError, Event, MessageHandle, Outgoing, Received, Shortfall, Unacknowledged};
 pub use forward::Routing;
-pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
+pub use link::{LinkId, LinkProfile, Path, Remote, SessionId, To, Transmit};
 pub use peers::{Peer, RouteState, Traffic};
 pub(crate) use rate::quota_address;
 pub use rate::{Buckets, Limits, Rate};

@@ -10,7 +10,7 @@ use std::hash::Hash;
 use std::net::{IpAddr, Ipv6Addr};
 use std::time::{Duration, Instant};
 
-use super::{Counter, LinkId, Path};
+use super::{Counter, LinkId, Path, Remote, SessionId};
 use crate::address::JausId;
 
 /// A token bucket rate: a sustained rate and a burst.
@@ -187,13 +187,15 @@ pub(crate) fn quota_address(address: IpAddr) -> IpAddr {
 pub(super) enum Origin {
     Address(IpAddr),
     Line(LinkId),
+    Session(LinkId, SessionId),
 }
 
 impl From<Path> for Origin {
     fn from(path: Path) -> Self {
-        match path.peer.socket() {
-            Some(address) => Self::Address(quota_address(address.ip())),
-            None => Self::Line(path.link),
+        match path.peer {
+            Remote::Socket(address) => Self::Address(quota_address(address.ip())),
+            Remote::Line => Self::Line(path.link),
+            Remote::Session(session) => Self::Session(path.link, session),
         }
     }
 }

@@ -128,7 +128,7 @@ impl Endpoint {
     /// `None` if nothing changes.
     fn with_wildcards_for_zeros(&self, frame: &Frame) -> Option<Frame> {
         let means_all = frame.destination.has_zero()
-            && self.peers.profile(frame.source).reads_zero_as_wildcard();
+            && self.peers.presumed(frame.source).reads_zero_as_wildcard();
         means_all.then(|| Frame {
             destination: frame.destination.with_zeros_for_all(),
             ..frame.clone()

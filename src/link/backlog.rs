@@ -11,15 +11,16 @@ use crate::wire::Priority;
 
 /// The limits of a backlog.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Bounds {
+pub struct Bounds {
     /// Items, at least 1.
-    pub(crate) items: usize,
+    pub items: usize,
     /// Octets of all items. A single larger item is accepted if nothing else waits.
-    pub(crate) octets: usize,
+    pub octets: usize,
 }
 
+/// The queue.
 #[derive(Debug)]
-pub(crate) struct Backlog<T> {
+pub struct Backlog<T> {
     bounds: Bounds,
     /// By priority, low first: the items, each with its octets.
     levels: [VecDeque<(usize, T)>; LEVELS],
@@ -34,7 +35,9 @@ const LEVELS: usize = Priority::ALL.len();
 const KEPT: usize = 32;
 
 impl<T> Backlog<T> {
-    pub(crate) fn new(bounds: Bounds) -> Self {
+    /// An empty queue with these limits.
+    #[must_use]
+    pub fn new(bounds: Bounds) -> Self {
         Self {
             bounds,
             levels: Default::default(),
@@ -42,26 +45,34 @@ impl<T> Backlog<T> {
         }
     }
 
-    pub(crate) fn len(&self) -> usize {
+    /// Items that wait.
+    #[must_use]
+    pub fn len(&self) -> usize {
         self.levels.iter().map(VecDeque::len).sum()
     }
 
-    pub(crate) fn octets(&self) -> usize {
+    /// Octets of all items that wait.
+    #[must_use]
+    pub fn octets(&self) -> usize {
         self.octets.iter().sum()
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
+    /// Whether nothing waits.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
     /// Whether `items` more fit, and at most half of the octets are in use.
-    pub(crate) fn has_room(&self, items: usize) -> bool {
+    #[must_use]
+    pub fn has_room(&self, items: usize) -> bool {
         self.len() + items <= self.bounds.items && self.octets() <= self.bounds.octets / 2
     }
 
     /// Whether items of this or a higher priority take less than half of the room. The other half
     /// is a reserve for items that are pushed without this check.
-    pub(crate) fn has_reserve(&self, priority: Priority) -> bool {
+    #[must_use]
+    pub fn has_reserve(&self, priority: Priority) -> bool {
         let level = usize::from(priority.bits());
         let items: usize = self.levels[level..].iter().map(VecDeque::len).sum();
         let octets: usize = self.octets[level..].iter().sum();
@@ -70,7 +81,7 @@ impl<T> Backlog<T> {
 
     /// Adds an item; returns how many items were dropped for it.
     #[must_use]
-    pub(crate) fn push(&mut self, priority: Priority, octets: usize, item: T) -> u64 {
+    pub fn push(&mut self, priority: Priority, octets: usize, item: T) -> u64 {
         let level = usize::from(priority.bits());
         self.levels[level].push_back((octets, item));
         self.octets[level] += octets;
@@ -82,19 +93,19 @@ impl<T> Backlog<T> {
     }
 
     /// The item that [`pop`](Self::pop) removes next.
-    #[cfg(unix)]
-    pub(crate) fn first(&self) -> Option<&T> {
+    #[must_use]
+    pub fn first(&self) -> Option<&T> {
         let (_, first) = self.levels.iter().rev().find_map(VecDeque::front)?;
         Some(first)
     }
 
     /// Removes the oldest item of the highest priority.
-    pub(crate) fn pop(&mut self) -> Option<T> {
+    pub fn pop(&mut self) -> Option<T> {
         (0..LEVELS).rev().find_map(|level| self.pop_from(level))
     }
 
     /// Drops the oldest item of the lowest priority; returns whether there was one.
-    pub(crate) fn drop_least(&mut self) -> bool {
+    pub fn drop_least(&mut self) -> bool {
         (0..LEVELS).any(|level| self.pop_from(level).is_some())
     }
 

@@ -4,7 +4,8 @@
 //! [`UdpLink`](udp::UdpLink) per network interface, and one [`TcpLink`](tcp::TcpLink) for all
 //! connections. The TCP link decodes the framing itself, because only the frames show where a
 //! message ends. There is one `SerialLink` (feature `serial`) per serial line. A `JuniorLink` (on
-//! Unix) may replace UDP; with it the node is a client of a Junior on the same host.
+//! Unix) may replace UDP; with it the node is a client of a Junior on the same host. Other crates
+//! provide further links by [`CustomLink`](custom::CustomLink).
 //!
 //! # Several nodes on one host
 //!
@@ -27,7 +28,8 @@
 //! room for either socket. One of the two has to move, or the node becomes its client (`junior`).
 #![expect(clippy::disallowed_types, reason = "this module owns the sockets")]
 
-pub(crate) mod backlog;
+pub mod backlog;
+pub mod custom;
 mod error;
 mod group;
 mod holder;

@@ -8,12 +8,13 @@ use std::any::Any;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
 use super::Config;
 use super::awaiting::{Awaiting, Waiter};
+use super::clock::{now, time_of_day};
 use super::components::{Components, Departure};
 use super::error::SendError;
 use super::events::EventSender;
@@ -37,13 +38,6 @@ const BURST: usize = 64;
 /// How long a node that shuts down tries to send queued messages.
 pub(super) const LAST_WORDS: Duration = Duration::from_millis(250);
 
-/// The clock of nodes and components. It is tokio's: where a test pauses that clock, timers,
-/// endpoints, components and the control loops that read it share one virtual time.
-#[expect(clippy::disallowed_methods, reason = "the node owns the clock")]
-pub fn now() -> Instant {
-    tokio::time::Instant::now().into_std()
-}
-
 /// The state that handles, ports and the driver share.
 #[derive(Debug)]
 pub(super) struct Shared {
@@ -64,7 +58,7 @@ impl Shared {
         let endpoint = Endpoint::new(endpoint::Config {
             // The keys of `RandomState` come from the operating system.
             challenge_key: RandomState::new().hash_one(0),
-            ..config.endpoint(first_sequence())
+            ..config.endpoint(first_sequence_at(time_of_day()))
         });
         Self {
             config,
@@ -131,14 +125,6 @@ impl Shared {
     pub(super) fn lock(&self) -> MutexGuard<'_, Core> {
         self.core.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-/// The first sequence number.
-#[expect(clippy::disallowed_methods, reason = "the node owns the clock")]
-fn first_sequence() -> u16 {
-    let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-    // A clock before 1970 was never set; then every start uses the same number.
-    first_sequence_at(since_1970.unwrap_or_default())
 }
 
 #[derive(Debug)]

@@ -7,7 +7,8 @@ use std::task::{Poll, ready};
 
 use tokio::time::{Instant, sleep_until};
 
-use super::core::{Shared, now};
+use super::clock::now;
+use super::core::Shared;
 
 #[derive(Debug)]
 pub(super) struct Driver(pub(super) Arc<Shared>);

@@ -2,7 +2,7 @@
 
 use std::net::IpAddr;
 
-use super::{ConfigError, Peer};
+use super::{ConfigError, PeerAddress};
 use crate::address::JausId;
 use crate::endpoint::{self, Shortfall};
 use crate::link;
@@ -36,7 +36,7 @@ pub enum StartError {
     )]
     PeerOutOfReach {
         /// The peer.
-        peer: Peer,
+        peer: PeerAddress,
         /// The address of this host on the route to it.
         local: IpAddr,
         /// The selected interfaces.

@@ -19,8 +19,8 @@ use crate::link::{Error, Interface};
 /// Poll interval where the operating system does not report changes, or where an interface could
 /// not be used yet.
 const POLL: Duration = Duration::from_secs(2);
-/// Poll interval otherwise, in case a report was lost.
-const FALLBACK: Duration = Duration::from_secs(60);
+/// Poll interval otherwise, in case a report was lost. Longer than the tests wait for a report.
+const FALLBACK: Duration = Duration::from_secs(120);
 /// How long changes are collected before a poll: an interface that comes up causes several.
 const SETTLE: Duration = Duration::from_millis(50);
 

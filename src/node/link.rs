@@ -7,6 +7,7 @@ use std::time::Instant;
 use super::components::Components;
 use crate::endpoint::{Endpoint, Ingress, LinkId, LinkProfile, Path, Remote, Transmit};
 use crate::link::Slab;
+use crate::link::custom::{self, CustomLink};
 #[cfg(unix)]
 use crate::link::junior::JuniorLink;
 #[cfg(feature = "serial")]
@@ -26,6 +27,7 @@ pub(super) enum Link {
     Tcp(TcpLink),
     #[cfg(feature = "serial")]
     Serial(SerialLink),
+    Custom(Box<dyn CustomLink>),
 }
 
 impl Link {
@@ -67,6 +69,7 @@ impl Link {
             Self::Tcp(_) => "tcp".to_owned(),
             #[cfg(feature = "serial")]
             Self::Serial(link) => link.settings().device.clone(),
+            Self::Custom(link) => link.name().to_owned(),
         }
     }
 
@@ -80,6 +83,7 @@ impl Link {
             Self::Tcp(link) => link.transmit(transmit),
             #[cfg(feature = "serial")]
             Self::Serial(link) => link.transmit(transmit),
+            Self::Custom(link) => link.transmit(transmit),
         }
     }
 
@@ -99,6 +103,7 @@ impl Link {
             Self::Tcp(link) => link.poll_flush(cx, now),
             #[cfg(feature = "serial")]
             Self::Serial(link) => link.poll_flush(cx),
+            Self::Custom(link) => link.poll_flush(cx, now),
         }
     }
 
@@ -108,6 +113,7 @@ impl Link {
             #[cfg(unix)]
             Self::Junior(link) => link.hang_up(),
             Self::Tcp(link) => link.hang_up(),
+            Self::Custom(link) => link.hang_up(),
             _ => Poll::Ready(()),
         }
     }
@@ -121,6 +127,7 @@ impl Link {
             Self::Tcp(link) => link.poll_timeout(),
             #[cfg(feature = "serial")]
             Self::Serial(link) => link.poll_timeout(),
+            Self::Custom(link) => link.poll_timeout(),
         }
     }
 
@@ -178,6 +185,24 @@ impl Link {
                 }
                 serial::Arrival::Lost => endpoint.forget_path(from(Remote::Line)),
             }),
+            Self::Custom(link) => {
+                for _ in 0..BATCH {
+                    let Poll::Ready(arrival) = link.poll_receive(cx, now) else {
+                        return false;
+                    };
+                    match arrival {
+                        custom::Arrival::Datagram { session, octets } => {
+                            let path = from(Remote::Session(session));
+                            components.taps.datagram(path, &octets);
+                            endpoint.handle_datagram(now, path, octets, components);
+                        }
+                        custom::Arrival::Closed(session) => {
+                            endpoint.forget_path(from(Remote::Session(session)));
+                        }
+                    }
+                }
+                true
+            }
         }
     }
 }

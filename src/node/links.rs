@@ -11,8 +11,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::link::Link;
-use super::{Config, Peer, StartError};
+use super::{Config, PeerAddress, StartError};
 use crate::endpoint::{LinkId, Path, StaticPeer};
+use crate::link::custom::CustomLink;
 #[cfg(unix)]
 use crate::link::junior::JuniorLink;
 #[cfg(feature = "serial")]
@@ -28,6 +29,7 @@ pub(super) struct Links {
     pub(super) open: BTreeMap<LinkId, Link>,
     next: LinkId,
     routes: Routes,
+    uses_udp: bool,
 }
 
 /// The local address on the route to each configured peer.
@@ -54,16 +56,20 @@ impl Survey {
 }
 
 impl Links {
-    /// Opens a link on every selected interface, and the links for streams. If one fails, none
-    /// stays open.
-    pub(super) fn open(config: &Arc<Config>) -> Result<Self, StartError> {
+    /// Opens a link on every selected interface, and the links for streams, and adds the custom
+    /// links. If one fails, none stays open.
+    pub(super) fn open(
+        config: &Arc<Config>,
+        custom: Vec<Box<dyn CustomLink>>,
+    ) -> Result<Self, StartError> {
         let mut links = Self {
             config: config.clone(),
             open: BTreeMap::new(),
             next: LinkId(0),
             routes: Routes::new(),
+            uses_udp: config.uses_udp(!custom.is_empty()),
         };
-        if config.uses_udp() {
+        if links.uses_udp {
             links.open_udp()?;
         }
         #[cfg(unix)]
@@ -78,6 +84,9 @@ impl Links {
         for line in &config.serial {
             let link = SerialLink::open(line)?;
             links.insert(Link::Serial(link));
+        }
+        for link in custom {
+            links.insert(Link::Custom(link));
         }
         Ok(links)
     }
@@ -127,7 +136,7 @@ impl Links {
 
     /// Whether changes of interfaces matter to this node.
     pub(super) fn follows(&self) -> bool {
-        self.config.uses_udp() && self.config.interfaces != Interfaces::Loopback
+        self.uses_udp && self.config.interfaces != Interfaces::Loopback
     }
 
     /// Removes the links whose interfaces are gone. Returns them, and the interfaces without a
@@ -168,7 +177,7 @@ impl Links {
             .map(|peer| (peer, self.link_to(peer.address()), true));
         // Broadcasts go to all connections anyway.
         let by_tcp = by_tcp.iter().map(|peer| (peer, tcp, false));
-        let named = |(peer, link, gets_broadcasts): (&Peer, Option<LinkId>, bool)| {
+        let named = |(peer, link, gets_broadcasts): (&PeerAddress, Option<LinkId>, bool)| {
             let (id, link, peer) = (peer.id()?, link?, peer.address().into());
             Some(StaticPeer {
                 id,
@@ -217,7 +226,7 @@ impl Links {
 /// A configured peer's address, and the local address on the route to it, if there is one at
 /// present. Ensures that its interface is selected.
 fn route_to(
-    peer: Peer,
+    peer: PeerAddress,
     wanted: &Interfaces,
     chosen: &mut Vec<Interface>,
 ) -> Result<Option<(SocketAddr, IpAddr)>, StartError> {
@@ -262,7 +271,7 @@ mod tests {
         }
     }
 
-    fn peer() -> Peer {
+    fn peer() -> PeerAddress {
         "127.0.0.1:9".parse().unwrap()
     }
 

@@ -21,7 +21,15 @@ use crate::wire::Priority;
 /// Progress of the reader is signalled when the number of waiting messages is a multiple of this.
 const SIGNAL_READ: usize = 128;
 
-/// The limits of a mailbox.
+/// The limits of the mailbox of each component.
+///
+/// ```
+/// use jaus::node::{Config, MailboxLimits};
+///
+/// let mut config = Config::new(101, 1);
+/// config.mailbox = MailboxLimits { messages: 256, octets: 1 << 20 };
+/// assert_eq!(config.validate(), Ok(()));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]

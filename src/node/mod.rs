@@ -34,6 +34,7 @@
 //! ```
 
 mod awaiting;
+mod clock;
 mod components;
 mod config;
 mod core;
@@ -56,9 +57,9 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+pub use self::clock::{now, sleep_until, time_of_day};
 pub use self::components::{ComponentEvent, Departure};
-pub use self::config::{Config, ConfigError, Delivery, Peer, Tcp, units};
-pub use self::core::now;
+pub use self::config::{Config, ConfigError, Delivery, PeerAddress, Tcp, units};
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::events::EventStream;
 pub use self::host::{Host, HostEvent, HostEvents};
@@ -77,6 +78,7 @@ use self::links::Links;
 use self::local::serve;
 use crate::address::JausId;
 use crate::endpoint::{self, Event, LinkId};
+use crate::link::custom::CustomLink;
 use crate::link::interface::Changes;
 #[cfg(unix)]
 use crate::link::junior;
@@ -89,6 +91,20 @@ use crate::link::{Interface, tcp, udp};
 ///
 /// The node runs until [`shutdown`](Self::shutdown), or until its last handle and its last
 /// [`Port`] are dropped.
+///
+/// ```
+/// use jaus::node::{Config, Node};
+///
+/// # #[tokio::main(flavor = "current_thread")]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let node = Node::start(Config::loopback(101, 1))?;
+/// let driver = node.attach(33)?;
+/// assert_eq!(driver.id().to_string(), "101.1.33");
+/// assert!(!node.links().is_empty());
+/// node.shutdown().await;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Node {
     guard: Arc<Guard>,
@@ -110,10 +126,19 @@ impl Node {
     /// # Errors
     /// [`StartError`] gives the reason and the remedy. Nothing is left running.
     pub fn start(config: Config) -> Result<Self, StartError> {
+        Self::start_with(config, Vec::new())
+    }
+
+    /// Starts the node with links of other crates, in addition to those of its configuration. An
+    /// empty list of interfaces then leaves it with these alone.
+    ///
+    /// # Errors
+    /// As [`start`](Self::start).
+    pub fn start_with(config: Config, links: Vec<Box<dyn CustomLink>>) -> Result<Self, StartError> {
         config.validate()?;
         let runtime = tokio::runtime::Handle::try_current().map_err(|_| StartError::NoRuntime)?;
         let config = Arc::new(config);
-        let links = Links::open(&config)?;
+        let links = Links::open(&config, links)?;
         let listener = match &config.local {
             Local::Off => None,
             Local::At(address) => Some(Listener::open(address)?),

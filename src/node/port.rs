@@ -23,6 +23,18 @@ use crate::endpoint::{self, MessageHandle, Outgoing, Received};
 ///
 /// Sending never waits. Received messages wait in a bounded mailbox, most urgent first; a full
 /// mailbox drops messages, see [`MailboxLimits`](super::MailboxLimits).
+///
+/// ```no_run
+/// # use jaus::endpoint::Outgoing;
+/// # use jaus::node::{Port, SendError};
+/// # async fn example(mut port: Port) -> Result<(), SendError> {
+/// while let Some(message) = port.recv().await {
+///     println!("{} octets from {}", message.payload.len(), message.source);
+///     port.send(Outgoing::new(port.id(), message.source, message.payload))?;
+/// }
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Port {
     sender: Sender,
@@ -158,6 +170,18 @@ impl Drop for Port {
 }
 
 /// Sends for a component. Keeps neither the node running nor the component attached.
+///
+/// ```no_run
+/// # use jaus::address::JausId;
+/// # use jaus::endpoint::Outgoing;
+/// # use jaus::node::{Port, Undelivered};
+/// # async fn example(port: &Port, peer: JausId) -> Result<(), Undelivered> {
+/// let sender = port.sender();
+/// let resume = Outgoing::new(sender.id(), peer, vec![0x04, 0x00].into());
+/// sender.deliver(resume).await?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Sender {
     id: JausId,
@@ -200,9 +224,9 @@ impl Sender {
     /// [`Undelivered`] tells what was not acknowledged, and why.
     pub async fn deliver(&self, mut message: Outgoing) -> Result<(), Undelivered> {
         message.acknowledge = true;
-        let (tell, told) = oneshot::channel();
-        self.transmit(message, Some(Waiter::Here(tell)))?;
-        told.await.unwrap_or(Err(Undelivered::Lost))
+        let (sender, outcome) = oneshot::channel();
+        self.transmit(message, Some(Waiter::Here(sender)))?;
+        outcome.await.unwrap_or(Err(Undelivered::Lost))
     }
 
     /// Waits until all messages sent so far are written to the connection to the host's node, or it

@@ -122,6 +122,23 @@ impl Passage {
 /// traffic, and messages between components of the node.
 ///
 /// Drop it to end it.
+///
+/// ```no_run
+/// # use jaus::node::{Node, Tapped};
+/// # async fn example(node: Node) {
+/// let mut tap = node.tap(1024);
+/// while let Some(tapped) = tap.next().await {
+///     match tapped {
+///         Tapped::Passage(passage) => {
+///             for frame in passage.frames() {
+///                 println!("{} to {}", frame.source, frame.destination);
+///             }
+///         }
+///         Tapped::Lost(count) => println!("{count} passages lost"),
+///     }
+/// }
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Tap {
     queue: Arc<Queue>,
@@ -332,8 +349,8 @@ mod tests {
             let one = framing.encode(&frame).unwrap();
             let mut content = vec![(one.clone(), None, 1)];
             if framing == Framing::Judp {
-                let train = [&one[..], &one[..]].concat();
-                content.push((train.into(), Some(one.len()), 2));
+                let batch = [&one[..], &one[..]].concat();
+                content.push((batch.into(), Some(one.len()), 2));
             }
             for (octets, segment, count) in content {
                 let passage = Passage {

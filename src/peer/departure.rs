@@ -1,12 +1,12 @@
 //! The departures of known peers from the standard.
 
-use super::Peer::{Fkie, Iop, JausPlusPlus, Jts, Junior, OpenJausSdk};
+use super::Implementation::{Fkie, Iop, JausPlusPlus, Jts, Junior, OpenJausSdk};
 use super::Sign::{
     AsksWholeNodes, BeginsWithOne, CallsUnknownIds, IopService, JausPlusPlusService, LongFragments,
     NumbersByDestination, PriorityFault, RegistersAcrossSubsystems, RepeatedCode, RepeatedVersion,
     StaleOctets,
 };
-use super::{Peer, Sign};
+use super::{Implementation, Sign};
 use Recognition::{By, Configured, NeedNotBe};
 
 /// A way in which a peer departs from the standard, or from what other peers do.
@@ -16,7 +16,7 @@ pub struct Departure {
     /// A short name.
     pub name: &'static str,
     /// The peers that it applies to.
-    pub peers: &'static [Peer],
+    pub peers: &'static [Implementation],
     /// What these peers do.
     pub does: &'static str,
     /// How it is known.
@@ -254,7 +254,7 @@ departures! {
     "aliased ids": [Jts], Recorded, Configured =>
         does "reads a 0 in any octet of an id as a wildcard, so it also delivers messages for \
             1.1.1 to 513.1.1",
-        ours "`Peer::confuses` tells which ids it cannot distinguish; choose only subsystems below \
+        ours "`Implementation::confuses` tells which ids it cannot distinguish; choose only subsystems below \
             256, or none below 256",
         in "src/peer/habits.rs",
         tested by "junior_of_the_tool_set_confuses_ids_with_zero_octets";

@@ -1,7 +1,9 @@
 //! The behaviour that depends on a known peer: limits, rates and wire variants.
 
-use super::Peer;
+use super::Implementation;
 use crate::address::JausId;
+use crate::codec::Message;
+use crate::messages::core::UpdateEvent;
 
 /// How a sender cuts large messages for AS5669A.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -24,7 +26,7 @@ pub struct Pacing {
     pub rate: u64,
 }
 
-impl Peer {
+impl Implementation {
     /// How it cuts large messages and expects them to be cut; `None` if unknown.
     #[must_use]
     pub const fn large_style(self) -> Option<LargeStyle> {
@@ -85,6 +87,12 @@ impl Peer {
         matches!(self, Self::Iop | Self::Jts)
     }
 
+    /// Whether its process ends when it receives a message with this code.
+    #[must_use]
+    pub const fn crashes_on(self, code: u16) -> bool {
+        matches!(self, Self::JausPlusPlus) && code == UpdateEvent::CODE
+    }
+
     /// Whether answers on the TCP connections that it opened are lost, so that answers must go by
     /// UDP.
     #[must_use]
@@ -96,10 +104,10 @@ impl Peer {
     ///
     /// ```
     /// use jaus::address::JausId;
-    /// use jaus::peer::Peer;
+    /// use jaus::peer::Implementation;
     ///
     /// let (one, other) = (JausId::new(1, 1, 1), JausId::new(513, 1, 1));
-    /// assert!(Peer::Jts.confuses(one, other) && !Peer::Junior.confuses(one, other));
+    /// assert!(Implementation::Jts.confuses(one, other) && !Implementation::Junior.confuses(one, other));
     /// ```
     #[must_use]
     pub fn confuses(self, one: JausId, other: JausId) -> bool {

@@ -7,17 +7,17 @@
 //! [below](#the-table), for programs in [`DEPARTURES`].
 //!
 //! Most handling suits every peer and applies to all: tolerance for lenient peers never degrades
-//! what strict peers get. Handling that would not suit every peer depends on the [`Peer`] that was
-//! recognised or configured, through methods such as [`Peer::large_style`],
-//! [`Peer::payload_limit`], [`Peer::intake`], [`Peer::reads_zero_as_wildcard`] and
-//! [`Peer::is_deaf_on_its_connections`].
+//! what strict peers get. Handling that would not suit every peer depends on the
+//! [`Implementation`] that was recognised or configured, through methods such as
+//! [`Implementation::large_style`], [`Implementation::payload_limit`], [`Implementation::intake`],
+//! [`Implementation::reads_zero_as_wildcard`] and [`Implementation::is_deaf_on_its_connections`].
 //!
 //! A [`Recogniser`] receives everything that one peer sends, and reports which peer it is, with
 //! what certainty, and why. It does no I/O and keeps a few octets of state.
 //!
 //! ```
 //! use bytes::Bytes;
-//! use jaus::peer::{Certainty, Peer, Recogniser};
+//! use jaus::peer::{Certainty, Implementation, Recogniser};
 //! use jaus::wire::judp;
 //!
 //! // Recorded from JAUS++, which reports its services and then sends a query from the same buffer.
@@ -27,7 +27,7 @@
 //! let frame = frames.next().expect("a first message or an error")?;
 //! recogniser.handle_frame(&frame, frames.remaining());
 //! let verdict = recogniser.verdict();
-//! assert_eq!((verdict.peer, verdict.certainty), (Peer::JausPlusPlus, Certainty::Likely));
+//! assert_eq!((verdict.peer, verdict.certainty), (Implementation::JausPlusPlus, Certainty::Likely));
 //! assert!(verdict.reasons[0].explanation().contains("follow its messages"));
 //! # Ok::<(), jaus::wire::Error>(())
 //! ```
@@ -57,10 +57,11 @@ pub(crate) use recogniser::is_priority_fault;
 pub use recogniser::{Certainty, Recogniser, Verdict};
 pub use sign::Sign;
 
-/// A JAUS implementation whose departures are known.
+/// A JAUS implementation whose departures are known. Settings name it `standard`, `jaus++`,
+/// `junior`, `jts`, `fkie`, `openjaus-sdk` or `iop`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
-pub enum Peer {
+pub enum Implementation {
     /// A peer without known departures, treated as the standard says.
     #[default]
     Standard,
@@ -79,7 +80,7 @@ pub enum Peer {
     Iop,
 }
 
-impl Peer {
+impl Implementation {
     /// All peers.
     pub const ALL: [Self; 7] = [
         Self::Standard,
@@ -134,7 +135,7 @@ impl Peer {
     }
 }
 
-impl fmt::Display for Peer {
+impl fmt::Display for Implementation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
     }
@@ -148,7 +149,7 @@ impl fmt::Display for Peer {
 )]
 pub struct UnknownPeer(pub String);
 
-impl FromStr for Peer {
+impl FromStr for Implementation {
     type Err = UnknownPeer;
 
     fn from_str(text: &str) -> Result<Self, UnknownPeer> {
@@ -157,9 +158,9 @@ impl FromStr for Peer {
     }
 }
 
-serde_as_text!(Peer);
+serde_as_text!(Implementation);
 
-/// Assigns a profile to an id. It overrides what the recogniser observes.
+/// Assigns a profile to an id. It takes precedence over the recognition of the peer.
 ///
 /// ```toml
 /// [[profile]]
@@ -172,14 +173,14 @@ serde_as_text!(Peer);
 pub struct Assignment {
     /// The id, which may hold the wildcards 65535 and 255.
     pub id: JausId,
-    /// The profile. [`Peer::Standard`] prevents the peer from being recognised as anything else.
-    pub profile: Peer,
+    /// The profile. `standard` prevents the peer from being recognised as anything else.
+    pub profile: Implementation,
 }
 
 impl Assignment {
     /// The profile of an id: the first entry that matches.
     #[must_use]
-    pub fn find(all: &[Self], id: JausId) -> Option<Peer> {
+    pub fn find(all: &[Self], id: JausId) -> Option<Implementation> {
         let fits = |assignment: &&Self| assignment.id.matches(id);
         all.iter().find(fits).map(|assignment| assignment.profile)
     }

@@ -5,7 +5,7 @@ use std::fmt;
 use super::habits::{JAUSPP_FRAGMENT, JUNIOR_PAYLOAD};
 use super::numbers::Numbers;
 use super::sign::Signs;
-use super::{LargeStyle, Peer, Sign};
+use super::{Implementation, LargeStyle, Sign};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::messages::core::{QueryIdentification, RegisterServices};
@@ -47,12 +47,13 @@ impl fmt::Display for Certainty {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Verdict {
-    /// The most likely peer; [`Peer::Standard`] without evidence.
-    pub peer: Peer,
+    /// The most likely peer; [`Implementation::Standard`] without evidence.
+    pub peer: Implementation,
     /// How certain that is. An uncertain result changes how a peer is treated only where a wrong
     /// guess does little harm.
     pub certainty: Certainty,
-    /// All observed signs, including those that point to other peers.
+    /// All observed signs, including those that point to other peers, and those that are no
+    /// evidence by themselves.
     pub reasons: Vec<Sign>,
 }
 
@@ -63,7 +64,7 @@ pub struct Verdict {
 pub struct Recogniser {
     signs: Signs,
     /// The peer recognised with certainty.
-    certain: Peer,
+    certain: Implementation,
     begun: bool,
     numbers: Numbers,
     large: Option<Large>,
@@ -174,31 +175,32 @@ impl Recogniser {
         }
     }
 
-    /// The peer recognised with certainty; otherwise [`Peer::Standard`].
+    /// The peer recognised with certainty; otherwise [`Implementation::Standard`].
     #[must_use]
-    pub const fn certain(&self) -> Peer {
+    pub const fn certain(&self) -> Implementation {
         self.certain
     }
 
     /// The peer recognised with certainty; otherwise a presumption, for uses where a wrong guess
-    /// does little harm. A peer is presumed to be Junior if it begins with number 1, and then calls
-    /// an unknown id or sends fragments of Junior's length. A node of ours may do either of the
-    /// latter, but does not begin with 1.
+    /// does little harm. A peer is presumed to be Junior if that is likely: it begins with number
+    /// 1, and then calls an unknown id or sends fragments of Junior's length. A peer of which
+    /// nothing else is likely, but that offers services of the interoperability profiles, is
+    /// presumed to follow them in all.
     #[must_use]
-    pub fn presumed(&self) -> Peer {
-        let has = |sign| self.signs.has(sign);
-        let is_like_junior =
-            has(Sign::BeginsWithOne) && (has(Sign::CallsUnknownIds) || has(Sign::LongFragments));
-        if self.certain == Peer::Standard && is_like_junior && self.best().0 == Peer::Junior {
-            Peer::Junior
-        } else {
-            self.certain
+    pub fn presumed(&self) -> Implementation {
+        match self.best() {
+            _ if self.certain != Implementation::Standard => self.certain,
+            (Implementation::Junior, Certainty::Likely) => Implementation::Junior,
+            (_, Certainty::Unknown | Certainty::Guess) if self.signs.has(Sign::IopService) => {
+                Implementation::Iop
+            }
+            _ => Implementation::Standard,
         }
     }
 
     /// The peer with the most evidence, and its certainty; the first if several are equal.
-    fn best(&self) -> (Peer, Certainty) {
-        let weighed = Peer::ALL.map(|peer| (self.signs.weight(peer), peer));
+    fn best(&self) -> (Implementation, Certainty) {
+        let weighed = Implementation::ALL.map(|peer| (self.signs.weight(peer), peer));
         let most = weighed.into_iter().rev().max_by_key(|&(weight, _)| weight);
         let (weight, peer) = most.unwrap_or_default();
         let certainty = match weight {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::Peer;
+use super::Implementation;
 
 /// Defines the signs. Each has the peer that it points to, its weight, and its description.
 macro_rules! signs {
@@ -20,9 +20,9 @@ macro_rules! signs {
 
             /// The peer that it points to.
             #[must_use]
-            pub const fn peer(self) -> Peer {
+            pub const fn peer(self) -> Implementation {
                 match self {
-                    $(Self::$sign => Peer::$peer,)+
+                    $(Self::$sign => Implementation::$peer,)+
                 }
             }
 
@@ -116,10 +116,27 @@ impl Signs {
             .filter(move |&sign| self.has(sign))
     }
 
+    /// Whether a sign is evidence. Nodes of this implementation show some signs too: they call
+    /// unknown ids, may send fragments of Junior's length, query whole nodes, and seem to count per
+    /// destination if messages overtake each other. But they do not begin with number 1, so these
+    /// signs count only for a peer that does. They also offer services of the interoperability
+    /// profiles, but write no 0 in destinations.
+    const fn is_evidence(self, sign: Sign) -> bool {
+        match sign {
+            Sign::LongFragments
+            | Sign::CallsUnknownIds
+            | Sign::NumbersByDestination
+            | Sign::AsksWholeNodes => self.has(Sign::BeginsWithOne),
+            Sign::IopService => self.has(Sign::ZeroInDestination),
+            _ => true,
+        }
+    }
+
     /// The total weight for a peer. Signs of Junior also count for a fork of it, if at least one
     /// sign points to that fork alone.
-    pub(super) fn weight(self, peer: Peer) -> u8 {
-        let of_it = self.iter().filter(|sign| sign.peer() == peer);
+    pub(super) fn weight(self, peer: Implementation) -> u8 {
+        let is_for_it = |sign: &Sign| sign.peer() == peer && self.is_evidence(*sign);
+        let of_it = self.iter().filter(is_for_it);
         let alone = of_it.map(Sign::weight).sum();
         match peer.fork_of() {
             Some(original) if alone > 0 => alone + self.weight(original),

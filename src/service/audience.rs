@@ -106,7 +106,7 @@ impl Audience {
 
     /// Whether a component of the directory belongs to the audience.
     #[must_use]
-    pub fn includes(&self, component: &service::Component) -> bool {
+    pub fn includes(&self, component: &service::ComponentEntry) -> bool {
         let offers = |wanted: &Wanted| match wanted {
             Wanted::AnyVersion(urn) => component.offers(urn),
             Wanted::Version(wanted) => component.offered().any(|it| it.serves(*wanted)),
@@ -195,9 +195,9 @@ mod tests {
         minor: 1,
     };
 
-    fn component(id: JausId, minor: u8) -> service::Component {
+    fn component(id: JausId, minor: u8) -> service::ComponentEntry {
         let offer = Offer::from(ServiceId { minor, ..SPEED });
-        service::Component {
+        service::ComponentEntry {
             id,
             identification: None,
             services: Some([offer].into()),

@@ -14,26 +14,26 @@ use crate::codec::ServiceId;
 /// parts.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Directory {
-    subsystems: BTreeMap<u16, Arc<Subsystem>>,
+    subsystems: BTreeMap<u16, Arc<SubsystemEntry>>,
 }
 
 /// A vehicle, an operator station, or any other system with its own subsystem number.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Subsystem {
+pub struct SubsystemEntry {
     identification: Option<Identification>,
-    nodes: BTreeMap<u8, Node>,
+    nodes: BTreeMap<u8, NodeEntry>,
 }
 
 /// A computer of a subsystem.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Node {
+pub struct NodeEntry {
     identification: Option<Identification>,
-    components: BTreeMap<u8, Component>,
+    components: BTreeMap<u8, ComponentEntry>,
 }
 
 /// A program on a node.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Component {
+pub struct ComponentEntry {
     /// Its id.
     pub id: JausId,
     /// Kind and name, once reported.
@@ -95,7 +95,7 @@ pub enum Level {
 
 impl Directory {
     /// All subsystems with their numbers, in order.
-    pub fn subsystems(&self) -> impl Iterator<Item = (u16, &Subsystem)> {
+    pub fn subsystems(&self) -> impl Iterator<Item = (u16, &SubsystemEntry)> {
         self.subsystems
             .iter()
             .map(|(&id, subsystem)| (id, &**subsystem))
@@ -103,12 +103,12 @@ impl Directory {
 
     /// One subsystem.
     #[must_use]
-    pub fn subsystem(&self, id: u16) -> Option<&Subsystem> {
+    pub fn subsystem(&self, id: u16) -> Option<&SubsystemEntry> {
         self.subsystems.get(&id).map(|subsystem| &**subsystem)
     }
 
     /// All components of all subsystems, in order of their ids.
-    pub fn components(&self) -> impl Iterator<Item = &Component> {
+    pub fn components(&self) -> impl Iterator<Item = &ComponentEntry> {
         self.subsystems
             .values()
             .flat_map(|subsystem| subsystem.components())
@@ -116,14 +116,14 @@ impl Directory {
 
     /// One component.
     #[must_use]
-    pub fn component(&self, id: JausId) -> Option<&Component> {
+    pub fn component(&self, id: JausId) -> Option<&ComponentEntry> {
         self.subsystem(id.subsystem())?
             .node(id.node())?
             .component(id.component())
     }
 
     /// The components that offer a service, in any version.
-    pub fn offering<'d>(&'d self, urn: &'d str) -> impl Iterator<Item = &'d Component> {
+    pub fn offering<'d>(&'d self, urn: &'d str) -> impl Iterator<Item = &'d ComponentEntry> {
         self.components()
             .filter(move |component| component.offers(urn))
     }
@@ -158,7 +158,7 @@ impl Directory {
         }
         let subsystem = self.subsystems.entry(id.subsystem()).or_default();
         let node = Arc::make_mut(subsystem).nodes.entry(id.node()).or_default();
-        let component = Component {
+        let component = ComponentEntry {
             id,
             identification: None,
             services: None,
@@ -187,8 +187,8 @@ impl Directory {
     }
 
     /// Sets the identification at one level of a known component. Returns whether it has changed.
-    pub(super) fn identify(&mut self, level: Level, id: JausId, told: Identification) -> bool {
-        if self.identification(level, id) == Some(&told) {
+    pub(super) fn identify(&mut self, level: Level, id: JausId, new: Identification) -> bool {
+        if self.identification(level, id) == Some(&new) {
             return false;
         }
         let slot = match level {
@@ -199,7 +199,7 @@ impl Directory {
         let Some(slot) = slot else {
             return false;
         };
-        *slot = Some(told);
+        *slot = Some(new);
         true
     }
 
@@ -228,20 +228,20 @@ impl Directory {
 
     /// The subsystem of `id`, for changes. It is copied first if a clone of the directory shares
     /// it.
-    fn subsystem_mut(&mut self, id: JausId) -> Option<&mut Subsystem> {
+    fn subsystem_mut(&mut self, id: JausId) -> Option<&mut SubsystemEntry> {
         self.subsystems.get_mut(&id.subsystem()).map(Arc::make_mut)
     }
 
-    fn node_mut(&mut self, id: JausId) -> Option<&mut Node> {
+    fn node_mut(&mut self, id: JausId) -> Option<&mut NodeEntry> {
         self.subsystem_mut(id)?.nodes.get_mut(&id.node())
     }
 
-    fn component_mut(&mut self, id: JausId) -> Option<&mut Component> {
+    fn component_mut(&mut self, id: JausId) -> Option<&mut ComponentEntry> {
         self.node_mut(id)?.components.get_mut(&id.component())
     }
 }
 
-impl Subsystem {
+impl SubsystemEntry {
     /// Kind and name, once reported.
     #[must_use]
     pub fn identification(&self) -> Option<&Identification> {
@@ -249,23 +249,23 @@ impl Subsystem {
     }
 
     /// Its nodes with their numbers, in order.
-    pub fn nodes(&self) -> impl Iterator<Item = (u8, &Node)> {
+    pub fn nodes(&self) -> impl Iterator<Item = (u8, &NodeEntry)> {
         self.nodes.iter().map(|(&id, node)| (id, node))
     }
 
     /// One of its nodes.
     #[must_use]
-    pub fn node(&self, id: u8) -> Option<&Node> {
+    pub fn node(&self, id: u8) -> Option<&NodeEntry> {
         self.nodes.get(&id)
     }
 
     /// All components of all its nodes.
-    pub fn components(&self) -> impl Iterator<Item = &Component> {
-        self.nodes.values().flat_map(Node::components)
+    pub fn components(&self) -> impl Iterator<Item = &ComponentEntry> {
+        self.nodes.values().flat_map(NodeEntry::components)
     }
 }
 
-impl Node {
+impl NodeEntry {
     /// Kind and name, once reported.
     #[must_use]
     pub fn identification(&self) -> Option<&Identification> {
@@ -273,18 +273,18 @@ impl Node {
     }
 
     /// Its components, in order.
-    pub fn components(&self) -> impl Iterator<Item = &Component> {
+    pub fn components(&self) -> impl Iterator<Item = &ComponentEntry> {
         self.components.values()
     }
 
     /// One of its components.
     #[must_use]
-    pub fn component(&self, id: u8) -> Option<&Component> {
+    pub fn component(&self, id: u8) -> Option<&ComponentEntry> {
         self.components.get(&id)
     }
 }
 
-impl Component {
+impl ComponentEntry {
     /// Its services. Empty until it has reported them.
     pub fn offered(&self) -> impl Iterator<Item = &Offer> {
         self.services.iter().flat_map(|services| services.iter())

@@ -109,7 +109,8 @@ pub struct Handlers<P = Functions> {
     /// Passes a published report on; returns the codes of the queries that it answers.
     pub(super) publish: fn(&mut P, &Publication) -> Vec<u16>,
     guard: MotionGuard,
-    told: BTreeSet<u16>,
+    /// Codes of the commands whose end is reported.
+    reported: BTreeSet<u16>,
     timers: Timers,
     last_call: Option<Instant>,
 }
@@ -122,7 +123,7 @@ impl<P> Handlers<P> {
             provider,
             publish: |_, _| Vec::new(),
             guard: MotionGuard::default(),
-            told: BTreeSet::new(),
+            reported: BTreeSet::new(),
             timers: Timers::default(),
             last_call: None,
         }
@@ -140,7 +141,7 @@ impl<P> Handlers<P> {
     /// [`Stack::end_command`](super::Stack::end_command).
     #[must_use]
     pub fn tell_end_of<M: Message>(mut self) -> Self {
-        self.told.insert(M::CODE);
+        self.reported.insert(M::CODE);
         self
     }
 
@@ -270,7 +271,7 @@ where
     }
 
     fn tells_end_of(&self, command: u16) -> bool {
-        self.told.contains(&command)
+        self.reported.contains(&command)
     }
 
     fn poll_timeout(&self) -> Option<Instant> {

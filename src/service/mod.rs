@@ -68,7 +68,9 @@ pub use client::{
 };
 pub use context::Context;
 pub use control::{AccessControl, Condition, Management};
-pub use directory::{Component, Directory, Identification, Kind, Level, Node, Offer, Subsystem};
+pub use directory::{
+    ComponentEntry, Directory, Identification, Kind, Level, NodeEntry, Offer, SubsystemEntry,
+};
 pub use discovery::{Change, Discovery, Loss, NodeDirectory, Profile, Refused, Scope, Timing};
 pub use events::EventSettings;
 pub use functions::Functions;

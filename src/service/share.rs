@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 
-use crate::endpoint::{LinkId, Received, Remote, quota_address};
+use crate::endpoint::{LinkId, Received, Remote, SessionId, quota_address};
 
 /// The origin of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -15,6 +15,8 @@ pub(super) enum Share {
     Address(IpAddr),
     /// A serial line.
     Line(LinkId),
+    /// An authenticated session.
+    Session(LinkId, SessionId),
 }
 
 impl Share {
@@ -25,6 +27,7 @@ impl Share {
         };
         match path.peer {
             Remote::Line => Self::Line(path.link),
+            Remote::Session(session) => Self::Session(path.link, session),
             Remote::Socket(address) => Self::Address(quota_address(address.ip())),
         }
     }

@@ -296,8 +296,8 @@ impl Stack {
     /// Runs a command for a client that requests a command event, unless it must be refused.
     fn carry_out(&mut self, now: Instant, trial: &CommandTrial) {
         let code = trial.code;
-        let told = self.services.iter().any(|it| it.tells_end_of(code));
-        let refusal = if !told {
+        let is_reported = self.services.iter().any(|it| it.tells_end_of(code));
+        let refusal = if !is_reported {
             Some(Refusal::NobodyTells)
         } else if !self.standing.acts_for(trial.client()) {
             Some(Refusal::NotAllowed)

@@ -7,7 +7,8 @@ use jaus::address::JausId;
 use jaus::codec::{Message, ServiceId};
 use jaus::component::{
     Component, Control, ControlError, ControlLost, FindError, Handlers, Kind, ManageError,
-    Management, Outage, Patience, SubscribeError, Subscription, SubscriptionEnd, Update, When,
+    Management, Outage, Patience, SessionError, SessionState, SubscribeError, Subscription,
+    SubscriptionEnd, Update, When,
 };
 use jaus::endpoint::{Outgoing, Received};
 use jaus::messages::core::{
@@ -33,18 +34,18 @@ impl Scene {
     fn new() -> Self {
         let group = own_group();
         let start = |subsystem| Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
-        let (desk, vehicle) = (start(42), start(101));
+        let (station, vehicle) = (start(42), start(101));
         let operator = Component::builder(Kind::OperatorControlUnit, "Operator")
             .patience(Patience {
                 tries: 2,
                 interval: Duration::from_millis(100),
             })
-            .attach(&desk, 1)
+            .attach(&station, 1)
             .unwrap();
         Self {
             operator,
             peer: Puppet(vehicle.attach(33).unwrap()),
-            _nodes: [desk, vehicle],
+            _nodes: [station, vehicle],
         }
     }
 
@@ -124,6 +125,27 @@ fn status(code: u8) -> ReportStatus {
         status: code.into(),
         reserved: 0,
     }
+}
+
+#[tokio::test]
+async fn a_subscription_is_shared_and_ends_with_its_last_reader() {
+    let mut scene = Scene::new();
+    let mut first = scene.subscribed().await;
+    let mut second = first.share().depth(1);
+    scene.peer.fire(7, 0, &status(1));
+    scene.peer.fire(7, 2, &status(2));
+    let next = async |of: &mut Subscription<ReportStatus>| within_limit(of.report()).await;
+    assert_eq!(next(&mut first).await, Some(status(1)));
+    assert_eq!(next(&mut first).await, Some(status(2)));
+    assert_eq!(next(&mut second).await, Some(status(2)), "the latest");
+    assert_eq!((first.missed(), second.missed()), (0, 1));
+    assert_eq!((first.lost(), second.lost()), (1, 1));
+    drop(first);
+    scene.peer.fire(7, 3, &status(3));
+    assert_eq!(next(&mut second).await, Some(status(3)));
+    drop(second);
+    let end: CancelEvent = within_limit(scene.peer.expect()).await;
+    assert_eq!(end.event_id, 7);
 }
 
 #[tokio::test]
@@ -315,6 +337,36 @@ async fn resume_waits_until_the_peer_says_that_it_is_ready() {
 }
 
 #[tokio::test]
+async fn a_session_does_not_resume_a_peer_that_is_lost() {
+    let Scene {
+        operator,
+        mut peer,
+        _nodes,
+    } = Scene::new();
+    let mut session = within_limit(operator.session(peer.id(), 127))
+        .await
+        .unwrap();
+    within_limit(peer.expect::<RequestControl>()).await;
+    peer.say(&ConfirmControl::default());
+    within_limit(peer.expect::<Resume>()).await;
+    peer.say(&RejectControl::default());
+    within_limit(async {
+        loop {
+            let state = session.changed().await.unwrap();
+            if matches!(state, SessionState::Lost { continues, .. } if continues) {
+                break;
+            }
+        }
+    })
+    .await;
+    let refused = within_limit(session.resume()).await.unwrap_err();
+    assert!(
+        matches!(refused, SessionError::State(SessionState::Lost { .. })),
+        "{refused}"
+    );
+}
+
+#[tokio::test]
 async fn the_greater_authority_takes_control_and_an_emergency_stops_everybody() {
     let group = own_group();
     let start = |subsystem| Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
@@ -369,8 +421,8 @@ async fn what_the_node_holds_ends_with_it() {
     let mut scene = Scene::new();
     let mut subscription = scene.subscribed().await;
     let mut control = scene.controlled().await;
-    let [desk, _vehicle] = scene._nodes;
-    within_limit(desk.shutdown()).await;
+    let [station, _vehicle] = scene._nodes;
+    within_limit(station.shutdown()).await;
     while let Some(update) = within_limit(subscription.next()).await {
         assert!(matches!(update, Update::Down { .. }), "{update:?}");
     }

@@ -58,6 +58,26 @@ async fn an_operator_finds_a_rover_and_asks_for_its_speed() {
 }
 
 #[tokio::test]
+async fn a_component_with_a_query_that_is_neither_answered_nor_declined_is_not_attached() {
+    let node = start(101, own_group());
+    let attach = |handlers: Handlers| {
+        Component::builder(Kind::Vehicle, "Rover")
+            .offer(handlers)
+            .attach(&node, 33)
+    };
+    let speedometer =
+        || Handlers::new(velocity_state_sensor::LATEST).publishes::<QueryVelocityState>();
+    let refused = attach(speedometer()).unwrap_err();
+    assert!(matches!(refused, AttachError::Unsafe(_)), "{refused}");
+    let text = refused.to_string();
+    assert!(
+        text.contains(".declines::<QueryVelocityStateExt>()"),
+        "{text}"
+    );
+    attach(speedometer().declines::<QueryVelocityStateExt>()).unwrap();
+}
+
+#[tokio::test]
 async fn queries_at_the_same_time_all_get_their_answers() {
     let (rover, operator) = rover_and_operator();
     let beat = || operator.query(rover.id(), &QueryHeartbeatPulse {});
@@ -197,9 +217,9 @@ async fn a_service_can_be_offered_and_withdrawn_while_the_component_runs() {
 #[tokio::test]
 async fn a_heartbeat_goes_out_without_being_asked_for() {
     let group = own_group();
-    let desk = start(42, group);
+    let station = start(42, group);
     let operator = Component::builder(Kind::OperatorControlUnit, "Operator")
-        .attach(&desk, 1)
+        .attach(&station, 1)
         .unwrap();
     let mut messages = operator.messages();
     let _rover = Component::builder(Kind::Vehicle, "Rover")

@@ -7,8 +7,8 @@ use std::time::{Duration, SystemTime};
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received, first_sequence_at};
-use jaus::node::{Config, Node, Peer, Port, StartError};
-use jaus::peer::Peer as Known;
+use jaus::node::{Config, Node, PeerAddress, Port, StartError};
+use jaus::peer::Implementation as Known;
 use jaus::wire::jtcp::{self, Decoder};
 use jaus::wire::{Acknowledgement, Frame, Version};
 use jaus_test_kit::waiting::{until, within_limit};
@@ -26,7 +26,7 @@ fn listening(subsystem: u16) -> Config {
 
 /// A node without UDP that connects to another; `id` is the peer's configured id.
 fn connecting(subsystem: u16, to: SocketAddr, id: &str) -> Config {
-    let peer: Peer = format!("{id}{to}").parse().unwrap();
+    let peer: PeerAddress = format!("{id}{to}").parse().unwrap();
     Config::new(subsystem, 1).without_udp().tcp_connect(peer)
 }
 

@@ -192,7 +192,7 @@ async fn the_longest_datagram_arrives_whole() {
 }
 
 /// A GSO batch: several datagrams in one transmit, as the endpoint emits them.
-fn train(link: &UdpLink, octets: Bytes, segment: usize) -> Transmit {
+fn batch(link: &UdpLink, octets: Bytes, segment: usize) -> Transmit {
     Transmit {
         link: LinkId(0),
         to: To::Peer(link.local().into()),
@@ -203,7 +203,7 @@ fn train(link: &UdpLink, octets: Bytes, segment: usize) -> Transmit {
 }
 
 #[tokio::test]
-async fn a_train_arrives_as_the_datagrams_that_it_is_made_of() {
+async fn a_batch_arrives_as_its_datagrams() {
     // Fits into a default receive buffer.
     let octets: Bytes = (0..90_500_u32).map(|i| (i * 7 % 251) as u8).collect();
     for (sends, receives) in [(true, true), (true, false), (false, true), (false, false)] {
@@ -213,10 +213,10 @@ async fn a_train_arrives_as_the_datagrams_that_it_is_made_of() {
         };
         let mut a = UdpLink::open(&loopback(), &with(sends)).unwrap();
         let mut b = UdpLink::open(&loopback(), &with(receives)).unwrap();
-        a.transmit(&train(&b, octets.clone(), 1000));
+        a.transmit(&batch(&b, octets.clone(), 1000));
         // Shorter than a datagram of the batch, and exactly as long.
-        a.transmit(&train(&b, octets.slice(..999), 1000));
-        a.transmit(&train(&b, octets.slice(..1000), 1000));
+        a.transmit(&batch(&b, octets.slice(..999), 1000));
+        a.transmit(&batch(&b, octets.slice(..1000), 1000));
         a.flush();
         for datagram in octets.chunks(1000).chain([&octets[..999], &octets[..1000]]) {
             let (from, received) = receive(&mut b).await;
@@ -229,14 +229,14 @@ async fn a_train_arrives_as_the_datagrams_that_it_is_made_of() {
 }
 
 #[tokio::test]
-async fn a_train_to_everyone_reaches_everyone_whole() {
+async fn a_batch_to_the_group_reaches_every_member_complete() {
     let settings = settings();
     let mut a = UdpLink::open(&loopback(), &settings).unwrap();
     let mut b = UdpLink::open(&loopback(), &settings).unwrap();
     let octets = Bytes::from(vec![7; 10_100]);
     let to_all = Transmit {
         to: To::Group,
-        ..train(&b, octets, 1000)
+        ..batch(&b, octets, 1000)
     };
     a.transmit(&to_all);
     a.flush();

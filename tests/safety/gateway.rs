@@ -12,7 +12,7 @@ use jaus::address::JausId;
 use jaus_ra::carrier::To;
 use jaus_ra::convert::to_ra;
 use jaus_ra::gateway::{Action, Gateway, Settings};
-use jaus_ra::node::{self, RaNode, Subsystem};
+use jaus_ra::node::{self, RaNode, RaSubsystemEntry};
 use jaus_ra::{Message, RaId};
 
 use crate::sim::{Event as EndpointEvent, OwnedEndpoint};
@@ -236,17 +236,17 @@ fn address(host: u8) -> SocketAddr {
     SocketAddr::from(([10, 77, 0, host], 3794))
 }
 
-fn subsystem() -> Subsystem {
-    let commander = node::Component {
+fn subsystem() -> RaSubsystemEntry {
+    let commander = node::RaComponentEntry {
         component: OPERATOR.component,
         instance: OPERATOR.instance,
         name: "Commander".to_owned(),
         services: Vec::new(),
     };
-    Subsystem {
+    RaSubsystemEntry {
         id: OPERATOR.subsystem,
         name: "Operator".to_owned(),
-        nodes: vec![node::Node {
+        nodes: vec![node::RaNodeEntry {
             id: OPERATOR.node,
             name: "Operator".to_owned(),
             components: vec![commander],

@@ -4,7 +4,7 @@
 use std::time::{Duration, Instant};
 
 use jaus_vehicle::motion::{Frame, Motion, Pose, Velocity, WheelCount};
-use jaus_vehicle::navigation::{Navigator, NavigatorConfig, Quality, SimulatedReceiver};
+use jaus_vehicle::navigation::{Course, Navigator, NavigatorConfig, Quality, SimulatedReceiver};
 
 use crate::cell::Fault;
 
@@ -26,6 +26,8 @@ pub(crate) struct Positioning {
     sentences: String,
     /// Distance of the wheels: forward in metres, and turned in radians.
     travel: (f64, f64),
+    /// The last velocity.
+    velocity: Velocity,
     /// The fault of the receiver.
     pub(crate) fault: Option<Fault>,
 }
@@ -51,6 +53,7 @@ impl Positioning {
             written_at: now,
             sentences: String::new(),
             travel: (0.0, 0.0),
+            velocity: Velocity::default(),
             fault: None,
         }
     }
@@ -59,6 +62,7 @@ impl Positioning {
     pub(crate) fn travel(&mut self, velocity: Velocity, seconds: f64) {
         self.travel.0 += velocity.x * seconds;
         self.travel.1 += velocity.yaw * seconds;
+        self.velocity = velocity;
     }
 
     /// Reads wheels and receiver.
@@ -98,6 +102,18 @@ impl Positioning {
         }
     }
 
+    fn course(&self, truth: &Pose) -> Course {
+        let ahead = if self.velocity.x < 0.0 {
+            std::f64::consts::PI
+        } else {
+            0.0
+        };
+        Course {
+            speed: self.velocity.x.abs(),
+            direction: truth.yaw + ahead,
+        }
+    }
+
     /// What the receiver writes.
     fn octets(&mut self, now: Instant, truth: &Pose) -> Vec<u8> {
         let jump = match self.fault {
@@ -109,7 +125,8 @@ impl Positioning {
             _ => (Quality::RtkFixed, 0.8),
         };
         let seen = FRAME.to_global(&Pose::at(truth.x, truth.y + jump));
-        let sentences = self.receiver.fix(now, &seen, None);
+        let course = self.course(truth);
+        let sentences = self.receiver.fix(now, &seen, Some(course));
         match self.fault {
             Some(Fault::ReceiverSilent) => Vec::new(),
             Some(Fault::ReceiverFrozen) => self.sentences.clone().into_bytes(),
@@ -130,4 +147,45 @@ fn garbled(sentence: String) -> Vec<u8> {
     let mut noise = sentence.into_bytes();
     noise[10] = 0xFF;
     [cut, digit, noise].concat()
+}
+
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_receiver_that_freezes_does_not_turn_the_heading_of_a_vehicle_that_turns() {
+        /// One step in seconds.
+        const STEP: f64 = 0.02;
+        let mut now = Instant::now();
+        let mut positioning = Positioning::new(now);
+        let mut truth = Pose::default();
+        let mut drive = |positioning: &mut Positioning, rate: f64, seconds: f64| {
+            for _ in 0..(seconds / STEP) as u32 {
+                now += Duration::from_secs_f64(STEP);
+                let velocity = Velocity::forward(1.0, rate);
+                truth.yaw += rate * STEP;
+                truth.x += STEP * truth.yaw.cos();
+                truth.y += STEP * truth.yaw.sin();
+                positioning.travel(velocity, STEP);
+                positioning.handle_time(now, &truth);
+            }
+            let motion = Motion {
+                pose: truth,
+                ..Motion::default()
+            };
+            positioning.measure(now, motion).pose.yaw - truth.yaw
+        };
+        drive(&mut positioning, 0.0, 10.0);
+        positioning.fault = Some(Fault::ReceiverFrozen);
+        let missed = drive(
+            &mut positioning,
+            0.3,
+            Positioning::OUTAGE.as_secs_f64() - 0.2,
+        );
+        assert!(missed.abs() < 0.1, "{missed}");
+    }
 }

@@ -11,14 +11,15 @@ use jaus::component::Kind;
 /// Identity of a node, as far as it is configured.
 #[derive(Debug, Default, Deserialize)]
 pub struct Identity {
+    /// The id of our component.
     pub(super) id: Option<OwnId>,
-    /// Name of the subsystem.
+    /// The name of our subsystem.
     pub name: Option<String>,
-    /// Kind of the subsystem.
+    /// The kind of our subsystem.
     pub kind: Option<SubsystemKind>,
 }
 
-/// Our own id: a single component, without wildcards.
+/// A single component without wildcards: `101.1.33`, or `101.1`, which means component 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
 pub(super) struct OwnId(pub(super) JausId);

@@ -5,6 +5,7 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
+use clap::builder::Resettable;
 use clap::{ArgMatches, Args, Command, CommandFactory, FromArgMatches, Parser};
 
 use super::failure::{Failure, Outcome};
@@ -12,7 +13,7 @@ use super::logging::Logging;
 use super::network::Network;
 use super::runtime::RunFor;
 use super::systemd::Systemd;
-use super::{output, runtime, settings};
+use super::{output, reference, runtime, settings};
 use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::node::{Config, Node};
@@ -52,7 +53,7 @@ struct Program<F: Args> {
     flags: F,
 
     /// The subsystem's name, the same for all its components
-    #[arg(long)]
+    #[arg(long, help_heading = Resettable::Reset)]
     name: Option<String>,
 
     #[command(flatten)]
@@ -76,12 +77,24 @@ const USUAL: &str = "warn,jaus_vehicle=info,jaus_ocu=info,jaus_ra=info,jaus_cli=
 /// start.
 #[must_use]
 pub fn launch<F: Ready>() -> ExitCode {
+    if std::env::args_os().skip(1).eq([reference::ARGUMENT]) {
+        return end::<F>(print_reference::<F>());
+    }
     let program = match read::<F>() {
         Ok(program) => program,
         Err(failure) => return end::<F>(Err(failure)),
     };
     let outcome = program.logging.start(USUAL);
     end::<F>(outcome.and_then(|()| program.run()))
+}
+
+/// Prints the program's part of the book.
+fn print_reference<F: Ready>() -> Result<Outcome, Failure> {
+    #[derive(Args)]
+    struct NoFlags;
+    let others = with_file_help(Program::<NoFlags>::command());
+    reference::print(command::<F>(), others)?;
+    Ok(Outcome::Done)
 }
 
 fn end<F: Ready>(outcome: Result<Outcome, Failure>) -> ExitCode {
@@ -174,18 +187,21 @@ fn read<F: Ready>() -> Result<Program<F>, Failure> {
 }
 
 fn command<F: Ready>() -> Command {
-    Program::<F>::command()
+    with_file_help(Program::<F>::command())
         .name(F::PROGRAM)
         .about(F::ABOUT)
         .long_about(None)
         .after_help(F::EXAMPLES)
         .args_override_self(true)
         .mut_arg("id", |id| id.help(id_help(F::ID)))
-        .mut_arg("config", |config| {
-            config
-                .help(FILE_HELP)
-                .long_help(format!("{FILE_HELP}\n\n{FILE_EXAMPLE}"))
-        })
+}
+
+fn with_file_help(command: Command) -> Command {
+    command.mut_arg("config", |config| {
+        config
+            .help(FILE_HELP)
+            .long_help(format!("{FILE_HELP}\n\n{FILE_EXAMPLE}"))
+    })
 }
 
 fn id_help(usual: JausId) -> String {

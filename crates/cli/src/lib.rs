@@ -11,12 +11,14 @@
 pub mod failure;
 mod fence;
 mod identity;
-pub mod junit;
 mod launch;
 pub mod logging;
 pub mod network;
 pub mod output;
+pub mod reference;
 pub mod runtime;
+#[cfg(feature = "secure")]
+pub mod secure;
 pub mod settings;
 pub mod statistics;
 mod systemd;

@@ -12,11 +12,13 @@ use jaus::link::junior::DEFAULT_FOLDER;
 use jaus::link::local::record::Reason;
 use jaus::link::udp::PortTaken;
 use jaus::link::{Group, Interfaces};
-use jaus::node::{Address, Config, Host, HostError, Node, Peer, Port, Sender};
+use jaus::node::{Address, Config, Host, HostError, Node, PeerAddress, Port, Sender};
 
 use super::failure::Failure;
 use super::identity::OwnId;
 pub use super::identity::{Identity, SubsystemKind};
+#[cfg(feature = "secure")]
+use super::secure::SecureFlags;
 use super::settings;
 
 #[derive(Args, Debug)]
@@ -56,7 +58,7 @@ pub struct Network {
     ///
     /// ADDRESS, ADDRESS:PORT or ID@ADDRESS:PORT, for example 192.168.7.2 or 102.255.255@192.168.7.2
     #[arg(long, value_name = "PEER")]
-    peer: Vec<Peer>,
+    peer: Vec<PeerAddress>,
 
     /// Attach to this host's node (`jaus node --local`) instead of running our own; ADDRESS is its
     /// local link's [default: the usual place]
@@ -97,6 +99,10 @@ pub struct Network {
     ///   peers = ["192.168.7.2", "102.255.255@192.168.7.3:3795"]
     #[arg(long, value_name = "FILE", verbatim_doc_comment)]
     config: Option<PathBuf>,
+
+    #[cfg(feature = "secure")]
+    #[command(flatten)]
+    secure: SecureFlags,
 }
 
 impl Network {
@@ -189,7 +195,7 @@ impl Network {
             for_node(&mut config);
             config.validate().map_err(Failure::of)?;
             let config = config.or_any_free_port();
-            let node = Node::start(config).map_err(Failure::of)?;
+            let node = self.start(config)?;
             let port = node.attach(id.component()).map_err(Failure::of)?;
             return Ok(Place {
                 port,
@@ -213,7 +219,7 @@ impl Network {
     pub async fn join_for_a_moment(&self) -> Result<(Port, Stay), Failure> {
         let Some(address) = &self.attach else {
             let (id, config) = self.for_a_moment()?;
-            let node = Node::start(config).map_err(Failure::of)?;
+            let node = self.start(config)?;
             let port = node.attach(id.component()).map_err(Failure::of)?;
             return Ok((port, Stay::OnOurs(node)));
         };
@@ -244,6 +250,20 @@ impl Network {
             .live_on(port)
             .map_err(Failure::of)?;
         Ok((component, sender, stay))
+    }
+
+    /// Starts a node with these settings, and with a secure link if flags or the settings file
+    /// name one.
+    ///
+    /// # Errors
+    /// A key or trust file that cannot be used, or a node that cannot be started.
+    pub fn start(&self, config: Config) -> Result<Node, Failure> {
+        #[cfg(feature = "secure")]
+        if let Some(secure) = self.secure.settings(self.file())? {
+            let (config, link) = secure.open(config)?;
+            return Node::start_with(config, vec![Box::new(link)]).map_err(Failure::of);
+        }
+        Node::start(config).map_err(Failure::of)
     }
 
     /// The settings of the file, or the defaults.
@@ -282,7 +302,8 @@ impl Network {
 
 /// What a user can do when a component does not answer.
 pub const REMEDY: &str = "List components with `jaus discover`, choose the network with \
-    --interface, or name a host that multicast does not reach with --peer";
+    --interface, or name a host that multicast does not reach with --peer; `jaus doctor` finds out \
+    what is wrong";
 
 /// Parses the id of a single component.
 pub fn one_component(text: &str) -> Result<JausId, String> {

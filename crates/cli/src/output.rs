@@ -1,9 +1,12 @@
 //! Standard output by lines, and messages on standard error.
 
+use std::borrow::Cow;
 use std::fmt::{self, Display};
 use std::io::{self, IsTerminal, StdoutLock, Write};
 
 use super::failure::Failure;
+
+pub use jaus_view::{disturbs_terminal, quoted};
 
 /// For example `no errors`, `1 error`, `2 errors`.
 pub fn counted(count: usize, what: &str) -> String {
@@ -14,11 +17,26 @@ pub fn counted(count: usize, what: &str) -> String {
     }
 }
 
+/// A size with a fitting unit, for example `812 B`, `1.5 kB` or `20.0 MB`.
+pub fn size(octets: u64) -> String {
+    let mut size = octets as f64;
+    if size < 1000.0 {
+        return format!("{octets} B");
+    }
+    let mut units = ["kB", "MB", "GB", "TB"].into_iter().peekable();
+    loop {
+        size /= 1000.0;
+        let unit = units.next().unwrap_or("TB");
+        // Rounding must not make 1000.0 of it.
+        if size < 999.95 || units.peek().is_none() {
+            return format!("{size:.1} {unit}");
+        }
+    }
+}
+
 /// Standard output. Every line is flushed when [`line`](Self::line) returns.
 pub struct Output {
     out: StdoutLock<'static>,
-    /// Whether [`line`](Self::line) replaces control characters.
-    is_terminal: bool,
 }
 
 impl Default for Output {
@@ -32,7 +50,6 @@ impl Output {
     pub fn new() -> Self {
         Self {
             out: io::stdout().lock(),
-            is_terminal: io::stdout().is_terminal(),
         }
     }
 
@@ -41,12 +58,11 @@ impl Output {
         self.write(format_args!("{text}"))
     }
 
-    /// Prints a line. On a terminal, control characters from the network have no effect.
+    /// Prints a line, or several. Control characters other than line ends, tabs and colours are
+    /// escaped as in JSON, on a terminal and elsewhere. Text from the network goes through
+    /// [`quoted`], so that it adds no lines.
     pub fn line(&mut self, text: impl Display) -> Result<(), Failure> {
-        if self.is_terminal {
-            return self.write(format_args!("{}\n", harmless(&text.to_string())));
-        }
-        self.write(format_args!("{text}\n"))
+        self.write(format_args!("{}\n", harmless(&text.to_string())))
     }
 
     fn write(&mut self, text: fmt::Arguments<'_>) -> Result<(), Failure> {
@@ -90,25 +106,31 @@ pub fn say(words: impl Display) {
 
 /// The same, for a program other than `jaus`.
 pub fn say_as(program: &str, words: impl Display) {
-    let words = harmless(&words.to_string());
+    let words = words.to_string();
+    let words = harmless(&words);
     let _ = writeln!(io::stderr().lock(), "{program}: {words}");
 }
 
-/// Replaces control characters by `·`, except for line ends, tabs and colours.
-fn harmless(text: &str) -> String {
+/// Escapes characters that disturb a terminal as in JSON, so that JSON stays the same value; except
+/// for line ends, tabs and colours.
+pub(crate) fn harmless(text: &str) -> Cow<'_, str> {
+    let is_disturbing = |c| disturbs_terminal(c) && !matches!(c, '\n' | '\t');
+    if !text.contains(is_disturbing) {
+        return text.into();
+    }
     let mut shown = String::with_capacity(text.len());
     let mut rest = text;
     while let Some(first) = rest.chars().next() {
         let colour = colour_at(rest);
-        let is_harmless = matches!(first, '\n' | '\t') || !disturbs_terminal(first);
         match colour {
             Some(sequence) => shown.push_str(sequence),
-            None if is_harmless => shown.push(first),
-            None => shown.push('·'),
+            // All of them have four digits.
+            None if is_disturbing(first) => shown += &format!("\\u{:04x}", u32::from(first)),
+            None => shown.push(first),
         }
         rest = &rest[colour.map_or(first.len_utf8(), str::len)..];
     }
-    shown
+    shown.into()
 }
 
 /// The sequence for a colour at the beginning of a text, such as `ESC [ 3 1 m`.
@@ -117,12 +139,6 @@ fn colour_at(text: &str) -> Option<&str> {
     let end = parameters.find(|c: char| !c.is_ascii_digit() && c != ';')?;
     let is_colour = parameters[end..].starts_with('m');
     is_colour.then(|| &text[..text.len() - parameters.len() + end + 1])
-}
-
-/// Whether a character could do more on a terminal than show itself: move the cursor, or change the
-/// direction of the text after it, so that a name reads as another one.
-pub fn disturbs_terminal(c: char) -> bool {
-    c.is_control() || matches!(c, '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
 }
 
 /// Whether to use colours: on a terminal, unless NO_COLOR (<https://no-color.org>) is set.
@@ -135,20 +151,49 @@ mod tests {
     use super::*;
 
     #[test]
+    fn sizes_have_a_fitting_unit() {
+        for (octets, text) in [
+            (0, "0 B"),
+            (999, "999 B"),
+            (1_000, "1.0 kB"),
+            (999_949, "999.9 kB"),
+            (999_960, "1.0 MB"),
+            (20_000_000, "20.0 MB"),
+            (u64::MAX, "18446744.1 TB"),
+        ] {
+            assert_eq!(size(octets), text);
+        }
+    }
+
+    #[test]
     fn only_colours_reach_the_terminal_as_control_sequences() {
         for (text, shown) in [
             (
                 "\x1b[31mred\x1b[0m\tand\nnext",
                 "\x1b[31mred\x1b[0m\tand\nnext",
             ),
-            ("\x1b]0;title\x07", "·]0;title·"),
-            ("\x1b[2Jclear\r", "·[2Jclear·"),
-            ("\u{9b}31m \u{7f} \u{202e}gpj.exe", "·31m · ·gpj.exe"),
-            ("\x1b", "·"),
-            ("\x1b[1", "·[1"),
+            ("\x1b]0;title\x07", r"\u001b]0;title\u0007"),
+            ("\x1b[2Jclear\r", r"\u001b[2Jclear\u000d"),
+            (
+                "\u{9b}31m \u{7f} \u{202e}gpj.exe",
+                r"\u009b31m \u007f \u202egpj.exe",
+            ),
+            ("\x1b", r"\u001b"),
+            ("\x1b[1", r"\u001b[1"),
             ("Müller · 5 µs", "Müller · 5 µs"),
         ] {
             assert_eq!(harmless(text), shown, "{text:?}");
         }
+    }
+
+    #[test]
+    fn json_with_a_disturbing_name_stays_the_same_value() {
+        let json = serde_json::json!({ "name": "\u{202e}gpj\u{9b}2J\u{7f}\r\n" });
+        let printed = harmless(&json.to_string()).into_owned();
+        assert!(!printed.contains(disturbs_terminal), "{printed}");
+        assert_eq!(
+            serde_json::from_str::<serde_json::Value>(&printed).unwrap(),
+            json
+        );
     }
 }

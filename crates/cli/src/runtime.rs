@@ -9,6 +9,7 @@ use std::future::Future;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use clap::builder::Resettable;
 use jaus::node::units;
 use tokio::runtime::Builder;
 
@@ -46,7 +47,12 @@ pub async fn end(limit: Option<Duration>) {
 )]
 pub struct RunFor {
     /// End after this time, such as 10s [default: at Ctrl-C]
-    #[arg(long = "for", value_name = "DURATION", value_parser = duration)]
+    #[arg(
+        long = "for",
+        value_name = "DURATION",
+        value_parser = duration,
+        help_heading = Resettable::Reset
+    )]
     duration: Option<Duration>,
 }
 
@@ -100,6 +106,15 @@ pub fn duration_within(text: &str, least: &str, most: &str) -> Result<Duration, 
     match (bound(least)?..=bound(most)?).contains(&duration) {
         true => Ok(duration),
         false => Err(format!("write a duration from {least} to {most}")),
+    }
+}
+
+/// Parses a flag's size, such as `1500`, `64 KiB` or `1.5MB`, within bounds in octets.
+pub fn size_within(text: &str, least: usize, most: usize) -> Result<usize, String> {
+    let size = units::size(text).map_err(|error| error.to_string())?;
+    match (least..=most).contains(&size) {
+        true => Ok(size),
+        false => Err(format!("write a size from {least} to {most} octets")),
     }
 }
 

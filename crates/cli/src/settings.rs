@@ -18,11 +18,32 @@ const OWN: [&str; 3] = ["id", "name", "kind"];
 
 /// The table with the flags of a single-component program.
 const COMPONENT: &str = "component";
+/// The table with the settings of the secure link.
+const SECURE: &str = "secure";
 
 /// Reads a settings file: identity and settings of the node.
 pub fn read(path: &Path) -> Result<(Identity, Config), Failure> {
     let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
     parse(&text).map_err(|mistake| Failure::new(format!("{}:{mistake}", path.display())))
+}
+
+/// The table `[secure]` of a settings file, or the default without one.
+///
+/// # Errors
+/// An unreadable file, or an invalid table.
+#[cfg(feature = "secure")]
+pub fn secure<T: serde::de::DeserializeOwned + Default>(path: &Path) -> Result<T, Failure> {
+    let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
+    let read = || {
+        let mut table = DeTable::parse(&text)?;
+        let secure = table.get_mut().remove(SECURE);
+        let read = secure.map(|secure| T::deserialize(toml::de::ValueDeserializer::from(secure)));
+        read.unwrap_or_else(|| Ok(T::default()))
+    };
+    read().map_err(|error: Error| {
+        let mistake = Mistake::of(&error, &text);
+        Failure::new(format!("{}:{mistake}", path.display()))
+    })
 }
 
 /// The flags in the table `[component]` of a settings file, as command line arguments: a key is a
@@ -89,13 +110,15 @@ fn parse(text: &str) -> Result<(Identity, Config), Mistake> {
     let wrong = |error: Error| Mistake::of(&error, text);
     let table = DeTable::parse(text).map_err(wrong)?;
     let known = serde_json::to_value(Config::default()).unwrap_or_default();
-    let besides = [&OWN[..], &[COMPONENT]].concat();
+    let besides = [&OWN[..], &[COMPONENT, SECURE]].concat();
     if let Some(unknown) = unknown_key(table.get_ref(), &known, &besides, "") {
         return Err(unknown.in_text(text));
     }
     let place = table.span();
     let mut table = table;
-    table.get_mut().remove(COMPONENT);
+    for other in [COMPONENT, SECURE] {
+        table.get_mut().remove(other);
+    }
     let is_own = |(key, _): &(Spanned<DeString<'_>>, _)| OWN.contains(&key.get_ref().as_ref());
     let (own, node): (Vec<_>, Vec<_>) = table.into_inner().into_iter().partition(is_own);
     let part = |entries: Vec<_>| {
@@ -111,7 +134,7 @@ fn parse(text: &str) -> Result<(Identity, Config), Mistake> {
 #[derive(Debug)]
 pub struct Mistake {
     line: usize,
-    /// The line in the file: key and value.
+    /// The line in the file, key and value, or the part of it around the mistake.
     written: String,
     problem: String,
 }
@@ -121,10 +144,13 @@ impl Mistake {
     pub fn at(place: Option<Range<usize>>, text: &str, problem: String) -> Self {
         let before = place.map_or("", |place| text.get(..place.start).unwrap_or(text));
         let line = before.matches('\n').count();
+        let column = before.len() - before.rfind('\n').map_or(0, |end| end + 1);
+        let written = text.lines().nth(line).unwrap_or_default();
+        let indent = written.len() - written.trim_start().len();
         Self {
             line: line + 1,
-            written: text.lines().nth(line).unwrap_or_default().trim().to_owned(),
-            problem,
+            written: around(written.trim(), column.saturating_sub(indent)),
+            problem: without_middle(problem),
         }
     }
 
@@ -143,6 +169,37 @@ impl Display for Mistake {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: `{}`: {}", self.line, self.written, self.problem)
     }
+}
+
+/// Maximum number of characters of a line in a message.
+const SHOWN: usize = 80;
+/// Those of them that stand before the mistake.
+const BEFORE: usize = 30;
+/// Maximum number of characters of a problem, which may quote a key or a value.
+const PROBLEM: usize = 1000;
+
+/// The part of a line around an octet of it.
+fn around(line: &str, place: usize) -> String {
+    let length = line.chars().count();
+    if length <= SHOWN {
+        return line.to_owned();
+    }
+    let before = line.get(..place).unwrap_or(line).chars().count();
+    let first = before.saturating_sub(BEFORE).min(length - SHOWN);
+    let part: String = line.chars().skip(first).take(SHOWN).collect();
+    let mark = |is_cut| if is_cut { "…" } else { "" };
+    format!("{}{part}{}", mark(first > 0), mark(first + SHOWN < length))
+}
+
+/// The beginning and the end of a long problem: the remedy is at the end.
+fn without_middle(problem: String) -> String {
+    let length = problem.chars().count();
+    if length <= PROBLEM {
+        return problem;
+    }
+    let part = |skipped| problem.chars().skip(skipped).take(PROBLEM / 2);
+    let (begin, end) = (part(0), part(length - PROBLEM / 2));
+    begin.chain(['…']).chain(end).collect()
 }
 
 /// The remedy, for types that serde names in programmers' terms.
@@ -309,5 +366,31 @@ mod tests {
                 assert!(said.contains(part), "{text}: {said}");
             }
         }
+    }
+
+    #[test]
+    fn a_long_line_is_cut_around_the_mistake() {
+        let long = "x".repeat(400_000);
+        for text in [
+            format!("ttl = 1\nname = \"{long}\" ttl = 2"),
+            format!("ttl = \"{long}\""),
+            format!("{long} = 3"),
+            format!("group = \"{long}\""),
+        ] {
+            let said = mistake(&text);
+            assert!(said.chars().count() < 1200, "{} octets", said.len());
+        }
+        let spaces = " ".repeat(400_000);
+        let said = mistake(&format!(
+            "mailbox = {{ messages = 1, {spaces}mesages = 4 }}"
+        ));
+        assert!(said.contains("  mesages = 4 }`: "), "{said}");
+        assert_eq!(
+            mistake(&format!("   ttl = 300 # {long}"))
+                .split(": ")
+                .nth(1)
+                .unwrap(),
+            format!("`ttl = 300 # {}…`", "x".repeat(68))
+        );
     }
 }

@@ -50,7 +50,7 @@ macro_rules! __codec_enumeration {
         $crate::if_serde! {
             impl $crate::view::View for $name {
                 fn view(&self) -> $crate::view::Value {
-                    $crate::view::View::view(&self.0)
+                    $crate::view::enumerated::<Self>($crate::view::View::view(&self.0))
                 }
 
                 fn from_view(

@@ -31,6 +31,17 @@ impl fmt::Display for ServiceId {
 ///
 /// The encoded form begins with the two octets of the message code. It contains no transport
 /// headers.
+///
+/// ```
+/// use jaus_codec::{Bytes, DecodeError, Message};
+///
+/// /// Decodes a message of any type, and says which it is.
+/// fn name<M: Message>(octets: &Bytes) -> Result<&'static str, DecodeError> {
+///     let message = M::decode(octets)?;
+///     assert_eq!(message.encode().as_ref(), Ok(octets));
+///     Ok(M::NAME)
+/// }
+/// ```
 pub trait Message: Sized + View + Clone + Debug + PartialEq + Send + Sync + 'static {
     /// The message code, for example `0x4B00`.
     const CODE: u16;

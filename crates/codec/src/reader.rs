@@ -9,6 +9,17 @@ use super::text::Text;
 
 /// A cursor over a received message. It keeps a slice for reading fields, and the shared octets so
 /// that strings and blobs need no copy.
+///
+/// ```
+/// use jaus_codec::{Bytes, Reader};
+///
+/// let octets = Bytes::from_static(&[0x00, 0x2B, 0x02]);
+/// let mut reader = Reader::new(&octets);
+/// reader.code(0x2B00)?;
+/// assert_eq!(reader.fixed::<u8>()?, 2);
+/// assert_eq!(reader.remaining(), 0);
+/// # Ok::<(), jaus_codec::DecodeError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Reader<'a> {
     shared: &'a Bytes,

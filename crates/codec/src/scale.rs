@@ -9,6 +9,15 @@ use super::exact::Expansion;
 /// value.
 ///
 /// `value = raw * (upper - lower) / (2^n - 1) + lower`, both limits inclusive.
+///
+/// ```
+/// use jaus_codec::{Rounding, Scale};
+///
+/// let metres = Scale::new(-10_000.0, 35_000.0, u64::from(u16::MAX), Rounding::Round);
+/// let raw = metres.raw(100.0).unwrap();
+/// assert!((metres.value(raw) - 100.0).abs() <= metres.step() / 2.0);
+/// assert_eq!(metres.raw(40_000.0), None);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
     lower: f64,

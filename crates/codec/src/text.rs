@@ -10,6 +10,14 @@ use bytes::Bytes;
 /// JSIDL specifies no character set, so the octets are kept unchanged. [`as_str`](Self::as_str) and
 /// [`to_string_lossy`](Self::to_string_lossy) interpret them as UTF-8. A received text shares the
 /// memory of its message.
+///
+/// ```
+/// use jaus_codec::Text;
+///
+/// let name = Text::from("Rover");
+/// assert_eq!(name.as_str(), Some("Rover"));
+/// assert_eq!(name, "Rover");
+/// ```
 #[derive(Clone, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Text(Bytes);
 
@@ -17,6 +25,15 @@ impl Text {
     /// Creates a text from a static string without copying.
     pub const fn from_static(text: &'static str) -> Self {
         Self(Bytes::from_static(text.as_bytes()))
+    }
+
+    /// The longest prefix of `text` of at most `octets` octets, to fit a field with that limit.
+    pub fn prefix(text: &str, octets: usize) -> &str {
+        let mut end = octets.min(text.len());
+        while !text.is_char_boundary(end) {
+            end -= 1;
+        }
+        &text[..end]
     }
 
     /// The octets.
@@ -121,6 +138,20 @@ mod tests {
                 (octets.len(), octets.is_empty())
             );
             assert_eq!(Bytes::from(text), octets);
+        }
+    }
+
+    #[test]
+    fn a_prefix_has_whole_characters_only() {
+        for (octets, prefix) in [
+            (0, ""),
+            (1, "q"),
+            (2, "q"),
+            (3, "qü"),
+            (4, "qüi"),
+            (9, "qüi"),
+        ] {
+            assert_eq!(Text::prefix("qüi", octets), prefix, "{octets}");
         }
     }
 

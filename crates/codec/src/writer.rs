@@ -6,6 +6,16 @@ use super::fixed::{Count, Fixed};
 use super::text::Text;
 
 /// Appends a message to a buffer. The buffer keeps its capacity between messages.
+///
+/// ```
+/// use jaus_codec::Writer;
+///
+/// let mut buffer = Vec::new();
+/// let mut writer = Writer::new(&mut buffer);
+/// writer.fixed(0x2B00_u16);
+/// writer.fixed(2_u8);
+/// assert_eq!(buffer, [0x00, 0x2B, 0x02]);
+/// ```
 #[derive(Debug)]
 pub struct Writer<'a> {
     buffer: &'a mut Vec<u8>,

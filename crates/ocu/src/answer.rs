@@ -15,6 +15,8 @@ pub(super) enum Said<'a> {
         token_needed: bool,
         operator: String,
         authority: u8,
+        /// Whether the station has a map file.
+        base_map: bool,
     },
     State(&'a State),
     Fleet(&'a Fleet),

@@ -7,6 +7,8 @@
 #![forbid(unsafe_code)]
 
 mod answer;
+mod base_map;
+mod georeference;
 mod missing;
 pub(crate) mod page;
 mod picture;
@@ -30,5 +32,6 @@ pub mod stick;
 mod token;
 mod tree;
 
+pub use base_map::{BaseMap, BaseMapError};
 pub use station::{Listen, OpenStation, Station};
 pub use token::{Token, TokenError};

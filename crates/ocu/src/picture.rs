@@ -8,13 +8,14 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 pub(super) use self::part::{Depth, Part};
+use super::georeference::Georeference;
 use super::missing::{Absence, GonePart, GoneParts};
 use super::report::{Mission, MissionStage, Report};
 use super::role::Role;
 use super::sample_clock::{SampleClock, Stamp};
 use super::state;
 use jaus::address::JausId;
-use jaus::service::{Component, Directory, State};
+use jaus::service::{ComponentEntry, Directory, State};
 use jaus_vehicle::messages::handoff::enhanced_access_control;
 
 /// The known state of a vehicle.
@@ -29,6 +30,7 @@ pub(super) struct Picture {
     parts: BTreeMap<JausId, Part>,
     gone: GoneParts,
     pose: Option<Sample<state::Pose>>,
+    georeference: Georeference,
     velocity: Option<Sample<state::Velocity>>,
     mission: Option<Sample<Mission>>,
     path: Vec<[f64; 2]>,
@@ -48,6 +50,8 @@ struct Sample<T> {
 impl Picture {
     /// Manual drive requires pose, velocity and status younger than this.
     const DRIVABLE: Duration = Duration::from_secs(1);
+    /// A local pose of the same time as a global one is younger than this.
+    const PAIR: Duration = Duration::from_millis(300);
     /// A planner that is silent for this time while other parts report is lost.
     const LOST: Duration = Duration::from_secs(2);
 
@@ -62,6 +66,7 @@ impl Picture {
             parts: BTreeMap::new(),
             gone: GoneParts::default(),
             pose: None,
+            georeference: Georeference::default(),
             velocity: None,
             mission: None,
             path: Vec::new(),
@@ -92,6 +97,7 @@ impl Picture {
         self.parts.values_mut().for_each(Part::forget);
         (self.pose, self.velocity, self.mission) = (None, None, None);
         (self.path, self.maps, self.store) = (Vec::new(), Vec::new(), None);
+        self.georeference = Georeference::default();
     }
 
     pub(super) const fn parts(&self) -> &BTreeMap<JausId, Part> {
@@ -115,7 +121,7 @@ impl Picture {
     }
 
     pub(super) fn mission(&self) -> Option<&Mission> {
-        self.mission.as_ref().map(|told| &told.what)
+        self.mission.as_ref().map(|known| &known.what)
     }
 
     /// The component that stores the maps.
@@ -144,7 +150,11 @@ impl Picture {
     }
 
     /// Replaces the components of the vehicle.
-    fn set_parts<'c>(&mut self, now: Instant, components: impl Iterator<Item = &'c Component>) {
+    fn set_parts<'c>(
+        &mut self,
+        now: Instant,
+        components: impl Iterator<Item = &'c ComponentEntry>,
+    ) {
         let mut parts = BTreeMap::new();
         for component in components {
             let before = self.parts.remove(&component.id);
@@ -191,6 +201,11 @@ impl Picture {
             Report::Pose(what, stamp) => {
                 let at = sampled_at(&mut part.pose_clock, now, stamp);
                 self.pose = Some(Sample { what, by, at });
+            }
+            Report::GlobalPose(fix) => {
+                let fresh = |it: &&Sample<_>| now.saturating_duration_since(it.at) < Self::PAIR;
+                let local = self.pose.as_ref().filter(fresh).map(|it| &it.what);
+                self.georeference.handle_fix(now, fix, local);
             }
             Report::Velocity(what, stamp) => {
                 let at = sampled_at(&mut part.velocity_clock, now, stamp);
@@ -264,6 +279,15 @@ impl Picture {
         gone.chain(silent)
     }
 
+    /// The condition of any component of the vehicle that discovery knows, for the tree.
+    pub(super) fn condition(&self, now: Instant, id: JausId) -> &'static str {
+        match self.parts.get(&id) {
+            Some(part) if part.is_silent(now, self.depth.silent()) => Absence::Silent.name(),
+            Some(part) => part.status.map_or(PRESENT, |known| state_name(known.what)),
+            None => PRESENT,
+        }
+    }
+
     fn missing_state(&self, now: Instant) -> Vec<state::Missing> {
         let describe = |(id, name, how): (JausId, &str, Absence)| {
             let part = self.parts.get(&id).map(|it| (it.role, it.heard));
@@ -283,8 +307,8 @@ impl Picture {
     /// The planner, if it was lost while it drove. When all parts are silent, the network is to
     /// blame, and the planner does not count as lost.
     pub(super) fn lost_planner(&self, now: Instant) -> Option<(JausId, Absence)> {
-        let told = self.mission.as_ref();
-        let planner = told.filter(|it| it.what.stage.is_driven())?.by;
+        let known = self.mission.as_ref();
+        let planner = known.filter(|it| it.what.stage.is_driven())?.by;
         if self.gone.get(planner).is_some() {
             return Some((planner, Absence::Gone));
         }
@@ -323,7 +347,7 @@ impl Picture {
         now: Instant,
         emergency_wanted: bool,
         obstacle: impl Fn(JausId) -> Option<String>,
-    ) -> Option<state::Vehicle> {
+    ) -> Option<state::VehicleState> {
         let is_known = self.directory.subsystem(self.vehicle).is_some();
         if !is_known && self.is_empty() {
             return None;
@@ -334,16 +358,17 @@ impl Picture {
             |(id, part): (&JausId, &Part)| self.part_state(now, *id, part, obstacle(*id));
         let any = self.in_emergency().next().is_some();
         let all = any && self.not_in_emergency(now).next().is_none();
-        Some(state::Vehicle {
+        Some(state::VehicleState {
             subsystem: self.vehicle,
             name: self.name.clone(),
-            pose: self.pose.map(|told| state::Pose {
-                age_ms: age(now, told.at),
-                ..told.what
+            pose: self.pose.map(|known| state::Pose {
+                age_ms: age(now, known.at),
+                ..known.what
             }),
-            velocity: self.velocity.map(|told| state::Velocity {
-                age_ms: age(now, told.at),
-                ..told.what
+            place: self.georeference.state(now),
+            velocity: self.velocity.map(|known| state::Velocity {
+                age_ms: age(now, known.at),
+                ..known.what
             }),
             parts: parts.into_iter().map(describe).collect(),
             missing: self.missing_state(now),
@@ -378,7 +403,7 @@ impl Picture {
             name: self.name.clone(),
             selected,
             presence,
-            state: status.map(|told| state_name(told.what)),
+            state: status.map(|known| state_name(known.what)),
             controller: holder.map(|(id, _)| id.to_string()),
             authority: holder.map(|(_, authority)| authority),
             held,
@@ -417,13 +442,13 @@ impl Picture {
         part: &Part,
         obstacle: Option<String>,
     ) -> state::Part {
-        let controller = part.controller.and_then(|told| told.what);
+        let controller = part.controller.and_then(|known| known.what);
         state::Part {
             id: id.to_string(),
             role: part.role.name(),
             managed: part.managed,
-            state: part.status.map(|told| state_name(told.what)),
-            state_age_ms: part.status.map(|told| age(now, told.at)),
+            state: part.status.map(|known| state_name(known.what)),
+            state_age_ms: part.status.map(|known| age(now, known.at)),
             controller: controller.map(|(id, _)| id.to_string()),
             authority: controller.map(|(_, authority)| authority),
             ours: controller.is_some_and(|(id, _)| id == self.own),
@@ -436,18 +461,18 @@ impl Picture {
     /// Snapshot of the mission with its path, also of a planner lost while driving. `told_to_stop`
     /// states whether the drivers were stopped for that reason.
     pub(super) fn mission_state(&self, now: Instant, told_to_stop: bool) -> Option<state::Mission> {
-        let told = self.mission.as_ref()?;
+        let known = self.mission.as_ref()?;
         let lost = self.lost_planner(now).map(|(id, how)| state::LostPlanner {
             id: id.to_string(),
             how: how.name(),
             told_to_stop,
         });
-        let is_known = lost.is_some() || self.parts.contains_key(&told.by);
+        let is_known = lost.is_some() || self.parts.contains_key(&known.by);
         is_known.then(|| state::Mission {
             path: self.path.clone(),
-            age_ms: age(now, told.at),
+            age_ms: age(now, known.at),
             lost,
-            ..told.what.state()
+            ..known.what.state()
         })
     }
 
@@ -458,6 +483,9 @@ impl Picture {
         map.or_else(|| self.maps.first()).cloned()
     }
 }
+
+/// Condition of a component without a known state.
+pub(super) const PRESENT: &str = "present";
 
 /// Sample time of a report that arrives now.
 fn sampled_at(clock: &mut Option<SampleClock>, now: Instant, stamp: Option<Stamp>) -> Instant {
@@ -479,7 +507,7 @@ fn state_name(code: u8) -> &'static str {
 }
 
 /// Milliseconds since `then`.
-fn age(now: Instant, then: Instant) -> u64 {
+pub(super) fn age(now: Instant, then: Instant) -> u64 {
     let age = now.saturating_duration_since(then).as_millis();
     u64::try_from(age).unwrap_or(u64::MAX)
 }

@@ -1,10 +1,11 @@
 //! Reports of vehicle parts, decoded from messages into SI units.
 
+use super::georeference::Fix;
 use super::sample_clock::Stamp;
 use super::state;
 use jaus::address::JausId;
 use jaus::messages::core::{ReportControl, ReportStatus};
-use jaus::messages::mobility::{ReportLocalPose, ReportVelocityState};
+use jaus::messages::mobility::{ReportGlobalPose, ReportLocalPose, ReportVelocityState};
 use jaus_vehicle::ground::StageState;
 use jaus_vehicle::messages::ground::{
     ReportMission, ReportPlannedPath, ReportRasterMaps, ReportStage,
@@ -20,6 +21,8 @@ pub(super) enum Report {
     Stage(state::Stage),
     /// The pose, with the time stamp of the sample if present.
     Pose(state::Pose, Option<Stamp>),
+    /// The position on the globe; `None` if it is unknown.
+    GlobalPose(Option<Fix>),
     /// The velocity, with the time stamp of the sample if present.
     Velocity(state::Velocity, Option<Stamp>),
     Mission(Mission),
@@ -134,6 +137,12 @@ impl From<ReportLocalPose> for Report {
             age_ms: 0,
         };
         Self::Pose(pose, report.time_stamp.and_then(Stamp::read))
+    }
+}
+
+impl From<ReportGlobalPose> for Report {
+    fn from(report: ReportGlobalPose) -> Self {
+        Self::GlobalPose(Fix::of(&report))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Messages from a page: requests for the vehicle, and settings of the connection.
 
+use jaus::address::JausId;
 use serde::Deserialize;
 
 /// One frame from a page.
@@ -70,8 +71,10 @@ pub enum OperatorRequest {
     },
     /// Decide about another operator's request for control.
     Handover {
-        /// Number of the request.
-        request: u8,
+        /// The part of the vehicle that has passed it on.
+        part: JausId,
+        /// The operator who requests control.
+        operator: JausId,
         /// Whether to hand over control.
         grant: bool,
     },
@@ -137,9 +140,10 @@ mod tests {
                 OperatorRequest::Control { on: true },
             ),
             (
-                r#"{"type":"handover","request":3,"grant":false}"#,
+                r#"{"type":"handover","part":"101.3.36","operator":"43.1.1","grant":false}"#,
                 OperatorRequest::Handover {
-                    request: 3,
+                    part: JausId::new(101, 3, 36),
+                    operator: JausId::new(43, 1, 1),
                     grant: false,
                 },
             ),
@@ -203,13 +207,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_frame_is_no_wish() {
+    fn an_invalid_frame_is_no_request() {
         for text in [
             "",
             "{}",
             "[]",
             r#"{"type":"fly"}"#,
             r#"{"type":"control"}"#,
+            r#"{"type":"handover","part":"101.3.36","operator":"43","grant":true}"#,
             r#"{"type":"select","subsystem":70000}"#,
             r#"{"type":"drive","forward":"fast","turn":0}"#,
             r#"{"type":"emergency","on":true,"id":-1}"#,

@@ -2,10 +2,10 @@
 
 use jaus::messages::core::management;
 use jaus::messages::mobility::{
-    local_path_segment_driver, local_pose_sensor, local_vector_driver, primitive_driver,
-    velocity_state_sensor,
+    global_pose_sensor, local_path_segment_driver, local_pose_sensor, local_vector_driver,
+    primitive_driver, velocity_state_sensor,
 };
-use jaus::service::{Component, Kind, Subsystem};
+use jaus::service::{ComponentEntry, Kind, SubsystemEntry};
 use jaus_vehicle::messages::ground::{mission_planner, raster_maps, stage};
 
 /// Role of a component. A component with several roles has the first of them.
@@ -17,6 +17,7 @@ pub(super) enum Role {
     Planner,
     VelocitySensor,
     PoseSensor,
+    GlobalPoseSensor,
     Store,
     /// Another component with Management.
     Other,
@@ -24,18 +25,19 @@ pub(super) enum Role {
 
 impl Role {
     /// In the order of the chain of command.
-    const ALL: [(Self, &'static str); 7] = [
+    const ALL: [(Self, &'static str); 8] = [
         (Self::PrimitiveDriver, primitive_driver::URN),
         (Self::VectorDriver, local_vector_driver::URN),
         (Self::PathDriver, local_path_segment_driver::URN),
         (Self::Planner, mission_planner::URN),
         (Self::VelocitySensor, velocity_state_sensor::URN),
         (Self::PoseSensor, local_pose_sensor::URN),
+        (Self::GlobalPoseSensor, global_pose_sensor::URN),
         (Self::Store, raster_maps::URN),
     ];
 
     /// The role of a component; `None` if it is irrelevant to an operator.
-    pub(super) fn of(component: &Component) -> Option<Self> {
+    pub(super) fn of(component: &ComponentEntry) -> Option<Self> {
         let known = Self::ALL.iter().find(|(_, urn)| component.offers(urn));
         let other = || is_managed(component).then_some(Self::Other);
         known.map(|(role, _)| *role).or_else(other)
@@ -49,6 +51,7 @@ impl Role {
             Self::Planner => "planner",
             Self::VelocitySensor => "velocity_sensor",
             Self::PoseSensor => "pose_sensor",
+            Self::GlobalPoseSensor => "global_pose_sensor",
             Self::Store => "knowledge_store",
             Self::Other => "other",
         }
@@ -63,6 +66,7 @@ impl Role {
             Self::Planner => "the planner",
             Self::VelocitySensor => "the velocity sensor",
             Self::PoseSensor => "the pose sensor",
+            Self::GlobalPoseSensor => "the global pose sensor",
             Self::Store => "the knowledge store",
             Self::Other => "the component",
         }
@@ -77,6 +81,7 @@ impl Role {
             Self::Planner => Some("Planner"),
             Self::VelocitySensor => Some("Velocity Sensor"),
             Self::PoseSensor => Some("Pose Sensor"),
+            Self::GlobalPoseSensor => Some("Global Pose Sensor"),
             Self::Store => Some("Knowledge Store"),
             Self::Other => None,
         }
@@ -92,27 +97,32 @@ impl Role {
 }
 
 /// Whether a component offers Management, and so can enter emergency.
-pub(super) fn is_managed(component: &Component) -> bool {
+pub(super) fn is_managed(component: &ComponentEntry) -> bool {
     component.offers(management::URN)
 }
 
 /// Whether a component reports its stage.
-pub(super) fn tells_stage(component: &Component) -> bool {
+pub(super) fn tells_stage(component: &ComponentEntry) -> bool {
     component.offers(stage::URN)
 }
 
 /// Whether a component reports the vehicle's pose.
-pub(super) fn reports_pose(component: &Component) -> bool {
+pub(super) fn reports_pose(component: &ComponentEntry) -> bool {
     component.offers(local_pose_sensor::URN)
 }
 
+/// Whether a component reports the vehicle's pose on the globe.
+pub(super) fn reports_global_pose(component: &ComponentEntry) -> bool {
+    component.offers(global_pose_sensor::URN)
+}
+
 /// Whether a component reports the vehicle's velocity.
-pub(super) fn reports_velocity(component: &Component) -> bool {
+pub(super) fn reports_velocity(component: &ComponentEntry) -> bool {
     component.offers(velocity_state_sensor::URN)
 }
 
 /// Whether a subsystem has components that an operator can use, and is not another operator's.
-pub(super) fn is_vehicle(subsystem: &Subsystem) -> bool {
+pub(super) fn is_vehicle(subsystem: &SubsystemEntry) -> bool {
     let kind = subsystem.identification().map(|it| it.kind);
     kind != Some(Kind::OperatorControlUnit)
         && subsystem.components().any(|it| Role::of(it).is_some())

@@ -13,7 +13,7 @@ pub struct State {
     /// The operator's own JAUS id.
     pub operator: String,
     /// The selected vehicle.
-    pub vehicle: Option<Vehicle>,
+    pub vehicle: Option<VehicleState>,
     /// Control of the vehicle.
     pub control: Control,
     /// Manual drive.
@@ -63,12 +63,12 @@ pub struct FleetVehicle {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Tree {
     /// All known subsystems.
-    pub subsystems: Vec<Subsystem>,
+    pub subsystems: Vec<TreeSubsystem>,
 }
 
 /// A subsystem of the tree.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Subsystem {
+pub struct TreeSubsystem {
     /// Subsystem number.
     pub subsystem: u16,
     /// Name.
@@ -76,34 +76,37 @@ pub struct Subsystem {
     /// Kind, for example `vehicle`.
     pub kind: String,
     /// Nodes of the subsystem.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<TreeNode>,
 }
 
 /// A node of the tree.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Node {
+pub struct TreeNode {
     /// Node number.
     pub node: u8,
     /// Name.
     pub name: String,
     /// Components of the node.
-    pub components: Vec<Component>,
+    pub components: Vec<TreeComponent>,
 }
 
 /// A component of the tree.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Component {
+pub struct TreeComponent {
     /// JAUS id.
     pub id: String,
     /// Name.
     pub name: String,
+    /// Management state, for example `ready`, if it reports it to this station; otherwise
+    /// `present`. `silent` if its reports have ceased, `gone` if discovery has lost it.
+    pub state: &'static str,
     /// Services offered.
-    pub services: Vec<Service>,
+    pub services: Vec<TreeService>,
 }
 
 /// A service that a component offers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Service {
+pub struct TreeService {
     /// URN.
     pub urn: String,
     /// Major and minor version, as `1.0`.
@@ -112,13 +115,15 @@ pub struct Service {
 
 /// The selected vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Vehicle {
+pub struct VehicleState {
     /// Subsystem number.
     pub subsystem: u16,
     /// Name.
     pub name: String,
     /// Pose.
     pub pose: Option<Pose>,
+    /// Where its local frame is on the globe; `null` if it has reported no global pose.
+    pub place: Option<Place>,
     /// Velocity.
     pub velocity: Option<Velocity>,
     /// Components that offer Management or matter to the operator.
@@ -143,6 +148,36 @@ pub struct Pose {
     pub yaw: Option<f64>,
     /// Milliseconds since the sample was taken according to its time stamp, or since the report
     /// arrived without a stamp.
+    pub age_ms: u64,
+}
+
+/// The origin of the local frame on the globe (WGS 84).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Place {
+    /// Degrees north.
+    pub latitude: f64,
+    /// Degrees east.
+    pub longitude: f64,
+    /// Direction of X in radians clockwise from true north.
+    pub heading: f64,
+    /// The last reported global pose; `null` if it is unknown now.
+    pub fix: Option<Fix>,
+}
+
+/// A global pose of the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Fix {
+    /// Degrees north.
+    pub latitude: f64,
+    /// Degrees east.
+    pub longitude: f64,
+    /// The same position in the frame of [`Place`], in metres along X.
+    pub x: f64,
+    /// Metres along Y.
+    pub y: f64,
+    /// Radians clockwise from X; `null` if unknown.
+    pub yaw: Option<f64>,
+    /// Milliseconds since the report.
     pub age_ms: u64,
 }
 
@@ -231,8 +266,8 @@ pub struct Control {
 /// Another operator's request for control.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct HandoverRequest {
-    /// Number of the request.
-    pub id: u8,
+    /// JAUS id of the part of the vehicle that has passed it on.
+    pub part: String,
     /// JAUS id of the operator.
     pub operator: String,
     /// Authority of the operator.

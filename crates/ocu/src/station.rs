@@ -5,6 +5,7 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 use tokio::net::TcpListener;
 
+use super::base_map::BaseMap;
 use super::server::{Admission, Server};
 use super::session::Session;
 use super::token::Token;
@@ -12,6 +13,21 @@ use jaus::link::interface;
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
 /// An operator station with its page.
+///
+/// ```no_run
+/// # use jaus::component::Kind;
+/// # use jaus::node::{Config, Node};
+/// # use jaus_ocu::Station;
+/// # use jaus_vehicle::parts::{Part, Slot};
+/// # async fn example() -> Result<(), Box<dyn std::error::Error>> {
+/// let node = Node::start(Config::new(42, 1))?;
+/// let slot = Slot::new(node.attach(1)?, node, Kind::OperatorControlUnit, "Operator");
+/// let station = Station { vehicles: vec![101], ..Station::default() }.open().await?;
+/// println!("the page is at {}", station.urls().join(" "));
+/// station.run(slot).await?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 pub struct Station {
     /// The vehicles to show, by subsystem number; the first is selected at the start. Empty for all
@@ -28,6 +44,8 @@ pub struct Station {
     pub token_to_read: bool,
     /// Host names of the page, in addition to `localhost` and the addresses of this machine.
     pub hosts: Vec<String>,
+    /// The geographic map behind a vehicle that reports its global pose.
+    pub base_map: Option<BaseMap>,
 }
 
 /// Address of the page.
@@ -56,6 +74,7 @@ impl Default for Station {
             token: None,
             token_to_read: false,
             hosts: Vec::new(),
+            base_map: None,
         }
     }
 }
@@ -70,12 +89,14 @@ impl Station {
         let address = listener
             .local_addr()
             .map_err(|error| PartError::Broken(error.to_string()))?;
-        if self.token.is_none() && !address.ip().is_loopback() {
-            let made_up = Token::generate();
-            self.token = Some(made_up.map_err(|error| PartError::Broken(error.to_string()))?);
+        let generates_token = self.token.is_none() && !address.ip().is_loopback();
+        if generates_token {
+            let generated = Token::generate();
+            self.token = Some(generated.map_err(|error| PartError::Broken(error.to_string()))?);
         }
         Ok(OpenStation {
             station: self,
+            generates_token,
             listener,
             address,
         })
@@ -86,6 +107,8 @@ impl Station {
 #[derive(Debug)]
 pub struct OpenStation {
     station: Station,
+    /// Whether the token was generated at this start.
+    generates_token: bool,
     listener: TcpListener,
     address: SocketAddr,
 }
@@ -97,11 +120,25 @@ impl OpenStation {
         self.address
     }
 
-    /// URLs of the page, including the token if one is needed, for the user who starts the station.
+    /// URLs of the page, without a token.
     #[must_use]
     pub fn urls(&self) -> Vec<String> {
-        let token = self.station.token.as_ref();
-        let token = token.map_or_else(String::new, |it| format!("#token={}", it.reveal()));
+        self.urls_with("")
+    }
+
+    /// URLs of the page with the token that was generated at this start; none if the token came from
+    /// the caller. They are for the user who starts the station, not for a log.
+    #[must_use]
+    pub fn secret_urls(&self) -> Vec<String> {
+        match &self.station.token {
+            Some(token) if self.generates_token => {
+                self.urls_with(&format!("#token={}", token.reveal()))
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn urls_with(&self, token: &str) -> Vec<String> {
         let port = self.address.port();
         let url = |ip: IpAddr| format!("http://{}/{token}", SocketAddr::new(ip, port));
         if self.address.ip().is_unspecified() {
@@ -124,9 +161,7 @@ impl Part for OpenStation {
             tracing::info!("the operator's page is at {url}");
         }
         let Self {
-            station,
-            listener,
-            address: _,
+            station, listener, ..
         } = self;
         let node = slot.node.clone();
         let component = slot.component("Operator").live_on(slot.port)?;
@@ -136,6 +171,7 @@ impl Part for OpenStation {
             token: station.token,
             token_to_read: station.token_to_read,
             hosts: station.hosts,
+            base_map: station.base_map,
             node,
         };
         let (session, access) = Session::new(component, station.vehicles, station.authority);

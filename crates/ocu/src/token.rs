@@ -5,6 +5,13 @@ use std::hint::black_box;
 use std::path::Path;
 
 /// Access token of an operator: from a file, or generated for one run.
+///
+/// ```
+/// use jaus_ocu::Token;
+///
+/// assert!(Token::new("0123456789abcdef").is_some());
+/// assert!(Token::new("too short").is_none());
+/// ```
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 

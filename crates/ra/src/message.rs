@@ -8,6 +8,18 @@ use jaus::codec;
 use jaus::wire::ra::{CODE_LEN, RaId};
 
 /// A complete message, reassembled if it arrived in parts.
+///
+/// ```
+/// use bytes::Bytes;
+/// use jaus::messages::core::QueryHeartbeatPulse;
+/// use jaus_ra::{Message, RaId};
+///
+/// let (ours, theirs): (RaId, RaId) = ("32.1.32.1".parse()?, "20.1.33.1".parse()?);
+/// let query = Message::new(ours, theirs, 0x2202, Bytes::new());
+/// assert_eq!(query.body::<QueryHeartbeatPulse>()?, QueryHeartbeatPulse);
+/// assert_eq!(query.answer(0x4202, Bytes::new()).destination, ours);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, PartialEq, Eq)]
 pub struct Message {
     /// Destination; 255 in a field addresses all.

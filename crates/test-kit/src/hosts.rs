@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use crate::evidence::{not_tested, this_test};
+use crate::evidence::{RUN, not_tested, run as this_run, this_test};
 use crate::waiting::{LIMIT, block_until};
 
 /// Role of a test node's process.
@@ -78,7 +78,8 @@ fn in_user_namespace(command: &[&str]) -> Command {
         .args(["--user", "--map-root-user", "--net", "--mount", "sh", "-c"])
         .args(["mount -t tmpfs none /run && exec \"$@\"", "sh"])
         .args(command)
-        .env(INSIDE, "1");
+        .env(INSIDE, "1")
+        .env(RUN, this_run());
     unshare
 }
 

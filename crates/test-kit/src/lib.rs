@@ -12,11 +12,14 @@
 
 pub mod evidence;
 pub mod example;
+pub mod figures;
 pub mod group;
 #[cfg(target_os = "linux")]
 pub mod hosts;
+pub mod map_file;
 pub mod random;
 pub mod rover;
+pub mod snapshot;
 pub mod tools;
 pub mod vehicle_process;
 pub mod waiting;

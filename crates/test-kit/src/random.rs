@@ -1,24 +1,21 @@
-//! Seeded pseudorandom numbers.
+//! Seeded pseudorandom choices.
 
 use std::ops::Range;
 use std::time::Duration;
 
-/// A small pseudorandom number generator (SplitMix64).
-pub struct Random(u64);
+/// A generator of pseudorandom choices.
+pub struct Random(jaus::random::Random);
 
 impl Random {
     /// A generator with this seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        Self(seed)
+        Self(jaus::random::Random::new(seed))
     }
 
     /// The next 64-bit number.
     pub fn number(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        mixed ^ (mixed >> 31)
+        self.0.number()
     }
 
     /// A number below `end`, which is not 0.

@@ -26,8 +26,8 @@ use crate::messages::handoff::{
 pub struct Handoff {
     requests: Vec<Request>,
     last_id: u8,
-    /// When the client in control was last told of the requests.
-    told: Option<Instant>,
+    /// When the client in control was last notified of the requests.
+    notified: Option<Instant>,
 }
 
 /// A request for control that is not decided yet.
@@ -107,7 +107,7 @@ impl Handoff {
         } else if self.requests.len() < Self::MOST {
             tracing::info!(id = %context.id(), %client, "control is requested");
             self.requests.push(request);
-            self.tell_controller(now, context);
+            self.notify_controller(now, context);
             Answer::QUEUED
         } else {
             Answer::NOT_AVAILABLE
@@ -118,16 +118,21 @@ impl Handoff {
         confirm(client, id, answer, context);
     }
 
-    const fn next_id(&mut self) -> u8 {
-        self.last_id = self.last_id.wrapping_add(1);
-        self.last_id
+    /// A number that no undecided request has.
+    fn next_id(&mut self) -> u8 {
+        loop {
+            self.last_id = self.last_id.wrapping_add(1);
+            if self.requests.iter().all(|it| it.id != self.last_id) {
+                return self.last_id;
+            }
+        }
     }
 
     /// Handles the withdrawal of a request.
     fn remove(&mut self, now: Instant, client: JausId, id: u8, context: &mut Context<'_>) {
         self.requests.retain(|it| it.client != client);
         confirm(client, id, Answer::DENIED, context);
-        self.tell_controller(now, context);
+        self.notify_controller(now, context);
     }
 
     /// Handles the decisions of the client in control.
@@ -159,7 +164,7 @@ impl Handoff {
                 }
             }
         }
-        self.tell_controller(now, context);
+        self.notify_controller(now, context);
     }
 
     /// Hands control over, and refuses the other requests.
@@ -172,9 +177,9 @@ impl Handoff {
         }
     }
 
-    /// Tells the client in control which requests there are. Without any, its display empties.
-    fn tell_controller(&mut self, now: Instant, context: &mut Context<'_>) {
-        self.told = Some(now);
+    /// Notifies the client in control of the requests. An empty list clears its display.
+    fn notify_controller(&mut self, now: Instant, context: &mut Context<'_>) {
+        self.notified = Some(now);
         let Some(controller) = context.standing().controller else {
             return;
         };
@@ -241,9 +246,11 @@ impl Service for Handoff {
             confirm(ended.client, ended.id, Answer::TIMEOUT, context);
         }
         let left = self.requests.len();
-        let is_due = self.told.is_none_or(|told| now >= told + Self::REPEAT);
+        let is_due = self
+            .notified
+            .is_none_or(|notified| now >= notified + Self::REPEAT);
         if left < before || (left > 0 && is_due) {
-            self.tell_controller(now, context);
+            self.notify_controller(now, context);
         }
     }
 
@@ -258,14 +265,14 @@ impl Service for Handoff {
             return;
         }
         match controller {
-            Some(_) => self.tell_controller(now, context),
+            Some(_) => self.notify_controller(now, context),
             None => self.grant(0, context),
         }
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
         let next = self.requests.iter().map(Request::expires).min()?;
-        let repeat = self.told.map(|told| told + Self::REPEAT);
+        let repeat = self.notified.map(|notified| notified + Self::REPEAT);
         Some(repeat.map_or(next, |repeat| repeat.min(next)))
     }
 }

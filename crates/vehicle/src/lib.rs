@@ -30,3 +30,8 @@ pub mod parts;
 pub mod sensing;
 pub mod world;
 pub mod zones;
+
+/// Compiles the program in the guide to the vehicle.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/the-vehicle.md")]
+struct TheVehicle;

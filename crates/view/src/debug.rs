@@ -1,13 +1,13 @@
-//! The debug view: what passes a node or several, for viewers on this host, over HTTP and WebSocket.
+//! The debug view: serves the traffic of nodes to viewers on this host, over HTTP and WebSocket.
 //!
-//! | path | what |
+//! | path | content |
 //! |---|---|
-//! | `/messages` | a WebSocket that sends every message as a JSON object, one a frame; the [`Filter`]'s terms are its parameters: `/messages?message=Velocity&field=velocity_x>1` |
-//! | `/tree` | what discovery has found, as JSON |
+//! | `/messages` | a WebSocket that sends every message as a JSON object, one per frame; its parameters are the terms of a [`Filter`]: `/messages?message=Velocity&field=velocity_x>1` |
+//! | `/tree` | the discovered components, as JSON |
 //!
-//! It is read-only: input from viewers is ignored. A viewer that is too slow loses messages and
-//! receives their number in `{"lost":N}`; the traffic never waits. Requests from other sites' pages
-//! are refused, because any web page can ask a browser to connect to this host.
+//! It is read-only: input from viewers is ignored. A slow viewer loses messages and receives their
+//! number in `{"lost":N}`; the traffic never waits. Requests from pages of other sites are refused,
+//! because any web page can make a browser connect to this host.
 
 use std::convert::Infallible;
 use std::net::SocketAddr;
@@ -31,18 +31,30 @@ use super::tree;
 use jaus::component::Component;
 use jaus::node::{Node, Tap, Tapped};
 
-/// Viewers at a time.
+/// Limit of simultaneous viewers.
 pub const MOST_VIEWERS: usize = 16;
-/// Passages that may wait for one viewer.
+/// Limit of passages that wait for one viewer.
 const WAITING: usize = 1024;
-/// Messages that are sent together, if they are there.
+/// Limit of waiting messages that are sent together.
 const TOGETHER: usize = 64;
-/// The longest frame that a viewer may send: it has nothing to say.
+/// The longest frame accepted from a viewer, whose input is ignored.
 const LONGEST: usize = 1024;
-/// A viewer that takes nothing for so long has gone.
+/// How long a viewer may read nothing before it is disconnected.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// What passes nodes, to be looked at.
+/// A read-only view of the traffic of nodes.
+///
+/// ```no_run
+/// # use jaus::component::Component;
+/// # use jaus::node::Node;
+/// # use jaus_view::{Dictionary, debug::DebugView};
+/// # async fn example(node: Node, component: Component) -> std::io::Result<()> {
+/// let view = DebugView::new([node], component, Dictionary::new());
+/// let listener = tokio::net::TcpListener::bind("127.0.0.1:8794").await?;
+/// view.serve(listener).await?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 pub struct DebugView(Arc<Inner>);
 
@@ -55,9 +67,9 @@ struct Inner {
 }
 
 impl DebugView {
-    /// A view of `nodes` and of what `component`, which lives on one of them, has found;
-    /// `dictionary` has the messages that are shown with their fields. A message between two of the
-    /// nodes is shown once.
+    /// Creates a view of the traffic of `nodes`, decoded with `dictionary`, and of the directory of
+    /// `component`, which is attached to one of them. A message between two of the nodes is shown
+    /// once.
     #[must_use]
     pub fn new(
         nodes: impl IntoIterator<Item = Node>,
@@ -72,7 +84,7 @@ impl DebugView {
         }))
     }
 
-    /// The paths, to be served alone or among others.
+    /// The routes, to serve alone or together with others.
     pub fn router(self) -> Router {
         Router::new()
             .route("/messages", get(messages))
@@ -80,10 +92,10 @@ impl DebugView {
             .with_state(self)
     }
 
-    /// Serves viewers at an address; ends only when that is not possible any more.
+    /// Serves viewers. Ends only with an error.
     ///
     /// # Errors
-    /// What the operating system says.
+    /// The error of the operating system.
     pub async fn serve(self, listener: TcpListener) -> std::io::Result<Infallible> {
         axum::serve(listener, self.router()).await?;
         Err(std::io::ErrorKind::ConnectionAborted.into())

@@ -1,5 +1,5 @@
-//! One layout of a message: what it is called, which services define it so, and how its octets and
-//! its JSON are made of one another.
+//! One layout of a message: its name, the services that define it, and the conversion between
+//! octets and JSON.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,18 +8,20 @@ use std::sync::Arc;
 use bytes::Bytes;
 use jsidl::dynamic;
 use jsidl::model::{Id, Message, Version};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use serde_json::Value as Json;
 
 use jaus::codec::view::Value;
 use jaus::codec::{AnyMessage, DecodeError, MessageInfo, ServiceId};
 
-/// Why octets cannot be read, or JSON cannot be written, as a message.
+use super::named::{ByName, name_values};
+
+/// Why octets cannot be decoded, or JSON cannot be encoded, as a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unreadable {
-    /// A sentence.
+    /// The problem, as a sentence.
     pub problem: String,
-    /// Where: the octet, counted from the first of the message code, or the column of a line.
+    /// The position: the octet, counted from the message code, or the column of a line.
     pub offset: usize,
 }
 
@@ -56,24 +58,32 @@ enum Codec {
     Dynamic(Arc<Message>),
 }
 
-/// A message's fields, which serialize as people see them.
-#[derive(Debug, Clone, Serialize)]
-#[serde(untagged)]
+/// The fields of a message. They serialize with units; enumerated values by name, if they have one.
+#[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Body {
-    /// Read by a generated type.
+    /// Decoded by a generated type.
     Generated(Value),
-    /// Read by a definition loaded at run time.
+    /// Decoded by a definition loaded at run time.
     Dynamic(Json),
 }
 
-/// A service as people name it: `urn:jaus:jss:core:Events`, or with its version
+impl Serialize for Body {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Generated(value) => ByName(value).serialize(serializer),
+            Self::Dynamic(json) => json.serialize(serializer),
+        }
+    }
+}
+
+/// The name of a service in flags and requests: `urn:jaus:jss:core:Events`, or with its version
 /// `urn:jaus:jss:core:Events@1.0`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ServiceName {
     /// The URN.
     pub urn: String,
-    /// The version; any, if not given.
+    /// The version; `None` for any.
     pub version: Option<Version>,
 }
 
@@ -198,9 +208,10 @@ impl Definition {
             Codec::Dynamic(message) => {
                 let value = dynamic::decode(message, octets)
                     .map_err(|error| Unreadable::new(error.to_string(), error.offset))?;
-                dynamic::to_json(message, &value)
-                    .map(Body::Dynamic)
-                    .map_err(|error| Unreadable::new(error.to_string(), 0))
+                let mut view = dynamic::to_json(message, &value)
+                    .map_err(|error| Unreadable::new(error.to_string(), 0))?;
+                name_values(message, &mut view);
+                Ok(Body::Dynamic(view))
             }
         }
     }

@@ -1,5 +1,5 @@
-//! Which definition a message is read and written by: the generated types, and definitions loaded
-//! at run time.
+//! Selects the definition that decodes or encodes a message: a generated type, or a definition
+//! loaded at run time.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -16,9 +16,9 @@ use jaus::messages;
 
 /// Message definitions by code and by name.
 ///
-/// Where several definitions share a code, they are tried in a stated order: those loaded at run
-/// time, then the generated ones; within each, newer versions first. The first that fits exactly
-/// is taken. [`prefer`](Self::prefer) settles the matter by naming a service.
+/// Several definitions may share a code. They are tried in this order: those loaded at run time,
+/// then the generated ones; newer versions first. The first one that fits exactly applies.
+/// [`prefer`](Self::prefer) selects a service instead.
 ///
 /// ```
 /// use jaus_view::Dictionary;
@@ -41,19 +41,19 @@ pub struct Dictionary {
     added: Vec<Id>,
 }
 
-/// How much of a name must be right for it to be taken for a slip: 1 is all of it.
+/// The least similarity of a misspelt name; 1 is equality.
 const ALIKE: f64 = 0.75;
 
-/// What [`Dictionary::load`] did.
+/// The result of [`Dictionary::load`].
 #[derive(Debug)]
 pub struct Added {
-    /// How many messages were added, those counted twice that a service both receives and sends.
+    /// The number of added messages. A message that a service both receives and sends counts twice.
     pub messages: usize,
-    /// What is wrong with the definitions.
+    /// The errors and warnings in the definitions.
     pub diagnostics: Diagnostics,
 }
 
-/// What the dictionary knows about octets.
+/// A decoded message.
 #[derive(Debug, Clone)]
 pub struct Reading<'d> {
     /// The message code, unless there are fewer than two octets.
@@ -109,18 +109,18 @@ impl Dictionary {
         self
     }
 
-    /// Adds the sets whose features are off, read by their definitions at run time. Parsing them
-    /// takes some milliseconds and a few MiB.
+    /// Adds the service sets whose features are off, from their definitions. Parsing them takes some
+    /// milliseconds and a few MiB.
     #[must_use]
     pub fn with_catalogue(mut self) -> Self {
         self.load::<&Path>([]);
         self
     }
 
-    /// Adds the definitions in files and directories, which may refer to one another and to the
-    /// definitions that come with this crate; those are added too, after all others. A service with
-    /// the URN and version of one that is already here takes its place. What has a mistake is left
-    /// out and named in the diagnostics.
+    /// Adds the definitions in files and directories. They may refer to one another and to the
+    /// definitions of this crate, which are added too, after all others. A service replaces a
+    /// present one with the same URN and version. Definitions with errors are left out; the
+    /// diagnostics name them.
     pub fn load<P: AsRef<Path>>(&mut self, paths: impl IntoIterator<Item = P>) -> Added {
         let mut loader = Loader::new();
         for path in paths {
@@ -199,7 +199,7 @@ impl Dictionary {
         }
     }
 
-    /// Takes this service's definitions wherever it has any, instead of trying others.
+    /// Prefers the definitions of this service to all others.
     ///
     /// # Errors
     /// If no definition here belongs to such a service.
@@ -231,8 +231,8 @@ impl Dictionary {
         ))
     }
 
-    /// Takes the Reference Architecture's definitions wherever it has any, for messages without a
-    /// header, which would tell.
+    /// Prefers the definitions of the Reference Architecture, for messages without a header, which
+    /// would identify it.
     pub fn prefer_reference_architecture(&mut self) {
         self.prefers_ra = true;
     }
@@ -249,7 +249,7 @@ impl Dictionary {
         self.candidates(code).next().map(Definition::name)
     }
 
-    /// Looks the message up by its code, and takes its fields apart.
+    /// Decodes a message.
     pub fn read(&self, octets: &Bytes) -> Reading<'_> {
         let Some(code) = octets.first_chunk().map(|&code| u16::from_le_bytes(code)) else {
             let count = octets.len();
@@ -356,10 +356,10 @@ impl Dictionary {
         code.is_some_and(|code| self.candidates(code).any(Definition::is_command))
     }
 
-    /// Makes the octets of a message out of what people write.
+    /// Encodes a message.
     ///
     /// # Errors
-    /// If no definition is meant, or the body does not fit it.
+    /// If the request names no definition, or the body does not fit it.
     pub fn write(&self, request: &Request) -> Result<Bytes, Unreadable> {
         let mut failure = None;
         for definition in self.requested(request)? {

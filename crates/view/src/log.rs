@@ -1,8 +1,10 @@
 //! Decoding of the messages in a capture's datagrams.
 
 use bytes::Bytes;
+use serde_json::{Map, Value as Json};
 
 use super::dictionary::{Dictionary, Reading};
+use super::hex::from_hex;
 use super::large::LargeMessages;
 use super::line::{Content, Envelope, Header, Line};
 use super::network::Datagram;
@@ -41,6 +43,27 @@ impl<'d> MessageLog<'d> {
     /// Number of large messages with missing fragments so far.
     pub fn incomplete_messages(&self) -> u64 {
         self.large.incomplete()
+    }
+
+    /// An object of a line whose writer had no definition of the message, or of the one inside an
+    /// event, with the fields that the definitions here give it. Others stay as they are.
+    pub(super) fn decoded(&self, mut object: Map<String, Json>) -> Map<String, Json> {
+        let carried = object.get_mut("carries").and_then(Json::as_object_mut);
+        if let Some(carried) = carried {
+            *carried = self.decoded(std::mem::take(carried));
+            return object;
+        }
+        let octets = object.get("octets").and_then(Json::as_str);
+        let Some(Ok(octets)) = octets.map(from_hex) else {
+            return object;
+        };
+        let line = self.dictionary.line(&octets.into());
+        let decoded = serde_json::to_value(&line);
+        if let (false, Ok(Json::Object(decoded))) = (line.is_error(), decoded) {
+            object.retain(|key, _| !["error", "offset", "octets"].contains(&key.as_str()));
+            object.extend(decoded);
+        }
+        object
     }
 
     /// The messages of a datagram, or the reason why there are none.

@@ -14,6 +14,16 @@ use super::dictionary::Dictionary;
 use super::request::Request;
 
 /// A query and the report that answers it.
+///
+/// ```
+/// use jaus_view::{Dictionary, Request};
+///
+/// let request = Request::new("QueryVelocityState", serde_json::json!({}));
+/// let dictionary = Dictionary::new().with_catalogue();
+/// let query = dictionary.query(&request, &["velocity_x".to_owned()])?;
+/// assert_eq!((query.name.as_str(), query.report), ("QueryVelocityState", 0x4404));
+/// # Ok::<(), jaus_view::Unreadable>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EncodedQuery {
     /// The name of the query.

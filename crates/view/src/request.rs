@@ -24,6 +24,15 @@ const PASSED_OVER: [&str; 13] = [
 ];
 
 /// Specification of a message and its content.
+///
+/// ```
+/// use jaus_view::{Dictionary, Request};
+///
+/// let request = Request::from_json(r#"{"message": "QueryIdentification", "body": {"QueryType": 2}}"#)?;
+/// let octets = Dictionary::new().write(&request)?;
+/// assert_eq!(octets[..], [0x00, 0x2B, 0x02]);
+/// # Ok::<(), jaus_view::Unreadable>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
     /// Name of the message in its definition.

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::str::FromStr;
+use std::time::Duration;
 
 const NANOS_PER_SECOND: u32 = 1_000_000_000;
 const SECONDS_PER_DAY: i64 = 86_400;
@@ -10,6 +11,15 @@ const SECONDS_PER_DAY: i64 = 86_400;
 ///
 /// [`Display`](fmt::Display) writes RFC 3339 in UTC, with as many decimals as the capture has:
 /// `2015-06-07T14:03:21.068150Z`.
+///
+/// ```
+/// use jaus_view::Timestamp;
+///
+/// let time: Timestamp = "2015-06-07T14:03:21.068150Z".parse()?;
+/// assert_eq!((time.seconds(), time.subsec_nanos()), (1_433_685_801, 68_150_000));
+/// assert_eq!(time.to_string(), "2015-06-07T14:03:21.068150Z");
+/// # Ok::<(), jaus_view::InvalidTime>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Timestamp {
     seconds: i64,
@@ -28,6 +38,12 @@ impl Timestamp {
             nanos: nanos % NANOS_PER_SECOND,
             decimals: decimals.min(9),
         }
+    }
+
+    /// Creates a time stamp from the time since the beginning of 1970 (UTC); see [`new`](Self::new).
+    pub fn since_1970(time: Duration, decimals: u8) -> Self {
+        let seconds = i64::try_from(time.as_secs()).unwrap_or(i64::MAX);
+        Self::new(seconds, time.subsec_nanos(), decimals)
     }
 
     /// Whole seconds since 1970.

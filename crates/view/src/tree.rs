@@ -4,11 +4,18 @@ use std::collections::BTreeMap;
 
 use jaus::address::JausId;
 use jaus::component::{Change, Directory, Identification, Kind, Level, Loss, Offer};
-use jaus::service::Component;
+use jaus::service::ComponentEntry;
 use serde_json::{Map, Value as Json, json};
 
-/// Formats the tree as indented lines, without the observing component `left_out`.
-pub fn lines(directory: &Directory, left_out: Option<JausId>) -> Vec<String> {
+use super::words::quoted;
+
+/// Formats the tree as indented lines, without the observing component `left_out`; with the colours of
+/// a terminal on demand.
+pub fn lines(directory: &Directory, left_out: Option<JausId>, colours: bool) -> Vec<String> {
+    let paint = |code: &str, text: String| match colours {
+        true => format!("\x1b[{code}m{text}\x1b[0m"),
+        false => text,
+    };
     let mut lines = Vec::new();
     for (number, subsystem) in directory.subsystems() {
         let others: Vec<_> = subsystem
@@ -18,16 +25,14 @@ pub fn lines(directory: &Directory, left_out: Option<JausId>) -> Vec<String> {
         if others.is_empty() {
             continue;
         }
-        lines.push(format!(
-            "subsystem {number}{}",
-            naming(subsystem.identification())
-        ));
+        let subsystem_line = format!("subsystem {number}{}", naming(subsystem.identification()));
+        lines.push(paint("1", subsystem_line));
         for (number, node) in subsystem.nodes() {
             lines.push(format!("  node {number}{}", naming(node.identification())));
             for component in node.components().filter(|c| Some(c.id) != left_out) {
                 lines.push(format!(
                     "    {}{}",
-                    component.id,
+                    paint("36", component.id.to_string()),
                     naming(component.identification.as_ref())
                 ));
                 lines.extend(
@@ -64,12 +69,13 @@ pub fn introduction(Identification { kind, name }: &Identification) -> String {
 }
 
 /// One line per service, with its versions aligned in a column.
-fn services(component: &Component) -> Vec<String> {
+fn services(component: &ComponentEntry) -> Vec<String> {
     let Some(offers) = &component.services else {
         return vec!["(services not yet reported)".to_owned()];
     };
-    let services = by_urn(offers);
-    let width = services.keys().map(|urn| urn.len()).max().unwrap_or(0);
+    let services = by_urn(offers).into_iter();
+    let services: Vec<_> = services.map(|(urn, it)| (quoted(urn), it)).collect();
+    let width = services.iter().map(|(urn, _)| urn.len()).max().unwrap_or(0);
     services
         .into_iter()
         .map(|(urn, versions)| format!("{urn:width$}  {}", versions.join(", ")))
@@ -111,7 +117,7 @@ pub fn json(directory: &Directory, own: JausId) -> Json {
     json!({ "subsystems": subsystems })
 }
 
-fn component_json(component: &Component) -> Json {
+fn component_json(component: &ComponentEntry) -> Json {
     let id = json!(component.id.to_string());
     let mut object = named_json("component", id, component.identification.as_ref());
     if let Some(offers) = &component.services {
@@ -154,7 +160,7 @@ pub fn in_words(change: Change, directory: &Directory) -> Option<String> {
             let offers = directory.component(id)?.services.as_ref()?;
             let names = by_urn(offers).into_iter().map(|(urn, versions)| {
                 let name = urn.rsplit(':').next().unwrap_or(urn);
-                format!("{name} {}", versions.join("/"))
+                format!("{} {}", quoted(name), versions.join("/"))
             });
             format!("{id} offers {}", names.collect::<Vec<_>>().join(", "))
         }
@@ -215,5 +221,27 @@ const fn reason(loss: Loss) -> &'static str {
         Loss::Unlisted => "its subsystem no longer lists it",
         Loss::WithItsReporter => "the component that reported it is lost",
         Loss::NoRoom => "it never sent a message, and its entry is needed for another",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_urn_of_a_service_is_escaped() {
+        let urn = "urn:\x1b[2J\r\nforged \u{202e}".to_owned();
+        let offer = Offer {
+            urn,
+            major: 1,
+            minor: 2,
+        };
+        let component = Component {
+            id: JausId::new(101, 1, 7),
+            identification: None,
+            services: Some(vec![offer].into()),
+        };
+        let line = r#""urn:\u{1b}[2J\r\nforged \u{202e}"  1.2"#;
+        assert_eq!(services(&component), [line]);
     }
 }

@@ -7,7 +7,6 @@
 mod behaviour;
 mod composite;
 mod field;
-mod layout;
 mod service;
 mod triggers;
 
@@ -23,7 +22,6 @@ pub(crate) use field::{
     bits, enum_index, octet_index, one_meaning, overlap, scale, value_range, value_set,
     values_of_bits, values_of_number,
 };
-pub(crate) use layout::same_shape;
 pub(crate) use service::{ambiguous_codes, ambiguous_names, left_out, same_service};
 pub(crate) use triggers::Events;
 

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::layout::same_message;
 use crate::diagnostic::Report;
+use crate::fingerprint::same_on_wire;
 use crate::library::Library;
 use crate::model::{Message, Service};
 use crate::source::Span;
@@ -32,7 +32,7 @@ pub(crate) fn same_service(
         && first
             .messages()
             .zip(other.messages())
-            .all(|(a, b)| same_message(a, b));
+            .all(|(a, b)| same_on_wire(a, b));
     if !same {
         report.warning(
             definition.span,
@@ -58,7 +58,7 @@ pub(crate) fn ambiguous_codes(
     }
     for (message, &place) in service.messages().zip(places) {
         let other = *known.entry(message.code).or_insert(message);
-        if same_message(other, message) {
+        if same_on_wire(other, message) {
             continue;
         }
         let (name, code) = (&message.name, message.code);

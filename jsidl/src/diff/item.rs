@@ -1,7 +1,7 @@
 //! Compares members: presence, order and layout.
 
 use super::Walk;
-use crate::check::same_shape;
+use crate::fingerprint::same_shape_on_wire;
 use crate::model::{Item, Shape};
 
 impl Walk<'_> {
@@ -90,7 +90,7 @@ fn pairs(old: &[Item], new: &[Item]) -> Vec<(usize, Option<usize>)> {
         let candidate = candidate(&pairs, position).filter(|&at| at < new.len() && !taken(at));
         if let Some(at) = candidate
             && pairs[position].1.is_none()
-            && same_shape(&old[position].shape, &new[at].shape)
+            && same_shape_on_wire(&old[position].shape, &new[at].shape)
         {
             pairs[position].1 = Some(at);
         }

@@ -1,7 +1,5 @@
 //! Compares fields: types, scales, units, named values, bits, lengths, choices.
 
-use std::fmt;
-
 use super::Walk;
 use crate::model::{
     BitField, Choice, Count, Format, Meaning, NamedValue, Number, Rounding, Scalar, Scale, Shape,
@@ -246,25 +244,6 @@ fn ranges(ranges: &[ValueRange]) -> String {
     if ranges.is_empty() {
         return "absent".to_owned();
     }
-    let shown: Vec<_> = ranges
-        .iter()
-        .map(|range| Shown(range).to_string())
-        .collect();
+    let shown: Vec<_> = ranges.iter().map(ValueRange::to_string).collect();
     shown.join(", ")
-}
-
-/// A range as people write it.
-struct Shown<'r>(&'r ValueRange);
-
-impl fmt::Display for Shown<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ValueRange { lower, upper, .. } = self.0;
-        write!(f, "{lower} to {upper}")?;
-        match (self.0.lower_exclusive, self.0.upper_exclusive) {
-            (false, false) => Ok(()),
-            (true, false) => write!(f, " without {lower}"),
-            (false, true) => write!(f, " without {upper}"),
-            (true, true) => write!(f, " without both"),
-        }
-    }
 }

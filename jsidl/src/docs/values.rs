@@ -2,7 +2,7 @@
 
 use super::block::{Cell, Line, code, muted, text};
 use crate::dynamic::Steps;
-use crate::model::{Meaning, Number, Scalar, Scale, ValueRange, ValueSet};
+use crate::model::{Meaning, Number, Scalar, Scale, ValueRange, ValueSet, shortened};
 
 /// Range and resolution, or the named values.
 pub(super) fn of(scalar: &Scalar) -> Cell {
@@ -14,7 +14,8 @@ pub(super) fn of(scalar: &Scalar) -> Cell {
 }
 
 fn scaled(scale: &Scale, kind: Number) -> Cell {
-    let limits = format!("{} to {}", number(scale.lower), number(scale.upper));
+    let [lower, upper] = [scale.lower, scale.upper].map(|limit| shortened(limit, PLACES));
+    let limits = format!("{lower} to {upper}");
     let steps = Steps::of(scale, kind);
     let steps = steps.map(|steps| format!("in steps of {}", significant(steps.step())));
     let steps = steps.map(|steps| vec![muted(steps)]);
@@ -32,16 +33,8 @@ pub(super) fn of_set(set: &ValueSet) -> Cell {
 }
 
 fn range(range: &ValueRange) -> Line {
-    let limit = |value, exclusive, word: &str| {
-        let exclusive = if exclusive { word } else { "" };
-        format!("{exclusive}{}", number(value))
-    };
-    let words = format!(
-        "{} to {}",
-        limit(range.lower, range.lower_exclusive, "above "),
-        limit(range.upper, range.upper_exclusive, "below ")
-    );
-    explained(vec![text(words)], &range.interpretation)
+    let limits = format!("{range:.PLACES$}");
+    explained(vec![text(limits)], &range.interpretation)
 }
 
 fn explained(mut line: Line, words: &str) -> Line {
@@ -51,15 +44,8 @@ fn explained(mut line: Line, words: &str) -> Line {
     line
 }
 
-/// A limit, without excess digits of π.
-fn number(value: f64) -> String {
-    let shortened = (value * 1e6).round() / 1e6;
-    if shortened != 0.0 && (shortened - value).abs() < 1e-6 {
-        shortened.to_string()
-    } else {
-        value.to_string()
-    }
-}
+/// Decimal places of limits, so that π does not show excess digits.
+const PLACES: usize = 6;
 
 /// Three significant digits.
 fn significant(value: f64) -> String {

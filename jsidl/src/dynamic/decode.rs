@@ -72,7 +72,7 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
                 },
             ));
         }
-        self.told(0, Part::Code(message));
+        self.record(0, Part::Code(message));
         let value = if message.header.is_none() && message.footer.is_none() {
             self.section(message.body.as_ref())?
                 .unwrap_or(Value::Group(Vec::new()))
@@ -101,7 +101,7 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
             Shape::Bits(bits) => {
                 let start = self.position;
                 let raw = self.unsigned(bits.base)?;
-                self.told(start, Part::Bits(bits, raw));
+                self.record(start, Part::Bits(bits, raw));
                 Value::Bits(raw)
             }
             Shape::FixedString { length } => Value::Text(self.padded(*length)?),
@@ -112,7 +112,7 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
             Shape::FormattedBlob { formats, count } => {
                 let start = self.position;
                 let [format] = self.array()?;
-                self.told(start, Part::Format(formats, format));
+                self.record(start, Part::Format(formats, format));
                 let name = formats.iter().find(|known| known.index == format);
                 let name = name.map_or("", |known| &known.name);
                 Value::Formatted {
@@ -125,7 +125,7 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
                 let [index] = self.array()?;
                 let choice = choices.iter().find(|choice| choice.index == index);
                 let choice = choice.ok_or(Fault::at(offset, DecodeProblem::Index { index }))?;
-                self.told(offset, Part::Index(choice));
+                self.record(offset, Part::Index(choice));
                 Value::Measure {
                     index,
                     number: self.scalar(&choice.scalar)?,
@@ -180,7 +180,7 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
             .and_then(|shift| u64::MAX.checked_shl(shift))
             .map_or(0, |mask| vector & mask);
         if undefined == 0 {
-            self.told(offset, Part::Presence(group, width, vector));
+            self.record(offset, Part::Presence(group, width, vector));
             Ok(vector)
         } else {
             Err(Fault::at(
@@ -229,14 +229,14 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
             .and_then(|tag| variant.alternatives.get(tag));
         match chosen {
             Some(item) => {
-                self.told(offset, Part::Tag(variant, tag));
+                self.record(offset, Part::Tag(variant, tag));
                 Ok(Value::Variant {
                     tag,
                     value: Some(Box::new(self.member(item)?)),
                 })
             }
             None if alternatives == 0 && tag == 0 => {
-                self.told(offset, Part::Tag(variant, tag));
+                self.record(offset, Part::Tag(variant, tag));
                 Ok(Value::Variant { tag, value: None })
             }
             None => Err(Fault::at(offset, DecodeProblem::Tag { tag, alternatives })),
@@ -247,7 +247,7 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
     fn padded(&mut self, length: u32) -> Read<Vec<u8>> {
         let start = self.position;
         let octets = self.take(u64::from(length))?;
-        self.told(start, Part::Text);
+        self.record(start, Part::Text);
         let end = octets
             .iter()
             .rposition(|&octet| octet != 0)
@@ -260,7 +260,7 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
         let length = self.count(count)?;
         let start = self.position;
         let octets = self.take(length)?.to_vec();
-        self.told(start, part);
+        self.record(start, part);
         Ok(octets)
     }
 
@@ -268,7 +268,7 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
         let offset = self.position;
         let number = self.unsigned(count.unsigned)?;
         if self.limits.admit(count, number) {
-            self.told(offset, Part::Count(count, number));
+            self.record(offset, Part::Count(count, number));
             Ok(number)
         } else {
             let Count { min, max, .. } = *count;
@@ -286,7 +286,7 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
     fn scalar(&mut self, scalar: &'m Scalar) -> Read<Raw> {
         let start = self.position;
         let raw = self.number(scalar.number)?;
-        self.told(start, Part::Number(scalar, raw));
+        self.record(start, Part::Number(scalar, raw));
         Ok(raw)
     }
 
@@ -340,7 +340,7 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
     }
 
     /// Traces the octets since `start`.
-    fn told(&mut self, start: usize, part: Part<'m>) {
+    fn record(&mut self, start: usize, part: Part<'m>) {
         self.trace.read(start..self.position, part);
     }
 

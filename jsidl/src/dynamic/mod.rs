@@ -26,7 +26,7 @@ pub use decode::{decode, decode_with};
 pub use encode::{encode, encode_with};
 pub use error::{DecodeError, DecodeProblem, EncodeError, EncodeProblem, Path, Step};
 #[cfg(feature = "json")]
-pub use json::{JsonError, JsonProblem, from_json, to_json};
+pub use json::{JsonError, JsonProblem, Leaf, for_each_number, from_json, to_json};
 pub use scale::{Steps, raw_from_real, real_from_raw, shortest_real};
 pub use value::{Raw, Value};
 

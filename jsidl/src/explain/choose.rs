@@ -13,7 +13,8 @@ use crate::model::{Id, Message, Service, Version};
 const DEEPEST: usize = 4;
 
 /// A service name given by a user: the URN or its last part, with or without a version, as in
-/// `urn:jaus:jss:core:Events`, `urn:jaus:jss:core:Events 1.0` and `Events@1.0`.
+/// `urn:jaus:jss:core:Events`, `urn:jaus:jss:core:Events@1.0` and `Events@1.0`. A space may stand for
+/// the `@`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ServiceName {
     /// The URN, or the part after its last colon.
@@ -63,7 +64,7 @@ impl fmt::Display for ServiceName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.urn)?;
         self.version
-            .map_or(Ok(()), |version| write!(f, " {version}"))
+            .map_or(Ok(()), |version| write!(f, "@{version}"))
     }
 }
 
@@ -84,7 +85,7 @@ pub enum Unexplained {
         code: u16,
     },
     /// No service has this name.
-    #[error("there is no service {name}{}", .similar.as_ref().map_or_else(String::new, |id| format!("; did you mean {id}?")))]
+    #[error("there is no service {name}{}", .similar.as_ref().map_or_else(String::new, |id| format!("; did you mean {}@{}?", id.urn, id.version)))]
     UnknownService {
         /// The requested name.
         name: ServiceName,
@@ -110,7 +111,8 @@ pub enum Unexplained {
 }
 
 fn listed(ids: &[Id]) -> String {
-    let ids: Vec<_> = ids.iter().map(ToString::to_string).collect();
+    let in_words = |id: &Id| format!("{}@{}", id.urn, id.version);
+    let ids: Vec<_> = ids.iter().map(in_words).collect();
     ids.join(", ")
 }
 

@@ -87,13 +87,11 @@ pub(super) fn scalar_facts(scalar: &Scalar) -> Vec<String> {
 /// The ranges of a value set.
 pub(super) fn ranges(set: &ValueSet) -> Option<String> {
     let range = |range: &ValueRange| {
-        let lower = if range.lower_exclusive { "above " } else { "" };
-        let upper = if range.upper_exclusive { "below " } else { "" };
         let meaning = match prose(&range.interpretation) {
             text if text.is_empty() => text,
             text => format!(" ({})", text.trim_end_matches('.')),
         };
-        format!("{lower}{} to {upper}{}{meaning}", range.lower, range.upper)
+        format!("{range}{meaning}")
     };
     let ranges: Vec<_> = set.ranges.iter().map(range).collect();
     (!ranges.is_empty()).then(|| ranges.join(" or "))

@@ -11,7 +11,6 @@ mod choices;
 mod decode;
 mod docs;
 mod encode;
-mod fingerprint;
 mod ident;
 mod layout;
 mod machine;
@@ -35,6 +34,7 @@ use self::machine::Messages;
 use self::messages::Plan;
 use self::registry::ServicePaths;
 use self::writer::Writer;
+use crate::fingerprint;
 use crate::library::Library;
 use crate::model::{Id, Message, Service, Version};
 

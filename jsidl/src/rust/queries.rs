@@ -2,13 +2,13 @@
 
 use std::collections::HashMap;
 
-use super::fingerprint;
 use super::ident::Names;
 use super::layout::Layout;
 use super::messages::Plan;
 use super::selections::{Record, Selection, Step, selections};
 use super::types::{Field, Kind, Type, shared_key};
 use super::writer::Writer;
+use crate::fingerprint;
 use crate::model::Item;
 
 /// Implements `Query` if the message is a query with a report in the set. `shared` has the types
@@ -198,8 +198,8 @@ fn keys(key: &Field<'_>, report: &Layout<'_>) -> Option<[String; 2]> {
         } => Some((*number, format!("{}.0", field.ident))),
         _ => None,
     };
-    let (asked, told) = (number(key)?, number(same)?);
-    (asked.0 == told.0 && !same.item.optional).then_some([asked.1, told.1])
+    let (query, report) = (number(key)?, number(same)?);
+    (query.0 == report.0 && !same.item.optional).then_some([query.1, report.1])
 }
 
 /// Writes the statements that drop what a vector does not request from a record of the report.
@@ -220,13 +220,13 @@ fn drop_fields(
                 (place, blocks) = ("item".to_owned(), blocks + 1);
                 if let Some(List {
                     member,
-                    keys: Some([asked, told]),
+                    keys: Some([query, report]),
                     ..
                 }) = list.take()
                 {
                     out.push(format!("let mut requests = self.{member}.iter();"));
                     out.push(format!(
-                        "let Some(request) = requests.find(|it| it.{asked} == item.{told}) else {{"
+                        "let Some(request) = requests.find(|it| it.{query} == item.{report}) else {{"
                     ));
                     out.push("continue;\n};");
                     request = "request";

@@ -7,8 +7,8 @@ use std::collections::HashMap;
 
 use heck::ToUpperCamelCase;
 
-use super::fingerprint;
 use super::ident::Names;
+use crate::fingerprint;
 use crate::model::{
     Array, BitField, Choice, Count, Group, Item, Meaning, NamedValue, Number, Scalar, Scale, Shape,
     SubField, Unsigned, ValueSet, Variant,

@@ -88,6 +88,12 @@ fn names_and_limits_leave_the_wire_as_it_is() {
         ],
     );
     check(
+        "enum_const=\"On\"/>",
+        "enum_const=\"On\"/><value_range lower_limit=\"1\" lower_limit_type=\"exclusive\" \
+         upper_limit=\"9\" upper_limit_type=\"inclusive\"/>",
+        &["same SetLights D001.LightsRec.Mode: the allowed range is above 1 to 9, was absent"],
+    );
+    check(
         "version=\"1.0\"",
         "version=\"1.1\"",
         &["same : the version is 1.1, was 1.0"],

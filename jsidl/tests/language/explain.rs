@@ -165,11 +165,11 @@ fn what_cannot_be_looked_up_is_refused_with_advice() {
     );
     assert_eq!(
         said(&[0x00, 0x2B], Some("urn:jaus:jss:core:Discover")),
-        "there is no service urn:jaus:jss:core:Discover; did you mean urn:jaus:jss:core:Discovery 1.1?"
+        "there is no service urn:jaus:jss:core:Discover; did you mean urn:jaus:jss:core:Discovery@1.1?"
     );
     assert_eq!(
         said(&[0x00, 0x2B], Some("Time 1.0")),
-        "Time 1.0 has no message 2B00h; it is defined in urn:jaus:jss:core:Discovery 1.0, urn:jaus:jss:core:Discovery 1.1"
+        "Time@1.0 has no message 2B00h; it is defined in urn:jaus:jss:core:Discovery@1.0, urn:jaus:jss:core:Discovery@1.1"
     );
     assert_eq!(
         "Time 1".parse::<jsidl::explain::ServiceName>(),

@@ -1,6 +1,8 @@
 //! Merged state machines: their diagrams, how they run, and the soundness of the published ones.
 
-use jaus_test_kit::evidence;
+use std::path::Path;
+
+use jaus_test_kit::{evidence, snapshot};
 use jsidl::behaviour::{Name, Transition, TransitionKind};
 use jsidl::machine::{Machine, Outcome, Run, Stimulus, dot, mermaid};
 use jsidl::model::Service;
@@ -32,49 +34,9 @@ fn a_machine_is_drawn_with_all_that_it_does() {
     let library = library(LAMP);
     let service = library.services().next().expect("sound");
     let machine = &library.machines(service)[0];
-    insta::assert_snapshot!(mermaid(machine), @r#"
-    stateDiagram-v2
-        [*] --> s1
-        state "Up" as s0 {
-            [*] --> s1
-            state "Dark" as s1
-            state "Lit" as s2
-        }
-        s1 --> s2 : Test, with return
-        s2 --> s2 : Test, with return
-        s1 --> s2 : Switch [may() && !late('x')] / Send('Gone')
-        s2 --> s2 : Flash / click()
-        note right of s1
-            entry / cool()
-        end note
-        note right of s2
-            entry / warm()
-            exit / fade()
-            Back, then return
-            Tick / glow()
-        end note
-    "#);
-    insta::assert_snapshot!(dot(machine), @r#"
-    digraph machine {
-        compound=true;
-        newrank=true;
-        rankdir=LR;
-        node [shape=box, style=rounded, fontname="sans-serif"];
-        edge [fontname="sans-serif", fontsize=10];
-        graph [fontname="sans-serif", style=rounded, labeljust=l];
-        start [shape=point, width=0.2, label=""];
-        subgraph cluster_s0 {
-            label="Up\n";
-            s1 [label="Dark\nentry / cool()\l"];
-            s2 [label="Lit\nentry / warm()\lexit / fade()\lBack, then return\lTick / glow()\l"];
-        }
-        start -> s1;
-        s1 -> s2 [label="Test, with return"];
-        s2 -> s2 [label="Test, with return"];
-        s1 -> s2 [label="Switch [may() && !late('x')] / Send('Gone')"];
-        s2 -> s2 [label="Flash / click()"];
-    }
-    "#);
+    let diagrams = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/language/machines");
+    snapshot::check(diagrams.join("lamp.mmd"), &mermaid(machine));
+    snapshot::check(diagrams.join("lamp.dot"), &dot(machine));
 }
 
 #[test]

@@ -15,9 +15,8 @@ use tokio::sync::watch;
 use super::member_table::MemberTable;
 use crate::address::JausId;
 use crate::codec::Message;
-use crate::component::driver::sleep_until;
 use crate::component::{Component, SubscribeError, Subscription, Update};
-use crate::node::now;
+use crate::node::{now, sleep_until};
 use crate::service::Audience;
 use crate::service::{Outage, Topic};
 
@@ -28,6 +27,20 @@ use crate::service::{Outage, Topic};
 /// [`Subscription`]. A member that Discovery loses, or that withdraws its service, is `Gone`, and
 /// is subscribed to again when it returns. A member that refuses is retried at growing intervals.
 /// All this happens only while [`next`](Self::next) is awaited.
+///
+/// ```no_run
+/// # use jaus::component::{GroupSubscription, GroupUpdate};
+/// # use jaus::messages::mobility::ReportVelocityState;
+/// # async fn example(mut speeds: GroupSubscription<ReportVelocityState>) {
+/// while let Some((sensor, update)) = speeds.next().await {
+///     match update {
+///         GroupUpdate::Report(report) => println!("{sensor}: {:?}", report.velocity_x_m_per_s()),
+///         GroupUpdate::NotSubscribed { why, .. } => eprintln!("{sensor}: {why}"),
+///         other => println!("{sensor}: {other:?}"),
+///     }
+/// }
+/// # }
+/// ```
 pub struct GroupSubscription<R> {
     component: Component,
     audience: Audience,

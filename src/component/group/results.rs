@@ -7,6 +7,20 @@ use std::task::Poll;
 use crate::address::JausId;
 
 /// The result at each member of a group, in order of their ids.
+///
+/// ```no_run
+/// # use jaus::component::{Audience, Component};
+/// # use jaus::messages::core::QueryIdentification;
+/// # use jaus::messages::mobility::primitive_driver;
+/// # async fn example(operator: Component) {
+/// let drivers = Audience::from(primitive_driver::LATEST);
+/// let results = operator.query_all(drivers, &QueryIdentification::default()).await;
+/// for (member, error) in results.failures() {
+///     eprintln!("{member}: {error}");
+/// }
+/// assert_eq!(results.is_complete(), results.successes().count() == results.len());
+/// # }
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[must_use = "a group does not fail as a whole: check each member's result"]
 pub struct Results<T, E>(Vec<(JausId, Result<T, E>)>);
@@ -123,7 +137,7 @@ mod tests {
         let results = of_each(members(20), 3, work).await;
         assert_eq!((results.len(), most.get()), (20, 3));
         assert_eq!(results.successes().count(), 10);
-        assert!(results.failures().all(|(member, told)| member == *told));
+        assert!(results.failures().all(|(member, other)| member == *other));
         let order: Vec<JausId> = results.iter().map(|(member, _)| member).collect();
         assert_eq!(order, members(20));
     }

@@ -10,22 +10,26 @@ use crate::peer::{self, Assignment, LargeStyle, Recogniser};
 
 impl Peers {
     /// The profile of a peer: the configured one, or the one recognised with certainty.
-    pub(in crate::endpoint) fn profile(&self, id: JausId) -> peer::Peer {
+    pub(in crate::endpoint) fn profile(&self, id: JausId) -> peer::Implementation {
         self.assigned_or(id, Recogniser::certain)
     }
 
     /// The same, but falls back to a presumed profile, for uses where a wrong guess does little
     /// harm.
-    pub(in crate::endpoint) fn presumed(&self, id: JausId) -> peer::Peer {
+    pub(in crate::endpoint) fn presumed(&self, id: JausId) -> peer::Implementation {
         self.assigned_or(id, Recogniser::presumed)
     }
 
-    fn assigned_or(&self, id: JausId, by: fn(&Recogniser) -> peer::Peer) -> peer::Peer {
+    fn assigned_or(
+        &self,
+        id: JausId,
+        by: fn(&Recogniser) -> peer::Implementation,
+    ) -> peer::Implementation {
         let recognised = || self.get(id).map(|state| by(&state.recogniser));
         self.assigned(id).or_else(recognised).unwrap_or_default()
     }
 
-    fn assigned(&self, id: JausId) -> Option<peer::Peer> {
+    fn assigned(&self, id: JausId) -> Option<peer::Implementation> {
         Assignment::find(&self.config.profiles, id)
     }
 

@@ -35,7 +35,7 @@ pub struct Peer {
     /// When its latest message arrived.
     pub last_heard: Instant,
     /// Its profile: the configured one, or the one recognised with certainty.
-    pub profile: peer::Peer,
+    pub profile: peer::Implementation,
     /// Messages from it, including fragments and acknowledgements, without duplicates.
     pub received: Traffic,
     /// Unicast messages from local components to it.
@@ -114,7 +114,7 @@ impl PeerState {
                 version: frame.version,
                 first_heard: now,
                 last_heard: now,
-                profile: peer::Peer::Standard,
+                profile: peer::Implementation::Standard,
                 received,
                 sent: Traffic::default(),
                 duplicates: 0,

@@ -1,7 +1,7 @@
 //! How long a repetition counts as a duplicate, and which messages are remembered.
 
 use super::*;
-use crate::peer::{Assignment, Peer as Known};
+use crate::peer::{Assignment, Implementation as Known};
 
 const MILLISECOND: Duration = Duration::from_millis(1);
 

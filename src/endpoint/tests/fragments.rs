@@ -433,7 +433,7 @@ fn octets_that_happen_to_repeat_are_not_taken_for_a_repeated_code() {
     let configured = Config {
         profiles: vec![crate::peer::Assignment {
             id: JausId::EVERYONE,
-            profile: crate::peer::Peer::Standard,
+            profile: crate::peer::Implementation::Standard,
         }],
         ..Config::default()
     };

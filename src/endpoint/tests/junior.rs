@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use super::*;
-use crate::peer::{Assignment, Peer as Known};
+use crate::peer::{Assignment, Implementation as Known};
 use crate::wire::DataControl;
 
 const CODE: [u8; 2] = [0xF0, 0xD7];

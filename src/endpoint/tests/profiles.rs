@@ -1,7 +1,7 @@
 //! Special handling of peers that depart from the standard, and only of those.
 
 use super::*;
-use crate::peer::{Assignment, Peer as Known};
+use crate::peer::{Assignment, Implementation as Known};
 use crate::wire::{DataControl, Kind};
 
 const CODE: [u8; 2] = [0x01, 0x4B];

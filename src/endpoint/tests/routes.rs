@@ -449,9 +449,9 @@ fn what_was_seen_of_a_peer_ends_when_its_numbers_begin_anew() {
         ..from_peer(REGISTRATION)
     });
     let profile = |rig: &Rig| rig.endpoint.peers().next().unwrap().profile;
-    assert_eq!(profile(&rig), crate::peer::Peer::JausPlusPlus);
+    assert_eq!(profile(&rig), crate::peer::Implementation::JausPlusPlus);
     rig.hear(&again(1));
-    assert_eq!(profile(&rig), crate::peer::Peer::Standard);
+    assert_eq!(profile(&rig), crate::peer::Implementation::Standard);
 }
 
 #[test]

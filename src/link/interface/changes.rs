@@ -102,3 +102,13 @@ mod elsewhere {
         pub(crate) const fn forget(&mut self) {}
     }
 }
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::Changes;
+
+    #[tokio::test]
+    async fn linux_announces_changes() {
+        assert!(Changes::open().are_announced());
+    }
+}

@@ -60,7 +60,8 @@ pub enum Address {
     Tcp(SocketAddr),
 }
 
-/// Whether a node serves other processes: `off`, or an [`Address`].
+/// Whether a node serves the component processes of its host: `off`, or where, as an [`Address`]:
+/// `default`, the path of a socket, or a port of loopback such as `127.0.0.1:3795`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Local {
     /// It does not.

@@ -31,7 +31,8 @@ use deku::no_std_io::{Read, Seek, Write};
 use deku::prelude::*;
 
 use crate::address::JausId;
-use crate::endpoint::{LinkId, Path, Remote, Shortfall};
+use crate::codec::Text;
+use crate::endpoint::{LinkId, Path, Remote, SessionId, Shortfall};
 use crate::wire::Flags;
 
 /// The version of the format.
@@ -203,11 +204,7 @@ impl Record {
     /// With a name or an explanation, of which at most 255 octets are kept.
     #[must_use]
     pub fn with_text(head: Head, text: &str) -> Self {
-        let mut end = text.len().min(LONGEST_TEXT);
-        while !text.is_char_boundary(end) {
-            end -= 1;
-        }
-        let payload = Bytes::copy_from_slice(&text.as_bytes()[..end]);
+        let payload = Text::from(Text::prefix(text, LONGEST_TEXT)).into();
         Self { head, payload }
     }
 
@@ -298,6 +295,10 @@ fn read_path<R: Read + Seek>(reader: &mut Reader<R>) -> Result<Option<Path>, Dek
     let link = LinkId(u16::from_reader_with_ctx(reader, Endian::Little)?);
     let peer = match place {
         1 => Remote::Line,
+        3 => Remote::Session(SessionId(u64::from_reader_with_ctx(
+            reader,
+            Endian::Little,
+        )?)),
         2 => {
             let ip = Ipv6Addr::from_reader_with_ctx(reader, Endian::Big)?;
             let (port, scope) = DekuReader::from_reader_with_ctx(reader, Endian::Little)?;
@@ -319,8 +320,13 @@ fn write_path<W: Write + Seek>(
     let Some(Path { link, peer }) = path else {
         return 0_u8.to_writer(writer, ());
     };
-    let Remote::Socket(address) = peer else {
-        return (1_u8, link.0).to_writer(writer, endian);
+    let address = match peer {
+        Remote::Line => return (1_u8, link.0).to_writer(writer, endian),
+        Remote::Session(SessionId(number)) => {
+            (3_u8, link.0).to_writer(writer, endian)?;
+            return number.to_writer(writer, endian);
+        }
+        Remote::Socket(address) => address,
     };
     let (ip, scope) = match address {
         SocketAddr::V4(address) => (address.ip().to_ipv6_mapped(), 0),

@@ -2,7 +2,7 @@
 
 use serial2_tokio as serial2;
 
-/// The settings of a [`SerialLink`](super::SerialLink). Characters have 8 bits, as the framing
+/// A serial line. Both ends need the same settings. Characters have 8 bits, as the framing
 /// requires.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

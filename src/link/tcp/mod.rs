@@ -214,7 +214,7 @@ impl TcpLink {
         match transmit.to {
             To::Peer(Remote::Socket(peer)) => self.send_to(peer, transmit),
             // Not a peer of this link.
-            To::Peer(Remote::Line) => {}
+            To::Peer(Remote::Line | Remote::Session(_)) => {}
             To::Group => self.send_to_all(transmit.priority, &transmit.payload),
         }
     }

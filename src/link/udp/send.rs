@@ -50,7 +50,7 @@ impl UdpLink {
             }
             To::Group => self.enqueue_for_all(priority, octets, transmit.segment),
             // Not a peer of this link.
-            To::Peer(Remote::Line) => {}
+            To::Peer(Remote::Line | Remote::Session(_)) => {}
         }
     }
 

@@ -10,7 +10,7 @@ use crate::link::{Interface, InvalidGroup};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum PortTaken {
-    /// Fail with [`Error::PortTaken`](crate::link::Error::PortTaken).
+    /// Refuse to start, with an error.
     #[default]
     Refuse,
     /// Use any free port instead, and log a warning. Peers learn the port from our datagrams.

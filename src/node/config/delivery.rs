@@ -13,7 +13,7 @@ const WINDOWS: RangeInclusive<usize> = 2..=16_384;
 const BURSTS: RangeInclusive<usize> = 8192..=1 << 30;
 const LONGEST_PACKING: Duration = Duration::from_secs(1);
 
-/// Delivery of messages beyond the network's best effort.
+/// Acknowledgement, packing and pacing of messages.
 ///
 /// ```toml
 /// [delivery]
@@ -51,7 +51,7 @@ pub struct Delivery {
     )]
     pub packing: Packing,
     /// Octets of a receive buffer that the fragments of an unacknowledged large message may fill at
-    /// once; 8192 to 1 GiB. See [`Pacing`].
+    /// once; 8192 to 1 GiB.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub pace_burst: usize,
     /// Octets of a receive buffer that the receiver is assumed to read per second; 0 disables

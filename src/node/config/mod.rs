@@ -55,7 +55,7 @@ use std::path::PathBuf;
 pub use self::delivery::Delivery;
 pub use self::error::ConfigError;
 use self::error::{in_range, not_zero};
-pub use self::peer::Peer;
+pub use self::peer::PeerAddress;
 pub use self::tcp::Tcp;
 use super::mailbox::MailboxLimits;
 use crate::address::JausId;
@@ -110,7 +110,7 @@ pub struct Config {
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub receive_buffer: usize,
     /// Peers that also get all multicast traffic by unicast.
-    pub peers: Vec<Peer>,
+    pub peers: Vec<PeerAddress>,
     /// The limit of payload octets in one packet, 64 to 4079. The default, 1425, keeps a packet
     /// within one Ethernet frame.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
@@ -256,7 +256,7 @@ impl Config {
 
     /// Connects to a peer by TCP.
     #[must_use]
-    pub fn tcp_connect(mut self, peer: Peer) -> Self {
+    pub fn tcp_connect(mut self, peer: PeerAddress) -> Self {
         self.tcp.connect.push(peer);
         self
     }
@@ -271,7 +271,7 @@ impl Config {
 
     /// Adds a peer that is also sent to by unicast.
     #[must_use]
-    pub fn peer(mut self, peer: Peer) -> Self {
+    pub fn peer(mut self, peer: PeerAddress) -> Self {
         self.peers.push(peer);
         self
     }
@@ -341,13 +341,13 @@ impl Config {
     }
 
     /// Whether UDP is in use. Junior replaces it, and an empty list of interfaces disables it if
-    /// another link or a local address is configured.
-    pub(super) fn uses_udp(&self) -> bool {
+    /// another link or a local address is configured, or the node `has_custom` links.
+    pub(super) fn uses_udp(&self, has_custom: bool) -> bool {
         #[cfg(unix)]
         if self.junior.is_some() {
             return false;
         }
-        let another_way = self.has_streams() || matches!(self.local, Local::At(_));
+        let another_way = has_custom || self.has_streams() || matches!(self.local, Local::At(_));
         self.interfaces != Interfaces::Only(Vec::new()) || !another_way
     }
 

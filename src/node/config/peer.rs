@@ -10,17 +10,16 @@ use crate::as_text::serde_as_text;
 use crate::link::Place;
 
 /// A peer to send to by unicast from the start: `10.0.0.2`, which means port 3794, `10.0.0.2:3795`,
-/// `[fe80::2%eth0]:3794`, or with its id in front `102.1.1@10.0.0.2`.
-///
-/// With an id (which may have the wildcards 65535 and 255), messages for it go there before it has
-/// sent any, and its address is never learned again.
+/// `[fe80::2%eth0]:3794`, or with its id in front `102.1.1@10.0.0.2`. With an id (which may have the
+/// wildcards 65535 and 255), messages for it go there before it has sent any, and its address is
+/// never learned again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Peer {
+pub struct PeerAddress {
     id: Option<JausId>,
     place: Place,
 }
 
-impl Peer {
+impl PeerAddress {
     /// The id, or pattern of ids, at this address, if known.
     #[must_use]
     pub const fn id(self) -> Option<JausId> {
@@ -35,7 +34,7 @@ impl Peer {
     }
 }
 
-impl FromStr for Peer {
+impl FromStr for PeerAddress {
     type Err = ConfigError;
 
     fn from_str(text: &str) -> Result<Self, ConfigError> {
@@ -52,7 +51,7 @@ impl FromStr for Peer {
     }
 }
 
-impl fmt::Display for Peer {
+impl fmt::Display for PeerAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(id) = self.id {
             write!(f, "{id}@")?;
@@ -61,7 +60,7 @@ impl fmt::Display for Peer {
     }
 }
 
-serde_as_text!(Peer);
+serde_as_text!(PeerAddress);
 
 #[cfg(test)]
 mod tests {
@@ -70,19 +69,19 @@ mod tests {
     #[test]
     fn a_peer_is_an_address_with_or_without_port_and_id() {
         assert_eq!(
-            "10.0.0.2".parse::<Peer>().unwrap().to_string(),
+            "10.0.0.2".parse::<PeerAddress>().unwrap().to_string(),
             "10.0.0.2:3794"
         );
         assert_eq!(
-            "10.0.0.2:9".parse::<Peer>().unwrap().to_string(),
+            "10.0.0.2:9".parse::<PeerAddress>().unwrap().to_string(),
             "10.0.0.2:9"
         );
-        let named: Peer = "101.255.255@10.0.0.2".parse().unwrap();
+        let named: PeerAddress = "101.255.255@10.0.0.2".parse().unwrap();
         assert_eq!(named.to_string(), "101.255.255@10.0.0.2:3794");
         assert_eq!(named.id(), Some(JausId::new(101, 255, 255)));
         assert!(
             "101.1@10.0.0.2"
-                .parse::<Peer>()
+                .parse::<PeerAddress>()
                 .unwrap_err()
                 .to_string()
                 .contains("\"101.1\"")
@@ -95,7 +94,7 @@ mod tests {
             "0.0.0.0",
             "10.0.0.2:70000",
         ] {
-            let error = wrong.parse::<Peer>().unwrap_err().to_string();
+            let error = wrong.parse::<PeerAddress>().unwrap_err().to_string();
             assert!(error.contains(&format!("`{wrong}`")), "{error}");
         }
     }

@@ -6,7 +6,7 @@ use std::net::SocketAddr;
 
 #[cfg(feature = "serde")]
 use super::ConfigError;
-use super::Peer;
+use super::PeerAddress;
 use crate::endpoint::Access;
 #[cfg(feature = "serde")]
 use crate::link::STANDARD_PORT;
@@ -30,7 +30,7 @@ pub struct Tcp {
     pub listen: Option<SocketAddr>,
     /// Peers to connect to. With an id (or a pattern of ids) in front, messages for it go there
     /// before it has sent any.
-    pub connect: Vec<Peer>,
+    pub connect: Vec<PeerAddress>,
     /// Limit of accepted connections.
     pub max_accepted: usize,
     /// Limit of accepted connections from one IPv4 address, or from the 64-bit network of an IPv6

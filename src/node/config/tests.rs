@@ -77,16 +77,16 @@ mod toml_files {
             .unwrap()
         };
         let tcp = read("tcp = { connect = [\"10.0.0.7\"] }");
-        assert!(!tcp.uses_udp() && read("").uses_udp());
+        assert!(!tcp.uses_udp(false) && read("").uses_udp(false));
         assert_eq!(tcp.validate(), Ok(()));
         #[cfg(feature = "serial")]
         {
             let serial = read("[[serial]]\ndevice = \"/dev/ttyUSB0\"");
-            assert!(!serial.uses_udp());
+            assert!(!serial.uses_udp(false));
             assert_eq!(serial.validate(), Ok(()));
         }
         let local = Config::loopback(1, 1).local(Address::Default);
-        assert!(local.uses_udp() && !local.without_udp().uses_udp());
+        assert!(local.uses_udp(false) && !local.without_udp().uses_udp(false));
         let closed = read("tcp = { listen = \"0.0.0.0\", max_accepted = 0 }").validate();
         assert!(closed.unwrap_err().to_string().contains("choose 1 or more"));
     }
@@ -142,8 +142,11 @@ mod toml_files {
         let config: Config = toml::from_str(text).unwrap();
         let endpoint = config.endpoint(0);
         let found = |id: &str| Assignment::find(&endpoint.profiles, id.parse().unwrap());
-        assert_eq!(found("7.1.33"), Some(crate::peer::Peer::JausPlusPlus));
-        assert_eq!(found("8.1.1"), Some(crate::peer::Peer::Iop));
+        assert_eq!(
+            found("7.1.33"),
+            Some(crate::peer::Implementation::JausPlusPlus)
+        );
+        assert_eq!(found("8.1.1"), Some(crate::peer::Implementation::Iop));
         assert_eq!(found("8.1.2"), None);
         let wrong = error("[[profile]]\nid = \"7.1.1\"\nprofile = \"jauspp\"");
         assert!(

@@ -38,6 +38,18 @@ use crate::link::local::{Address, Error, Reader, Writer, connect};
 const HANDSHAKE: Duration = Duration::from_secs(5);
 
 /// The node of this host, for a component of another process.
+///
+/// ```no_run
+/// # use jaus::node::{Address, Host, HostError, MailboxLimits};
+/// # async fn example() -> Result<(), HostError> {
+/// let host = Host::at(Address::Path("/run/jaus/node.sock".into()))
+///     .name("wheels")
+///     .mailbox(MailboxLimits { messages: 64, octets: 1 << 16 });
+/// let port = host.attach(33).await?;
+/// println!("attached as {}", port.id());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Host {
     address: Address,

@@ -57,7 +57,7 @@ fn with_code_in_each(octets: usize, payload: usize) -> Vec<Frame> {
 fn nothing_is_known_of_who_keeps_to_the_standard() {
     let frames: Vec<_> = (500..520).map(|number| frame(number, QUERY)).collect();
     assert_eq!(after(&frames), Verdict::default());
-    assert_eq!(Recogniser::default().certain(), Peer::Standard);
+    assert_eq!(Recogniser::default().certain(), Implementation::Standard);
 }
 
 #[test]
@@ -65,7 +65,7 @@ fn jauspp_is_certain_by_its_fragments_and_nobody_by_others() {
     let verdict = after(&with_code_in_each(5000, 1573));
     assert_eq!(
         (verdict.peer, verdict.certainty),
-        (Peer::JausPlusPlus, Certainty::Certain)
+        (Implementation::JausPlusPlus, Certainty::Certain)
     );
     assert_eq!(verdict.reasons, [Sign::RepeatedCode]);
     let other_length = after(&with_code_in_each(5000, 1425));
@@ -86,9 +86,13 @@ fn stale_octets_make_jauspp_likely_and_a_registration_from_elsewhere_makes_it_ce
     let verdict = recogniser.verdict();
     assert_eq!(
         (verdict.peer, verdict.certainty),
-        (Peer::JausPlusPlus, Certainty::Likely)
+        (Implementation::JausPlusPlus, Certainty::Likely)
     );
-    assert_eq!(recogniser.certain(), Peer::Standard, "likely is not enough");
+    assert_eq!(
+        recogniser.certain(),
+        Implementation::Standard,
+        "likely is not enough"
+    );
     let registration = RegisterServices {
         service_list: vec![register_services::ServiceRec {
             uri: Text::from("urn:jaus:jss:core:Events"),
@@ -104,7 +108,7 @@ fn stale_octets_make_jauspp_likely_and_a_registration_from_elsewhere_makes_it_ce
         },
         0,
     );
-    assert_eq!(recogniser.certain(), Peer::JausPlusPlus);
+    assert_eq!(recogniser.certain(), Implementation::JausPlusPlus);
     let reasons = recogniser.verdict().reasons;
     assert_eq!(
         reasons,
@@ -118,30 +122,33 @@ fn stale_octets_make_jauspp_likely_and_a_registration_from_elsewhere_makes_it_ce
 
 #[test]
 fn services_tell_jauspp_and_the_profiles() {
-    let verdict = |services: &[(&str, u8, u8)]| {
+    let after = |services: &[(&str, u8, u8)]| {
         let mut recogniser = Recogniser::default();
         recogniser.handle_services(services.iter().copied());
-        recogniser.certain()
+        recogniser
     };
-    assert_eq!(
-        verdict(&[("urn:jaus:jss:jpp:extras:Video", 1, 0)]),
-        Peer::JausPlusPlus
-    );
-    assert_eq!(verdict(&[("urn:jaus:jss:iop:CostMap2D", 1, 1)]), Peer::Iop);
-    assert_eq!(
-        verdict(&[("urn:jaus:jss:core:Events", 1, 0)]),
-        Peer::Standard
-    );
+    let of_jauspp = after(&[("urn:jaus:jss:jpp:extras:Video", 1, 0)]);
+    assert_eq!(of_jauspp.certain(), Implementation::JausPlusPlus);
+    // Any peer may offer these, for instance our own vehicle.
+    let mut of_profile = after(&[("urn:jaus:jss:iop:CostMap2D", 1, 1)]);
+    assert_eq!(of_profile.verdict().certainty, Certainty::Unknown);
+    assert_eq!(of_profile.presumed(), Implementation::Iop, "a 0 of it means all");
+    of_profile.note(Sign::ZeroInDestination);
+    assert_eq!(of_profile.certain(), Implementation::Iop);
+    let of_core = after(&[("urn:jaus:jss:core:Events", 1, 0)]);
+    assert_eq!(of_core.certain(), Implementation::Standard);
+    assert_eq!(of_core.presumed(), Implementation::Standard);
 }
 
 #[test]
 fn junior_of_the_tool_set_confuses_ids_with_zero_octets() {
-    let confused =
-        |one: &str, other: &str| Peer::Jts.confuses(one.parse().unwrap(), other.parse().unwrap());
+    let confused = |one: &str, other: &str| {
+        Implementation::Jts.confuses(one.parse().unwrap(), other.parse().unwrap())
+    };
     assert!(confused("1.1.1", "513.1.1") && confused("513.1.1", "1.1.1"));
     assert!(!confused("1.1.1", "2.1.1") && !confused("257.1.1", "513.1.1"));
     assert!(!confused("1.1.1", "1.1.1"), "it is the same");
-    assert!(!Peer::Fkie.confuses(JausId::new(1, 1, 1), JausId::new(513, 1, 1)));
+    assert!(!Implementation::Fkie.confuses(JausId::new(1, 1, 1), JausId::new(513, 1, 1)));
 }
 
 #[test]
@@ -155,7 +162,7 @@ fn junior_is_likely_by_its_first_call_and_certain_by_its_fault() {
     let verdict = after([&call]);
     assert_eq!(
         (verdict.peer, verdict.certainty),
-        (Peer::Junior, Certainty::Likely)
+        (Implementation::Junior, Certainty::Likely)
     );
     let ours = Frame {
         sequence: 4711,
@@ -163,7 +170,7 @@ fn junior_is_likely_by_its_first_call_and_certain_by_its_fault() {
     };
     assert_eq!(
         after([&ours]).certainty,
-        Certainty::Guess,
+        Certainty::Unknown,
         "we call like that too"
     );
     let fault = Frame {
@@ -185,13 +192,13 @@ fn what_speaks_for_junior_speaks_for_a_fork_that_gives_itself_away() {
     let guessed = recogniser.verdict();
     assert_eq!(
         (guessed.peer, guessed.certainty),
-        (Peer::Jts, Certainty::Likely)
+        (Implementation::Jts, Certainty::Likely)
     );
     recogniser.note(Sign::MisreadType);
-    assert_eq!(recogniser.certain(), Peer::Jts);
+    assert_eq!(recogniser.certain(), Implementation::Jts);
     let mut recogniser = Recogniser::default();
     recogniser.note(Sign::MisreadType);
-    assert_eq!(recogniser.certain(), Peer::Junior);
+    assert_eq!(recogniser.certain(), Implementation::Junior);
 }
 
 #[test]
@@ -213,7 +220,7 @@ fn the_judging_tool_is_told_by_how_it_counts_and_whom_it_asks() {
     let verdict = after(&frames);
     assert_eq!(
         (verdict.peer, verdict.certainty),
-        (Peer::OpenJausSdk, Certainty::Certain)
+        (Implementation::OpenJausSdk, Certainty::Certain)
     );
     let once: Vec<_> = [(node, 7), (US, 8), (node, 9), (US, 10), (node, 11)]
         .map(|(destination, number)| to(destination, number))
@@ -226,11 +233,65 @@ fn the_judging_tool_is_told_by_how_it_counts_and_whom_it_asks() {
 }
 
 #[test]
+fn a_node_of_ours_is_not_taken_for_another_implementation() {
+    let node = US.whole_node();
+    let to_all = |destination, number| Frame {
+        flags: Flags::default().with_broadcast(Broadcast::Global),
+        ..to(destination, number)
+    };
+    let whole_nodes = [to_all(node, 31_361), to_all(node, 31_362)];
+    let long = Frame {
+        flags: Flags::default().with_data(DataControl::First),
+        payload: vec![1; 4079].into(),
+        ..frame(31_362, b"")
+    };
+    let call = Frame {
+        flags: Flags::default()
+            .with_broadcast(Broadcast::Global)
+            .with_acknowledgement(Acknowledgement::Request),
+        ..frame(31_363, QUERY)
+    };
+    for frames in [&whole_nodes[..], &[long, call]] {
+        let verdict = after(frames);
+        assert!(!verdict.reasons.is_empty(), "the test shows no sign");
+        assert_eq!(
+            (verdict.peer, verdict.certainty),
+            (Implementation::Standard, Certainty::Unknown),
+            "{:?}",
+            verdict.reasons
+        );
+    }
+}
+
+#[test]
+fn messages_out_of_order_are_no_count_per_destination() {
+    let other = JausId::new(101, 1, 2);
+    let retransmitted = [
+        (US, 500),
+        (other, 501),
+        (US, 502),
+        (other, 501),
+        (US, 503),
+        (other, 501),
+        (US, 504),
+    ];
+    let early = [(US, 500), (other, 502), (US, 501), (other, 504), (US, 502)];
+    let late = [(US, 501), (other, 500), (US, 502), (other, 498), (US, 503)];
+    for order in [&retransmitted[..], &early, &late] {
+        let frames: Vec<_> = order.iter().map(|&(id, number)| to(id, number)).collect();
+        assert_eq!(after(&frames), Verdict::default(), "{order:?}");
+    }
+    let far = [(US, 500), (other, 9), (US, 501), (other, 10), (US, 502)];
+    let frames: Vec<_> = far.iter().map(|&(id, number)| to(id, number)).collect();
+    assert_eq!(after(&frames).reasons, [Sign::NumbersByDestination]);
+}
+
+#[test]
 fn what_speaks_for_somebody_else_is_told_too() {
     let mut recogniser = Recogniser::default();
     recogniser.handle_frame(&frame(1, QUERY), 12);
     let verdict = recogniser.verdict();
-    assert_eq!(verdict.peer, Peer::JausPlusPlus);
+    assert_eq!(verdict.peer, Implementation::JausPlusPlus);
     let reasons: Vec<_> = verdict
         .reasons
         .iter()
@@ -260,17 +321,20 @@ fn who_begins_with_1_and_calls_may_be_taken_for_junior_and_no_node_of_ours() {
         }
         (recogniser.presumed(), recogniser.certain())
     };
-    let likely = (Peer::Junior, Peer::Standard);
+    let likely = (Implementation::Junior, Implementation::Standard);
     assert_eq!(presumed(&[call(1), frame(2, QUERY)]), likely);
     assert_eq!(presumed(&[frame(1, QUERY), long(2)]), likely);
-    assert_eq!(presumed(&[call(1), long(2)]).1, Peer::Junior);
+    assert_eq!(presumed(&[call(1), long(2)]).1, Implementation::Junior);
     // A node of ours that sends packets of the maximum length and searches for a peer.
     let ours = [call(31_361), long(31_362), frame(31_363, QUERY)];
-    assert_eq!(presumed(&ours), (Peer::Standard, Peer::Standard));
+    assert_eq!(
+        presumed(&ours),
+        (Implementation::Standard, Implementation::Standard)
+    );
     // JAUS++ and others may begin with 1 too.
-    assert_eq!(presumed(&[frame(1, QUERY)]).0, Peer::Standard);
+    assert_eq!(presumed(&[frame(1, QUERY)]).0, Implementation::Standard);
     let mut recogniser = Recogniser::default();
     recogniser.handle_frame(&call(1), 206);
     recogniser.note(Sign::RepeatedVersion);
-    assert_eq!(recogniser.presumed(), Peer::JausPlusPlus);
+    assert_eq!(recogniser.presumed(), Implementation::JausPlusPlus);
 }

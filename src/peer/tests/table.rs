@@ -1,6 +1,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use jaus_test_kit::snapshot;
+
 use super::super::*;
 
 /// The table of all departures, as Markdown.
@@ -70,31 +72,23 @@ fn each_departure_names_a_file_and_a_test_that_are_there() {
     }
 }
 
-/// The environment variable that makes the test rewrite the page.
-const RENEW: &str = "JAUS_RENEW_SNAPSHOTS";
-
 #[test]
 fn the_page_shows_the_table_as_it_is() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/peer/departures.md");
-    let table = table();
-    if std::env::var_os(RENEW).is_some() {
-        fs::write(&page, &table).unwrap();
-    }
-    let shown = fs::read_to_string(page).unwrap();
-    assert!(shown == table, "set {RENEW} to write it anew");
+    snapshot::check(page, &table());
 }
 
 #[test]
 fn each_peer_but_the_standard_one_departs_somewhere() {
-    for peer in Peer::ALL {
+    for peer in Implementation::ALL {
         assert_eq!(
             peer.departures().count() == 0,
-            peer == Peer::Standard,
+            peer == Implementation::Standard,
             "{peer}"
         );
         assert_eq!(peer.name().parse(), Ok(peer));
     }
-    let error = "jaus".parse::<Peer>().unwrap_err().to_string();
+    let error = "jaus".parse::<Implementation>().unwrap_err().to_string();
     assert!(
         error.contains("`jaus`") && error.contains("\"jaus++\""),
         "{error}"

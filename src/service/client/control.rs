@@ -255,9 +255,9 @@ impl Controls {
     pub(in crate::service) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
         let news = &mut self.news;
         self.all.retain(|&peer, control| {
-            let told = control.handle_timeout(now, peer, out);
-            news.extend(told.map(|told| (control.id, told)));
-            if told.is_some_and(ControlNews::is_final) {
+            let change = control.handle_timeout(now, peer, out);
+            news.extend(change.map(|change| (control.id, change)));
+            if change.is_some_and(ControlNews::is_final) {
                 control.state = State::Over;
             }
             control.state != State::Over || control.awaits_answer_to_release(now)
@@ -305,7 +305,7 @@ impl Control {
     /// How long a confirmation is valid.
     fn lifetime(&self) -> Duration {
         match self.lifetime {
-            Some(told) if !told.is_zero() => told.min(Self::LIFETIME),
+            Some(lifetime) if !lifetime.is_zero() => lifetime.min(Self::LIFETIME),
             _ => Self::LIFETIME,
         }
     }

@@ -65,7 +65,8 @@ impl fmt::Display for Rejection {
             write!(f, " (code {code})")?;
         }
         match &self.text {
-            Some(text) => write!(f, ": \"{text}\""),
+            // Escaped: it comes from the peer.
+            Some(text) => write!(f, ": {text:?}"),
             None => Ok(()),
         }
     }
@@ -95,6 +96,19 @@ mod tests {
     fn a_code_that_the_presence_vector_does_not_tell_of_is_one_too_low() {
         let (request, reason) = read(&[0xF4, 0x01, 0, 9, 4]);
         assert_eq!((request, reason.code), (9, Some(5)));
+    }
+
+    #[test]
+    fn a_peers_text_is_shown_on_one_line_without_control_characters() {
+        let reason = Rejection {
+            code: Some(5),
+            text: Some("\x1b[2Jno\r\nfake \u{202e}".to_owned()),
+        };
+        let shown = reason.to_string();
+        assert!(
+            shown.ends_with(r#": "\u{1b}[2Jno\r\nfake \u{202e}""#),
+            "{shown}"
+        );
     }
 
     #[test]

@@ -13,7 +13,7 @@ use crate::messages::core::{
     query_service_list, query_services, report_configuration, report_service_list, report_services,
     report_subsystem_list,
 };
-use crate::service::{Component, Directory, Level, Node, Outbox, Subsystem, read};
+use crate::service::{ComponentEntry, Directory, Level, NodeEntry, Outbox, SubsystemEntry, read};
 
 /// Lists of services are split into several reports, so that each stays under this many octets: one
 /// packet, which every peer can read.
@@ -46,7 +46,7 @@ impl Discovery {
             // A call also announces its sender.
             self.known.lock().admit(now, received);
         }
-        let told = match query.query_type.0 {
+        let own = match query.query_type.0 {
             1 => self.profile.system(),
             2 => self.profile.identification(Level::Subsystem),
             3 => self.profile.identification(Level::Node),
@@ -54,11 +54,11 @@ impl Discovery {
             _ => return,
         };
         // A component without a configured name leaves the answer to others.
-        if !told.name.is_empty() && self.may_answer(now, received) {
+        if !own.name.is_empty() && self.may_answer(now, received) {
             let report = ReportIdentification {
                 query_type: query.query_type.0.into(),
-                r#type: told.kind.code().into(),
-                identification: Text::from(told.name),
+                r#type: own.kind.code().into(),
+                identification: Text::from(own.name),
             };
             out.reply(received, &report);
         }
@@ -84,7 +84,7 @@ impl Discovery {
         let directory = self.directory();
         let nodes = directory.subsystem(self.own.subsystem()).into_iter();
         let nodes = nodes
-            .flat_map(Subsystem::nodes)
+            .flat_map(SubsystemEntry::nodes)
             .filter(|(id, _)| whole || *id == self.own.node());
         let known = self.known.lock();
         let nodes = nodes.filter_map(|(id, node)| configuration_of(id, node, &known));
@@ -185,13 +185,13 @@ impl Discovery {
     }
 
     /// The components to answer for: this one, or all known directly in its subsystem.
-    fn speaks_for<'d>(&self, directory: &'d Directory, together: bool) -> Vec<&'d Component> {
+    fn speaks_for<'d>(&self, directory: &'d Directory, together: bool) -> Vec<&'d ComponentEntry> {
         let own = self.own;
         let known = self.known.lock();
         let subsystem = directory.subsystem(own.subsystem()).into_iter();
-        let members = subsystem.flat_map(Subsystem::components);
-        let told = |it: &&Component| it.id == own || !together && known.is_heard(it.id);
-        members.filter(told).collect()
+        let members = subsystem.flat_map(SubsystemEntry::components);
+        let is_listed = |it: &&ComponentEntry| it.id == own || !together && known.is_heard(it.id);
+        members.filter(is_listed).collect()
     }
 }
 
@@ -214,7 +214,11 @@ pub(super) fn tell_services(
 }
 
 /// The components of a node that are known directly; `None` if there are none.
-fn configuration_of(id: u8, node: &Node, known: &Known) -> Option<report_configuration::NodeSeq> {
+fn configuration_of(
+    id: u8,
+    node: &NodeEntry,
+    known: &Known,
+) -> Option<report_configuration::NodeSeq> {
     let components = node.components().filter(|it| known.is_heard(it.id));
     let components = components.map(|component| report_configuration::ComponentRec {
         component_id: component.id.component(),
@@ -290,7 +294,7 @@ fn component_filters(
 }
 
 /// Adds a component to the last report, or to a new one if it does not fit.
-fn add_services(reports: &mut Vec<ReportServices>, component: &Component) {
+fn add_services(reports: &mut Vec<ReportServices>, component: &ComponentEntry) {
     use report_services::{ComponentRec, ComponentSeq, NodeRec, NodeSeq, ServiceRec};
 
     let Some(services) = &component.services else {
@@ -339,7 +343,11 @@ fn add_services(reports: &mut Vec<ReportServices>, component: &Component) {
 
 /// Adds the services of a component that pass one of the filters, as a separate report: Report
 /// Service List is rare, and simple beats short.
-fn add_filtered(reports: &mut Vec<ReportServiceList>, component: &Component, filters: &[String]) {
+fn add_filtered(
+    reports: &mut Vec<ReportServiceList>,
+    component: &ComponentEntry,
+    filters: &[String],
+) {
     use report_service_list::{
         ComponentRec, ComponentSeq, NodeRec, NodeSeq, ServiceRec, SubsystemRec, SubsystemSeq,
     };

@@ -198,19 +198,19 @@ impl Known {
         if knows_better(level, source, own, profile) {
             return;
         }
-        let told = Identification {
+        let identification = Identification {
             kind: Kind::from_code(report.r#type.0),
             name: text(&report.identification),
         };
         let known = self.directory.identification(level, source);
-        if known == Some(&told) {
+        if known == Some(&identification) {
             return;
         }
         let is_known = known.is_some();
         if is_known && !self.peers.may_change(now, source) {
             return self.refuse(now, |refused| &mut refused.too_often);
         }
-        if self.tree().identify(level, source, told) {
+        if self.tree().identify(level, source, identification) {
             self.tell(Change::Identified(level, source));
             if is_known {
                 self.doubt(now, source, Share::of(received));

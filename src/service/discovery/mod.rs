@@ -253,7 +253,7 @@ impl Discovery {
 
     fn take(&mut self, now: Instant, message: &Received, out: &mut Outbox) {
         let known = || self.known.lock();
-        let told = (self.own, &self.profile);
+        let own = (self.own, &self.profile);
         match code_of(&message.payload) {
             Some(QueryIdentification::CODE) => self.answer_identification(now, message, out),
             Some(QueryConfiguration::CODE) => self.answer_configuration(now, message, out),
@@ -261,7 +261,7 @@ impl Discovery {
             Some(QueryServices::CODE) => self.answer_services(now, message, out),
             Some(QueryServiceList::CODE) => self.answer_service_list(now, message, out),
             Some(RegisterServices::CODE) => known().learn_registration(now, message),
-            Some(ReportIdentification::CODE) => known().learn_identification(now, message, told),
+            Some(ReportIdentification::CODE) => known().learn_identification(now, message, own),
             Some(ReportConfiguration::CODE) => known().learn_configuration(now, message),
             Some(ReportServices::CODE) => known().learn_services(now, message),
             _ => {}

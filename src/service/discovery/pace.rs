@@ -3,26 +3,20 @@
 
 use std::time::{Duration, Instant};
 
-/// Pseudo-random numbers (SplitMix64) to spread packets in time. Not for secrets.
+use crate::random::Random;
+
+/// Random durations that spread packets in time.
 #[derive(Debug, Clone)]
-pub(super) struct Jitter(u64);
+pub(super) struct Jitter(Random);
 
 impl Jitter {
     pub(super) const fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        mixed ^ (mixed >> 31)
+        Self(Random::new(seed))
     }
 
     /// A duration between 0 and `most`.
     pub(super) fn up_to(&mut self, most: Duration) -> Duration {
-        most.mul_f64((self.next() >> 11) as f64 / (1_u64 << 53) as f64)
+        most.mul_f64(self.0.unit())
     }
 
     /// A duration between 90 % and 110 % of `middle`.

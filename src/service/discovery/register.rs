@@ -13,7 +13,7 @@ use crate::address::JausId;
 use crate::codec::Text;
 use crate::messages::core::RegisterServices;
 use crate::messages::core::register_services::ServiceRec;
-use crate::service::Component;
+use crate::service::ComponentEntry;
 
 /// Limit of servers that a component registers with at a time, however many claim to be servers.
 const MOST_SERVERS: usize = 8;
@@ -60,7 +60,7 @@ impl Registrations {
 }
 
 /// The registration of a component with all that it offers.
-pub(super) fn registration(component: &Component) -> RegisterServices {
+pub(super) fn registration(component: &ComponentEntry) -> RegisterServices {
     let services = component.offered().map(|offer| ServiceRec {
         uri: Text::from(offer.urn.as_str()),
         major_version_number: offer.major,

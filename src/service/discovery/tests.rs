@@ -12,7 +12,7 @@ use crate::endpoint::{LinkId, Outgoing, Path};
 use crate::messages::core::{
     ReportHeartbeatPulse, report_configuration, report_identification, report_services,
 };
-use crate::service::{Component, Kind};
+use crate::service::{ComponentEntry, Kind};
 use crate::wire::{Broadcast, Priority};
 
 const US: JausId = JausId::new(101, 1, 1);
@@ -198,7 +198,7 @@ fn octets(rig: &Rig) -> usize {
     let directory = rig.discovery.directory();
     let mut lists: Vec<_> = directory.components().collect();
     lists.retain(|it| it.id != US);
-    let offers = lists.into_iter().flat_map(Component::offered);
+    let offers = lists.into_iter().flat_map(ComponentEntry::offered);
     offers.map(|it| size_of::<Offer>() + it.urn.len()).sum()
 }
 

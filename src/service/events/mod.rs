@@ -52,7 +52,7 @@ use commands::Commands;
 pub(super) use commands::{CommandTrial, Refusal};
 use rejecting::{INVALID_EVENT, reject, rejection};
 pub(super) use table::Due;
-use table::{Kind, Name, Subscription, Table};
+use table::{Kind, Name, Subscriber, Table};
 
 const PERIODIC: u8 = 0;
 const EVERY_CHANGE: u8 = 1;
@@ -225,7 +225,7 @@ impl Events {
     }
 
     fn report(&self, client: JausId, which: &QueryEventsVar) -> ReportEvents {
-        let wanted = |id: u8, subscription: &Subscription| match which {
+        let wanted = |id: u8, subscription: &Subscriber| match which {
             QueryEventsVar::MessageIdRec(wanted) => {
                 code_of(&subscription.query) == Some(wanted.message_code)
             }
@@ -244,7 +244,7 @@ impl Events {
         let others = self.table.of(client);
         let others = others.filter(|&(id, _)| beside.is_some_and(|listed| id != listed));
         let listed = listed.chain(others);
-        let entry = |(event_id, subscription): (u8, &Subscription)| report_events::ReportEventRec {
+        let entry = |(event_id, subscription): (u8, &Subscriber)| report_events::ReportEventRec {
             event_type: report_events::EventType(type_of(subscription)),
             event_id,
             query_message: subscription.query.clone(),
@@ -282,11 +282,11 @@ impl Events {
             return reject(&trial.request, trial.request_id, why, out);
         };
         let sequence = before.map_or(0, |before| before.sequence);
-        let mut subscription = Subscription {
+        let mut subscription = Subscriber {
             kind,
             query: trial.query.clone(),
             sequence,
-            told: None,
+            reported: None,
             next: None,
             expires: self.expiry(now),
             request_id: trial.request_id,
@@ -333,7 +333,7 @@ impl Events {
         &self,
         (client, share): (JausId, Share),
         kind: Kind,
-        before: Option<&Subscription>,
+        before: Option<&Subscriber>,
     ) -> bool {
         let before = before.map(|before| before.kind);
         (before.is_some() || self.table.of(client).count() < self.settings.per_client)
@@ -360,9 +360,9 @@ impl Events {
     pub(super) fn expire(&mut self, now: Instant, out: &mut Outbox) {
         self.expire_commands(now, out);
         for (name, ended) in self.table.take_expired(now) {
-            let mut told = confirmation(ended.request_id, name.1);
-            set_rate(&mut told, &ended);
-            out.send(name.0, &told);
+            let mut confirmed = confirmation(ended.request_id, name.1);
+            set_rate(&mut confirmed, &ended);
+            out.send(name.0, &confirmed);
         }
     }
 
@@ -389,7 +389,7 @@ impl Events {
         };
         self.table.reschedule(due, now, |subscription| {
             let news = matches!(subscription.kind, Kind::Periodic { .. })
-                || subscription.told.as_ref().map(|(_, told)| told) != Some(&report);
+                || subscription.reported.as_ref().map(|(_, last)| last) != Some(&report);
             if news {
                 send(now, subscription, due.name, report, out);
             }
@@ -445,7 +445,7 @@ fn own(query: &Bytes) -> Bytes {
 }
 
 /// Whether two subscriptions look the same to the client.
-fn is_the_same(one: &Subscription, other: &Subscription) -> bool {
+fn is_the_same(one: &Subscriber, other: &Subscriber) -> bool {
     one.kind == other.kind && one.query == other.query
 }
 
@@ -472,7 +472,7 @@ const fn type_number(kind: Kind) -> u8 {
     }
 }
 
-const fn type_of(subscription: &Subscription) -> u8 {
+const fn type_of(subscription: &Subscriber) -> u8 {
     type_number(subscription.kind)
 }
 
@@ -480,7 +480,7 @@ fn confirm(
     request: &Received,
     request_id: u8,
     (_, event_id): Name,
-    subscription: &Subscription,
+    subscription: &Subscriber,
     out: &mut Outbox,
 ) {
     let mut confirm = confirmation(request_id, event_id);
@@ -497,7 +497,7 @@ fn confirmation(request_id: u8, event_id: u8) -> ConfirmEventRequest {
     }
 }
 
-fn set_rate(confirm: &mut ConfirmEventRequest, subscription: &Subscription) {
+fn set_rate(confirm: &mut ConfirmEventRequest, subscription: &Subscriber) {
     if let Kind::Periodic { hertz, .. } = subscription.kind
         && let Err(error) = confirm.set_confirmed_periodic_rate_hz(hertz)
     {
@@ -506,13 +506,7 @@ fn set_rate(confirm: &mut ConfirmEventRequest, subscription: &Subscription) {
     }
 }
 
-fn send(
-    now: Instant,
-    subscription: &mut Subscription,
-    name: Name,
-    report: Bytes,
-    out: &mut Outbox,
-) {
+fn send(now: Instant, subscription: &mut Subscriber, name: Name, report: Bytes, out: &mut Outbox) {
     let event = Event {
         event_id: name.1,
         sequence_number: subscription.sequence,
@@ -520,7 +514,7 @@ fn send(
     };
     subscription.sequence = subscription.sequence.wrapping_add(1);
     if matches!(subscription.kind, Kind::EveryChange { .. }) {
-        subscription.told = Some((now, report));
+        subscription.reported = Some((now, report));
     }
     out.send(name.0, &event);
 }

@@ -42,12 +42,12 @@ fn in_1000_seconds(hertz: f64) -> usize {
 }
 
 #[derive(Debug)]
-pub(super) struct Subscription {
+pub(super) struct Subscriber {
     pub(super) kind: Kind,
     pub(super) query: Bytes,
     pub(super) sequence: u8,
     /// For events on change, the last report and its time.
-    pub(super) told: Option<(Instant, Bytes)>,
+    pub(super) reported: Option<(Instant, Bytes)>,
     /// When the next report is due; `None` while there is no change to report.
     pub(super) next: Option<Instant>,
     pub(super) expires: Option<Instant>,
@@ -71,11 +71,11 @@ impl Due {
     }
 }
 
-impl Subscription {
+impl Subscriber {
     /// The earliest time from `now` on at which a change may be reported.
     fn after_its_pause(&self, now: Instant) -> Instant {
-        match (self.kind, &self.told) {
-            (Kind::EveryChange { pause }, Some((told, _))) => now.max(*told + pause),
+        match (self.kind, &self.reported) {
+            (Kind::EveryChange { pause }, Some((reported, _))) => now.max(*reported + pause),
             _ => now,
         }
     }
@@ -83,7 +83,7 @@ impl Subscription {
 
 #[derive(Debug)]
 pub(super) struct Table {
-    subscriptions: BTreeMap<Name, Subscription>,
+    subscriptions: BTreeMap<Name, Subscriber>,
     due: BTreeSet<(Instant, Name)>,
     expiring: BTreeSet<(Instant, Name)>,
     /// Events on change, by the code of their query.
@@ -119,16 +119,16 @@ impl Table {
     }
 
     /// All subscriptions.
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Subscription> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Subscriber> {
         self.subscriptions.values()
     }
 
-    pub(super) fn get(&self, name: Name) -> Option<&Subscription> {
+    pub(super) fn get(&self, name: Name) -> Option<&Subscriber> {
         self.subscriptions.get(&name)
     }
 
     /// The subscriptions of one client, in order of their numbers.
-    pub(super) fn of(&self, client: JausId) -> impl Iterator<Item = (u8, &Subscription)> {
+    pub(super) fn of(&self, client: JausId) -> impl Iterator<Item = (u8, &Subscriber)> {
         self.subscriptions
             .range((client, 0)..=(client, u8::MAX))
             .map(|(name, subscription)| (name.1, subscription))
@@ -152,7 +152,7 @@ impl Table {
     }
 
     /// Inserts a subscription, in place of any other with that name.
-    pub(super) fn insert(&mut self, name: Name, subscription: Subscription) {
+    pub(super) fn insert(&mut self, name: Name, subscription: Subscriber) {
         self.remove(name);
         if let Some(next) = subscription.next {
             self.due.insert((next, name));
@@ -170,7 +170,7 @@ impl Table {
         self.subscriptions.insert(name, subscription);
     }
 
-    pub(super) fn remove(&mut self, name: Name) -> Option<Subscription> {
+    pub(super) fn remove(&mut self, name: Name) -> Option<Subscriber> {
         let gone = self.subscriptions.remove(&name)?;
         self.shares.give_back(gone.share, 1);
         self.rates.give_back(gone.share, gone.kind.reports());
@@ -207,7 +207,7 @@ impl Table {
         }
     }
 
-    pub(super) fn take_expired(&mut self, now: Instant) -> Vec<(Name, Subscription)> {
+    pub(super) fn take_expired(&mut self, now: Instant) -> Vec<(Name, Subscriber)> {
         let mut expired = Vec::new();
         while let Some(&(when, name)) = self.expiring.first()
             && when <= now
@@ -244,7 +244,7 @@ impl Table {
         &mut self,
         due: &Due,
         now: Instant,
-        report: impl FnOnce(&mut Subscription),
+        report: impl FnOnce(&mut Subscriber),
     ) {
         self.due.remove(&(due.when, due.name));
         let Some(subscription) = self.subscriptions.get_mut(&due.name) else {

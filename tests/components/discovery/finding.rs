@@ -36,9 +36,9 @@ fn two_components_find_each_other_within_a_second_of_the_second_ones_start() {
     let mut world = World::new();
     let vehicle = world.start(plain(VEHICLE, "rover"));
     world.run(seconds(100));
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     world.run(seconds(1));
-    for (place, other, name) in [(vehicle, OPERATOR, "desk"), (operator, VEHICLE, "rover")] {
+    for (place, other, name) in [(vehicle, OPERATOR, "station"), (operator, VEHICLE, "rover")] {
         let directory = world.stack(place).directory();
         let found = directory.component(other).expect("found");
         assert!(
@@ -59,7 +59,7 @@ fn two_components_find_each_other_within_a_second_of_the_second_ones_start() {
 #[test]
 fn the_application_is_told_what_has_changed() {
     let mut world = World::new();
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     world.start(plain(VEHICLE, "rover"));
     world.run(seconds(1));
     let changes: Vec<_> = world
@@ -94,7 +94,7 @@ fn the_application_is_told_what_has_changed() {
 #[test]
 fn versions_1_0_and_1_1_of_the_core_services_are_listed() {
     let mut world = World::new();
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     world.start(plain(VEHICLE, "rover"));
     world.run(seconds(1));
     let directory = world.stack(operator).directory();
@@ -120,7 +120,7 @@ fn versions_1_0_and_1_1_of_the_core_services_are_listed() {
 fn a_dead_peer_leaves_the_tree_within_twelve_seconds() {
     let mut world = World::new();
     let vehicle = world.start(plain(VEHICLE, "rover"));
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     world.run(seconds(60));
     world.changes(operator);
     world.kill(vehicle);
@@ -151,7 +151,7 @@ fn a_dead_peer_leaves_the_tree_within_twelve_seconds() {
 #[test]
 fn newcomers_are_found_at_once_while_many_others_have_fallen_silent() {
     let mut world = World::new();
-    let watcher = world.start(plain(OPERATOR, "desk"));
+    let watcher = world.start(plain(OPERATOR, "station"));
     let fleet: Vec<_> = (1..=40)
         .map(|number| world.start(plain(JausId::new(200 + number, 1, 1), "rover")))
         .collect();
@@ -180,7 +180,7 @@ fn newcomers_are_found_at_once_while_many_others_have_fallen_silent() {
 fn a_peer_that_comes_back_is_found_again() {
     let mut world = World::new();
     let vehicle = world.start(plain(VEHICLE, "rover"));
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     world.run(seconds(10));
     world.kill(vehicle);
     world.run(seconds(20));
@@ -202,7 +202,7 @@ fn a_peer_that_comes_back_is_found_again() {
 #[test]
 fn a_peer_that_restarts_under_another_name_is_asked_anew_at_once() {
     let mut world = World::new();
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     let first = world.start(plain(VEHICLE, "rover"));
     world.run(seconds(10));
     world.kill(first);
@@ -220,7 +220,7 @@ fn a_peer_that_restarts_under_another_name_is_asked_anew_at_once() {
 #[test]
 fn components_that_disagree_about_their_subsystems_name_do_not_make_it_flicker() {
     let mut world = World::new();
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     world.start(plain(VEHICLE, "rover"));
     world.start(plain(JausId::new(101, 2, 7), "arm of the rover"));
     world.run(seconds(10));
@@ -232,7 +232,7 @@ fn components_that_disagree_about_their_subsystems_name_do_not_make_it_flicker()
 #[test]
 fn a_service_that_is_offered_or_withdrawn_later_is_noticed_at_once() {
     let mut world = World::new();
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     let vehicle = world.start(plain(VEHICLE, "rover"));
     world.run(seconds(10));
     let offered = |world: &mut World| {
@@ -259,7 +259,7 @@ fn a_service_that_is_offered_or_withdrawn_later_is_noticed_at_once() {
 #[test]
 fn a_peer_that_restarts_with_other_services_is_noticed_with_the_next_refresh() {
     let mut world = World::new();
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     let first = world.start(plain(VEHICLE, "rover"));
     world.run(seconds(10));
     world.kill(first);
@@ -309,7 +309,7 @@ fn a_component_that_looks_for_nobody_says_nothing_unless_it_is_asked() {
     let quiet = world.start(scoped(VEHICLE, Scope::Nobody));
     world.run(seconds(3600));
     assert_eq!(world.datagrams(quiet), 0);
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     world.run(seconds(1));
     assert!(
         world
@@ -326,7 +326,7 @@ fn a_component_that_looks_for_its_subsystem_does_not_see_others() {
     let sibling = JausId::new(101, 2, 1);
     let mut world = World::new();
     let near = world.start(scoped(VEHICLE, Scope::Subsystem));
-    world.start(plain(OPERATOR, "desk"));
+    world.start(plain(OPERATOR, "station"));
     world.start(plain(sibling, "rover"));
     world.run(seconds(60));
     let known: Vec<_> = world
@@ -361,7 +361,7 @@ fn a_component_that_is_only_listed_is_in_the_tree_as_long_as_it_is_listed() {
     let manager = JausId::new(7, 1, 1);
     let silent = JausId::new(7, 1, 2);
     let mut world = World::new();
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     let puppet = world.puppet(manager);
     let mut listed = vec![1, 2];
     for second in 0..80 {
@@ -390,7 +390,7 @@ fn a_component_that_is_only_listed_is_in_the_tree_as_long_as_it_is_listed() {
 #[test]
 fn a_component_that_was_listed_is_asked_who_it_is_once_it_speaks_for_itself() {
     let mut world = World::new();
-    world.start(plain(OPERATOR, "desk"));
+    world.start(plain(OPERATOR, "station"));
     let manager = world.puppet(JausId::new(7, 1, 1));
     let late = world.puppet(JausId::new(7, 1, 2));
     for _ in 0..4 {
@@ -475,7 +475,7 @@ fn play_manager(
 fn a_component_goes_with_the_one_that_listed_it() {
     let manager = JausId::new(7, 1, 1);
     let mut world = World::new();
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     let puppet = world.puppet(manager);
     for _ in 0..10 {
         world.run(seconds(1));
@@ -505,7 +505,7 @@ fn a_component_goes_with_the_one_that_listed_it() {
 fn a_stranger_that_says_nothing_about_itself_is_asked_a_few_times_and_not_for_ever() {
     let stranger = JausId::new(9, 1, 1);
     let mut world = World::new();
-    let operator = world.start(plain(OPERATOR, "desk"));
+    let operator = world.start(plain(OPERATOR, "station"));
     let puppet = world.puppet(stranger);
     let mut asked = 0;
     for _ in 0..250 {

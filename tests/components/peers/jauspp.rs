@@ -13,7 +13,7 @@ use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::endpoint::{Config, Counter, Outgoing};
 use jaus::messages::core::*;
-use jaus::peer::Peer;
+use jaus::peer::Implementation;
 use jaus::service::Stack;
 use jaus::wire::Frame;
 use jaus_test_kit::evidence;
@@ -401,7 +401,7 @@ fn an_operator_of_ours_is_what_vehicles_of_jauspp_ask_for() {
                 .find(|it| it.id == id(vehicle));
             assert_eq!(
                 peer.unwrap().profile,
-                Peer::JausPlusPlus,
+                Implementation::JausPlusPlus,
                 "{file}: {vehicle}"
             );
         }

@@ -8,7 +8,7 @@ use super::stand_in::StandIn;
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::{Config, Counter, Event, Outgoing, To};
-use jaus::peer::Peer;
+use jaus::peer::Implementation;
 use jaus::wire::DataControl;
 use jaus_test_kit::evidence;
 
@@ -108,7 +108,7 @@ fn the_priority_fault_is_counted_and_names_junior() {
     assert_eq!(stand_in.endpoint.counters().get(Counter::PriorityFault), 1);
     assert_eq!(
         stand_in.endpoint.peers().next().unwrap().profile,
-        Peer::Junior
+        Implementation::Junior
     );
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use jaus::address::JausId;
-use jaus::peer::{Certainty, Peer, Recogniser, Verdict};
+use jaus::peer::{Certainty, Implementation, Recogniser, Verdict};
 use jaus_test_kit::evidence;
 
 /// The verdict on each sender of a capture.
@@ -22,12 +22,14 @@ fn verdicts(file: &Path) -> BTreeMap<JausId, Verdict> {
     verdicts.map(|(id, it)| (id, it.verdict())).collect()
 }
 
-fn check(file: &str, expected: &[(&str, Peer, Certainty)]) {
+fn check(file: &str, expected: &[(&str, Implementation, Certainty)]) {
     for (id, verdict) in verdicts(&evidence::captures().join(file)) {
         let id = id.to_string();
         let of_it = expected.iter().find(|(expected, ..)| *expected == id);
-        let (peer, certainty) =
-            of_it.map_or((Peer::Standard, Certainty::Unknown), |it| (it.1, it.2));
+        let (peer, certainty) = of_it
+            .map_or((Implementation::Standard, Certainty::Unknown), |it| {
+                (it.1, it.2)
+            });
         let reasons: Vec<_> = verdict.reasons.iter().map(ToString::to_string).collect();
         assert_eq!(
             (verdict.peer, verdict.certainty),
@@ -39,7 +41,7 @@ fn check(file: &str, expected: &[(&str, Peer, Certainty)]) {
 
 #[test]
 fn jauspp_is_recognised_for_sure_and_a_plain_vehicle_beside_it_is_not() {
-    use {Certainty::Certain, Peer::JausPlusPlus};
+    use {Certainty::Certain, Implementation::JausPlusPlus};
     check(
         "jauspp/01-vehsim-client.pcap",
         &[
@@ -74,7 +76,7 @@ fn jauspp_is_recognised_for_sure_and_a_plain_vehicle_beside_it_is_not() {
 
 #[test]
 fn junior_is_recognised_by_its_first_call_and_for_sure_by_its_fault() {
-    use {Certainty::Certain, Certainty::Likely, Peer::Junior};
+    use {Certainty::Certain, Certainty::Likely, Implementation::Junior};
     for (file, certainty) in [
         ("01-discovery-then-unicast", Likely),
         ("02-acked-small", Likely),
@@ -96,7 +98,7 @@ fn junior_is_recognised_by_its_first_call_and_for_sure_by_its_fault() {
 
 #[test]
 fn the_judging_tool_is_recognised() {
-    use {Certainty::Likely, Peer::OpenJausSdk};
+    use {Certainty::Likely, Implementation::OpenJausSdk};
     for file in [
         "igvc2015/interface_test_1_13pts.pcapng",
         "igvc2015/qualification-practive-2015.pcap.pcapng",

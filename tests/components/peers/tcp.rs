@@ -9,7 +9,7 @@ use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::endpoint::{Config, Outgoing};
 use jaus::messages::core::{QueryAuthority, QueryStatus, RegisterServices};
-use jaus::peer::Peer;
+use jaus::peer::Implementation;
 use jaus::wire::jtcp::Decoder;
 use jaus::wire::{Frame, judp};
 use jaus_test_kit::evidence;
@@ -122,5 +122,5 @@ fn jauspp_is_answered_by_udp_once_it_has_registered_and_called() {
     }
     assert!(registered && answered > 3, "{answered}");
     let known = stand_in.endpoint.peers().find(|it| it.id == peer).unwrap();
-    assert_eq!(known.profile, Peer::JausPlusPlus);
+    assert_eq!(known.profile, Implementation::JausPlusPlus);
 }

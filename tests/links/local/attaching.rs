@@ -169,10 +169,10 @@ async fn an_attached_component_is_found_and_answers() {
     let rover = Component::builder(Kind::Vehicle, "Rover")
         .live_on(port)
         .unwrap();
-    let desk = Component::builder(Kind::Vehicle, "Desk")
+    let other = Component::builder(Kind::Vehicle, "Other")
         .attach(&node, 1)
         .unwrap();
-    let found = within_limit(desk.find("urn:jaus:jss:core:Liveness"))
+    let found = within_limit(other.find("urn:jaus:jss:core:Liveness"))
         .await
         .unwrap();
     assert_eq!(found, rover.id());

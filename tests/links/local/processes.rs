@@ -218,14 +218,14 @@ async fn a_restarted_node_is_rejoined_and_components_keep_what_they_know() {
         .live_on(port)
         .unwrap();
     let port = place.host().attach(1).await.unwrap();
-    let desk = Component::builder(Kind::Vehicle, "Desk")
+    let other = Component::builder(Kind::Vehicle, "Other")
         .live_on(port)
         .unwrap();
     let raw = place.host().attach(2).await.unwrap();
-    within_limit(desk.find("urn:jaus:jss:core:Liveness"))
+    within_limit(other.find("urn:jaus:jss:core:Liveness"))
         .await
         .unwrap();
-    let known = desk.directory().len();
+    let known = other.directory().len();
 
     let in_flight = raw.sender();
     let unanswered = message(&raw, JausId::new(101, 1, 200), b"x");
@@ -246,11 +246,11 @@ async fn a_restarted_node_is_rejoined_and_components_keep_what_they_know() {
     .await;
     let refused = raw.send(message(&raw, rover.id(), b"x")).unwrap_err();
     assert_eq!(refused, SendError::NotConnected(raw.id()));
-    assert_eq!(desk.directory().len(), known);
+    assert_eq!(other.directory().len(), known);
 
     let _second = Actor::start(&place, "node").await;
     host_event(&mut events, |event| *event == HostEvent::Back).await;
-    assert_eq!(desk.directory().len(), known);
+    assert_eq!(other.directory().len(), known);
     let outcome = within_limit(async {
         loop {
             match raw.deliver(message(&raw, rover.id(), b"x")).await {

@@ -4,7 +4,7 @@ use std::net::{Ipv6Addr, SocketAddr, SocketAddrV6};
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{LinkId, Path, Remote, Shortfall, Unacknowledged};
+use jaus::endpoint::{LinkId, Path, Remote, SessionId, Shortfall, Unacknowledged};
 use jaus::link::local::Assembler;
 use jaus::link::local::record::{Head, Outcome, Reason, Record, RecordError, VERSION};
 use jaus::wire::Flags;
@@ -35,7 +35,8 @@ fn path() -> impl Strategy<Value = Option<Path>> {
         let address = SocketAddrV6::new(Ipv6Addr::from(ip), port, 0, scope);
         Remote::Socket(address.into())
     });
-    let peer = prop_oneof![Just(Remote::Line), v4, v6];
+    let session = any::<u64>().prop_map(|number| Remote::Session(SessionId(number)));
+    let peer = prop_oneof![Just(Remote::Line), session, v4, v6];
     let path = (any::<u16>().prop_map(LinkId), peer);
     prop::option::of(path.prop_map(|(link, peer)| Path { link, peer }))
 }

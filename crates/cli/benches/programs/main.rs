@@ -1,12 +1,15 @@
-//! What a program of one component costs a small board: its size without symbols, its memory when
-//! it has nothing to do, and how long it takes from its start until others know its services.
+//! The programs as a user has them: what one of them costs a small board (its size without symbols,
+//! its memory when idle, the time from its start until others know its services), and how many
+//! messages a thousand components exchange.
 //!
 //! ```text
 //! cargo bench --bench programs
+//! cargo bench --bench programs -- load               only the thousand components; a minute
+//! JAUS_WRITE_FIGURES=1 cargo bench --bench programs  also writes docs/figures/programs.md and load.md
 //! ```
 //!
-//! It prints a Markdown table. Everything stays on loopback. Sizes are those of the profile `bench`,
-//! which has the settings of `release`. What was measured is kept in `docs/performance.md`.
+//! Everything stays on loopback. Sizes are those of the profile `bench`, which has the settings of
+//! `release` but unwinds.
 #![expect(
     clippy::expect_used,
     clippy::disallowed_methods,
@@ -21,6 +24,7 @@ use std::time::{Duration, Instant};
 use jaus::address::JausId;
 use jaus::component::{Change, Component, Kind};
 use jaus::node::{Config, Node};
+use jaus_test_kit::figures::Figures;
 
 /// Starts of each program.
 const STARTS: usize = 7;
@@ -40,10 +44,46 @@ const PROGRAMS: &[(&str, &[&str])] = &[
     (env!("CARGO_BIN_EXE_jaus-ocu"), &[]),
 ];
 
+/// The tool whose `load` moves the messages.
+const TOOL: &str = env!("CARGO_BIN_EXE_jaus");
+
+fn main() {
+    // Cargo passes `--bench` to every benchmark.
+    let filter = std::env::args().skip(1).find(|it| it != "--bench");
+    let is_wanted = |name: &str| filter.as_ref().is_none_or(|filter| name.contains(filter));
+    if is_wanted("programs") {
+        programs();
+    }
+    if is_wanted("load") {
+        load();
+    }
+}
+
+/// Measures `jaus load`, which prints a table.
+fn load() {
+    let mut figures = Figures::new("load", "cargo bench --bench programs -- load");
+    let output = Command::new(TOOL).arg("load").output();
+    let output = output.expect("the tool runs");
+    for line in String::from_utf8_lossy(&output.stdout).lines() {
+        figures.line(line);
+    }
+    figures.finish();
+}
+
 #[tokio::main(flavor = "current_thread")]
-async fn main() {
-    println!("| program | stripped | resident, idle | start to discovered, median (most) |");
-    println!("|---|---|---|---|");
+async fn programs() {
+    let mut figures = Figures::new("programs", "cargo bench --bench programs");
+    figures.table(
+        "A program of one component",
+        [
+            "program",
+            "without symbols",
+            "resident, idle",
+            "start to discovered, median",
+            "most",
+        ],
+    );
+    let mut is_met = true;
     for (number, (program, flags)) in (1..).zip(PROGRAMS) {
         // A new one for each program: it would go on asking those that were killed before.
         let node = Node::start(Config::loopback(42, 1)).expect("a node");
@@ -63,14 +103,21 @@ async fn main() {
         }
         starts.sort();
         let name = Path::new(program).file_name().expect("a program");
-        println!(
-            "| {} | {:.2} MiB | {resident:.1} MiB | {:.0} ms ({:.0}) |",
-            name.display(),
-            stripped(program),
-            millis(starts[STARTS / 2]),
-            millis(starts[STARTS - 1])
-        );
+        let (size, median) = (stripped(program), millis(starts[STARTS / 2]));
+        figures.row([
+            &name.display().to_string(),
+            &format!("{size:.2} MiB"),
+            &format!("{resident:.1} MiB"),
+            &format!("{median:.0} ms"),
+            &format!("{:.0} ms", millis(starts[STARTS - 1])),
+        ]);
+        is_met &= size < 6.0 && resident < 12.0 && median < 300.0;
     }
+    figures.aim(
+        "less than 6 MiB, 12 MiB resident and 300 ms for each",
+        [("", is_met)],
+    );
+    figures.finish();
 }
 
 fn millis(time: Duration) -> f64 {

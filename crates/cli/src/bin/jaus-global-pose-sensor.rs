@@ -12,7 +12,7 @@ use jaus_cli::runtime::{between, duration};
 use jaus_cli::{Ready, launch};
 use jaus_vehicle::motion::wrap;
 use jaus_vehicle::navigation::NavigatorConfig;
-use jaus_vehicle::parts::{GlobalPoseSensor, IioDevice, Part};
+use jaus_vehicle::parts::{GlobalPoseSensor, Gyro, IioDevice, Part};
 
 #[derive(Args)]
 struct Flags {
@@ -33,11 +33,16 @@ struct Flags {
     #[arg(long, requires = "gyro")]
     gyro_inverted: bool,
 
+    /// Take the turn rate from the IMU of the same subsystem: a component that reports a yaw rate and
+    /// no velocity, such as jaus-imu-sensor. While it is lost, the wheels turn the heading
+    #[arg(long, conflicts_with = "gyro")]
+    imu: bool,
+
     /// The initial heading in degrees from true north [default: unknown until the vehicle has moved]
     #[arg(long, value_name = "DEGREES", value_parser = |text: &str| between(text, -360.0, 360.0), allow_hyphen_values = true)]
     heading: Option<f64>,
 
-    /// How often to query wheel odometry, in hertz from 1 to 100
+    /// How often to query wheel odometry and the IMU, in hertz from 1 to 100
     #[arg(long, value_name = "HZ", default_value = "25", value_parser = |text: &str| between(text, 1.0, 100.0))]
     rate: f64,
 
@@ -64,7 +69,8 @@ impl Ready for Flags {
         subsystem, such as jaus-primitive-driver. Without one, the pose is that of the receiver. \
         The client in control of the sensor may set the heading.\n\nExamples:\n  \
         jaus-global-pose-sensor --loopback --receiver /dev/ttyUSB0 --baud 115200\n  \
-        jaus-global-pose-sensor --attach --gyro /sys/bus/iio/devices/iio:device0 --heading 90";
+        jaus-global-pose-sensor --attach --gyro /sys/bus/iio/devices/iio:device0 --heading 90\n  \
+        jaus-global-pose-sensor --attach --imu";
     const ID: JausId = JausId::new(101, 43, 43);
 
     fn part(self) -> Result<impl Part, Failure> {
@@ -72,10 +78,13 @@ impl Ready for Flags {
         Ok(GlobalPoseSensor {
             receiver: self.receiver,
             baud: self.baud,
-            gyro: self.gyro.map(|directory| IioDevice {
-                directory,
-                inverted,
-            }),
+            gyro: match self.gyro {
+                Some(directory) => Some(Gyro::Device(IioDevice {
+                    directory,
+                    inverted,
+                })),
+                None => self.imu.then_some(Gyro::Component),
+            },
             hz: self.rate,
             navigator: NavigatorConfig {
                 heading: self.heading.map(|degrees| wrap(degrees.to_radians())),

@@ -1,15 +1,18 @@
 //! `jaus-ocu`: the operator's station and its page.
 
+use std::convert::Infallible;
+use std::io::{self, IsTerminal};
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
+use jaus_cli::output::Output;
 use jaus_cli::{Failure, Ready, launch};
-use jaus_ocu::{Listen, Station, Token};
-use jaus_vehicle::parts::Part;
+use jaus_ocu::{BaseMap, Listen, Station, Token};
+use jaus_vehicle::parts::{Part, PartError, Slot};
 
 #[derive(Args)]
 struct Flags {
@@ -27,8 +30,8 @@ struct Flags {
     #[arg(long, value_name = "ADDRESS")]
     listen: Option<SocketAddr>,
 
-    /// Read the token from this one-line file and require it on the loopback interface too
-    /// [default: a generated token, printed if one is needed]
+    /// Read the token from this one-line file and require it on the loopback interface too; it is
+    /// never printed [default: a generated token, printed on standard output if one is needed]
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
 
@@ -39,6 +42,11 @@ struct Flags {
     /// A host name by which browsers reach this machine, besides its addresses (repeatable)
     #[arg(long, value_name = "NAME")]
     host: Vec<String>,
+
+    /// A geographic map to show behind a vehicle that reports its global pose: a PMTiles file
+    /// (version 3) with vector tiles or pictures
+    #[arg(long, value_name = "FILE.pmtiles")]
+    map: Option<PathBuf>,
 }
 
 impl Ready for Flags {
@@ -49,7 +57,8 @@ impl Ready for Flags {
         jaus-ocu --loopback                        for a vehicle on this computer\n  \
         jaus-ocu --listen 0.0.0.0:8080             for tablets; prints the address with a token\n  \
         jaus-ocu --listen 0.0.0.0:8080 --token-file /etc/jaus/token --host ocu.local\n  \
-        jaus-ocu --vehicle 101 --vehicle 102 --interface eth0";
+        jaus-ocu --vehicle 101 --vehicle 102 --interface eth0\n  \
+        jaus-ocu --map /srv/maps/berlin.pmtiles    behind vehicles with a global pose";
     const ID: JausId = JausId::new(42, 1, 1);
     const KIND: Kind = Kind::OperatorControlUnit;
     const SUBSYSTEM: &'static str = "Operator";
@@ -65,15 +74,53 @@ impl Ready for Flags {
                  a file that holds one",
             ));
         }
-        Ok(Station {
+        let base_map = self.map.as_deref().map(open_map).transpose()?;
+        Ok(Announced(Station {
             vehicles: self.vehicle,
             authority: self.authority,
             listen,
             token,
             token_to_read: self.token_to_read,
             hosts: self.host,
-        })
+            base_map,
+        }))
     }
+}
+
+/// A station that prints a generated token.
+struct Announced(Station);
+
+impl Part for Announced {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
+        let station = self.0.open().await?;
+        announce(&station.secret_urls());
+        station.run(slot).await
+    }
+}
+
+/// Environment variable of systemd: the output goes to its journal.
+const JOURNAL: &str = "JOURNAL_STREAM";
+
+/// Prints the addresses with the token, unless the output is a log.
+fn announce(secret_urls: &[String]) {
+    if secret_urls.is_empty() {
+        return;
+    }
+    if std::env::var_os(JOURNAL).is_some() && !io::stdout().is_terminal() {
+        tracing::warn!(
+            "the generated token is not written to the journal: choose one with --token-file"
+        );
+        return;
+    }
+    let mut output = Output::new();
+    for url in secret_urls {
+        // A closed standard output does not stop the station.
+        let _ = output.line(format_args!("to control vehicles, open {url}"));
+    }
+}
+
+fn open_map(path: &Path) -> Result<BaseMap, Failure> {
+    BaseMap::open(path).map_err(|error| Failure::new(format!("--map {}: {error}", path.display())))
 }
 
 fn main() -> ExitCode {

@@ -7,7 +7,7 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus_cli::failure::Failure;
 use jaus_cli::{Ready, launch, runtime};
-use jaus_vehicle::mission::{LostLink, Settings, Vehicle};
+use jaus_vehicle::mission::{Footprint, LostLink, Settings};
 use jaus_vehicle::parts::{Part, Planner};
 
 #[derive(Args)]
@@ -47,7 +47,7 @@ struct Flags {
 
     /// The time a stage may take to start or to recover
     #[arg(long, value_name = "DURATION", default_value = "15s", value_parser = runtime::duration)]
-    patience: Duration,
+    timeout: Duration,
 
     /// The time the vehicle may drive without progress
     #[arg(long, value_name = "DURATION", default_value = "1min", value_parser = runtime::duration)]
@@ -88,7 +88,7 @@ impl Ready for Flags {
 
     fn part(self) -> Result<impl Part, Failure> {
         Ok(Planner {
-            vehicle: Vehicle {
+            vehicle: Footprint {
                 width: self.width,
                 margin: self.margin,
                 turning_radius: self.turning_radius,
@@ -96,7 +96,7 @@ impl Ready for Flags {
             mission: Settings {
                 attempts: self.attempts,
                 pause: self.pause,
-                patience: self.patience,
+                patience: self.timeout,
                 stall: self.stall,
                 detours: self.detours,
                 speed: self.speed,

@@ -71,11 +71,9 @@ struct Flags {
     #[command(flatten)]
     bridges: Bridges,
 
-    #[cfg(all(feature = "can", target_os = "linux"))]
     #[command(flatten)]
     can: can::Can,
 
-    #[cfg(all(feature = "gpio", target_os = "linux"))]
     #[command(flatten)]
     gpio: gpio::Gpio,
 }
@@ -182,6 +180,8 @@ impl Ready for Flags {
     const ID: JausId = JausId::new(101, 33, 33);
 
     fn part(self) -> Result<impl Part, Failure> {
+        self.can.check()?;
+        self.gpio.check()?;
         Ok(PrimitiveDriver {
             motors: self.motors(),
             steering: self.steering(),
@@ -298,12 +298,23 @@ fn pair(text: &str) -> Result<(u32, u32), String> {
         .ok_or_else(|| "write two different numbers such as 17,27".to_owned())
 }
 
-#[cfg(all(feature = "can", target_os = "linux"))]
+/// The error about hardware that this build does not support.
+#[cfg(not(all(feature = "can", feature = "gpio", target_os = "linux")))]
+fn unsupported(flag: &str, feature: &str) -> Failure {
+    Failure::new(format!(
+        "{flag}: this program was built without the feature `{feature}`: build it on Linux with \
+         `cargo build -p jaus-cli --features {feature}`, or use the Debian package"
+    ))
+}
+
 mod can {
+    #[cfg(all(feature = "can", target_os = "linux"))]
     use std::time::Duration;
 
     use clap::Args;
+    use jaus_cli::Failure;
     use jaus_cli::runtime::between;
+    #[cfg(all(feature = "can", target_os = "linux"))]
     use jaus_vehicle::parts::CanMotors;
 
     #[derive(Args)]
@@ -333,6 +344,16 @@ mod can {
     }
 
     impl Can {
+        /// Checks that this build supports what the flags ask for.
+        pub(super) fn check(&self) -> Result<(), Failure> {
+            #[cfg(not(all(feature = "can", target_os = "linux")))]
+            if self.can.is_some() {
+                return Err(super::unsupported("--can", "can"));
+            }
+            Ok(())
+        }
+
+        #[cfg(all(feature = "can", target_os = "linux"))]
         pub(super) fn motors(&self, deadline: Duration) -> Option<CanMotors> {
             Some(CanMotors {
                 interface: self.can.clone()?,
@@ -345,14 +366,17 @@ mod can {
     }
 }
 
-#[cfg(all(feature = "gpio", target_os = "linux"))]
 mod gpio {
     use std::path::PathBuf;
+    #[cfg(all(feature = "gpio", target_os = "linux"))]
     use std::time::Duration;
 
     use clap::Args;
+    use jaus_cli::Failure;
     use jaus_cli::runtime::between;
+    #[cfg(all(feature = "gpio", target_os = "linux"))]
     use jaus_vehicle::actuator::StepperConfig;
+    #[cfg(all(feature = "gpio", target_os = "linux"))]
     use jaus_vehicle::parts::GpioMotors;
 
     #[derive(Args)]
@@ -387,6 +411,21 @@ mod gpio {
     }
 
     impl Gpio {
+        /// Checks that this build supports what the flags ask for.
+        pub(super) fn check(&self) -> Result<(), Failure> {
+            #[cfg(not(all(feature = "gpio", target_os = "linux")))]
+            for (flag, is_used) in [
+                ("--gpio", self.gpio.is_some()),
+                ("--stop-line", self.stop_line.is_some()),
+            ] {
+                if is_used {
+                    return Err(super::unsupported(flag, "gpio"));
+                }
+            }
+            Ok(())
+        }
+
+        #[cfg(all(feature = "gpio", target_os = "linux"))]
         pub(super) fn motors(&self, top: f64, deadline: Duration) -> Option<GpioMotors> {
             Some(GpioMotors {
                 chip: self.gpio.clone()?,

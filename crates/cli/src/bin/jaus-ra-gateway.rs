@@ -24,7 +24,7 @@ use jaus_vehicle::parts::Part;
 struct Flags {
     /// How long to wait for an answer of the other side
     #[arg(long, value_name = "DURATION", default_value = "1s", value_parser = duration)]
-    patience: Duration,
+    timeout: Duration,
 
     /// The maximum authority used to control RA components, even if the JAUS client's is higher
     #[arg(long, value_name = "CODE", default_value = "255")]
@@ -205,7 +205,7 @@ impl Flags {
     fn settings(&self) -> Settings {
         let mut settings = Settings {
             ids: self.ids.settings(),
-            patience: self.patience,
+            patience: self.timeout,
             authority: self.authority,
             timeout: Duration::from_secs(self.control_timeout.into()),
             ..Settings::default()

@@ -14,6 +14,7 @@
 )]
 
 mod attack;
+mod doctor;
 mod gateway;
 mod judge;
 mod nodes;

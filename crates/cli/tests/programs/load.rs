@@ -50,7 +50,7 @@ fn every_message_is_acknowledged_by_its_receiver() {
             .args([
                 "--acknowledged-by",
                 who,
-                "--json",
+                "--save",
                 "load.json",
                 "--svg",
                 "load.svg",

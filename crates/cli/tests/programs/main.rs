@@ -17,6 +17,8 @@ mod load;
 mod packaging;
 #[cfg(target_os = "linux")]
 mod parts;
+#[cfg(target_os = "linux")]
+mod reference;
 mod store;
 mod support;
 mod tool;

@@ -33,7 +33,7 @@ const ELSEWHERE: [&str; 4] = [
 ];
 
 /// Names of our programs without `jaus-`.
-fn programs() -> BTreeSet<String> {
+pub(crate) fn programs() -> BTreeSet<String> {
     named(&workspace("crates/cli/src/bin"), "jaus-", ".rs")
 }
 
@@ -66,6 +66,24 @@ fn the_system_for_one_machine_has_nothing_wrong_and_every_part_that_is_a_service
         let line = line.unwrap_or_else(|| panic!("{part} is not in system.toml"));
         assert!(line.contains(&format!("/jaus-{part} ")), "{line}");
     }
+}
+
+#[test]
+fn the_system_for_one_machine_has_the_ids_of_the_demo() {
+    let demo = run(&["demo", "--headless", "--seconds", "1"], b"").stdout;
+    let system = packaging("system.toml");
+    let system = run(&["up", system.to_str().unwrap(), "--check"], b"").stdout;
+    let starts = demo.lines().filter_map(|line| line.split_once(" starts "));
+    let mut parts = 0;
+    for (_, start) in starts {
+        let (id, name) = start.split_once(", the ").unwrap();
+        let begin = format!("{}: ", name.replace(' ', "-"));
+        let line = system.lines().find(|line| line.starts_with(&begin));
+        let line = line.unwrap_or_else(|| panic!("no {begin} in {system}"));
+        assert!(line.contains(&format!("--id={id}")), "{id}: {line}");
+        parts += 1;
+    }
+    assert_eq!(parts, 9, "{demo}");
 }
 
 #[test]

@@ -26,8 +26,14 @@ struct Program {
 
 impl Program {
     fn start(flags: &[&str], environment: &[(&str, &str)]) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_jaus-primitive-driver"));
+        let driver = env!("CARGO_BIN_EXE_jaus-primitive-driver");
+        Self::start_as(driver, flags, environment)
+    }
+
+    fn start_as(program: &str, flags: &[&str], environment: &[(&str, &str)]) -> Self {
+        let mut command = Command::new(program);
         command.arg("--loopback").args(flags).stderr(Stdio::piped());
+        command.stdout(Stdio::piped());
         command.env_remove("JAUS_LOG");
         command.envs(environment.iter().copied());
         let mut child = command.spawn().unwrap();
@@ -47,14 +53,24 @@ impl Program {
         assert!(sent.unwrap().success());
     }
 
-    /// Waits for a line with this text.
-    fn says(&self, text: &str) {
+    /// Waits for a line with this text, and returns all lines up to it.
+    fn says(&self, text: &str) -> String {
+        let mut said = String::new();
         while let Ok(line) = self.lines.recv_timeout(LIMIT) {
-            if line.contains(text) {
-                return;
+            said += &(line + "\n");
+            if said.contains(text) {
+                return said;
             }
         }
-        panic!("it does not say \"{text}\"");
+        panic!("it does not say \"{text}\": {said}");
+    }
+
+    /// The first line of its standard output, or all of it if that has no line.
+    fn prints(&mut self) -> String {
+        let mut line = String::new();
+        let output = self.child.stdout.take().unwrap();
+        BufReader::new(output).read_line(&mut line).unwrap();
+        line
     }
 }
 
@@ -139,6 +155,44 @@ async fn emergencies_and_the_stop_input_are_logged_without_a_flag() {
 }
 
 #[test]
+fn the_operators_token_is_never_logged_and_printed_only_if_it_was_generated() {
+    const TOKEN: &str = "0123456789abcdef-of-the-file";
+    let directory = scratch("token");
+    let file = directory.join("token");
+    std::fs::write(&file, TOKEN).unwrap();
+    let group = group_flag(own_group());
+    let station = env!("CARGO_BIN_EXE_jaus-ocu");
+    let flags = ["--group", &group, "--listen"];
+    let from_file = ["127.0.0.1:0", "--token-file", file.to_str().unwrap()];
+    let flags_of = |more: &[&str]| -> Vec<String> {
+        flags.iter().chain(more).map(|&it| it.to_owned()).collect()
+    };
+    for (more, generates) in [(&from_file[..], false), (&["0.0.0.0:0"][..], true)] {
+        let flags = flags_of(more);
+        let flags: Vec<_> = flags.iter().map(String::as_str).collect();
+        let mut program = Program::start_as(station, &flags, &[]);
+        let said = program.says("the operator's page is at http://");
+        assert!(!said.contains(TOKEN) && !said.contains("token="), "{said}");
+        if generates {
+            let printed = program.prints();
+            assert!(printed.contains("/#token="), "{printed}");
+        } else {
+            program.signal("TERM");
+            assert_eq!(program.prints(), "");
+        }
+    }
+    // The journal is a log too.
+    let flags = flags_of(&["0.0.0.0:0"]);
+    let flags: Vec<_> = flags.iter().map(String::as_str).collect();
+    let mut program = Program::start_as(station, &flags, &[("JOURNAL_STREAM", "8:1")]);
+    let said = program.says("the operator's page is at http://");
+    assert!(said.contains("--token-file"), "{said}");
+    program.signal("TERM");
+    assert_eq!(program.prints(), "");
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
 fn flags_of_motors_and_receivers_out_of_their_range_are_told_with_the_range() {
     let tool = std::path::Path::new(env!("CARGO_BIN_EXE_jaus"));
     let refused = |program: &str, flags: &str, told: &str| {
@@ -199,6 +253,7 @@ fn flags_of_motors_and_receivers_out_of_their_range_are_told_with_the_range() {
         ("--outage 10", "units us, ms, s, min and h"),
         ("--max-rms 0", "write a number from 0.01 to 100"),
         ("--gyro-inverted", "--gyro"),
+        ("--imu --gyro /dev/null", "cannot be used with"),
         ("--baud 1", "1 is not in 300..=4000000"),
     ] {
         refused("jaus-global-pose-sensor", flags, told);
@@ -229,4 +284,34 @@ fn flags_of_motors_and_receivers_out_of_their_range_are_told_with_the_range() {
 fn a_can_bus_that_does_not_exist_is_told_with_the_remedy() {
     let program = Program::start(&["--can", "nocan7", "--can-counts-per-metre", "200"], &[]);
     program.says("bring it up with `ip link set nocan7 up type can bitrate 500000`");
+}
+
+#[cfg(not(any(feature = "can", feature = "gpio")))]
+#[test]
+fn motors_that_a_build_does_not_support_are_refused_with_the_remedy() {
+    for (flags, feature) in [
+        (
+            &["--can", "can0", "--can-counts-per-metre", "200"][..],
+            "can",
+        ),
+        (
+            &[
+                "--gpio",
+                "/dev/gpiochip0",
+                "--left",
+                "17,27",
+                "--right",
+                "23,24",
+            ],
+            "gpio",
+        ),
+        (&["--stop-line", "/dev/gpiochip0:5"], "gpio"),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_jaus-primitive-driver"));
+        let output = command.args(flags).output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains(flags[0]), "{error}");
+        assert!(error.contains(&format!("--features {feature}")), "{error}");
+    }
 }

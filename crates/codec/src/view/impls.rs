@@ -8,6 +8,7 @@ use super::{Error, Object, Value, View};
 use crate::bits;
 use crate::bits::Bits;
 use crate::blob::FormattedBlob;
+use crate::enumeration::Enumeration;
 use crate::scale::{OutOfRange, Scale};
 use crate::text::Text;
 
@@ -207,7 +208,8 @@ pub fn raw_scaled(
 pub fn bits<B: Bits>(field: B) -> Value {
     let raw = field.raw();
     let sub_field = |&(name, from, to): &(&'static str, u32, u32)| {
-        (name.into(), Value::Unsigned(bits::get(raw, from, to)))
+        let value = Value::Unsigned(bits::get(raw, from, to));
+        (name.into(), value.with_name(B::names(name)))
     };
     let mut members: Vec<_> = B::FIELDS.iter().map(sub_field).collect();
     let reserved = raw & bits::reserved::<B>();
@@ -215,6 +217,12 @@ pub fn bits<B: Bits>(field: B) -> Value {
         members.push((RESERVED.into(), Value::Unsigned(reserved)));
     }
     Value::Object(members)
+}
+
+/// The view of an integer with named values.
+#[doc(hidden)]
+pub fn enumerated<E: Enumeration>(integer: Value) -> Value {
+    integer.with_name(E::VALUES)
 }
 
 /// Reads the integer of a bit field from its view. Omitted sub-fields are 0.

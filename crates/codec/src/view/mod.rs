@@ -5,7 +5,7 @@
 //! | record, sequence | object of the members that are present, in the order of the definition |
 //! | list, array | array |
 //! | variant | object with one key, the alternative's name |
-//! | integers, value sets | integer; when read, also the value's name |
+//! | integers, value sets | integer, with the value's [name](Value::Named); when read, also the name |
 //! | floating point | shortest decimal; `"NaN"`, `"Infinity"`, `"-Infinity"` |
 //! | scaled integers | the decimal with the fewest digits that gives the same integer |
 //! | bit fields | object of the sub-fields, and `"_reserved"` for other bits that are set |
@@ -27,7 +27,7 @@ pub use serde;
 pub use value::{Object, Value};
 
 #[doc(hidden)]
-pub use impls::{bits, choice, choice_of, raw_bits, raw_scaled, scaled};
+pub use impls::{bits, choice, choice_of, enumerated, raw_bits, raw_scaled, scaled};
 
 use super::scale::OutOfRange;
 

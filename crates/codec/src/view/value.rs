@@ -17,6 +17,8 @@ pub enum Value {
     Bool(bool),
     /// A non-negative integer.
     Unsigned(u64),
+    /// A non-negative integer, with its name in the definition. Serializes as the integer.
+    Named(u64, &'static str),
     /// A negative integer when reading; any signed field when writing.
     Signed(i64),
     /// A real number.
@@ -86,7 +88,7 @@ impl Value {
     /// If it is not a number.
     pub fn number(&self) -> Result<f64, Error> {
         match self {
-            Self::Unsigned(value) => Ok(*value as f64),
+            Self::Unsigned(value) | Self::Named(value, _) => Ok(*value as f64),
             Self::Signed(value) => Ok(*value as f64),
             Self::Real(value) => Ok(*value),
             _ => Err(self.unexpected("a number")),
@@ -99,12 +101,29 @@ impl Value {
     /// If it is not an integer, or does not fit.
     pub fn integer<T: TryFrom<u64> + TryFrom<i64>>(&self) -> Result<T, Error> {
         let integer = match *self {
-            Self::Unsigned(value) => T::try_from(value).ok(),
+            Self::Unsigned(value) | Self::Named(value, _) => T::try_from(value).ok(),
             Self::Signed(value) => T::try_from(value).ok(),
             _ => return Err(self.unexpected("an integer")),
         };
         let bits = 8 * size_of::<T>();
         integer.ok_or_else(|| self.unexpected(&format!("an integer of {bits} bits")))
+    }
+
+    /// Adds the name of an integer, if it has one that stands for no other value.
+    pub(super) fn with_name(self, names: &[(u64, &'static str)]) -> Self {
+        let raw = match self {
+            Self::Unsigned(raw) => Some(raw),
+            Self::Signed(raw) => u64::try_from(raw).ok(),
+            _ => None,
+        };
+        let named = names.iter().find(|(value, _)| Some(*value) == raw);
+        let stands_for = |name| names.iter().find(|(_, it)| *it == name);
+        match named {
+            Some(&(raw, name)) if stands_for(name).is_some_and(|(it, _)| *it == raw) => {
+                Self::Named(raw, name)
+            }
+            _ => self,
+        }
     }
 
     /// Replaces a name with the integer it stands for. Other values are returned unchanged.
@@ -139,7 +158,7 @@ impl fmt::Display for Value {
         match self {
             Self::Null => f.write_str("null"),
             Self::Bool(value) => value.fmt(f),
-            Self::Unsigned(value) => value.fmt(f),
+            Self::Unsigned(value) | Self::Named(value, _) => value.fmt(f),
             Self::Signed(value) => value.fmt(f),
             Self::Real(value) => value.fmt(f),
             Self::Text(text) if text.chars().count() <= 40 => write!(f, "{text:?}"),
@@ -207,7 +226,7 @@ impl Serialize for Value {
         match self {
             Self::Null => serializer.serialize_none(),
             Self::Bool(value) => serializer.serialize_bool(*value),
-            Self::Unsigned(value) => serializer.serialize_u64(*value),
+            Self::Unsigned(value) | Self::Named(value, _) => serializer.serialize_u64(*value),
             Self::Signed(value) => serializer.serialize_i64(*value),
             Self::Real(value) => serializer.serialize_f64(*value),
             Self::Text(text) => serializer.serialize_str(text),

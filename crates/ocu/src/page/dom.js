@@ -72,7 +72,7 @@ export function words(value) {
   return text.charAt(0).toUpperCase() + text.slice(1);
 }
 
-/** Whether keys that are pressed now belong to a field in which somebody types. */
+/** Whether keys that are pressed now belong to a text field. */
 export function typing() {
   const element = document.activeElement;
   return element instanceof HTMLInputElement || element instanceof HTMLSelectElement;

@@ -1,5 +1,5 @@
 // Manual drive. Something must be held all the time: a finger on the stick, a key, a shoulder
-// button of the gamepad. While it is, the wish is repeated every 100 ms; when it is let go, or the
+// button of the gamepad. While it is, the setpoint is repeated every 100 ms; when it is let go, or the
 // page is hidden, loses the connection or the control, driving ends at once and does not begin
 // again before everything has been let go.
 
@@ -46,7 +46,7 @@ export class Drive {
     this.#render([0, 0], null);
   }
 
-  /** Takes a state; `obstacle` says why nobody can drive now, or is empty. */
+  /** Takes a state; `obstacle` says why the vehicle cannot be driven now, or is empty. */
   update(state, obstacle) {
     this.#obstacle = obstacle;
     this.#confirmed = state?.drive ?? null;
@@ -107,15 +107,15 @@ export class Drive {
     if (this.#timer) {
       clearInterval(this.#timer);
       this.#timer = 0;
-      this.#link.tell({ type: "drive_end" });
+      this.#link.send({ type: "drive_end" });
     }
     this.#render([0, 0], null);
   }
 
   #tick() {
-    const [wish, source] = this.#wish();
-    const [forward, turn] = wish.map((value) => Math.round(value * this.#limit * 1000) / 1000);
-    if (!this.#link.tell({ type: "drive", forward, turn })) {
+    const [direction, source] = this.#direction();
+    const [forward, turn] = direction.map((value) => Math.round(value * this.#limit * 1000) / 1000);
+    if (!this.#link.send({ type: "drive", forward, turn })) {
       this.release();
       return;
     }
@@ -123,7 +123,7 @@ export class Drive {
   }
 
   /** Where the operator wants to go, each -1 to 1, and by what. */
-  #wish() {
+  #direction() {
     if (this.#stick) return [this.#stick, "Stick"];
     if (this.#keys.size) {
       const target = [0, 0];

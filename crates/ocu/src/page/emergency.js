@@ -1,5 +1,5 @@
 // Emergency stop of the selected vehicle and of all: one touch or key, from anywhere, in any
-// condition. The wish is kept and repeated until the vehicles say that they have stopped, over
+// condition. The request is repeated until the vehicles report that they have stopped, over
 // reconnections as well. Clearing it takes two.
 
 import { get, mark, say, show, toast } from "./dom.js";
@@ -9,7 +9,7 @@ const touch = matchMedia("(hover: none)");
 
 export class Emergency {
   #link;
-  /** Whether somebody wants the vehicle stopped and it has not confirmed that yet. */
+  /** Whether the operator has stopped the vehicle and it has not confirmed that yet. */
   #wanted = false;
   #confirmed = false;
   #refusal = "";
@@ -20,7 +20,7 @@ export class Emergency {
   #barred = false;
   #unbar;
 
-  /** Calls `unbar` when somebody wants to stop a vehicle and the station wants a token first. */
+  /** Calls `unbar` when the operator stops a vehicle and the station requires a token first. */
   constructor(link, unbar) {
     this.#link = link;
     this.#unbar = unbar;
@@ -122,7 +122,9 @@ export class Emergency {
   }
 
   #closeSheet() {
-    show(get("clear-sheet"), false);
+    const sheet = get("clear-sheet");
+    if (sheet.contains(document.activeElement)) get("estop").focus();
+    show(sheet, false);
   }
 
   async #clear(type) {

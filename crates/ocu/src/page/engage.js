@@ -4,7 +4,7 @@
 import { get, mark, plain, say, show, toast } from "./dom.js";
 import { part } from "./status.js";
 
-/** How long the station may take to show that it has heard of a request, in milliseconds. */
+/** How long the station may take to show the effect of a request, in milliseconds. */
 const GRACE = 2_000;
 
 export class Engage {

@@ -10,7 +10,7 @@ export class Fleet {
   #vehicles = [];
   #rows = new Map();
 
-  /** Calls `select` with the number of a vehicle that somebody chooses. */
+  /** Calls `select` with the number of a vehicle that the operator chooses. */
   constructor(select) {
     this.#select = select;
     get("fleet").addEventListener("keydown", (event) => this.#key(event));

@@ -1,12 +1,12 @@
 // Handing over control between operators: shows another operator's request, takes the answer, and
-// tells how control changed hands.
+// shows how control changed.
 
-import { get, list, number, plain, say, show, toast } from "./dom.js";
+import { get, list, plain, say, show, toast } from "./dom.js";
 
 export class Handover {
   #ask;
   #request = null;
-  #told = "";
+  #shown = "";
 
   /** Sends answers by `ask`. */
   constructor(ask) {
@@ -19,17 +19,17 @@ export class Handover {
   update(state, operable) {
     const { requests, handover } = state.control ?? {};
     const ending = plain(handover, 200);
-    if (ending && ending !== this.#told) toast("warn", ending.replace(/^./, (letter) => letter.toUpperCase()));
-    this.#told = ending;
+    if (ending && ending !== this.#shown) toast("warn", ending.replace(/^./, (letter) => letter.toUpperCase()));
+    this.#shown = ending;
     const [first] = list(requests, 8);
-    this.#request = number(first?.id);
+    this.#request = first ? { part: plain(first.part, 16), operator: plain(first.operator, 16) } : null;
     show(get("handover"), operable && this.#request !== null);
     if (this.#request === null) return;
     const why = plain(first.explanation, 120);
-    say(get("handover-text"), `${plain(first.operator, 16)} requests control (authority ${first.authority})${why ? `: ${why}` : ""}`);
+    say(get("handover-text"), `${this.#request.operator} requests control (authority ${first.authority})${why ? `: ${why}` : ""}`);
   }
 
   #answer(grant) {
-    if (this.#request !== null) this.#ask({ type: "handover", request: this.#request, grant });
+    if (this.#request !== null) this.#ask({ type: "handover", ...this.#request, grant });
   }
 }

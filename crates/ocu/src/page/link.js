@@ -1,5 +1,5 @@
 // The connection to jaus-ocu: opens the WebSocket, opens it again with growing pauses, carries
-// wishes and their answers, and knows how old the last state is.
+// requests and their answers, and knows how old the last state is.
 
 import { number, plain } from "./dom.js";
 
@@ -19,14 +19,14 @@ export class Link extends EventTarget {
   #retryAt = 0;
   #retryTimer = 0;
   #opened = 0;
-  #heard = 0;
+  #receivedAt = 0;
   #stateAt = 0;
   #ids = 0;
   #waiting = new Map();
   #token = takeToken();
   /** The vehicle that the page shows: what is asked is meant for it. */
   #vehicle = null;
-  /** Whether the server has said hello and, if it wants a token, has judged ours. */
+  /** Whether the server's first frame has arrived and, if it requires a token, it has checked ours. */
   settled = false;
 
   /** `connecting`, `live`, `stale` or `lost`. */
@@ -60,11 +60,11 @@ export class Link extends EventTarget {
     this.#connect();
   }
 
-  /** Sends a wish; resolves to null when it is done, or to the reason why not. */
-  ask(wish) {
+  /** Sends a request; resolves to null when it is done, or to the reason why not. */
+  ask(request) {
     if (!this.open) return Promise.resolve("No connection: not sent.");
     const id = ++this.#ids;
-    this.#send({ vehicle: this.#vehicle, ...wish, id });
+    this.#transmit({ vehicle: this.#vehicle, ...request, id });
     return new Promise((resolve) => {
       const timer = setTimeout(() => this.#answer(id, "No answer from the operator's node."), 5_000);
       this.#waiting.set(id, { resolve, timer });
@@ -72,8 +72,8 @@ export class Link extends EventTarget {
   }
 
   /** Sends what needs no answer; false if it could not be sent at once. */
-  tell(wish) {
-    return this.#send({ vehicle: this.#vehicle, ...wish });
+  send(request) {
+    return this.#transmit({ vehicle: this.#vehicle, ...request });
   }
 
   /** Uses a token from now on; resolves like `ask`. */
@@ -89,14 +89,14 @@ export class Link extends EventTarget {
     return reason;
   }
 
-  #send(wish) {
+  #transmit(request) {
     if (!this.open) return false;
     if (this.#socket.bufferedAmount > BACKLOG) {
       // Commands that arrive late are worse than none.
       this.#lose();
       return false;
     }
-    this.#socket.send(JSON.stringify(wish));
+    this.#socket.send(JSON.stringify(request));
     return true;
   }
 
@@ -105,64 +105,64 @@ export class Link extends EventTarget {
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
     const socket = new WebSocket(`${scheme}//${location.host}/ws`);
     this.#socket = socket;
-    this.#heard = performance.now();
+    this.#receivedAt = performance.now();
     this.settled = false;
     socket.addEventListener("open", () => {
-      this.#opened = this.#heard = performance.now();
+      this.#opened = this.#receivedAt = performance.now();
     });
     socket.addEventListener("message", (event) => socket === this.#socket && this.#handle(event.data));
     socket.addEventListener("close", () => socket === this.#socket && this.#lose());
   }
 
   #handle(text) {
-    this.#heard = performance.now();
-    let said;
+    this.#receivedAt = performance.now();
+    let frame;
     try {
-      said = JSON.parse(text);
+      frame = JSON.parse(text);
     } catch {
       return;
     }
-    if (said === null || typeof said !== "object") return;
-    switch (said.type) {
+    if (frame === null || typeof frame !== "object") return;
+    switch (frame.type) {
       case "hello":
-        this.#emit("hello", said);
+        this.#emit("hello", frame);
         break;
       case "state":
         this.#stateAt = performance.now();
         this.#pause = FIRST_PAUSE;
         this.#retryAt = 0;
-        this.#vehicle = number(said.vehicle?.subsystem);
-        this.#emit("state", said);
+        this.#vehicle = number(frame.vehicle?.subsystem);
+        this.#emit("state", frame);
         break;
       case "fleet":
       case "tree":
-        this.#emit(said.type, said);
+        this.#emit(frame.type, frame);
         break;
       case "done":
-        this.#answer(number(said.id), null);
+        this.#answer(number(frame.id), null);
         break;
       case "refused": {
-        const reason = plain(said.reason, 300) || "Refused without a reason.";
-        if (!this.#answer(number(said.id), reason)) this.#emit("refused", reason);
+        const reason = plain(frame.reason, 300) || "Refused without a reason.";
+        if (!this.#answer(number(frame.id), reason)) this.#emit("refused", reason);
         break;
       }
       case "message":
       case "lost":
-        this.#emit(said.type, said);
+        this.#emit(frame.type, frame);
     }
   }
 
   #answer(id, reason) {
-    const wish = this.#waiting.get(id);
-    if (!wish) return false;
-    clearTimeout(wish.timer);
+    const request = this.#waiting.get(id);
+    if (!request) return false;
+    clearTimeout(request.timer);
     this.#waiting.delete(id);
-    wish.resolve(reason);
+    request.resolve(reason);
     return true;
   }
 
   #watch() {
-    if (this.#socket && performance.now() - this.#heard > DEAD) this.#lose();
+    if (this.#socket && performance.now() - this.#receivedAt > DEAD) this.#lose();
   }
 
   #lose() {
@@ -176,7 +176,7 @@ export class Link extends EventTarget {
     this.#emit("close", null);
   }
 
-  /** Somebody looks, or the network is back: try at once. */
+  /** The page is visible again, or the network is back: try at once. */
   #hurry() {
     if (this.#socket) return;
     this.#pause = FIRST_PAUSE;

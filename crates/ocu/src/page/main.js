@@ -1,11 +1,12 @@
-// Puts the page together: what the server says goes to the panels, what the operator wants goes to
-// the server.
+// Puts the page together: frames of the server go to the panels, requests of the operator to the
+// server.
 
 import { get, mark, plain, say, show, toast, typing } from "./dom.js";
 import { Drive } from "./drive.js";
 import { Emergency } from "./emergency.js";
 import { Engage } from "./engage.js";
 import { Fleet } from "./fleet.js";
+import { keepFocus } from "./focus.js";
 import { Handover } from "./handover.js";
 import { Link } from "./link.js";
 import { MapView } from "./map.js";
@@ -18,7 +19,7 @@ import { showSystem, showTree } from "./tree.js";
 const link = new Link();
 const map = new MapView((place) => choose(place));
 const mission = new Mission(ask, map);
-const emergency = new Emergency(link, () => show(get("token-sheet"), true));
+const emergency = new Emergency(link, () => openTokenSheet());
 const drive = new Drive(link, () => emergency.stop());
 const fleet = new Fleet((subsystem) => selectVehicle(subsystem));
 const engage = new Engage(ask, () => readyToDrive());
@@ -27,15 +28,16 @@ new Messages(link);
 followTheme(() => map.recolour());
 
 let state = null;
-/** Whether the server takes wishes from this page: it wants no token, or has taken ours. */
+/** Whether the server accepts requests from this page: it requires no token, or has accepted ours. */
 let trusted = false;
 /** The authority that the operator's node asks for control with. */
 let authority = null;
 
-// What the server says.
+// Frames of the server.
 
 link.addEventListener("hello", async ({ detail }) => {
   trusted = !detail.token_needed;
+  map.offerBaseMap(detail.base_map);
   authority = detail.authority;
   if (!trusted && link.token) await offer(link.token);
   else show(get("token-sheet"), !trusted && !watching());
@@ -69,7 +71,11 @@ function render() {
   const mode = part(state, "primitive_driver")?.state;
   get("resume").disabled = !operable || !state.control?.held || mode !== "standby";
   get("standby").disabled = !operable || !state.control?.held || mode !== "ready";
-  if (!state) return;
+  if (state) renderState(live, operable, hindrance);
+  keepFocus();
+}
+
+function renderState(live, operable, hindrance) {
   showControl(state, authority, operable);
   engage.update(state, operable, hindrance);
   handover.update(state, operable);
@@ -80,7 +86,7 @@ function render() {
   showSystem(state);
 }
 
-/** Why nobody can drive from here now, even with control of a ready vehicle; empty if one can. */
+/** Why this page cannot drive now, even with control of a ready vehicle; empty if one can. */
 function hindered(live) {
   if (!live) return "Not connected";
   if (!trusted) return "Watching only: enter the token to drive";
@@ -101,11 +107,11 @@ function uncontrolled() {
 
 const sentence = (text) => plain(text, 140).replace(/^./, (letter) => letter.toUpperCase());
 
-// What the operator wants.
+// Requests of the operator.
 
-/** Sends a wish; shows a refusal, or what was done. */
-async function ask(wish, done) {
-  const reason = await link.ask(wish);
+/** Sends a request; shows a refusal, or what was done. */
+async function ask(request, done) {
+  const reason = await link.ask(request);
   if (reason !== null) toast("bad", reason);
   else if (done) toast("good", done);
   return reason;
@@ -159,6 +165,11 @@ async function offer(token) {
   render();
 }
 
+function openTokenSheet() {
+  show(get("token-sheet"), true);
+  get("token").focus();
+}
+
 get("token-form").addEventListener("submit", (event) => {
   event.preventDefault();
   sessionStorage.removeItem("jaus-watch");
@@ -170,7 +181,7 @@ get("token-no").addEventListener("click", () => {
   show(get("token-sheet"), false);
 });
 get("control-text").addEventListener("click", () => {
-  if (!trusted && link.open) show(get("token-sheet"), true);
+  if (!trusted && link.open) openTokenSheet();
 });
 
 // Views of small screens, and keys.

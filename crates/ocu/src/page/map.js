@@ -1,6 +1,7 @@
-// The map: raster, grid, trail, planned path, destination and vehicle on a canvas that is moved by
-// one finger, zoomed by two, and tapped to choose a destination. North (X) is up, east (Y) right.
+// The map: geographic map, raster, grid, trail, planned path, destination and vehicle on a canvas that is
+// moved by one finger, zoomed by two, and tapped to choose a destination. X of the local frame is up, Y right.
 
+import { BaseMap, degreesOf } from "./basemap.js";
 import { figure, get, list, mark, number, say, show } from "./dom.js";
 import { Raster } from "./raster.js";
 
@@ -14,9 +15,11 @@ export class MapView {
   #canvas = get("map");
   #context = this.#canvas.getContext("2d");
   #raster = new Raster(null);
+  #base = new BaseMap(() => this.#draw());
   #camera = { x: 0, y: 0, scale: 24 };
-  #placed = false;
-  /** Whether somebody has chosen what is seen, so that a turned screen leaves it alone. */
+  /** What the first view shows: `raster`, `vehicle`, or nothing yet. */
+  #placed = "";
+  /** Whether the operator has chosen what is seen, so that a turned screen leaves it alone. */
   #chosen = false;
   #following = true;
   #pointers = new Map();
@@ -33,7 +36,7 @@ export class MapView {
   #pick;
   #colours = {};
 
-  /** Calls `pick` with {x, y} in metres when somebody taps a place. */
+  /** Calls `pick` with {x, y} in metres when the operator taps a place. */
   constructor(pick) {
     this.#pick = pick;
     new ResizeObserver(() => this.#resize()).observe(this.#canvas);
@@ -48,10 +51,14 @@ export class MapView {
       this.#vehicle = vehicle?.subsystem;
       this.#trail = [];
       this.#raster = new Raster(this.#vehicle);
-      this.#placed = false;
+      this.#placed = "";
+      this.#chosen = false;
     }
-    const pose = vehicle?.pose;
-    const known = number(pose?.x) !== null && number(pose?.y) !== null;
+    this.#base.update(vehicle?.place, token);
+    const isKnown = (pose) => number(pose?.x) !== null && number(pose?.y) !== null;
+    // Without a local pose, the global one has the frame for itself.
+    const pose = isKnown(vehicle?.pose) ? vehicle.pose : vehicle?.place?.fix;
+    const known = isKnown(pose);
     this.#pose = known ? { x: pose.x, y: pose.y, yaw: number(pose.yaw) } : null;
     this.#poseFresh = live && known && pose.age_ms < 1_000;
     if (known) this.#extendTrail(pose);
@@ -63,14 +70,19 @@ export class MapView {
     this.#destination = isGiven ? { x, y } : null;
     this.#raster.update(state.map, token, () => this.#draw());
     const empty = get("map-empty");
-    show(empty, !this.#raster.picture);
+    show(empty, !this.#raster.picture && !this.#base.shown);
     say(empty, this.#raster.problem || "Waiting for the map");
-    if (!this.#placed) this.#place();
-    else if (this.#following) this.#follow();
+    this.#place();
+    if (this.#following) this.#follow();
     this.#draw();
   }
 
-  /** The place that somebody chose and that no mission has yet, or null. */
+  /** Takes whether the station has a map file. */
+  offerBaseMap(offered) {
+    this.#base.offer(offered);
+  }
+
+  /** The place that the operator chose and that no mission has yet, or null. */
   set draft(place) {
     this.#draft = place;
     this.#draw();
@@ -87,6 +99,9 @@ export class MapView {
     const style = getComputedStyle(document.documentElement);
     for (const name of ["ground", "grid", "grid-strong", "trail", "path", "destination", "vehicle", "vehicle-edge", "stale", "ink", "halo"]) {
       this.#colours[name] = style.getPropertyValue(`--map-${name}`).trim();
+    }
+    for (const name of ["land", "green", "landuse", "water", "building", "other", "road", "opacity", "cells"]) {
+      this.#colours[`base-${name}`] = style.getPropertyValue(`--base-${name}`).trim();
     }
     this.#raster.paint(() => {});
     this.#draw();
@@ -120,18 +135,25 @@ export class MapView {
     return { x: x - (py - height / 2) / scale, y: y + (px - width / 2) / scale };
   }
 
-  /** The first view: the whole map, or else the surroundings of the vehicle. */
+  /** The first view: the whole map, or else the surroundings of the vehicle until the map is known. */
   #place() {
-    if (this.#raster.info) this.#showAll();
-    else if (this.#pose) Object.assign(this.#camera, { x: this.#pose.x, y: this.#pose.y, scale: 24 });
-    else return;
-    this.#placed = Boolean(this.#raster.info);
+    const wanted = this.#raster.info ? "raster" : this.#pose ? "vehicle" : "";
+    if (!wanted || this.#placed === wanted || this.#placed === "raster") return;
+    const isFree = !this.#placed || !this.#chosen;
+    this.#placed = wanted;
+    if (isFree) this.#showAll();
   }
 
+  /** The whole map; without one, the surroundings of the vehicle. */
   #showAll() {
     const { width, height } = this.#size;
     const info = this.#raster.info;
-    if (!info || !width || !height) return;
+    if (!width || !height) return;
+    if (!info) {
+      if (this.#pose) Object.assign(this.#camera, { x: this.#pose.x, y: this.#pose.y, scale: 24 });
+      this.#chosen = false;
+      return this.#draw();
+    }
     const [tall, wide] = [info.rows * info.cell_m, info.columns * info.cell_m];
     this.#chosen = false;
     this.#camera = {
@@ -191,7 +213,7 @@ export class MapView {
     get("follow").addEventListener("click", () => this.#setFollowing(!this.#following));
   }
 
-  /** A key that nobody else wanted; true if it was for the map. */
+  /** A key that has no other use; true if it was for the map. */
   key(key) {
     switch (key) {
       case "+": case "=": this.#zoom(1.5); return true;
@@ -241,7 +263,10 @@ export class MapView {
   #readout(place) {
     const element = get("map-readout");
     show(element, place !== null);
-    if (place) say(element, `x ${figure(place.x, 1)}  y ${figure(place.y, 1)} m`);
+    if (!place) return;
+    const frame = this.#base.frame;
+    const degrees = frame ? `  ${degreesOf(frame.toGlobal(place))}` : "";
+    say(element, `North ${figure(place.x, 1)}  East ${figure(place.y, 1)} m${degrees}`);
   }
 
   // Drawing.
@@ -270,6 +295,7 @@ export class MapView {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.fillStyle = this.#colours.ground;
     context.fillRect(0, 0, width, height);
+    this.#paintBaseMap(width, height);
     this.#paintRaster();
     this.#paintGrid(width, height);
     context.globalAlpha = this.#over ? 0.4 : 1;
@@ -283,6 +309,20 @@ export class MapView {
     this.#paintNorth(width);
   }
 
+  #paintBaseMap(width, height) {
+    const view = {
+      width,
+      height,
+      scale: this.#camera.scale,
+      toWorld: (px, py) => this.#toWorld(px, py),
+      toScreen: (place) => this.#toScreen(place),
+    };
+    this.#base.paint(this.#context, view, this.#colours);
+    const note = get("map-source");
+    show(note, this.#base.note !== "");
+    say(note, this.#base.note);
+  }
+
   #paintRaster() {
     const { picture, info } = this.#raster;
     if (!picture) return;
@@ -290,7 +330,9 @@ export class MapView {
     const { scale } = this.#camera;
     const [wide, tall] = [info.columns * info.cell_m * scale, info.rows * info.cell_m * scale];
     this.#context.imageSmoothingEnabled = info.cell_m * scale < 1;
+    if (this.#base.shown) this.#context.globalAlpha = Number(this.#colours["base-cells"]) || 1;
     this.#context.drawImage(picture, left, bottom - tall, wide, tall);
+    this.#context.globalAlpha = 1;
     this.#context.strokeStyle = this.#colours["grid-strong"];
     this.#context.lineWidth = 1.5;
     this.#context.strokeRect(left, bottom - tall, wide, tall);
@@ -406,9 +448,14 @@ export class MapView {
     context.fillText(label, x + 6, y - 7);
   }
 
+  /** An arrow to true north if the frame's place on the globe is known, otherwise along X. */
   #paintNorth(width) {
     const context = this.#context;
-    const x = width / 2;
+    const [x, middle] = [width / 2, 18];
+    context.save();
+    context.translate(x, middle);
+    context.rotate(-(this.#base.frame?.heading ?? 0));
+    context.translate(-x, -middle);
     context.font = "700 14px system-ui, sans-serif";
     context.textAlign = "center";
     [context.strokeStyle, context.lineWidth, context.fillStyle] = [this.#colours.halo, 4, this.#colours.ink];
@@ -420,6 +467,7 @@ export class MapView {
     context.lineTo(x - 6, 14);
     context.closePath();
     context.fill();
+    context.restore();
   }
 }
 

@@ -35,7 +35,7 @@ export class Messages {
 
   #subscribe() {
     const filter = Object.fromEntries([...new FormData(get("filters"))].map(([name, value]) => [name, value.trim()]));
-    this.#link.tell({ type: "messages", on: this.#on, filter });
+    this.#link.send({ type: "messages", on: this.#on, filter });
   }
 
   #setOn(on) {

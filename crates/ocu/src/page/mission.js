@@ -16,7 +16,7 @@ const STAGES = [
 ];
 const OVER = ["idle", "arrived", "failed", "stopped", "lost"];
 
-/** A planner reports its mission 4 times a second; what is older, in milliseconds, is said to be old. */
+/** A planner reports its mission 4 times a second; an older report, in milliseconds, is marked as old. */
 const OLD = 2_000;
 
 /** What became of a mission whose planner is lost, and what is left to the operator. */
@@ -35,7 +35,7 @@ export class Mission {
   #furthest = { mission: null, index: -1 };
   #operable = false;
 
-  /** `ask` sends a wish and reports what is refused; `map` shows the chosen place. */
+  /** `ask` sends a request and shows a refusal; `map` shows the chosen place. */
   constructor(ask, map) {
     this.#ask = ask;
     this.#map = map;
@@ -54,7 +54,7 @@ export class Mission {
     form.addEventListener("input", () => this.#draft(this.#place()));
   }
 
-  /** A place that somebody tapped. */
+  /** A place that the operator tapped. */
   choose({ x, y }) {
     get("destination-x").value = x.toFixed(2);
     get("destination-y").value = y.toFixed(2);
@@ -85,7 +85,7 @@ export class Mission {
     const lost = mission?.lost ?? null;
     const stage = lost ? "lost" : plain(mission?.stage ?? "idle", 30);
     this.#showStages(mission, stage);
-    this.#showLine(mission, stage, state.vehicle?.missing);
+    this.#showLine(mission, stage, state.vehicle);
     const progress = mission ? Math.round(Math.min(100, Math.max(0, number(mission.progress) ?? 0))) : 0;
     mark(get("progress"), "aria-valuenow", progress);
     mark(get("progress"), "data-state", stage);
@@ -119,11 +119,16 @@ export class Mission {
     });
   }
 
-  #showLine(mission, stage, missing) {
+  /** Whether an emergency that ended the mission is over. */
+  #isCleared(stage, vehicle, reason) {
+    return ["stopped", "failed"].includes(stage) && /emergency/.test(plain(reason, 255)) && vehicle?.emergency === false;
+  }
+
+  #showLine(mission, stage, vehicle) {
     const line = get("mission-line");
     mark(line, "data-state", stage);
     if (stage === "lost") return say(line, lostPlanner(mission.lost));
-    const planner = mission ? null : list(missing, 64).find((one) => one?.role === "planner");
+    const planner = mission ? null : list(vehicle?.missing, 64).find((one) => one?.role === "planner");
     if (planner) return say(line, `The planner ${plain(planner.id, 16)} is ${plain(planner.how, 10)}: no mission can be planned`);
     if (!mission || stage === "idle") return say(line, plain(mission?.reason, 255) || "No mission");
     const what = {
@@ -140,7 +145,7 @@ export class Mission {
     }[stage] ?? words(stage);
     const left = number(mission.remaining_m);
     const far = left !== null && !OVER.includes(stage) ? `, ${figure(left, 1)} m to go` : "";
-    const reason = plain(mission.reason, 255);
+    const reason = this.#isCleared(stage, vehicle, mission.reason) ? "the emergency is cleared; plan again" : plain(mission.reason, 255);
     const age = number(mission.age_ms) ?? 0;
     const old = age > OLD ? ` (${duration(age)} old)` : "";
     say(line, `${what}${far}${reason ? `: ${reason}` : ""}${old}`);
@@ -168,8 +173,8 @@ export class Mission {
     const place = this.#place();
     if (!place || !this.#operable) return;
     const speed = get("destination-speed").valueAsNumber;
-    const wish = { type: "destination", ...place, ...(Number.isFinite(speed) ? { speed } : {}) };
-    if ((await this.#ask(wish, "Planning a route")) === null) {
+    const request = { type: "destination", ...place, ...(Number.isFinite(speed) ? { speed } : {}) };
+    if ((await this.#ask(request, "Planning a route")) === null) {
       this.#draft(null);
     }
   }

@@ -1,7 +1,7 @@
 //! The operator's page: plain HTML, CSS and JavaScript modules, embedded in the binary.
 //!
 //! There is no build step, and nothing is loaded from elsewhere. So the page works on a vehicle's
-//! own network without the Internet, and the browser can be told to run nothing else.
+//! own network without the Internet, and the browser is instructed to run nothing else.
 
 /// One file of the page.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +36,7 @@ macro_rules! files {
 pub(crate) const FILES: &[File] = files! {
     "/" HTML "index.html",
     "/style.css" CSS "style.css",
-    "/panels.css" CSS "panels.css",
+    "/sections.css" CSS "sections.css",
     "/icon.svg" IMAGE "icon.svg",
     "/main.js" SCRIPT "main.js",
     "/dom.js" SCRIPT "dom.js",
@@ -46,9 +46,13 @@ pub(crate) const FILES: &[File] = files! {
     "/status.js" SCRIPT "status.js",
     "/map.js" SCRIPT "map.js",
     "/raster.js" SCRIPT "raster.js",
+    "/basemap.js" SCRIPT "basemap.js",
+    "/mvt.js" SCRIPT "mvt.js",
+    "/projection.js" SCRIPT "projection.js",
     "/mission.js" SCRIPT "mission.js",
     "/drive.js" SCRIPT "drive.js",
     "/engage.js" SCRIPT "engage.js",
+    "/focus.js" SCRIPT "focus.js",
     "/gamepad.js" SCRIPT "gamepad.js",
     "/emergency.js" SCRIPT "emergency.js",
     "/theme.js" SCRIPT "theme.js",

@@ -22,12 +22,14 @@ export function showLink(link, state) {
   say(get("link-word"), word);
   say(get("link-detail"), detail);
   const banner = get("banner");
-  const text = {
-    stale: `No update for ${age}: this picture is old.`,
-    lost: state ? `No connection: this picture is ${age} old.` : "No connection to the operator's node.",
-  }[condition];
-  show(banner, Boolean(text));
-  if (text) say(banner, text);
+  // The age changes all the time: a screen reader hears the sentence alone, and once.
+  const [text, old] = {
+    stale: ["No new state: this picture is old.", age],
+    lost: state ? ["No connection: this picture is old.", age] : ["No connection to the operator's node.", ""],
+  }[condition] ?? ["", ""];
+  say(get("banner-text"), text);
+  say(get("banner-age"), old);
+  show(banner, text !== "");
 }
 
 /** How a part is missing, in words. */
@@ -84,7 +86,7 @@ function holder(driver) {
   return driver.controller ? `${plain(driver.controller, 16)} drives` : "not controlled";
 }
 
-/** Shows state, velocity and pose; what is old is said to be. `late` is the age of the state itself. */
+/** Shows state, velocity and pose; old values are marked. `late` is the age of the state itself. */
 export function showStatus(state, late) {
   const { vehicle } = state;
   const driver = part(state, "primitive_driver");
@@ -98,7 +100,9 @@ export function showStatus(state, late) {
   const [pose, velocity] = [vehicle?.pose, vehicle?.velocity];
   fill("speed", velocity?.x, 2, velocity, late);
   fill("turn-rate", degrees(velocity?.yaw_rate), 0, velocity, late);
-  fill("heading", bearing(pose?.yaw), 0, pose, late);
+  const fix = vehicle?.place?.fix;
+  const heading = number(pose?.yaw) !== null ? pose : fix;
+  fill("heading", bearing(heading?.yaw), 0, heading, late);
   fill("north", pose?.x, 2, pose, late);
   fill("east", pose?.y, 2, pose, late);
   const ages = [["state", driver?.state_age_ms], ["pose", pose?.age_ms], ["velocity", velocity?.age_ms]];

@@ -6,24 +6,18 @@ import { authority } from "./status.js";
 
 const PERIOD = 400;
 let shown = 0;
-let tree = null;
-/** How the selected vehicle's components are, by their ids. */
+/** The conditions of the selected vehicle's parts, by their ids. */
 let health = new Map();
 
 /** Shows the tree of components. */
-export function showTree(told) {
-  tree = told;
-  renderTree();
-}
-
-function renderTree() {
-  const subsystems = list(tree?.subsystems, 256);
+export function showTree(snapshot) {
+  const subsystems = list(snapshot?.subsystems, 256);
   const counts = { nodes: 0, components: 0 };
   update(get("tree"), subsystems.map((one) => subsystem(one, counts)));
   say(get("system-count"), `${counts.components} components on ${counts.nodes} nodes`);
 }
 
-/** Shows the parts of the selected vehicle; not more often than anybody can read. */
+/** Shows the parts of the selected vehicle; at a rate at which they can be read. */
 export function showSystem(state) {
   const now = performance.now();
   if (now - shown < PERIOD) return;
@@ -33,7 +27,6 @@ export function showSystem(state) {
   const parts = [...present, ...missing.filter((one) => one?.how === "gone")];
   health = new Map(parts.map((part) => [plain(part?.id, 16), condition(part, silent.get(plain(part?.id, 16)))]));
   showParts(parts);
-  if (tree) renderTree();
 }
 
 /** A part's state for the colours, and in words. A sensor or a store has no state: that it is there counts. */
@@ -75,13 +68,13 @@ function node(one, subsystem, counts) {
 
 function component(one) {
   const services = list(one?.services, 255);
-  const { state, word } = health.get(plain(one?.id, 16)) ?? {};
+  const state = plain(one?.state ?? "unknown", 20);
   return {
-    state: state ?? "unknown",
+    state,
     key: `c${plain(one?.id, 16)}`,
     id: plain(one?.id, 16),
     title: plain(one?.name, 60) || "Component",
-    note: `${word ? `${word} · ` : ""}${services.length} services`,
+    note: `${words(state)} · ${services.length} services`,
     open: false,
     children: services.map((service, index) => {
       const urn = plain(service?.urn, 160);

@@ -7,7 +7,7 @@ use crate::role::{self, Role};
 use crate::sample_clock::SampleClock;
 use crate::state;
 use jaus::address::JausId;
-use jaus::service::{Component, State};
+use jaus::service::{ComponentEntry, State};
 
 /// Which reports of the vehicle's parts are expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,6 +49,7 @@ pub(crate) struct Part {
     /// Name of the part.
     pub(super) name: String,
     pub(super) reports_pose: bool,
+    pub(super) reports_global_pose: bool,
     pub(super) reports_velocity: bool,
     pub(super) pose_clock: Option<SampleClock>,
     pub(super) velocity_clock: Option<SampleClock>,
@@ -71,6 +72,7 @@ impl Part {
             stage: None,
             name: String::new(),
             reports_pose: false,
+            reports_global_pose: false,
             reports_velocity: false,
             pose_clock: None,
             velocity_clock: None,
@@ -80,10 +82,11 @@ impl Part {
     }
 
     /// Updates the part from discovery data.
-    pub(super) fn describe(&mut self, component: &Component, role: Role) {
+    pub(super) fn describe(&mut self, component: &ComponentEntry, role: Role) {
         self.role = role;
         self.managed = role::is_managed(component);
         self.reports_pose = role::reports_pose(component);
+        self.reports_global_pose = role::reports_global_pose(component);
         self.reports_velocity = role::reports_velocity(component);
         let own_name = component.identification.as_ref().map(|it| it.name.clone());
         let own_name = own_name.filter(|it| !it.is_empty());
@@ -102,7 +105,8 @@ impl Part {
 
     /// Whether its reports have ceased.
     pub(super) fn is_silent(&self, now: Instant, limit: Duration) -> bool {
-        let is_periodic = self.managed || self.reports_pose || self.reports_velocity;
+        let is_periodic =
+            self.managed || self.reports_pose || self.reports_global_pose || self.reports_velocity;
         self.heard.is_some_and(|heard| {
             let silence = now.saturating_duration_since(heard);
             (is_periodic && silence >= limit) || (self.is_down && silence >= Self::DOWN)
@@ -119,11 +123,11 @@ impl Part {
     }
 
     pub(crate) fn controller(&self) -> Option<JausId> {
-        self.told_controller()?
+        self.reported_controller()?
     }
 
     /// The reported client in control, which may be none; `None` before a report.
-    pub(crate) fn told_controller(&self) -> Option<Option<JausId>> {
+    pub(crate) fn reported_controller(&self) -> Option<Option<JausId>> {
         Some(self.controller?.what.map(|(id, _)| id))
     }
 }

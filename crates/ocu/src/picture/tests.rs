@@ -18,36 +18,36 @@ fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)
 }
 
-fn component(id: JausId, urns: &[&str]) -> Component {
+fn component(id: JausId, urns: &[&str]) -> ComponentEntry {
     let offer = |urn: &&str| Offer {
         urn: (*urn).to_owned(),
         major: 1,
         minor: 0,
     };
-    Component {
+    ComponentEntry {
         id,
         identification: None,
         services: Some(urns.iter().map(offer).collect()),
     }
 }
 
-fn driver() -> Component {
+fn driver() -> ComponentEntry {
     component(DRIVER, &[management::URN, primitive_driver::URN])
 }
 
-fn sensors() -> Component {
+fn sensors() -> ComponentEntry {
     component(
         SENSORS,
         &[local_pose_sensor::URN, velocity_state_sensor::URN],
     )
 }
 
-fn planner() -> Component {
+fn planner() -> ComponentEntry {
     component(PLANNER, &[management::URN, mission_planner::URN])
 }
 
 /// A vehicle with these components.
-fn picture(now: Instant, components: &[Component]) -> Picture {
+fn picture(now: Instant, components: &[ComponentEntry]) -> Picture {
     let mut picture = Picture::new(JausId::new(42, 1, 1), 101, Depth::Full);
     picture.set_parts(now, components.iter());
     picture

@@ -1,6 +1,7 @@
 //! The web server: the page's files, the WebSocket to the session, and access protection. It holds
 //! no vehicle state: snapshots and requests just pass through.
 
+mod base_map;
 mod bounds;
 mod connections;
 mod guard;
@@ -22,6 +23,7 @@ use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, oneshot};
 
 use self::connections::Connections;
+use super::base_map::BaseMap;
 use super::page::{self, File};
 use super::session::{Access, Order};
 use super::token::Token;
@@ -36,6 +38,8 @@ pub(super) struct Admission {
     pub(super) token: Option<Token>,
     pub(super) token_to_read: bool,
     pub(super) hosts: Vec<String>,
+    /// The geographic map behind the vehicle.
+    pub(super) base_map: Option<BaseMap>,
     /// The station's node, if it runs in this process. Enables the message view.
     pub(super) node: Option<Node>,
 }
@@ -52,6 +56,8 @@ struct Shared {
     dictionary: Dictionary,
     /// Limits the number of pages.
     places: Arc<Semaphore>,
+    /// Limits the number of tiles of the map file that are read at once.
+    readers: Arc<Semaphore>,
     pages: AtomicU64,
     counters: Counters,
 }
@@ -89,6 +95,7 @@ impl Server {
             access,
             dictionary: Dictionary::of(jaus_vehicle::messages::registry()),
             places: Arc::new(Semaphore::new(Self::PAGES)),
+            readers: Arc::new(Semaphore::new(base_map::READERS)),
             pages: AtomicU64::new(0),
             counters: Counters::default(),
         };
@@ -105,6 +112,8 @@ impl Server {
         let router = files
             .route("/ws", get(serve_page))
             .route("/map/{vehicle}/{map}", get(serve_map))
+            .route("/base-map", get(base_map::describe))
+            .route("/base-map/{zoom}/{x}/{y}", get(base_map::serve))
             .route("/health", get(health))
             .layer(middleware::from_fn_with_state(self.shared.clone(), admit))
             .with_state(self.shared);

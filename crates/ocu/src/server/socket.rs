@@ -264,6 +264,7 @@ async fn write(
         token_needed: shared.needs_token(),
         operator: shared.admission.operator.to_string(),
         authority: shared.admission.authority,
+        base_map: shared.admission.base_map.is_some(),
     };
     let mut next = serde_json::to_string(&hello)
         .ok()

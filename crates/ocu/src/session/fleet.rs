@@ -9,11 +9,12 @@ use tokio::sync::mpsc;
 
 use super::following::Sighting;
 use super::vehicle::Vehicle;
-use crate::picture::Depth;
+use crate::picture::{Depth, PRESENT};
 use crate::role;
 use crate::state;
+use crate::tree::{self, LostComponents};
 use jaus::component::Component;
-use jaus::service::{Directory, Kind, Subsystem};
+use jaus::service::{Directory, Kind, SubsystemEntry};
 
 /// The vehicles of the station.
 pub(super) struct Fleet {
@@ -22,6 +23,7 @@ pub(super) struct Fleet {
     /// The vehicles of the settings; empty for all that are discovered.
     chosen: Vec<u16>,
     directory: Arc<Directory>,
+    lost: LostComponents,
     vehicles: BTreeMap<u16, Vehicle>,
     selected: Option<u16>,
 }
@@ -39,6 +41,7 @@ impl Fleet {
             component,
             sighted,
             directory: Arc::default(),
+            lost: LostComponents::default(),
             vehicles: BTreeMap::new(),
             selected: None,
             chosen,
@@ -102,8 +105,8 @@ impl Fleet {
         if Arc::ptr_eq(&directory, &self.directory) {
             return Vec::new();
         }
-        self.directory = directory;
-        let directory = Arc::clone(&self.directory);
+        self.lost.handle_directory(now, &self.directory, &directory);
+        self.directory = Arc::clone(&directory);
         let own = self.component.id().subsystem();
         let others = directory.subsystems().filter(|(number, _)| *number != own);
         let members = others.filter(|(number, known)| self.may_join(*number, known));
@@ -121,7 +124,7 @@ impl Fleet {
         joined
     }
 
-    fn may_join(&self, number: u16, known: &Subsystem) -> bool {
+    fn may_join(&self, number: u16, known: &SubsystemEntry) -> bool {
         self.chosen.is_empty() && !self.contains(number) && role::is_vehicle(known)
     }
 
@@ -146,7 +149,7 @@ impl Fleet {
     fn first(&self) -> Option<u16> {
         let is_named = |number: &&u16| {
             let known = self.directory.subsystem(**number);
-            let identification = known.and_then(Subsystem::identification);
+            let identification = known.and_then(SubsystemEntry::identification);
             identification.is_some_and(|it| it.kind == Kind::Vehicle)
         };
         let named = self.vehicles.keys().find(is_named);
@@ -180,12 +183,12 @@ impl Fleet {
         }
     }
 
-    /// The tree of all known components.
-    pub(super) fn tree(&self) -> state::Tree {
-        crate::tree::of(&self.directory)
-    }
-
-    pub(super) const fn directory(&self) -> &Arc<Directory> {
-        &self.directory
+    /// The tree of all known components, and of those that were lost recently.
+    pub(super) fn tree(&mut self, now: Instant) -> state::Tree {
+        self.lost.handle_time(now);
+        tree::of(&self.directory, &self.lost, |id| {
+            let vehicle = self.vehicles.get(&id.subsystem());
+            vehicle.map_or(PRESENT, |it| it.picture.condition(now, id))
+        })
     }
 }

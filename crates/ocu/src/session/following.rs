@@ -15,8 +15,8 @@ use jaus::address::JausId;
 use jaus::codec::Query;
 use jaus::component::{Component, SubscribeError, Update, When};
 use jaus::messages::core::{QueryControl, QueryStatus, access_control};
-use jaus::messages::mobility::{QueryLocalPose, QueryVelocityState};
-use jaus::service::Component as Known;
+use jaus::messages::mobility::{QueryGlobalPose, QueryLocalPose, QueryVelocityState};
+use jaus::service::ComponentEntry;
 use jaus_vehicle::messages::ground::{
     QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, mission_planner, raster_maps,
 };
@@ -44,6 +44,7 @@ struct Topics {
     control: bool,
     stage: bool,
     pose: bool,
+    global_pose: bool,
     velocity: bool,
     mission: bool,
     path: bool,
@@ -52,6 +53,8 @@ struct Topics {
 
 /// Rate of pose and velocity reports.
 const MOTION: When = When::hz(10.0);
+/// Rate of global pose reports.
+const GLOBAL_POSE: When = When::hz(5.0);
 /// Rate of status reports.
 const STATUS: When = When::hz(4.0);
 /// Rate of status reports of a vehicle that is only in the list.
@@ -60,14 +63,14 @@ const BRIEF_STATUS: When = When::hz(1.0);
 const PAUSE: Duration = Duration::from_secs(1);
 
 impl Topics {
-    fn of(part: &Known, picture: &Picture) -> Self {
+    fn of(part: &ComponentEntry, picture: &Picture) -> Self {
         match picture.depth() {
             Depth::Brief => Self::brief(part, picture.principal()),
             Depth::Full => Self::full(part),
         }
     }
 
-    fn brief(part: &Known, principal: Option<JausId>) -> Self {
+    fn brief(part: &ComponentEntry, principal: Option<JausId>) -> Self {
         Self {
             status: (principal == Some(part.id)).then_some(BRIEF_STATUS),
             control: principal == Some(part.id) || part.offers(mission_planner::URN),
@@ -76,12 +79,13 @@ impl Topics {
         }
     }
 
-    fn full(part: &Known) -> Self {
+    fn full(part: &ComponentEntry) -> Self {
         Self {
             status: role::is_managed(part).then_some(STATUS),
             control: role::is_managed(part) || part.offers(access_control::URN),
             stage: role::tells_stage(part),
             pose: role::reports_pose(part),
+            global_pose: role::reports_global_pose(part),
             velocity: role::reports_velocity(part),
             mission: part.offers(mission_planner::URN),
             path: part.offers(mission_planner::URN),
@@ -129,6 +133,10 @@ impl Following {
         if topics.pose {
             let query = QueryLocalPose::all();
             tasks.spawn(self.ask(peer, query, MOTION));
+        }
+        if topics.global_pose {
+            let query = QueryGlobalPose::all();
+            tasks.spawn(self.ask(peer, query, GLOBAL_POSE));
         }
         if topics.velocity {
             let query = QueryVelocityState::all();

@@ -85,8 +85,8 @@ impl Lease {
             Some(session) => session.check().is_ok(),
             None => driver.is(State::Ready),
         };
-        match driver.told_controller() {
-            Some(told) if told != Some(own) => self.set_target(TargetState::AsFound),
+        match driver.reported_controller() {
+            Some(holder) if holder != Some(own) => self.set_target(TargetState::AsFound),
             Some(_) if is_ready => self.set_target(TargetState::Ready),
             _ => {}
         }

@@ -14,7 +14,7 @@ mod vehicle;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 use tokio::sync::{mpsc, watch};
 use tokio::time::{MissedTickBehavior, interval};
@@ -28,11 +28,11 @@ use self::vehicle::Vehicle;
 use super::answer::Said;
 use super::picture::Depth;
 use super::request::OperatorRequest;
-use super::state::{Control, Drive, State};
+use super::state::{Control, Drive, State, Tree};
 use super::stick::PageId;
 use super::stick::{Push, Stick};
 use jaus::component::{Component, Handlers};
-use jaus::service::Directory;
+use jaus::node::time_of_day;
 use jaus_vehicle::parts::PartError;
 use jaus_view::Timestamp;
 
@@ -149,8 +149,8 @@ pub(super) struct Session {
     /// The service that receives the notices, until it is offered.
     handoff: Option<Handlers>,
     publisher: Publisher,
-    /// The directory whose tree was published.
-    published: Arc<Directory>,
+    /// The tree that was published.
+    published: Option<Tree>,
     seq: u64,
 }
 
@@ -183,7 +183,7 @@ impl Session {
             notices,
             handoff: Some(handover::service(noticed)),
             publisher,
-            published: Arc::default(),
+            published: None,
             seq: 0,
         };
         (session, Access { orders, snapshots })
@@ -325,9 +325,10 @@ impl Session {
     fn publish_fleet(&mut self, now: Instant) {
         let fleet = self.fleet.state(now);
         publish(&self.publisher.fleet, &Said::Fleet(&fleet));
-        if !Arc::ptr_eq(&self.published, self.fleet.directory()) {
-            self.published = Arc::clone(self.fleet.directory());
-            publish(&self.publisher.tree, &Said::Tree(&self.fleet.tree()));
+        let tree = self.fleet.tree(now);
+        if self.published.as_ref() != Some(&tree) {
+            publish(&self.publisher.tree, &Said::Tree(&tree));
+            self.published = Some(tree);
         }
     }
 
@@ -337,7 +338,7 @@ impl Session {
         let vehicle = self.fleet.selected();
         State {
             seq: self.seq / Self::SNAPSHOT,
-            time: time_of_day().to_string(),
+            time: Timestamp::since_1970(time_of_day(), DECIMALS).to_string(),
             operator: self.client.component().id().to_string(),
             vehicle: vehicle.and_then(|it| it.state(now)),
             control: vehicle.map_or_else(Control::default, Vehicle::control_state),
@@ -353,13 +354,5 @@ impl Session {
     }
 }
 
-/// Milliseconds are precise enough for display.
+/// Of seconds: milliseconds are precise enough for display.
 const DECIMALS: u8 = 3;
-
-/// The time of day. Clocks before 1970 yield the start of 1970.
-fn time_of_day() -> Timestamp {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    let since = since.unwrap_or_default();
-    let seconds = i64::try_from(since.as_secs()).unwrap_or(i64::MAX);
-    Timestamp::new(seconds, since.subsec_nanos(), DECIMALS)
-}

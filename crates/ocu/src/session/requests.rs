@@ -61,9 +61,11 @@ impl Session {
             }
             OperatorRequest::Emergency { on } => return self.emergency(now, meant, on, reply),
             OperatorRequest::EmergencyAll { on } => return self.emergency_of_all(now, on, reply),
-            OperatorRequest::Handover { request, grant } => {
-                return self.decide_handover(now, meant, (request, grant), reply);
-            }
+            OperatorRequest::Handover {
+                part,
+                operator,
+                grant,
+            } => return self.decide_handover(now, (part, operator), grant, reply),
             OperatorRequest::DriveEnd => {
                 self.stick.handle_release(now, page);
                 self.steer(now);
@@ -128,29 +130,28 @@ impl Session {
         }
     }
 
-    /// Grants or refuses another operator's request for control of a vehicle, by default of the
-    /// selected one. A grant stops manual drive and releases the vehicle.
+    /// Grants or refuses another operator's request for control, which a part of a vehicle has
+    /// passed on. A grant stops manual drive and releases the vehicle.
     fn decide_handover(
         &mut self,
         now: Instant,
-        meant: Option<u16>,
-        (request, grant): (u8, bool),
+        (part, operator): (JausId, JausId),
+        grant: bool,
         reply: Reply,
     ) {
-        let selected = self.fleet.selected_number();
-        let number = meant.or(selected);
-        let vehicle = number.and_then(|number| self.fleet.get_mut(number));
-        let decided = vehicle.and_then(|it| it.handover.decide(request, grant));
-        let Some((part, decision, operator)) = decided else {
+        let number = part.subsystem();
+        let vehicle = self.fleet.get_mut(number);
+        let decided = vehicle.and_then(|it| it.handover.decide(part, operator, grant));
+        let Some(decision) = decided else {
             return reply(Err("the request for control is over".to_owned()));
         };
         let mut sessions = Vec::new();
         if grant {
-            if number == selected {
+            if self.fleet.selected_number() == Some(number) {
                 self.stick.stop(now);
                 self.steer(now);
             }
-            if let Some(vehicle) = number.and_then(|number| self.fleet.get_mut(number)) {
+            if let Some(vehicle) = self.fleet.get_mut(number) {
                 vehicle.handover.ending = Some(format!("control was handed over to {operator}"));
                 sessions = vehicle.release();
             }
@@ -421,7 +422,8 @@ impl Vehicle {
             Err(why) => return reply(Err(why)),
         };
         if !x.is_finite() || !y.is_finite() || speed.is_some_and(|it| !(it > 0.0 && it <= 100.0)) {
-            let why = "a destination has x and y in metres, and a speed above 0 and up to 100 m/s";
+            let why =
+                "a destination has metres north and east, and a speed above 0 and up to 100 m/s";
             return reply(Err(why.to_owned()));
         }
         let mut destination = SetDestination {

@@ -114,7 +114,7 @@ impl Vehicle {
         client: &mut Client,
     ) {
         match content {
-            Content::Requests(requests) if self.is_wanted() => {
+            Content::Requests(requests) if self.is_wanted() && self.knows(part) => {
                 self.handover.handle_requests(now, part, requests);
             }
             Content::Requests(_) => {}
@@ -198,6 +198,11 @@ impl Vehicle {
         self.lease.held(self.picture.find(Role::Planner)?)
     }
 
+    /// Whether a component is a part of the vehicle.
+    fn knows(&self, part: JausId) -> bool {
+        self.picture.parts().contains_key(&part)
+    }
+
     /// Whether a part has reported this state.
     pub(super) fn is(&self, part: JausId, state: State) -> bool {
         let part = self.picture.parts().get(&part);
@@ -206,11 +211,11 @@ impl Vehicle {
 
     pub(super) fn fleet_state(&self, now: Instant, selected: bool) -> state::FleetVehicle {
         let held = !self.lease.all_held().is_empty();
-        let requested = !self.handover.requests().is_empty();
+        let requested = self.handover.is_requested();
         self.picture.fleet_state(now, selected, (held, requested))
     }
 
-    pub(super) fn state(&self, now: Instant) -> Option<state::Vehicle> {
+    pub(super) fn state(&self, now: Instant) -> Option<state::VehicleState> {
         let obstacle = |part| self.lease.obstacle(part);
         self.picture
             .vehicle_state(now, self.alarm.is_wanted(), obstacle)
@@ -219,7 +224,7 @@ impl Vehicle {
     pub(super) fn control_state(&self) -> state::Control {
         state::Control {
             asking: self.handover.holder().map(|it| it.to_string()),
-            requests: self.handover.requests().to_vec(),
+            requests: self.handover.requests(),
             handover: self.handover.ending.clone().unwrap_or_default(),
             ..self.lease.state(&self.picture)
         }

@@ -3,7 +3,7 @@
 use jaus_ocu::Station;
 use serde_json::json;
 
-use crate::scene::{Page, Scene, driver_of};
+use crate::scene::{ATTEMPTS, Page, Scene, driver_of};
 
 #[tokio::test]
 async fn a_page_sees_the_vehicle_and_its_parts_without_asking() {
@@ -146,7 +146,11 @@ async fn of_two_pages_one_drives_and_the_other_is_told_so() {
         .await;
     let request = json!({"type": "drive", "forward": 0.5, "turn": 0});
     // On a busy machine the first command expires (300 ms) before the second arrives.
+    let mut attempts = 0..ATTEMPTS;
     let refused = loop {
+        attempts
+            .next()
+            .expect("the first command expired each time");
         driver.ask(request.clone()).await.unwrap();
         if let Err(refused) = other.ask(request.clone()).await {
             break refused;

@@ -8,7 +8,7 @@ use jaus_ocu::Station;
 use serde_json::{Value, json};
 
 use crate::missing::planner;
-use crate::scene::{Page, Scene};
+use crate::scene::{ATTEMPTS, Page, Scene};
 
 /// A vehicle in the list.
 fn listed(fleet: &Value, subsystem: u16) -> &Value {
@@ -145,7 +145,9 @@ async fn a_page_does_not_select_another_vehicle_while_another_page_drives() {
         .await;
     let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
     // On a busy machine the push expires (300 ms) before the selection arrives.
+    let mut attempts = 0..ATTEMPTS;
     let refused = loop {
+        attempts.next().expect("the push expired each time");
         driver.ask(push.clone()).await.unwrap();
         let selected = other.ask(json!({"type": "select", "subsystem": 102})).await;
         if let Err(refused) = selected {

@@ -27,12 +27,18 @@ async fn page_of_other(address: std::net::SocketAddr) -> Page {
     other
 }
 
-/// Waits for the other operator's request and returns its number.
+/// Waits for the other operator's request and returns it.
 async fn requested(page: &mut Page) -> Value {
     let is_requested = |state: &Value| state["control"]["requests"][0]["operator"] == "43.1.1";
     let mut state = page.until(is_requested).await;
     assert_eq!(state["control"]["requests"][0]["authority"], 200);
-    state["control"]["requests"][0]["id"].take()
+    state["control"]["requests"][0].take()
+}
+
+/// The decision about a request.
+fn decision(request: &Value, grant: bool) -> Value {
+    let (part, operator) = (&request["part"], &request["operator"]);
+    json!({"type": "handover", "part": part, "operator": operator, "grant": grant})
 }
 
 #[tokio::test]
@@ -80,10 +86,12 @@ async fn an_equal_authority_asks_and_a_grant_stops_the_vehicle_and_hands_it_over
     assert!(!is_held(&state), "not yet");
     let request = requested(&mut first).await;
     first.drive_until(&scene, |scene| scene.speed() > 0.3).await;
-    first
-        .ask(json!({"type": "handover", "request": request, "grant": true}))
-        .await
-        .unwrap();
+    // A decision about another operator's request decides nothing about this one.
+    let mut other = decision(&request, true);
+    other["operator"] = json!("44.1.1");
+    let over = first.ask(other).await.unwrap_err();
+    assert_eq!(over, "the request for control is over");
+    first.ask(decision(&request, true)).await.unwrap();
     scene.until(|scene| scene.speed() == 0.0).await;
     let state = second.until(is_held).await;
     assert!(tells(&state, "42.1.1 has handed over control"), "{state}");
@@ -107,7 +115,7 @@ async fn a_refusal_is_seen_by_the_operator_who_asked_and_changes_nothing() {
     let mut second = page_of_other(address).await;
     second.ask(control(true)).await.unwrap();
     let request = requested(&mut first).await;
-    let answer = json!({"type": "handover", "request": request, "grant": false});
+    let answer = decision(&request, false);
     first.ask(answer.clone()).await.unwrap();
     let state = second
         .until(|state| tells(state, "42.1.1 has refused to hand over control"))

@@ -155,7 +155,7 @@ async fn a_page_that_never_stops_talking_is_shown_the_door() {
 }
 
 #[tokio::test]
-async fn what_is_no_wish_is_refused_in_words_and_the_page_goes_on() {
+async fn an_invalid_request_is_refused_in_words_and_the_page_goes_on() {
     let scene = Scene::new().await;
     let mut page = scene.page().await;
     for text in [

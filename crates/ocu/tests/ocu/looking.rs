@@ -3,11 +3,8 @@
 use std::path::Path;
 
 use jaus_ocu::Station;
-use jaus_test_kit::waiting::within_limit;
 use jaus_vehicle::parts::{KnowledgeStore, Part};
 use serde_json::json;
-use tokio::io::{AsyncReadExt, AsyncWriteExt};
-use tokio::net::TcpStream;
 
 use crate::scene::Scene;
 
@@ -31,24 +28,12 @@ async fn the_map_of_the_store_is_shown_with_all_its_cells() {
     assert_eq!((&map["rows"], &map["columns"]), (&json!(16), &json!(16)));
     for _ in 0..2 {
         let path = format!("/map/101/{}?revision={}", map["id"], map["revision"]);
-        let (head, cells) = get(&scene, &path).await;
+        let (head, cells) = scene.get(&path, "").await;
         assert!(head.starts_with("http/1.1 200"), "{head}");
         assert!(head.contains("content-length: 256"), "{head}");
         assert_eq!(cells, picture.cells);
     }
-    let (head, _) = get(&scene, "/map/101/999").await;
+    let (head, _) = scene.get("/map/101/999", "").await;
     assert!(head.starts_with("http/1.1 404"), "{head}");
     running.abort();
-}
-
-/// Sends a GET request. Returns the head of the response in lower case, and its body.
-async fn get(scene: &Scene, path: &str) -> (String, Vec<u8>) {
-    let mut stream = TcpStream::connect(scene.address).await.unwrap();
-    let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
-    stream.write_all(request.as_bytes()).await.unwrap();
-    let mut answer = Vec::new();
-    within_limit(stream.read_to_end(&mut answer)).await.unwrap();
-    let end = answer.windows(4).position(|it| it == b"\r\n\r\n").unwrap();
-    let head = String::from_utf8_lossy(&answer[..end]).to_lowercase();
-    (head, answer[end + 4..].to_vec())
 }

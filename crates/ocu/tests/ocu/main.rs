@@ -11,6 +11,7 @@
 
 mod scene;
 
+mod base_map;
 mod drive;
 mod fleet;
 mod handover;

@@ -39,6 +39,40 @@ async fn a_driver_that_ends_is_named_and_nobody_drives_until_it_is_back() {
     page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
 }
 
+/// The state of a component in the tree; `None` if the tree lacks it.
+fn in_tree<'t>(tree: &'t Value, id: &str) -> Option<&'t str> {
+    let list = |of: &'t Value, name: &str| of[name].as_array().into_iter().flatten();
+    let nodes = list(tree, "subsystems").flat_map(|it| list(it, "nodes"));
+    let mut components = nodes.flat_map(|it| list(it, "components"));
+    components.find(|it| it["id"] == id)?["state"].as_str()
+}
+
+#[tokio::test]
+async fn the_tree_shows_the_state_of_every_component_and_keeps_those_that_are_gone() {
+    let mut scene = Scene::new().await;
+    let _other = scene.another_vehicle(102);
+    let sensor = Component::builder(Kind::Vehicle, "Rover");
+    let _sensor = scene.attach(42, sensor.offer(scene.vehicle.velocity_state_sensor()));
+    scene.page().await.select(101).await;
+    // A page that connects later gets the tree as it is.
+    let mut page = scene.page().await;
+    let expected = [
+        ("101.1.1", "standby"),
+        ("101.1.42", "present"),
+        ("102.1.1", "standby"),
+    ];
+    let is_complete = |tree: &Value| {
+        let mut all = expected.iter();
+        all.all(|(id, state)| in_tree(tree, id) == Some(state))
+    };
+    page.said_until("tree", is_complete).await;
+    scene.end_rover();
+    let is_gone = |tree: &Value| in_tree(tree, "101.1.1") == Some("gone");
+    page.said_until("tree", is_gone).await;
+    scene.start_rover().await;
+    page.said_until("tree", is_complete).await;
+}
+
 #[tokio::test]
 async fn a_pose_that_freezes_ends_manual_drive_although_it_is_still_reported() {
     let frozen = Arc::new(AtomicBool::new(false));

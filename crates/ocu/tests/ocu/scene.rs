@@ -26,11 +26,15 @@ use jaus_vehicle::mobility::Vehicle;
 use jaus_vehicle::motion::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 use jaus_vehicle::parts::{Part, Slot};
 use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::task::JoinHandle;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 use tokio_tungstenite::tungstenite::{Error, Message};
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
+
+/// Attempts at a step that must reach the station before the previous one expires.
+pub(crate) const ATTEMPTS: u32 = 20;
 
 /// A vehicle that is one component, and a station that observes it.
 pub(crate) struct Scene {
@@ -124,6 +128,20 @@ impl Scene {
         };
         let vehicles = subsystems.map(start).collect();
         (node, vehicles)
+    }
+
+    /// Sends a GET request with further header lines. Returns the head of the response in lower
+    /// case, and its body.
+    pub(crate) async fn get(&self, path: &str, headers: &str) -> (String, Vec<u8>) {
+        let mut stream = TcpStream::connect(self.address).await.unwrap();
+        let request =
+            format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n{headers}Connection: close\r\n\r\n");
+        stream.write_all(request.as_bytes()).await.unwrap();
+        let mut answer = Vec::new();
+        within_limit(stream.read_to_end(&mut answer)).await.unwrap();
+        let end = answer.windows(4).position(|it| it == b"\r\n\r\n").unwrap();
+        let head = String::from_utf8_lossy(&answer[..end]).to_lowercase();
+        (head, answer[end + 4..].to_vec())
     }
 
     pub(crate) async fn page(&self) -> Page {

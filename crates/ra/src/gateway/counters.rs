@@ -65,7 +65,8 @@ counters! {
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     counters: Counters,
-    told: BTreeMap<(Counter, u16), Instant>,
+    /// When a refusal of each kind was last logged.
+    logged: BTreeMap<(Counter, u16), Instant>,
 }
 
 impl Tally {
@@ -92,14 +93,14 @@ impl Tally {
     ) {
         self.counters.add(counter);
         let kind = (counter, code);
-        let since = self.told.get(&kind);
-        if since.is_some_and(|&told| now < told + Self::SILENCE) {
+        let since = self.logged.get(&kind);
+        if since.is_some_and(|&logged| now < logged + Self::SILENCE) {
             return;
         }
-        if since.is_none() && self.told.len() >= Self::MOST_KINDS {
+        if since.is_none() && self.logged.len() >= Self::MOST_KINDS {
             return;
         }
-        self.told.insert(kind, now);
+        self.logged.insert(kind, now);
         let total = self.counters.get(counter);
         tracing::info!(code = %format_args!("{code:04X}h"), total, %why, "{}", counter.name());
     }

@@ -92,14 +92,14 @@ impl State {
     /// Cuts a report down to the `wanted` fields. A report whose size contradicts its presence
     /// vector is returned unchanged; decoding refuses it later.
     pub(super) fn narrow(self, report: &Bytes, wanted: u32) -> Bytes {
-        let Some(told) = self.wanted(report).filter(|_| !self.fields.is_empty()) else {
+        let Some(present) = self.wanted(report).filter(|_| !self.fields.is_empty()) else {
             return report.clone();
         };
         let mut narrowed = BytesMut::with_capacity(report.len());
-        narrowed.put_slice(&(told & wanted).to_le_bytes()[..self.presence]);
+        narrowed.put_slice(&(present & wanted).to_le_bytes()[..self.presence]);
         let mut at = self.presence;
         for (bit, &size) in self.fields.iter().enumerate() {
-            if told & 1 << bit == 0 {
+            if present & 1 << bit == 0 {
                 continue;
             }
             let Some(field) = report.get(at..at + size) else {

@@ -8,12 +8,12 @@ use crate::RaId;
 use crate::ids::{IdTable, RaComponent, Side, Unmapped};
 use crate::node;
 use jaus::address::JausId;
-use jaus::service::{Component, Directory, Kind};
+use jaus::service::{ComponentEntry, Directory, Kind};
 
 /// RA view of a JAUS subsystem, with the JAUS component behind each RA id.
 #[derive(Debug, Default)]
 pub(super) struct Picture {
-    pub(super) subsystem: node::Subsystem,
+    pub(super) subsystem: node::RaSubsystemEntry,
     pub(super) routes: BTreeMap<RaId, Target>,
     /// Components that cannot be shown, with the reason.
     pub(super) unmapped: Vec<(JausId, Unmapped)>,
@@ -33,16 +33,16 @@ pub(super) fn draw(
 ) -> Option<Picture> {
     let subsystem = directory.subsystem(number)?;
     let id = u8::try_from(ids.subsystem(Side::Jaus, number).ok()?).ok()?;
-    let told = subsystem.identification();
-    let is_operator = told.is_some_and(|it| it.kind == Kind::OperatorControlUnit);
-    let name = |told: Option<&jaus::service::Identification>| {
-        told.map_or_else(String::new, |it| cut(&it.name))
+    let identification = subsystem.identification();
+    let is_operator = identification.is_some_and(|it| it.kind == Kind::OperatorControlUnit);
+    let name = |identification: Option<&jaus::service::Identification>| {
+        identification.map_or_else(String::new, |it| cut(&it.name))
     };
     let mut picture = Picture::default();
     picture.subsystem.id = id;
-    picture.subsystem.name = name(told);
+    picture.subsystem.name = name(identification);
     for (node_number, jaus_node) in subsystem.nodes() {
-        let mut node = node::Node {
+        let mut node = node::RaNodeEntry {
             id: node_number,
             name: name(jaus_node.identification()),
             components: Vec::new(),
@@ -62,9 +62,9 @@ impl Picture {
     fn add(
         &mut self,
         ids: &IdTable,
-        component: &Component,
+        component: &ComponentEntry,
         commander: bool,
-        node: &mut node::Node,
+        node: &mut node::RaNodeEntry,
     ) {
         let mut parts = BTreeMap::new();
         for offer in component.offered() {
@@ -94,7 +94,7 @@ impl Picture {
                 lists,
             };
             self.routes.insert(shown, target);
-            node.components.push(node::Component {
+            node.components.push(node::RaComponentEntry {
                 component: shown.component,
                 instance: shown.instance,
                 name: name(component, part, several),
@@ -105,9 +105,9 @@ impl Picture {
 }
 
 /// The name of a component; with several component types, the type is part of it.
-fn name(component: &Component, part: RaComponent, several: bool) -> String {
-    let told = component.identification.as_ref().map(|it| it.name.as_str());
-    match told.filter(|name| !name.is_empty()) {
+fn name(component: &ComponentEntry, part: RaComponent, several: bool) -> String {
+    let name = component.identification.as_ref().map(|it| it.name.as_str());
+    match name.filter(|name| !name.is_empty()) {
         Some(name) if several => cut(&format!("{name}: {part}")),
         Some(name) => cut(name),
         None => part.to_string(),

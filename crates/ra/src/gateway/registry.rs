@@ -21,7 +21,7 @@ const MOST_RECIPIENTS: usize = 64;
 
 impl Gateway {
     /// Updates the proxies for a new or changed RA subsystem.
-    pub(super) fn list(&mut self, now: Instant, subsystem: &node::Subsystem) {
+    pub(super) fn list(&mut self, now: Instant, subsystem: &node::RaSubsystemEntry) {
         let number = subsystem.id;
         if let Err(collision) = self.claim(Side::Ra, number.into()) {
             return self.tally.refuse(now, Counter::Collision, 0, collision);
@@ -296,7 +296,11 @@ impl Gateway {
 }
 
 /// The JAUS profile of an RA component.
-fn profile(subsystem: &node::Subsystem, ra: RaId, component: &node::Component) -> Profile {
+fn profile(
+    subsystem: &node::RaSubsystemEntry,
+    ra: RaId,
+    component: &node::RaComponentEntry,
+) -> Profile {
     let or = |name: &str, otherwise: String| match name.is_empty() {
         true => otherwise,
         false => name.to_owned(),
@@ -312,7 +316,7 @@ fn profile(subsystem: &node::Subsystem, ra: RaId, component: &node::Component) -
 }
 
 /// Infers the kind of an RA subsystem from its components: RA systems do not report it.
-fn kind(subsystem: &node::Subsystem) -> Kind {
+fn kind(subsystem: &node::RaSubsystemEntry) -> Kind {
     let has = |wanted: fn(u8) -> bool| subsystem.components().any(|(id, _)| wanted(id.component));
     let drives = |part| RaComponent(part).is_driver();
     let commands = |part| matches!(part, 32 | 40);

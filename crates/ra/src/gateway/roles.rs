@@ -114,8 +114,8 @@ impl Role {
     }
 
     /// The RA services of a component in this role.
-    pub(super) fn services(&self) -> Vec<node::Service> {
-        let own = node::Service {
+    pub(super) fn services(&self) -> Vec<node::RaServiceEntry> {
+        let own = node::RaServiceEntry {
             kind: u16::from(self.part.0),
             inputs: commands(self.inputs),
             outputs: commands(self.outputs),
@@ -125,8 +125,8 @@ impl Role {
 }
 
 /// The RA service of a component with core messages only.
-pub(super) fn core_service() -> node::Service {
-    node::Service {
+pub(super) fn core_service() -> node::RaServiceEntry {
+    node::RaServiceEntry {
         kind: 0,
         inputs: commands(CORE_INPUTS),
         outputs: commands(CORE_OUTPUTS),

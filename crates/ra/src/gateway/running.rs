@@ -1,16 +1,12 @@
 //! Runs the gateway: the socket of the RA network, the JAUS node with the attached proxies, and one
 //! task that drives the [`Gateway`].
-#![expect(
-    clippy::disallowed_methods,
-    reason = "gives the gateway its clock and timer"
-)]
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::future::poll_fn;
 use std::net::SocketAddr;
 use std::task::Poll;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bytes::Bytes;
 use tokio::time::{Interval, MissedTickBehavior};
@@ -21,11 +17,25 @@ use jaus::address::JausId;
 use jaus::endpoint::Received;
 use jaus::link::udp::{self, UdpLink};
 use jaus::link::{Group, Interface, Interfaces, Ip, STANDARD_PORT, Slab};
-use jaus::node::{Node, Port, Resident};
+use jaus::node::{Node, Port, Resident, now, sleep_until};
 use jaus::wire::Priority;
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
 /// Configuration of a running gateway between RA systems and JAUS.
+///
+/// ```no_run
+/// # use jaus::component::Kind;
+/// # use jaus::node::{Config, Node};
+/// # use jaus_ra::gateway::RaGateway;
+/// # use jaus_vehicle::parts::{Part, Slot};
+/// # async fn example() -> Result<(), Box<dyn std::error::Error>> {
+/// let node = Node::start(Config::new(250, 1).port(3795))?;
+/// let slot = Slot::new(node.attach(1)?, node, Kind::OtherSubsystem, "RA gateway");
+/// let gateway = RaGateway { interface: Some("eth1".to_owned()), ..RaGateway::default() };
+/// gateway.run(slot).await?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 pub struct RaGateway {
     /// Gateway settings.
@@ -275,10 +285,6 @@ impl Running {
     }
 }
 
-fn now() -> Instant {
-    tokio::time::Instant::now().into_std()
-}
-
 fn ticks(period: Duration) -> Interval {
     let mut ticks = tokio::time::interval(period);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -289,13 +295,6 @@ fn ticks(period: Duration) -> Interval {
 async fn tick(ticks: &mut Option<Interval>) {
     match ticks {
         Some(ticks) => drop(ticks.tick().await),
-        None => std::future::pending().await,
-    }
-}
-
-async fn sleep_until(wake: Option<Instant>) {
-    match wake {
-        Some(wake) => tokio::time::sleep_until(wake.into()).await,
         None => std::future::pending().await,
     }
 }

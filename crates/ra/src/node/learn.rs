@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::RaNode;
 use super::peer::{Peer, Question, commands};
-use super::subsystem::{Command, Component, Node, Service};
+use super::subsystem::{Command, RaComponentEntry, RaNodeEntry, RaServiceEntry};
 use crate::RaId;
 use crate::counters::Counter;
 use crate::message::Message;
@@ -145,9 +145,9 @@ impl RaNode {
     }
 
     /// The nodes of a report, without invalid or duplicate ids and components above the limit.
-    fn nodes(&mut self, report: &ReportConfiguration) -> Vec<Node> {
+    fn nodes(&mut self, report: &ReportConfiguration) -> Vec<RaNodeEntry> {
         let mut room = self.settings.max_components;
-        let mut nodes: Vec<Node> = Vec::new();
+        let mut nodes: Vec<RaNodeEntry> = Vec::new();
         let mut left_out = false;
         for listed in &report.node_list {
             let id = listed.node_rec.node_id;
@@ -155,9 +155,9 @@ impl RaNode {
                 left_out = true;
                 continue;
             }
-            let mut components: Vec<Component> = Vec::new();
+            let mut components: Vec<RaComponentEntry> = Vec::new();
             for rec in &listed.component_list {
-                let is_there = |known: &Component| {
+                let is_there = |known: &RaComponentEntry| {
                     (known.component, known.instance) == (rec.component_id, rec.instance_id)
                 };
                 let in_range = [rec.component_id, rec.instance_id]
@@ -168,16 +168,16 @@ impl RaNode {
                     continue;
                 }
                 room -= 1;
-                components.push(Component {
+                components.push(RaComponentEntry {
                     component: rec.component_id,
                     instance: rec.instance_id,
-                    ..Component::default()
+                    ..RaComponentEntry::default()
                 });
             }
-            nodes.push(Node {
+            nodes.push(RaNodeEntry {
                 id,
                 components,
-                ..Node::default()
+                ..RaNodeEntry::default()
             });
         }
         if left_out {
@@ -325,11 +325,11 @@ fn readable(name: &Text) -> String {
     text.chars().filter(|c| !c.is_control()).collect()
 }
 
-fn service(seq: &report_services::ServiceSeq) -> Service {
+fn service(seq: &report_services::ServiceSeq) -> RaServiceEntry {
     let inputs = seq.input_message_list.iter();
     let outputs = seq.output_message_list.iter();
     let command = |code, presence| Command { code, presence };
-    Service {
+    RaServiceEntry {
         kind: seq.service_rec.service_type,
         inputs: inputs
             .map(|rec| command(rec.command_code, rec.presence_vector))

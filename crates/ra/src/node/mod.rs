@@ -34,7 +34,9 @@ use std::time::Instant;
 use bytes::Bytes;
 
 pub use settings::Settings;
-pub use subsystem::{BadSubsystem, Command, Component, Node, Service, Subsystem, Where};
+pub use subsystem::{
+    BadSubsystem, Command, RaComponentEntry, RaNodeEntry, RaServiceEntry, RaSubsystemEntry, Where,
+};
 
 use super::carrier::{Carrier, SendError, Transmit};
 use super::counters::{Counter, Counters};
@@ -69,9 +71,9 @@ pub struct RaNode {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
     /// A subsystem was discovered, with the names and services that it reported.
-    Appeared(Subsystem),
+    Appeared(RaSubsystemEntry),
     /// A known subsystem reports a different configuration.
-    Changed(Subsystem),
+    Changed(RaSubsystemEntry),
     /// It has shut down or timed out.
     Lost(u8),
     /// A message for one or several of our components (see its destination) that the node does not
@@ -160,7 +162,11 @@ impl RaNode {
     /// # Errors
     /// Invalid or duplicate ids, more than fits the messages, or a subsystem number in use by a
     /// peer.
-    pub fn announce(&mut self, now: Instant, subsystem: Subsystem) -> Result<(), BadSubsystem> {
+    pub fn announce(
+        &mut self,
+        now: Instant,
+        subsystem: RaSubsystemEntry,
+    ) -> Result<(), BadSubsystem> {
         let subsystem = own::complete(subsystem)?;
         let id = subsystem.id;
         if self.peers.contains_key(&id) {
@@ -271,7 +277,7 @@ impl RaNode {
     }
 
     /// The RA subsystems present, ordered by number, with what is known of them so far.
-    pub fn subsystems(&self) -> impl Iterator<Item = &Subsystem> + '_ {
+    pub fn subsystems(&self) -> impl Iterator<Item = &RaSubsystemEntry> + '_ {
         self.peers.values().map(|peer| &peer.subsystem)
     }
 
@@ -282,7 +288,7 @@ impl RaNode {
     }
 
     /// Our subsystems, including node managers and communicators.
-    pub fn own(&self) -> impl Iterator<Item = &Subsystem> + '_ {
+    pub fn own(&self) -> impl Iterator<Item = &RaSubsystemEntry> + '_ {
         self.own.values().map(|own| &own.subsystem)
     }
 }

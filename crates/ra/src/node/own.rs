@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
 use super::subscriptions::Subscription;
-use super::subsystem::{BadSubsystem, Command, Component, Node, Service, Subsystem};
+use super::subsystem::{
+    BadSubsystem, Command, RaComponentEntry, RaNodeEntry, RaServiceEntry, RaSubsystemEntry,
+};
 use crate::RaId;
 use crate::messages::ra33::{
     CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryConfiguration, QueryHeartbeatPulse,
@@ -16,7 +18,7 @@ use jaus::codec::{Message as _, Text};
 /// A local subsystem.
 #[derive(Debug)]
 pub(super) struct Own {
-    pub(super) subsystem: Subsystem,
+    pub(super) subsystem: RaSubsystemEntry,
     pub(super) next_heartbeat: Instant,
     /// Subscriptions by event number.
     pub(super) subscriptions: BTreeMap<u8, Subscription>,
@@ -26,7 +28,7 @@ pub(super) struct Own {
 
 impl Own {
     /// Takes a complete and validated subsystem.
-    pub(super) fn new(now: Instant, subsystem: Subsystem) -> Self {
+    pub(super) fn new(now: Instant, subsystem: RaSubsystemEntry) -> Self {
         Self {
             subsystem,
             next_heartbeat: now,
@@ -54,11 +56,11 @@ impl Own {
         self.subsystem.components().map(|(id, _)| id)
     }
 
-    fn node(&self, id: u8) -> Option<&Node> {
+    fn node(&self, id: u8) -> Option<&RaNodeEntry> {
         self.subsystem.nodes.iter().find(|node| node.id == id)
     }
 
-    fn component(&self, id: RaId) -> Option<&Component> {
+    fn component(&self, id: RaId) -> Option<&RaComponentEntry> {
         let found = self.subsystem.components().find(|&(other, _)| other == id);
         found.map(|(_, component)| component)
     }
@@ -117,8 +119,8 @@ fn short(name: &str) -> &str {
     &name[..end.unwrap_or(0)]
 }
 
-fn listed(node: &Node) -> report_configuration::NodeSeq {
-    let component = |component: &Component| report_configuration::ComponentRec {
+fn listed(node: &RaNodeEntry) -> report_configuration::NodeSeq {
+    let component = |component: &RaComponentEntry| report_configuration::ComponentRec {
         component_id: component.component,
         instance_id: component.instance,
     };
@@ -128,7 +130,7 @@ fn listed(node: &Node) -> report_configuration::NodeSeq {
     }
 }
 
-fn described(service: &Service) -> report_services::ServiceSeq {
+fn described(service: &RaServiceEntry) -> report_services::ServiceSeq {
     let input = |command: &Command| report_services::InputMessageRec {
         command_code: command.code,
         presence_vector: command.presence,
@@ -147,12 +149,12 @@ fn described(service: &Service) -> report_services::ServiceSeq {
 }
 
 /// The messages that the node itself receives and sends for each component.
-fn core() -> Service {
+fn core() -> RaServiceEntry {
     let commands = |codes: &[u16]| {
         let command = |&code| Command { code, presence: 0 };
         codes.iter().map(command).collect()
     };
-    Service {
+    RaServiceEntry {
         kind: 0,
         inputs: commands(&[
             CreateEvent::CODE,
@@ -174,12 +176,12 @@ fn core() -> Service {
 }
 
 /// Adds missing node managers and the communicator, and validates the result.
-pub(super) fn complete(mut subsystem: Subsystem) -> Result<Subsystem, BadSubsystem> {
+pub(super) fn complete(mut subsystem: RaSubsystemEntry) -> Result<RaSubsystemEntry, BadSubsystem> {
     subsystem.nodes.sort_by_key(|node| node.id);
     if subsystem.nodes.is_empty() {
-        subsystem.nodes.push(Node {
+        subsystem.nodes.push(RaNodeEntry {
             id: 1,
-            ..Node::default()
+            ..RaNodeEntry::default()
         });
     }
     for (number, node) in subsystem.nodes.iter_mut().enumerate() {
@@ -192,10 +194,10 @@ pub(super) fn complete(mut subsystem: Subsystem) -> Result<Subsystem, BadSubsyst
     Ok(subsystem)
 }
 
-fn add_missing(node: &mut Node, component: u8, name: &str) {
-    let is_it = |known: &Component| (known.component, known.instance) == (component, 1);
+fn add_missing(node: &mut RaNodeEntry, component: u8, name: &str) {
+    let is_it = |known: &RaComponentEntry| (known.component, known.instance) == (component, 1);
     if !node.components.iter().any(is_it) {
-        let missing = Component {
+        let missing = RaComponentEntry {
             component,
             instance: 1,
             name: name.to_owned(),
@@ -205,7 +207,7 @@ fn add_missing(node: &mut Node, component: u8, name: &str) {
     }
 }
 
-fn check(subsystem: &Subsystem) -> Result<(), BadSubsystem> {
+fn check(subsystem: &RaSubsystemEntry) -> Result<(), BadSubsystem> {
     const MOST: usize = 255;
     let in_range = |what, number| match number {
         1..=254 => Ok(()),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use super::Settings;
-use super::subsystem::{Component, Node, Service, Subsystem};
+use super::subsystem::{RaComponentEntry, RaNodeEntry, RaServiceEntry, RaSubsystemEntry};
 use crate::RaId;
 
 /// A discovery query, in query order.
@@ -41,7 +41,7 @@ struct Attempts {
 /// A peer subsystem.
 #[derive(Debug)]
 pub(super) struct Peer {
-    pub(super) subsystem: Subsystem,
+    pub(super) subsystem: RaSubsystemEntry,
     pub(super) communicator: RaId,
     /// Time of its last message.
     pub(super) heard: Instant,
@@ -64,9 +64,9 @@ pub(super) struct Peer {
 impl Peer {
     pub(super) fn new(now: Instant, communicator: RaId, settings: &Settings) -> Self {
         let mut peer = Self {
-            subsystem: Subsystem {
+            subsystem: RaSubsystemEntry {
                 id: communicator.subsystem,
-                ..Subsystem::default()
+                ..RaSubsystemEntry::default()
             },
             communicator,
             heard: now,
@@ -220,7 +220,7 @@ impl Peer {
     }
 
     /// Stores the services of a component.
-    pub(super) fn set_services(&mut self, id: RaId, services: Vec<Service>) {
+    pub(super) fn set_services(&mut self, id: RaId, services: Vec<RaServiceEntry>) {
         if let Some(component) = component(&mut self.subsystem, id) {
             self.changed |= replace(&mut component.services, services);
         }
@@ -238,11 +238,11 @@ impl Peer {
     }
 
     /// Replaces nodes and components; queries names and services of new ones.
-    pub(super) fn configure(&mut self, now: Instant, nodes: Vec<Node>) {
+    pub(super) fn configure(&mut self, now: Instant, nodes: Vec<RaNodeEntry>) {
         self.changed |= !self.configured;
         self.configured = true;
         let mut old = std::mem::take(&mut self.subsystem);
-        self.subsystem = Subsystem {
+        self.subsystem = RaSubsystemEntry {
             id: old.id,
             name: std::mem::take(&mut old.name),
             nodes,
@@ -262,7 +262,7 @@ impl Peer {
             }
         }
         // Moving known components leaves entries without number behind.
-        let kept = |node: &Node| self.subsystem.nodes.iter().any(|new| new.id == node.id);
+        let kept = |node: &RaNodeEntry| self.subsystem.nodes.iter().any(|new| new.id == node.id);
         self.shrunk |= !old.nodes.iter().all(kept);
         self.shrunk |= old.components().any(|(id, _)| id.component != 0);
         self.changed |= self.shrunk || !questions.is_empty();
@@ -281,12 +281,12 @@ impl Peer {
 }
 
 /// Number of messages that services list.
-pub(super) fn commands(services: &[Service]) -> usize {
-    let in_one = |service: &Service| 1 + service.inputs.len() + service.outputs.len();
+pub(super) fn commands(services: &[RaServiceEntry]) -> usize {
+    let in_one = |service: &RaServiceEntry| 1 + service.inputs.len() + service.outputs.len();
     services.iter().map(in_one).sum()
 }
 
-fn component(subsystem: &mut Subsystem, id: RaId) -> Option<&mut Component> {
+fn component(subsystem: &mut RaSubsystemEntry, id: RaId) -> Option<&mut RaComponentEntry> {
     let node = subsystem.nodes.iter_mut().find(|node| node.id == id.node)?;
     let mut components = node.components.iter_mut();
     components.find(|known| (known.component, known.instance) == (id.component, id.instance))

@@ -7,29 +7,29 @@ use crate::RaId;
 
 /// A local or peer subsystem.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Subsystem {
+pub struct RaSubsystemEntry {
     /// 1 ..= 254.
     pub id: u8,
     /// Its name, at most 79 octets on the wire; empty if not reported.
     pub name: String,
     /// Its nodes.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<RaNodeEntry>,
 }
 
 /// A node of a subsystem.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Node {
+pub struct RaNodeEntry {
     /// 1 ..= 254.
     pub id: u8,
     /// Its name; empty if not reported.
     pub name: String,
     /// Its components.
-    pub components: Vec<Component>,
+    pub components: Vec<RaComponentEntry>,
 }
 
 /// A component of a node.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Component {
+pub struct RaComponentEntry {
     /// Its type, 1 ..= 254.
     pub component: u8,
     /// Instance number within the type, 1 ..= 254.
@@ -37,12 +37,12 @@ pub struct Component {
     /// Its name; empty if not reported.
     pub name: String,
     /// Its services; empty if not reported.
-    pub services: Vec<Service>,
+    pub services: Vec<RaServiceEntry>,
 }
 
 /// A service: the messages of one kind that a component receives and sends.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Service {
+pub struct RaServiceEntry {
     /// 0 for the core services, else the number of the component type.
     pub kind: u16,
     /// Received messages.
@@ -60,11 +60,11 @@ pub struct Command {
     pub presence: u32,
 }
 
-impl Subsystem {
+impl RaSubsystemEntry {
     /// Its components with their ids.
-    pub fn components(&self) -> impl Iterator<Item = (RaId, &Component)> + '_ {
+    pub fn components(&self) -> impl Iterator<Item = (RaId, &RaComponentEntry)> + '_ {
         self.nodes.iter().flat_map(move |node| {
-            let id = |c: &Component| RaId::new(self.id, node.id, c.component, c.instance);
+            let id = |c: &RaComponentEntry| RaId::new(self.id, node.id, c.component, c.instance);
             node.components.iter().map(move |c| (id(c), c))
         })
     }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::wire::judp;
-use jaus_ra::node::{Component, Event, Node, RaNode, Settings, Subsystem};
+use jaus_ra::node::{Event, RaComponentEntry, RaNode, RaNodeEntry, RaSubsystemEntry, Settings};
 use jaus_ra::{Counter, RaId};
 use jaus_test_kit::evidence;
 use jaus_view::{Capture, Network};
@@ -93,22 +93,22 @@ impl Said {
 }
 
 /// A subsystem of one node, as described by its node manager.
-fn subsystem(id: u8, names: [&str; 4], others: &[(u8, &str)]) -> Subsystem {
+fn subsystem(id: u8, names: [&str; 4], others: &[(u8, &str)]) -> RaSubsystemEntry {
     let [name, node, manager, communicator] = names;
     let both = [(1, manager), (35, communicator)];
     let components = both
         .iter()
         .chain(others)
-        .map(|&(component, name)| Component {
+        .map(|&(component, name)| RaComponentEntry {
             component,
             instance: 1,
             name: name.into(),
             services: Vec::new(),
         });
-    Subsystem {
+    RaSubsystemEntry {
         id,
         name: name.into(),
-        nodes: vec![Node {
+        nodes: vec![RaNodeEntry {
             id: 1,
             name: node.into(),
             components: components.collect(),
@@ -129,7 +129,7 @@ struct Replay {
     clippy::disallowed_methods,
     reason = "virtual time starts at any instant"
 )]
-fn replay(file: &str, replaced: IpAddr, ours: Subsystem) -> Replay {
+fn replay(file: &str, replaced: IpAddr, ours: RaSubsystemEntry) -> Replay {
     let recorded = recorded(file);
     let (start, first) = (Instant::now(), recorded[0].time);
     let mut node = RaNode::new(Settings::default());
@@ -185,7 +185,7 @@ impl Replay {
         }
     }
 
-    fn appeared(&self) -> &Subsystem {
+    fn appeared(&self) -> &RaSubsystemEntry {
         let mut appeared = self.events.iter().filter_map(|event| match event {
             Event::Appeared(subsystem) => Some(subsystem),
             _ => None,

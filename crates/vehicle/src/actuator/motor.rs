@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::{Actuator, Command};
-use crate::motion::{CommandDeadline, Random};
+use crate::motion::{CommandDeadline, Noise};
 
 /// Parameters of a simulated motor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,7 +71,7 @@ pub struct SimulatedMotor {
     speed: f64,
     travel: f64,
     unevenness: f64,
-    random: Random,
+    noise: Noise,
     time: Option<Instant>,
 }
 
@@ -94,7 +94,7 @@ impl SimulatedMotor {
             speed: 0.0,
             travel: 0.0,
             unevenness: 0.0,
-            random: Random::new(config.seed),
+            noise: Noise::new(config.seed),
             time: None,
         }
     }
@@ -116,7 +116,7 @@ impl SimulatedMotor {
         if noise > 0.0 {
             let keep = (-Self::CHANGE * seconds).exp();
             let spread = noise * (1.0 - keep * keep).sqrt();
-            self.unevenness = self.unevenness * keep + spread * self.random.normal();
+            self.unevenness = self.unevenness * keep + spread * self.noise.normal();
         }
         let before = self.speed;
         let wanted = self.command.drive.clamp(-1.0, 1.0) * top * (1.0 + self.unevenness);

@@ -7,7 +7,6 @@
 
 use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::{Actuator, Command, MotorConfig, SimulatedMotor};
@@ -32,10 +31,10 @@ pub(super) trait MotorLine: Send + 'static {
     }
 }
 
-/// The thread of a line. When it is dropped, all motors are commanded to stop.
+/// The thread of a line. When it is dropped, all motors are commanded to stop; a line that takes no
+/// data delays that for no longer than [`FAREWELL`](Self::FAREWELL).
 pub(super) struct MotorThread {
     shared: Arc<Shared>,
-    thread: Option<JoinHandle<()>>,
 }
 
 struct Shared {
@@ -49,6 +48,8 @@ struct State {
     /// When the thread last returned from the line.
     served_at: Instant,
     ends: bool,
+    /// Whether the thread has ended and given up the line.
+    has_ended: bool,
 }
 
 #[derive(Clone, Copy)]
@@ -72,6 +73,9 @@ impl Motor {
 impl MotorThread {
     /// A thread that has not returned from the line for this time is stuck.
     const STUCK: Duration = Duration::from_millis(500);
+    /// At the end, the stop is waited for this long. Without it, the controller's own timeout stops
+    /// the motors.
+    const FAREWELL: Duration = Duration::from_secs(1);
 
     /// Starts the thread for this number of motors, whose commands expire after `deadline`.
     pub(super) fn start<L: MotorLine>(
@@ -90,15 +94,18 @@ impl MotorThread {
                 fault: None,
                 served_at: Instant::now(),
                 ends: false,
+                has_ended: false,
             }),
             news: Condvar::new(),
         });
         let of_thread = Arc::clone(&shared);
-        let thread = std::thread::Builder::new()
+        std::thread::Builder::new()
             .name(L::NAME.to_owned())
-            .spawn(move || run(&of_thread, line))?;
-        let thread = Some(thread);
-        Ok(Arc::new(Self { shared, thread }))
+            .spawn(move || {
+                let end = End(of_thread);
+                run(&end.0, line);
+            })?;
+        Ok(Arc::new(Self { shared }))
     }
 
     /// Sets the command of a motor.
@@ -136,13 +143,26 @@ impl Shared {
     }
 }
 
+/// Tells the end of the thread, also that of one that panics.
+struct End(Arc<Shared>);
+
+impl Drop for End {
+    fn drop(&mut self) {
+        self.0.lock().has_ended = true;
+        self.0.news.notify_all();
+    }
+}
+
 impl Drop for MotorThread {
     fn drop(&mut self) {
-        self.shared.lock().ends = true;
-        self.shared.news.notify_one();
-        if let Some(thread) = self.thread.take() {
-            // Without the thread, the controller's own timeout stops the motors.
-            let _ = thread.join();
+        let mut state = self.shared.lock();
+        state.ends = true;
+        self.shared.news.notify_all();
+        let news = &self.shared.news;
+        let waited = news.wait_timeout_while(state, Self::FAREWELL, |it| !it.has_ended);
+        let (state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        if !state.has_ended {
+            tracing::error!("the motor controller's line takes no data: no stop was commanded");
         }
     }
 }

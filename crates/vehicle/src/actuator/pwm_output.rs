@@ -52,20 +52,13 @@ impl PwmOutput {
         };
         let directory = chip.join(format!("pwm{channel}"));
         export(chip, channel, &directory).map_err(failed)?;
-        let mut output = Self {
+        let output = Self {
             directory,
             period: u64::try_from(period.as_nanos()).unwrap_or(u64::MAX),
             pulse: None,
         };
-        output.begin().map_err(failed)?;
+        begin(output.period, |file, value| output.write(file, value)).map_err(failed)?;
         Ok(output)
-    }
-
-    fn begin(&mut self) -> io::Result<()> {
-        // A period shorter than the pulse length is an error, so that length is 0 meanwhile.
-        self.write("duty_cycle", 0)?;
-        self.write("period", self.period)?;
-        self.write("enable", 1)
     }
 
     /// Sets the pulse length in nanoseconds, at most the interval between pulses.
@@ -94,6 +87,18 @@ impl PwmOutput {
     fn write(&self, file: &str, value: u64) -> io::Result<()> {
         fs::write(self.directory.join(file), value.to_string())
     }
+}
+
+/// Starts pulses of length 0 by writing the files of an output.
+fn begin(period: u64, mut write: impl FnMut(&str, u64) -> io::Result<()>) -> io::Result<()> {
+    // The kernel refuses everything but a period while the period is 0, as it is after the export,
+    // and a period shorter than the pulse length, which a killed program leaves behind.
+    if write("period", period).is_err() {
+        write("duty_cycle", 0)?;
+        write("period", period)?;
+    }
+    write("duty_cycle", 0)?;
+    write("enable", 1)
 }
 
 /// Has the kernel provide the files of an output, and waits until they may be written.
@@ -163,6 +168,51 @@ pub(super) mod tests {
         let error = PwmOutput::open(Path::new("/nowhere"), 0, Duration::from_millis(20));
         let error = error.unwrap_err().to_string();
         assert!(error.contains("PWM output 0 of /nowhere"), "{error}");
+    }
+
+    /// An output as the kernel keeps it (`pwm_apply_state`).
+    #[derive(Debug, Clone, Copy, PartialEq, Default)]
+    struct Output {
+        period: u64,
+        pulse: u64,
+        is_enabled: bool,
+    }
+
+    impl Output {
+        fn write(&mut self, file: &str, value: u64) -> io::Result<()> {
+            let mut next = *self;
+            match file {
+                "period" => next.period = value,
+                "duty_cycle" => next.pulse = value,
+                "enable" => next.is_enabled = value == 1,
+                _ => return Err(io::ErrorKind::NotFound.into()),
+            }
+            if next.period == 0 || next.pulse > next.period {
+                return Err(io::ErrorKind::InvalidInput.into());
+            }
+            *self = next;
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn an_output_starts_with_pulses_of_length_0_whatever_it_did_before() {
+        let exported = Output::default();
+        let killed = |period, pulse| Output {
+            period,
+            pulse,
+            is_enabled: true,
+        };
+        for before in [
+            exported,
+            killed(20_000, 19_000),
+            killed(50_000, 50_000),
+            killed(20_000_000, 1_500_000),
+        ] {
+            let mut output = before;
+            begin(50_000, |file, value| output.write(file, value)).unwrap();
+            assert_eq!(output, killed(50_000, 0), "{before:?}");
+        }
     }
 
     #[test]

@@ -95,7 +95,7 @@ fn drive(address: u8, motor: usize, share: f64) -> [u8; 4] {
 )]
 mod tests {
     use super::*;
-    use std::sync::{Arc, Mutex};
+    use std::sync::{Arc, Mutex, mpsc};
 
     use crate::actuator::{Actuator, Command};
 
@@ -198,6 +198,23 @@ mod tests {
         line.until([127, 127], || drive(&mut left, &mut right));
         drop((left, right));
         assert_eq!(line.last(), [0, 0], "stopped before the drop returns");
+    }
+
+    #[test]
+    fn a_line_that_takes_no_data_does_not_prevent_the_end() {
+        let (line, motors) = start();
+        // The thread's next write waits for the record.
+        let blocked = line.0.lock().unwrap();
+        let (ended, end) = mpsc::channel();
+        let ending = std::thread::spawn(move || {
+            drop(motors);
+            // The test may have failed.
+            let _ = ended.send(());
+        });
+        let result = end.recv_timeout(Duration::from_secs(20));
+        drop(blocked);
+        ending.join().unwrap();
+        assert_eq!(result, Ok(()), "it waits for the line");
     }
 
     #[test]

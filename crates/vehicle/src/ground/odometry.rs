@@ -16,7 +16,7 @@ pub struct WheelOdometry {
     odometer: Odometer,
     vehicle: Vehicle,
     /// The distances of the last change event.
-    told: (f64, f64),
+    announced: (f64, f64),
 }
 
 impl WheelOdometry {
@@ -26,7 +26,7 @@ impl WheelOdometry {
         Self {
             odometer,
             vehicle,
-            told: (0.0, 0.0),
+            announced: (0.0, 0.0),
         }
     }
 }
@@ -53,8 +53,8 @@ impl Service for WheelOdometry {
     fn handle_timeout(&mut self, _: Instant, context: &mut Context<'_>) {
         let count = self.odometer.count();
         let travelled = (count.left, count.right);
-        if travelled != self.told {
-            self.told = travelled;
+        if travelled != self.announced {
+            self.announced = travelled;
             context.changed::<QueryWheelOdometry>();
         }
     }

@@ -14,7 +14,7 @@ use crate::messages::ground::{
 };
 use crate::mission::{Destination, Mission, Path, Report, Settings};
 use jaus::address::JausId;
-use jaus::codec::{Message, ServiceId};
+use jaus::codec::{Message, ServiceId, Text};
 use jaus::endpoint::Received;
 use jaus::service::{
     Context, Handled, Hazards, Service, Standing, State, StopCause, code_of, read,
@@ -227,18 +227,11 @@ fn report(report: &Report) -> ReportMission {
         destination_x: report.destination.x,
         destination_y: report.destination.y,
         remaining: report.remaining as f32,
-        reason: told(&report.reason).into(),
+        reason: Text::prefix(&report.reason, MAX_REASON).into(),
     }
 }
 
-/// The longest prefix of a reason that fits into the report.
-fn told(reason: &str) -> &str {
-    let longest = (0..=MAX_REASON.min(reason.len())).rev();
-    let mut ends = longest.filter(|&end| reason.is_char_boundary(end));
-    &reason[..ends.next().unwrap_or_default()]
-}
-
-/// Maximum length in octets.
+/// Maximum length of a reason in octets.
 const MAX_REASON: usize = 255;
 
 fn report_path(mission: u32, path: &Path) -> ReportPlannedPath {

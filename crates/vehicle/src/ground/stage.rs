@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::messages::ground::{QueryStage, ReportStage, report_stage, stage};
 use jaus::address::JausId;
+use jaus::codec::Text;
 use jaus::service::Handlers;
 
 /// The published state of a driver of the chain. Cheap to clone; all clones share one state.
@@ -93,9 +94,9 @@ impl StageBoard {
 
     /// Replaces the report. Returns whether it differs from the previous one.
     pub fn tell(&self, report: StageReport) -> bool {
-        let mut told = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_news = *told != report;
-        *told = report;
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_news = *known != report;
+        *known = report;
         is_news
     }
 }
@@ -114,16 +115,8 @@ impl StageReport {
             next_subsystem_id: next.0,
             next_node_id: next.1,
             next_component_id: next.2,
-            reason: self.reason_that_fits().into(),
+            reason: Text::prefix(&self.reason, Self::MAX_REASON).into(),
         }
-    }
-
-    fn reason_that_fits(&self) -> &str {
-        let mut end = Self::MAX_REASON.min(self.reason.len());
-        while !self.reason.is_char_boundary(end) {
-            end -= 1;
-        }
-        &self.reason[..end]
     }
 
     /// Whether the driver has stood down and will not resume on its own.

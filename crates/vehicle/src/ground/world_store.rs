@@ -18,6 +18,7 @@ use crate::messages::ground::{
 };
 use crate::motion::Frame;
 use crate::world::{Change, Done, KeepError, MapId, Refusal, World};
+use jaus::codec::Text;
 use jaus::endpoint::Received;
 use jaus::messages::mobility::{QueryExcursion, QueryGlobalOperatingZone, QueryLocalOperatingZone};
 use jaus::service::Context;
@@ -324,7 +325,7 @@ fn refused(request_id: u8, map: u16, result: ChangeResult, reason: &str) -> Repo
         map,
         revision: 0,
         result,
-        reason: beginning(reason, usize::from(u8::MAX)).into(),
+        reason: Text::prefix(reason, usize::from(u8::MAX)).into(),
     }
 }
 
@@ -335,13 +336,4 @@ const fn result_of(refusal: &Refusal) -> ChangeResult {
         Refusal::Outside { .. } => ChangeResult::OUTSIDE,
         Refusal::Full(_) => ChangeResult::FULL,
     }
-}
-
-/// The longest prefix of a text within `most` octets.
-fn beginning(text: &str, most: usize) -> &str {
-    let mut end = most.min(text.len());
-    while !text.is_char_boundary(end) {
-        end -= 1;
-    }
-    &text[..end]
 }

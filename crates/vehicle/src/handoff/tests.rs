@@ -245,3 +245,17 @@ fn an_emergency_and_a_full_list_refuse_requests() {
     assert_eq!(rover.answer_to(OTHER), Some(Answer::NOT_AVAILABLE));
     assert_eq!(rover.stands(), (State::Emergency, Some(HOLDER)));
 }
+
+#[test]
+fn no_two_undecided_requests_have_one_number() {
+    let mut rover = Rover::new();
+    rover.hear(OTHER, &request(200));
+    let number = |rover: &Rover, client| rover.sent_to::<ConfirmHandoffRequest>(client)[0].id;
+    let first = number(&rover, OTHER);
+    for _ in 0..=u8::MAX {
+        rover.hear(THIRD, &request(100));
+        let id = number(&rover, THIRD);
+        assert_ne!(id, first);
+        rover.hear(THIRD, &RemoveHandoffRequest { id });
+    }
+}

@@ -18,7 +18,7 @@ mod tests;
 mod waterfall;
 
 pub use lost_link::LostLink;
-pub use path::{NoPath, Path, Point, Vehicle, blocked_after, plan};
+pub use path::{Footprint, NoPath, Path, Point, blocked_after, plan};
 pub use terrain::{Terrain, TerrainError};
 pub use waterfall::{
     Action, Destination, Link, LinkState, Mission, NotPlanned, Refusal, Report, Run, Settings,

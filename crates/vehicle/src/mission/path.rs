@@ -9,7 +9,7 @@ pub type Point = (f64, f64);
 
 /// Dimensions of the vehicle for planning.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Vehicle {
+pub struct Footprint {
     /// Width in metres.
     pub width: f64,
     /// Clearance on each side in metres.
@@ -18,7 +18,7 @@ pub struct Vehicle {
     pub turning_radius: f64,
 }
 
-impl Default for Vehicle {
+impl Default for Footprint {
     fn default() -> Self {
         Self {
             width: 0.6,
@@ -28,7 +28,7 @@ impl Default for Vehicle {
     }
 }
 
-impl Vehicle {
+impl Footprint {
     /// Minimum distance of the vehicle's centre from obstacles, in metres.
     #[must_use]
     pub fn clearance(&self) -> f64 {
@@ -43,6 +43,16 @@ impl Vehicle {
 }
 
 /// A drivable path of straight segments.
+///
+/// ```
+/// use jaus_vehicle::mission::{Terrain, Vehicle, plan};
+///
+/// // 20 x 20 cells of half a metre; 255 is open ground.
+/// let terrain = Terrain::new(20, 20, 0.5, (0.0, 0.0), vec![255; 400])?;
+/// let path = plan(&terrain, &Vehicle::default(), (1.0, 1.0), (9.0, 9.0))?;
+/// assert_eq!(path.segments().len(), 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Path {
     points: Vec<Point>,
@@ -205,7 +215,7 @@ struct At(Point);
 impl std::fmt::Display for At {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self((x, y)) = *self;
-        write!(f, "x {x:.2} m, y {y:.2} m")
+        write!(f, "north {x:.2} m, east {y:.2} m")
     }
 }
 
@@ -217,7 +227,7 @@ impl std::fmt::Display for At {
 #[must_use]
 pub fn blocked_after(
     terrain: &Terrain,
-    vehicle: &Vehicle,
+    vehicle: &Footprint,
     here: Point,
     path: &Path,
     segment: usize,
@@ -275,7 +285,7 @@ fn last_clear(is_clear: impl Fn(f64) -> bool) -> f64 {
 /// [`NoPath`] with the cause and a remedy.
 pub fn plan(
     terrain: &Terrain,
-    vehicle: &Vehicle,
+    vehicle: &Footprint,
     start: Point,
     destination: Point,
 ) -> Result<Path, NoPath> {

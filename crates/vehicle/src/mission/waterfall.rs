@@ -71,7 +71,7 @@ impl Destination {
         let Self { x, y, speed } = *self;
         if !x.is_finite() || !y.is_finite() {
             return Some(format!(
-                "the destination x {x} m, y {y} m is invalid: set finite numbers of metres"
+                "the destination north {x} m, east {y} m is invalid: set finite numbers of metres"
             ));
         }
         let speed = speed.filter(|&speed| !(speed > 0.0 && speed <= Self::MAX_SPEED))?;

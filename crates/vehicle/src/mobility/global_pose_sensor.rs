@@ -36,12 +36,12 @@ impl Behaviour for GlobalPoseSensor {
             }
             SetGlobalPose::CODE => {
                 if let Some(message) = exchange.configure() {
-                    set(told(&message, &pose(exchange)), exchange);
+                    set(updated(&message, &pose(exchange)), exchange);
                 }
             }
             SetGlobalPoseExt::CODE => {
                 if let Some(message) = exchange.configure() {
-                    set(told_ext(&message, &pose(exchange)), exchange);
+                    set(updated_ext(&message, &pose(exchange)), exchange);
                 }
             }
             SetGeomagneticProperty::CODE => {
@@ -82,7 +82,7 @@ fn set(pose: GlobalPose, exchange: &mut Exchange<'_, '_>) {
 }
 
 /// A pose updated with the fields that the client sets. The others keep their values.
-fn told(message: &SetGlobalPose, pose: &GlobalPose) -> GlobalPose {
+fn updated(message: &SetGlobalPose, pose: &GlobalPose) -> GlobalPose {
     GlobalPose {
         latitude: message.latitude_deg().unwrap_or(pose.latitude),
         longitude: message.longitude_deg().unwrap_or(pose.longitude),
@@ -93,7 +93,7 @@ fn told(message: &SetGlobalPose, pose: &GlobalPose) -> GlobalPose {
     }
 }
 
-fn told_ext(message: &SetGlobalPoseExt, pose: &GlobalPose) -> GlobalPose {
+fn updated_ext(message: &SetGlobalPoseExt, pose: &GlobalPose) -> GlobalPose {
     let altitude = match message.z_position {
         Some(ZPosition::AltitudeMsl(altitude)) => altitude.value(),
         // The local height of the ground or the water is unknown.

@@ -28,12 +28,12 @@ impl Behaviour for LocalPoseSensor {
             QueryLocalPoseExt::CODE => exchange.answer(report_ext),
             SetLocalPose::CODE => {
                 if let Some(message) = exchange.configure() {
-                    set(told(&message, &pose(exchange)), exchange);
+                    set(updated(&message, &pose(exchange)), exchange);
                 }
             }
             SetLocalPoseExt::CODE => {
                 if let Some(message) = exchange.configure() {
-                    set(told_ext(&message, &pose(exchange)), exchange);
+                    set(updated_ext(&message, &pose(exchange)), exchange);
                 }
             }
             _ => return Handled::No,
@@ -68,7 +68,7 @@ fn set(pose: Pose, exchange: &mut Exchange<'_, '_>) {
 }
 
 /// A pose updated with the fields that the client sets. The others keep their values.
-fn told(message: &SetLocalPose, pose: &Pose) -> Pose {
+fn updated(message: &SetLocalPose, pose: &Pose) -> Pose {
     Pose {
         x: message.x_m().unwrap_or(pose.x),
         y: message.y_m().unwrap_or(pose.y),
@@ -79,7 +79,7 @@ fn told(message: &SetLocalPose, pose: &Pose) -> Pose {
     }
 }
 
-fn told_ext(message: &SetLocalPoseExt, pose: &Pose) -> Pose {
+fn updated_ext(message: &SetLocalPoseExt, pose: &Pose) -> Pose {
     let z = match message.z_position {
         Some(ZPosition::ZLocal(z)) => z.value(),
         // Heights above another reference say nothing about the local frame.

@@ -29,6 +29,23 @@ use jaus::service::{
 };
 
 /// A vehicle as used by the mobility services. Cheap to clone; all clones share one state.
+///
+/// ```no_run
+/// # use jaus::component::{AttachError, Component, Kind, Management};
+/// # use jaus::node::Node;
+/// # use jaus_vehicle::mobility::Vehicle;
+/// # use jaus_vehicle::motion::{Frame, Pilot, SkidSteer, SkidSteerConfig};
+/// # fn example(node: &Node) -> Result<(), AttachError> {
+/// let platform = SkidSteer::new(SkidSteerConfig::default());
+/// let vehicle = Vehicle::new(Pilot::new(platform, Frame::default()));
+/// let driver = Component::builder(Kind::Vehicle, "Rover")
+///     .management(Management::default())
+///     .offer(vehicle.primitive_driver())
+///     .offer(vehicle.velocity_state_sensor())
+///     .attach(node, 33)?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone)]
 pub struct Vehicle {
     controls: Arc<Mutex<Controls>>,

@@ -71,6 +71,8 @@ impl Fence {
     /// Shortest step of the search along the vehicle's way, in metres. It bounds the cost of driving
     /// beside an edge.
     const STEP: f64 = 0.05;
+    /// Limit of steps. A vehicle too fast for that drives no faster than it can stop within them.
+    const MAX_STEPS: usize = 2000;
 
     /// A fence without zones.
     #[must_use]
@@ -136,6 +138,14 @@ impl Fence {
             state.held = Some(why.to_owned());
             return Bounds::HOLD;
         };
+        if !(limits.deceleration > 0.0 && limits.deceleration.is_finite()) {
+            let limit = limits.deceleration;
+            state.held = Some(format!(
+                "the deceleration limit is {limit} m/s², so no way is long enough to stop: set it \
+                 to what the brakes achieve"
+            ));
+            return Bounds::HOLD;
+        }
         let speed = |sign: f64| {
             let is_asked = wanted * sign > 0.0 || motion.velocity.x * sign > 0.0;
             let speed = || state.speed(&pose, &motion.velocity, sign, limits);
@@ -192,15 +202,7 @@ impl State {
         let brakes = Fence::BRAKES * limits.deceleration;
         let fastest = limits.speed.max(limits.reverse).max(velocity.x.abs());
         let farthest = margin + fastest * reaction + fastest * fastest / (2.0 * brakes);
-        // A step as long as the room at its start crosses no edge.
-        let mut way = 0.0;
-        while way < farthest {
-            let room = self.room(along(way));
-            if room < Fence::LEAST {
-                break;
-            }
-            way += room.max(Fence::STEP);
-        }
+        let way = self.free_way(along, farthest);
         if way >= farthest {
             return f64::INFINITY;
         }
@@ -208,6 +210,23 @@ impl State {
         let lag = brakes * reaction;
         // The speed from which `reaction` at that speed and braking take this way.
         lag.mul_add(lag, 2.0 * brakes * way).sqrt() - lag
+    }
+
+    /// How far the vehicle can drive before it meets something, as far as that is searched.
+    fn free_way(&self, along: impl Fn(f64) -> Point, farthest: f64) -> f64 {
+        let mut way = 0.0;
+        for _ in 0..Fence::MAX_STEPS {
+            if way >= farthest {
+                break;
+            }
+            let room = self.room(along(way));
+            if room < Fence::LEAST {
+                break;
+            }
+            // A step as long as the room at its start crosses no edge.
+            way += room.max(Fence::STEP);
+        }
+        way
     }
 
     /// Distance between the vehicle's disc at a point and the nearest forbidden place.
@@ -328,220 +347,4 @@ impl Bounds {
     clippy::disallowed_methods,
     reason = "virtual time starts at any instant"
 )]
-mod tests {
-    use super::*;
-    use crate::motion::{Curve, Frame, Goal, Heading, Pilot, SkidSteer, SkidSteerConfig, Waypoint};
-    use crate::zones::{Polygon, ZoneId};
-
-    /// A simulated rover before a wall of keep-out from X 5 to 8, within an operating zone whose
-    /// edge is at X -3.
-    struct Bench {
-        pilot: Pilot,
-        fence: Fence,
-        now: Instant,
-    }
-
-    const RADIUS: f64 = 0.25;
-
-    fn rectangle(south: f64, west: f64, north: f64, east: f64) -> Polygon {
-        let vertices = vec![(south, west), (north, west), (north, east), (south, east)];
-        Polygon::new(vertices).unwrap()
-    }
-
-    fn walled() -> Zones {
-        let mut zones = Zones::default();
-        zones.set(ZoneId::Operating, rectangle(-3.0, -20.0, 40.0, 20.0));
-        zones.set(ZoneId::KeepOut(7), rectangle(5.0, -10.0, 8.0, 10.0));
-        zones
-    }
-
-    impl Bench {
-        fn new(zones: Zones) -> Self {
-            let fence = Fence::new(FenceConfig::default());
-            fence.set_zones(zones);
-            let rover = SkidSteer::new(SkidSteerConfig::default());
-            let pilot = Pilot::new(rover, Frame::default()).with_fence(fence.clone());
-            Self {
-                pilot,
-                fence,
-                now: Instant::now(),
-            }
-        }
-
-        /// Pursues a goal for some seconds. Returns the least clearance of the vehicle's disc.
-        fn drive(&mut self, goal: Goal, seconds: u32) -> f64 {
-            self.pilot.pursue(goal);
-            let mut least = f64::INFINITY;
-            for _ in 0..seconds * 50 {
-                self.now += Pilot::STEP;
-                self.pilot.handle_time(self.now);
-                least = least.min(self.room());
-            }
-            least
-        }
-
-        fn room(&self) -> f64 {
-            let Pose { x, y, .. } = self.pilot.motion().pose;
-            let zones = Arc::clone(&self.fence.lock().zones);
-            zones
-                .clearance((x, y))
-                .map_or(f64::INFINITY, |it| it.metres)
-                - RADIUS
-        }
-
-        fn x(&self) -> f64 {
-            self.pilot.motion().pose.x
-        }
-    }
-
-    fn effort(forward: f64, turn: f64) -> Goal {
-        Goal::Effort(Effort {
-            forward,
-            turn,
-            ..Effort::default()
-        })
-    }
-
-    fn every_goal() -> [Goal; 5] {
-        let speed = 2.0;
-        [
-            effort(1.0, 0.0),
-            Goal::Velocity(Velocity::forward(speed, 0.0)),
-            Goal::Vector {
-                speed,
-                heading: Some(Heading::Local(0.1)),
-            },
-            Goal::Waypoint {
-                to: Waypoint::at(20.0, 0.0),
-                speed,
-                goes_on: false,
-            },
-            Goal::Path {
-                curve: Curve {
-                    start: (0.0, 0.0),
-                    control: (10.0, 0.5),
-                    end: (20.0, 1.0),
-                    weight: 0.0,
-                },
-                speed,
-                tolerance: 0.3,
-                goes_on: false,
-            },
-        ]
-    }
-
-    #[test]
-    fn no_goal_leads_into_a_keep_out_zone_and_the_vehicle_stops_close_to_it() {
-        for goal in every_goal() {
-            let mut bench = Bench::new(walled());
-            let least = bench.drive(goal, 15);
-            assert!(least > 0.0, "{goal:?}: {least:.2} m");
-            assert!(bench.x() > 4.0, "{goal:?}: only to {:.2} m", bench.x());
-            let held = bench.fence.held().unwrap_or_default();
-            assert!(held.starts_with("keep-out zone 7 is"), "{goal:?}: {held}");
-        }
-    }
-
-    #[test]
-    fn the_operating_zone_is_not_left_in_reverse() {
-        for goal in [
-            effort(-1.0, 0.0),
-            Goal::Velocity(Velocity::forward(-1.0, 0.0)),
-        ] {
-            let mut bench = Bench::new(walled());
-            let least = bench.drive(goal, 10);
-            assert!(
-                least > 0.0 && bench.x() < -2.0,
-                "{goal:?}: {least:.2}, {:.2}",
-                bench.x()
-            );
-        }
-    }
-
-    #[test]
-    fn from_an_edge_the_vehicle_turns_and_drives_away() {
-        let mut bench = Bench::new(walled());
-        bench.drive(effort(1.0, 0.0), 15);
-        let at_edge = bench.x();
-        let least = bench.drive(effort(-0.5, 0.0), 2);
-        assert!(
-            bench.x() < at_edge - 0.5 && least > 0.0,
-            "back from {at_edge:.2}"
-        );
-        bench.drive(effort(1.0, 0.0), 15);
-        let around = Goal::Vector {
-            speed: 1.0,
-            heading: Some(Heading::Local(std::f64::consts::PI)),
-        };
-        let least = bench.drive(around, 6);
-        assert!(
-            bench.x() < at_edge - 1.0 && least > 0.0,
-            "{:.2}: {least:.2}",
-            bench.x()
-        );
-    }
-
-    #[test]
-    fn a_vehicle_in_a_new_zone_leaves_it_slowly_and_drives_no_deeper() {
-        let mut zones = walled();
-        zones.set(ZoneId::KeepOut(9), rectangle(-1.0, -5.0, 10.0, 5.0));
-        let mut bench = Bench::new(zones);
-        bench.drive(effort(1.0, 0.0), 3);
-        assert!(bench.x() < 0.01, "deeper: {:.2}", bench.x());
-        let held = bench.fence.held().unwrap_or_default();
-        assert!(held.contains("1.0 m beyond keep-out zone 9"), "{held}");
-        bench.drive(Goal::Velocity(Velocity::forward(-1.0, 0.0)), 3);
-        assert!(
-            (-1.1..-0.6).contains(&bench.x()),
-            "slowly: {:.2}",
-            bench.x()
-        );
-        bench.drive(Goal::Velocity(Velocity::forward(-1.0, 0.0)), 10);
-        assert!(
-            (-2.8..-2.0).contains(&bench.x()),
-            "then to the edge: {:.2}",
-            bench.x()
-        );
-    }
-
-    #[test]
-    fn zones_that_go_let_the_command_in_force_go_on() {
-        let mut bench = Bench::new(walled());
-        let goal = every_goal()[3];
-        bench.drive(goal, 15);
-        bench.fence.set_zones(Zones::default());
-        bench.drive(goal, 15);
-        assert!(bench.x() > 19.0);
-    }
-
-    #[test]
-    fn without_a_pose_a_driver_that_needs_one_from_elsewhere_stands_while_there_are_zones() {
-        let mut bench = Bench::new(Zones::default());
-        bench.fence = Fence::located_elsewhere(FenceConfig::default());
-        let rover = SkidSteer::new(SkidSteerConfig::default());
-        bench.pilot = Pilot::new(rover, Frame::default()).with_fence(bench.fence.clone());
-        bench.drive(effort(1.0, 0.0), 2);
-        let moved = bench.x();
-        assert!(moved > 0.5, "no zones: {moved:.2}");
-        bench.fence.set_zones(walled());
-        bench.drive(effort(1.0, 0.0), 3);
-        let after = bench.x();
-        assert!(after < moved + 1.5, "{moved:.2} to {after:.2}");
-        assert!(
-            bench
-                .fence
-                .held()
-                .unwrap_or_default()
-                .contains("pose is unknown")
-        );
-        for pose in [Pose::at(f64::NAN, 0.0), Pose::default()] {
-            bench.fence.handle_pose(Some((pose, bench.now)));
-            bench.drive(effort(1.0, 0.0), 1);
-            assert!(
-                pose.x.is_nan() == (bench.x() - after < 0.1),
-                "{pose:?}: {:.2}",
-                bench.x()
-            );
-        }
-    }
-}
+mod tests;

@@ -16,9 +16,9 @@ pub struct Observed(Arc<Mutex<Observation>>);
 struct Observation {
     motion: Motion,
     /// The pose set by a client.
-    told: Option<Pose>,
+    set_pose: Option<Pose>,
     /// The pose on the globe set by a client.
-    told_global: Option<GlobalPose>,
+    set_global_pose: Option<GlobalPose>,
 }
 
 impl Observed {
@@ -37,14 +37,14 @@ impl Observed {
 
     /// Takes the pose set by a client, if there is a new one.
     #[must_use]
-    pub fn take_told(&self) -> Option<Pose> {
-        self.lock().told.take()
+    pub fn take_set_pose(&self) -> Option<Pose> {
+        self.lock().set_pose.take()
     }
 
     /// Takes the pose on the globe set by a client, if there is a new one.
     #[must_use]
-    pub fn take_told_global(&self) -> Option<GlobalPose> {
-        self.lock().told_global.take()
+    pub fn take_set_global_pose(&self) -> Option<GlobalPose> {
+        self.lock().set_global_pose.take()
     }
 
     fn lock(&self) -> MutexGuard<'_, Observation> {
@@ -62,11 +62,11 @@ impl Platform for Observed {
     fn set_pose(&mut self, pose: Pose) {
         let mut observation = self.lock();
         observation.motion.pose = pose;
-        observation.told = Some(pose);
+        observation.set_pose = Some(pose);
     }
 
     fn set_global_pose(&mut self, pose: GlobalPose) {
-        self.lock().told_global = Some(pose);
+        self.lock().set_global_pose = Some(pose);
     }
 
     fn drive(&mut self, _: Drive) {}

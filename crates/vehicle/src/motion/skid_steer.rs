@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::random::Random;
+use super::noise::Noise;
 use super::{
     Acceleration, CommandDeadline, Drive, Effort, Limits, Motion, Platform, Pose, Velocity, wrap,
 };
@@ -45,7 +45,7 @@ pub struct SkidSteer {
     /// Speed and yaw rate of the wheels. Slip is added to give those of the vehicle.
     wheels: (f64, f64),
     slip: (f64, f64),
-    random: Random,
+    noise: Noise,
     time: Option<Instant>,
 }
 
@@ -68,7 +68,7 @@ impl SkidSteer {
             motion: Motion::default(),
             wheels: (0.0, 0.0),
             slip: (0.0, 0.0),
-            random: Random::new(config.seed),
+            noise: Noise::new(config.seed),
             time: None,
         }
     }
@@ -143,8 +143,8 @@ impl SkidSteer {
         }
         let keep = (-Self::SLIP_CHANGE * seconds).exp();
         let spread = self.config.noise * (1.0 - keep * keep).sqrt();
-        self.slip.0 = self.slip.0 * keep + spread * self.random.normal();
-        self.slip.1 = self.slip.1 * keep + spread * self.random.normal();
+        self.slip.0 = self.slip.0 * keep + spread * self.noise.normal();
+        self.slip.1 = self.slip.1 * keep + spread * self.noise.normal();
     }
 
     fn integrate(&mut self, seconds: f64) {

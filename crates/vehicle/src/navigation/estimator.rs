@@ -9,8 +9,8 @@
 //! | course | sets the heading, then corrects it; only above 0.5 m/s and not in tight turns |
 //!
 //! An outlier is rejected: an input that the estimate makes improbable. What rejected positions say
-//! counts as uncertainty until they end. If they last, the estimate was wrong, and it starts again
-//! from them. Time without input makes the estimate uncertain, and old: [`Estimate::sampled_at`]
+//! counts as uncertainty until they end. If they last and agree with each other, the estimate was
+//! wrong, and it starts again from them. Time without input makes the estimate uncertain, and old: [`Estimate::sampled_at`]
 //! advances only with measured motion.
 
 use std::time::{Duration, Instant};
@@ -51,8 +51,12 @@ pub struct Estimator {
     seen_at: Option<Instant>,
     /// Time of the last input that shows the heading.
     turned_at: Option<Instant>,
-    positions: Outliers,
-    courses: Outliers,
+    /// Distance driven since the last position, accepted or not, in metres.
+    driven: f64,
+    /// Rejected positions: north and east in the frame.
+    positions: Outliers<[f64; 2]>,
+    /// Rejected headings.
+    courses: Outliers<f64>,
 }
 
 const NORTH: usize = 0;
@@ -71,26 +75,46 @@ struct State {
     has_heading: bool,
 }
 
-/// Consecutive rejected inputs of one kind.
+/// Consecutive rejected inputs of one kind that agree with each other.
 #[derive(Debug, Default)]
-struct Outliers {
+struct Outliers<T> {
+    /// Time of the first one.
     since: Option<Instant>,
+    /// The last one, and its time.
+    last: Option<(Instant, T)>,
     /// Distance of the last one from the estimate.
     distance: f64,
 }
 
-impl Outliers {
+impl<T: Default> Outliers<T> {
     /// Rejected inputs that last this long are right.
     const LIMIT: Duration = Duration::from_secs(5);
+    /// Inputs further apart are not consecutive. A receiver reports at least once a second.
+    const GAP: Duration = Duration::from_millis(1500);
 
-    /// Notes an outlier. Returns whether the estimate must give way.
-    fn reject(&mut self, now: Instant, distance: f64) -> bool {
-        let since = *self.since.get_or_insert(now);
-        self.distance = distance;
+    /// Notes an outlier. `agrees` compares it with the last one, so many seconds before. Returns
+    /// whether the estimate must give way.
+    fn reject(
+        &mut self,
+        now: Instant,
+        value: T,
+        distance: f64,
+        agrees: impl FnOnce(&T, f64) -> bool,
+    ) -> bool {
+        let goes_on = self.last.as_ref().is_some_and(|(at, last)| {
+            let gap = now.saturating_duration_since(*at);
+            gap <= Self::GAP && agrees(last, gap.as_secs_f64())
+        });
+        let since = self.since.filter(|_| goes_on).unwrap_or(now);
         let is_right = now.saturating_duration_since(since) >= Self::LIMIT;
-        if is_right {
-            *self = Self::default();
-        }
+        *self = match is_right {
+            true => Self::default(),
+            false => Self {
+                since: Some(since),
+                last: Some((now, value)),
+                distance,
+            },
+        };
         is_right
     }
 }
@@ -126,15 +150,16 @@ impl Estimator {
 
     /// Handles the travel of the wheels since the last call.
     pub fn handle_travel(&mut self, now: Instant, gone: Gone) {
+        if !gone.forward.is_finite() || !gone.turn.is_finite() {
+            return;
+        }
         self.travel = Some((now, gone));
         self.turned_at = Some(now);
+        self.driven += gone.forward.abs();
         let has_rate = self.rate(now).is_some();
         let Some(state) = &mut self.state else {
             return;
         };
-        if !gone.forward.is_finite() || !gone.turn.is_finite() {
-            return;
-        }
         self.unseen_turn += gone.turn;
         if !has_rate {
             // Without a gyroscope, or after its last rate: the turn since then counts too.
@@ -179,6 +204,7 @@ impl Estimator {
             ..GlobalPose::default()
         };
         let blind = self.blind(now);
+        let driven = std::mem::take(&mut self.driven);
         self.seen_at = Some(now);
         let Some(state) = &mut self.state else {
             self.state = Some(State::new(fix, variance));
@@ -191,7 +217,14 @@ impl Estimator {
         let missed = [place.x - state.values[NORTH], place.y - state.values[EAST]];
         let distance = missed[0].hypot(missed[1]);
         if state.improbability(missed, variance) > Self::GATES.0 {
-            if self.positions.reject(now, distance) {
+            // The vehicle is seen where it was rejected before, or where it can have driven since.
+            let agrees = |last: &[f64; 2], seconds: f64| {
+                let moved = 2.0 * variance + (Self::UNKNOWN_SPEED * seconds).powi(2);
+                let apart = (place.x - last[0]).hypot(place.y - last[1]);
+                apart <= driven + (Self::GATES.0 * moved).sqrt()
+            };
+            let seen = [place.x, place.y];
+            if self.positions.reject(now, seen, distance, agrees) {
                 tracing::warn!(metres = distance, "the position was wrong; it starts again");
                 state.place((place.x, place.y), variance);
                 self.accept(now, fix);
@@ -221,7 +254,8 @@ impl Estimator {
             .rate(now)
             .is_some_and(|rate| rate.abs() > Self::COURSE_RATE);
         let is_back = self.forward(now).is_some_and(|forward| forward < 0.0);
-        let before = self.turned_at.replace(now).unwrap_or(now);
+        let before = self.turned_at.unwrap_or(now);
+        self.turned_at = Some(before.max(now));
         let blind = now.saturating_duration_since(before).as_secs_f64();
         let Some(state) = &mut self.state else {
             return;
@@ -240,7 +274,11 @@ impl Estimator {
         state.covariance[YAW][YAW] += (Self::UNKNOWN_RATE * blind).powi(2);
         let missed = wrap(heading - state.values[YAW]);
         if missed.powi(2) > Self::GATES.1 * (variance + state.covariance[YAW][YAW]) {
-            if self.courses.reject(now, missed.abs()) {
+            let agrees = |last: &f64, seconds: f64| {
+                let turned = 2.0 * variance + (Self::UNKNOWN_RATE * seconds).powi(2);
+                wrap(heading - last).powi(2) <= Self::GATES.1 * turned
+            };
+            if self.courses.reject(now, heading, missed.abs(), agrees) {
                 tracing::warn!(radians = missed, "the heading was wrong; it starts again");
                 state.head(heading, variance);
             }

@@ -66,13 +66,15 @@ impl fmt::Display for NavigationLoss {
 }
 
 /// Reads the inputs and fuses them. Times are those of receipt; from the stamps of the inputs it
-/// finds out how old they are.
+/// finds out how old they are. A turn rate has no stamp, but the time of its measurement.
 #[derive(Debug, Default)]
 pub struct Navigator {
     config: NavigatorConfig,
     receiver: Receiver,
     /// Age of the positions, by the receiver's clock.
     fixes: Freshness,
+    /// Time of a fresh position whose course has not been used.
+    course_due: Option<Instant>,
     wheels: Wheels,
     estimator: Estimator,
 }
@@ -103,6 +105,7 @@ impl Navigator {
                     // A report that waited in a buffer is as old as its fix.
                     if let Some(at) = self.fixes.handle(now, Some(fix.time)) {
                         self.estimator.handle_fix(at, &fix);
+                        self.course_due = Some(at);
                     }
                     if self.estimator.estimate().is_some()
                         && let Some(heading) = self.config.heading.take()
@@ -110,15 +113,21 @@ impl Navigator {
                         self.estimator.set_heading(heading);
                     }
                 }
-                Navigation::Course(course) => self.estimator.handle_course(now, &course),
+                // A course has no age of its own, and RMC and VTG tell the same one: it counts once
+                // for each fresh position.
+                Navigation::Course(course) => {
+                    if let Some(at) = self.course_due.take() {
+                        self.estimator.handle_course(at, &course);
+                    }
+                }
                 Navigation::NoFix => tracing::debug!("the receiver has no fix"),
             }
         }
     }
 
-    /// Takes a turn rate in radians per second, right positive.
-    pub fn handle_rate(&mut self, now: Instant, rate: f64) {
-        self.estimator.handle_rate(now, rate);
+    /// Takes a turn rate in radians per second, right positive, measured at `at`.
+    pub fn handle_rate(&mut self, at: Instant, rate: f64) {
+        self.estimator.handle_rate(at, rate);
     }
 
     /// Takes a wheel count.
@@ -178,25 +187,41 @@ impl Navigator {
 )]
 mod tests {
     use super::*;
-    use crate::motion::{Frame, Pose};
-    use crate::navigation::{Quality, SimulatedReceiver};
+    use crate::motion::{Frame, Pose, wrap};
+    use crate::navigation::{Course, Quality, SimulatedReceiver};
 
-    /// A vehicle that drives north at 1 m/s, with five positions and fifty wheel counts a second.
+    const ORIGIN: Frame = Frame {
+        latitude: 52.5,
+        longitude: 13.4,
+        altitude: 0.0,
+        heading: 0.0,
+    };
+
+    /// A vehicle that drives at 1 m/s, with five positions and courses and fifty wheel counts a
+    /// second.
     struct Drive {
         navigator: Navigator,
         simulated: SimulatedReceiver,
         start: Instant,
         now: Instant,
-        metres: f64,
+        truth: Pose,
+        /// Turn rate in radians per second.
+        rate: f64,
+        /// Travel of the left and right wheels in metres.
+        wheels: [f64; 2],
         has_wheels: bool,
+        /// The last sentences of the sound receiver.
+        last: String,
     }
 
     /// What a faulty receiver writes in place of its sentences.
-    type Fault = fn(&mut SimulatedReceiver, Instant, String) -> String;
+    type Fault = fn(&mut Drive, String) -> String;
 
-    const SOUND: Fault = |_, _, sentences| sentences;
+    const SOUND: Fault = |_, sentences| sentences;
+    const TRACK: f64 = 0.5;
 
     impl Drive {
+        /// Drives north for 10 s.
         fn new() -> Self {
             let start = Instant::now();
             let navigator = Navigator::new(NavigatorConfig {
@@ -208,8 +233,11 @@ mod tests {
                 simulated: SimulatedReceiver::default(),
                 start,
                 now: start,
-                metres: 0.0,
+                truth: Pose::default(),
+                rate: 0.0,
+                wheels: [0.0; 2],
                 has_wheels: true,
+                last: String::new(),
             };
             assert_eq!(drive.navigator.pose(start), Err(NavigationLoss::NoPosition));
             drive.run(10.0, SOUND);
@@ -219,25 +247,40 @@ mod tests {
         fn run(&mut self, seconds: f64, fault: Fault) {
             for step in 0..(seconds * 50.0) as u32 {
                 self.now += Duration::from_millis(20);
-                self.metres += 0.02;
+                let turn = self.rate * 0.02;
+                self.truth.yaw = wrap(self.truth.yaw + turn);
+                self.truth.x += 0.02 * self.truth.yaw.cos();
+                self.truth.y += 0.02 * self.truth.yaw.sin();
+                self.wheels[0] += 0.02 + turn * TRACK / 2.0;
+                self.wheels[1] += 0.02 - turn * TRACK / 2.0;
                 if self.has_wheels {
                     let time = self.now.saturating_duration_since(self.start);
                     let count = WheelCount {
                         start: 7,
                         time_ms: time.as_millis() as u32,
-                        left: self.metres,
-                        right: self.metres,
-                        track: 0.5,
+                        left: self.wheels[0],
+                        right: self.wheels[1],
+                        track: TRACK,
                     };
                     self.navigator.handle_count(self.now, count);
                 }
                 if step % 10 == 0 {
-                    let place = Frame::at(52.5, 13.4).to_global(&Pose::at(self.metres, 0.0));
-                    let sentences = self.simulated.fix(self.now, &place, None);
-                    let sentences = fault(&mut self.simulated, self.now, sentences);
-                    self.navigator.handle_octets(self.now, sentences.as_bytes());
+                    let sentences = self.sentences(self.truth.yaw);
+                    let written = fault(self, sentences.clone());
+                    if written == sentences {
+                        self.last = sentences;
+                    }
+                    self.navigator.handle_octets(self.now, written.as_bytes());
                 }
             }
+        }
+
+        /// The sentences of the true position, and of a course.
+        fn sentences(&mut self, direction: f64) -> String {
+            let place = ORIGIN.to_global(&self.truth);
+            let speed = 1.0;
+            let course = Some(Course { speed, direction });
+            self.simulated.fix(self.now, &place, course)
         }
 
         fn loss(&self) -> String {
@@ -248,40 +291,57 @@ mod tests {
         /// Metres between the pose and the truth, if there is a pose.
         fn error(&self) -> Option<f64> {
             let pose = self.navigator.pose(self.now).ok()?.pose;
-            let pose = Frame::at(52.5, 13.4).to_local(&pose);
-            Some(pose.distance(self.metres, 0.0))
+            let pose = ORIGIN.to_local(&pose);
+            Some(pose.distance(self.truth.x, self.truth.y))
+        }
+
+        /// Radians between the heading and the truth.
+        fn turned(&self) -> f64 {
+            let estimate = self.navigator.estimator.estimate().unwrap();
+            wrap(estimate.pose.yaw - self.truth.yaw).abs()
         }
     }
 
     /// Every way in which a receiver does not tell a position.
     const FAULTS: [(&str, Fault); 6] = [
-        ("silent", |_, _, _| String::new()),
-        ("no fix", |simulated, now, _| simulated.no_fix(now)),
-        ("cut", |_, _, text| text[..text.len() / 2].to_owned()),
-        ("a wrong checksum", |_, _, text| {
-            text.replace("5230", "5231")
+        ("silent", |_, _| String::new()),
+        ("no fix", |drive, _| drive.simulated.no_fix(drive.now)),
+        ("cut", |_, text| text[..text.len() / 2].to_owned()),
+        ("a wrong checksum", |_, text| {
+            text.replace("5230", "5231").replace("GNVTG,", "GNVTG,1")
         }),
-        ("noise", |_, _, text| text.replace(['$', '*'], "\u{fffd}")),
-        ("frozen", |_, _, _| {
-            let mut stopped = SimulatedReceiver::default();
-            let place = Frame::at(52.5, 13.4).to_global(&Pose::default());
-            #[expect(clippy::disallowed_methods, reason = "always midnight")]
-            stopped.fix(Instant::now(), &place, None)
-        }),
+        ("noise", |_, text| text.replace(['$', '*'], "\u{fffd}")),
+        ("frozen", |drive, _| drive.last.clone()),
     ];
 
     #[test]
     fn a_receiver_that_tells_no_position_is_bridged_by_the_wheels_for_ten_seconds_only() {
         for (name, fault) in FAULTS {
             let mut drive = Drive::new();
+            drive.rate = 0.2;
             drive.run(9.0, fault);
             assert!(drive.error().is_some_and(|it| it < 1.0), "{name}");
+            assert!(drive.turned() < 0.1, "{name}: {}", drive.turned());
             drive.run(1.5, fault);
             let loss = drive.loss();
             assert!(loss.starts_with("no acceptable position"), "{name}: {loss}");
+            assert!(drive.turned() < 0.1, "{name}: {}", drive.turned());
             drive.run(1.0, SOUND);
             assert!(drive.error().is_some_and(|it| it < 0.2), "{name}: again");
         }
+    }
+
+    #[test]
+    fn a_course_counts_once_for_each_position() {
+        // The second sentence of an epoch tells another course, so that it shows if it counts.
+        let twice: Fault = |drive, sentences| {
+            let other = drive.sentences(drive.truth.yaw + 0.3);
+            let (_position, course) = other.split_once("\r\n").unwrap();
+            sentences + course
+        };
+        let mut drive = Drive::new();
+        drive.run(10.0, twice);
+        assert!(drive.turned() < 0.01, "{}", drive.turned());
     }
 
     #[test]
@@ -302,10 +362,12 @@ mod tests {
 
     #[test]
     fn a_position_that_jumps_or_is_vague_is_no_position() {
-        let jumps: Fault = |_, _, text| {
-            let body = text[1..text.len() - 5].replace("5230.", "5231.");
-            let sum = body.bytes().fold(0, |sum, octet| sum ^ octet);
-            format!("${body}*{sum:02X}\r\n")
+        let jumps: Fault = |drive, _| {
+            let truth = drive.truth;
+            drive.truth.x += 1855.0;
+            let sentences = drive.sentences(truth.yaw);
+            drive.truth = truth;
+            sentences
         };
         let mut drive = Drive::new();
         drive.run(0.2, jumps);

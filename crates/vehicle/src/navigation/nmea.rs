@@ -71,6 +71,15 @@ pub enum Navigation {
 }
 
 /// Reads the octets of a receiver.
+///
+/// ```
+/// use jaus_vehicle::navigation::{Navigation, Receiver};
+///
+/// let mut receiver = Receiver::default();
+/// let sentence = b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n";
+/// assert!(matches!(receiver.handle_octets(sentence)[..], [Navigation::Fix(_)]));
+/// assert_eq!(receiver.errors(), 0);
+/// ```
 #[derive(Debug, Default)]
 pub struct Receiver {
     /// The sentence being received, from its `$` on.

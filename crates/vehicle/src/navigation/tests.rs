@@ -7,7 +7,7 @@
 use std::time::{Duration, Instant};
 
 use super::*;
-use crate::motion::{Frame, Gone, Pose, Random, wrap};
+use crate::motion::{Frame, Gone, Noise, Pose, wrap};
 
 const HERE: Frame = Frame {
     latitude: 52.5,
@@ -22,7 +22,7 @@ struct Journey {
     now: Instant,
     steps: u32,
     truth: Pose,
-    random: Random,
+    noise: Noise,
     has_gnss: bool,
     has_wheels: bool,
     /// The bias of the gyroscope in radians per second, if there is one.
@@ -40,7 +40,7 @@ impl Journey {
             now: Instant::now(),
             steps: 0,
             truth: Pose::default(),
-            random: Random::new(seed),
+            noise: Noise::new(seed),
             has_gnss: true,
             has_wheels: true,
             gyro: None,
@@ -63,14 +63,14 @@ impl Journey {
         self.truth.x += speed * seconds * self.truth.yaw.cos();
         self.truth.y += speed * seconds * self.truth.yaw.sin();
         if let Some(bias) = self.gyro {
-            let noise = 0.002 * self.random.normal();
+            let noise = 0.002 * self.noise.normal();
             self.estimator.handle_rate(self.now, rate + bias + noise);
         }
         if self.has_wheels {
             let slip = if speed == 0.0 {
                 0.0
             } else {
-                0.01 * self.random.normal()
+                0.01 * self.noise.normal()
             };
             let gone = Gone {
                 forward: speed * seconds * (1.0 + slip),
@@ -87,7 +87,7 @@ impl Journey {
                 } else {
                     0.0
                 };
-            let noise = 0.05 * self.random.normal();
+            let noise = 0.05 * self.noise.normal();
             self.estimator.handle_course(
                 self.now,
                 &Course {
@@ -99,7 +99,7 @@ impl Journey {
     }
 
     fn fix(&mut self) -> Fix {
-        let noise = [0.5 * self.random.normal(), 0.5 * self.random.normal()];
+        let noise = [0.5 * self.noise.normal(), 0.5 * self.noise.normal()];
         let place = Pose::at(
             self.truth.x + noise[0],
             self.truth.y + noise[1] + self.offset,
@@ -235,6 +235,35 @@ fn a_jump_is_rejected_and_counts_as_uncertainty_until_it_lasts() {
 }
 
 #[test]
+fn two_jumps_with_silence_between_them_do_not_move_the_estimate() {
+    let mut journey = Journey::new(8);
+    journey.drive(1.0, 0.0, 30.0);
+    journey.offset = 40.0;
+    for _ in 0..3 {
+        journey.drive(1.0, 0.0, 0.2);
+        journey.has_gnss = false;
+        journey.drive(1.0, 0.0, 5.0);
+        journey.has_gnss = true;
+    }
+    let (missed, _, estimate) = journey.error();
+    assert!(missed < 2.0, "{missed}");
+    assert!(estimate.position_rms > 30.0, "in doubt: {estimate:?}");
+}
+
+#[test]
+fn rejected_positions_at_different_places_do_not_move_the_estimate() {
+    let mut journey = Journey::new(9);
+    journey.drive(1.0, 0.0, 30.0);
+    for step in 0..50 {
+        journey.offset = if step % 2 == 0 { 40.0 } else { -40.0 };
+        journey.drive(1.0, 0.0, 0.2);
+    }
+    let (missed, _, estimate) = journey.error();
+    assert!(missed < 2.0, "{missed}");
+    assert!(estimate.position_rms > 30.0, "in doubt: {estimate:?}");
+}
+
+#[test]
 fn without_wheels_the_position_follows_the_receiver() {
     let mut journey = Journey::new(5);
     journey.has_wheels = false;
@@ -267,8 +296,9 @@ fn inputs_that_are_no_numbers_change_nothing() {
         forward: f64::NAN,
         turn: 0.0,
     };
-    journey.estimator.handle_travel(journey.now, bad);
-    journey.estimator.handle_rate(journey.now, f64::INFINITY);
+    let later = journey.now + Duration::from_secs(1);
+    journey.estimator.handle_travel(later, bad);
+    journey.estimator.handle_rate(later, f64::INFINITY);
     journey.estimator.set_heading(f64::NAN);
     assert_eq!(journey.estimator.estimate(), Some(before));
 }

@@ -51,10 +51,10 @@ impl Part for Communicator {
         tell_place(&node, self.log.as_ref());
         let view = self.serve(&node, &component).await?;
         tokio::pin!(view);
-        let told = tell(&component, news);
+        let notified = tell(&component, news);
         tokio::select! {
             error = &mut view => Err(PartError::Broken(format!("the debug view failed: {error}"))),
-            end = told => Err(end),
+            end = notified => Err(end),
         }
     }
 }

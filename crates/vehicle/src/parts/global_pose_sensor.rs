@@ -9,7 +9,8 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use super::drivers::Sense;
 use super::navigation_inputs;
-use super::{IioDevice, Part, PartError, Slot};
+use super::turn_rates::TurnRates;
+use super::{Gyro, IioDevice, Part, PartError, Readings, Slot};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::Vehicle;
 use crate::motion::{Frame, GlobalPose, Motion, Observed, Pilot, Pose, WheelCount};
@@ -31,8 +32,8 @@ pub struct GlobalPoseSensor {
     /// Bits per second of the line.
     pub baud: u32,
     /// The gyroscope, if there is one.
-    pub gyro: Option<IioDevice>,
-    /// Report rate requested for the wheels, in hertz.
+    pub gyro: Option<Gyro>,
+    /// Report rate requested for the wheels, and for a gyroscope that is a component, in hertz.
     pub hz: f64,
     /// The heading at the start, and when the pose becomes unknown.
     pub navigator: NavigatorConfig,
@@ -44,7 +45,7 @@ pub struct NavigationInputs {
     /// Octets of the receiver, in any portions.
     pub receiver: mpsc::Receiver<Vec<u8>>,
     /// Turn rates in radians per second, right positive.
-    pub gyro: Option<mpsc::Receiver<f64>>,
+    pub gyro: Option<Readings<f64>>,
 }
 
 impl Default for GlobalPoseSensor {
@@ -62,11 +63,12 @@ impl Default for GlobalPoseSensor {
 impl Part for GlobalPoseSensor {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let (line, receiver) = navigation_inputs::receiver(&self.receiver, self.baud)?;
-        let gyro = self.gyro.as_ref().map(|device| {
-            let device = device.open()?;
-            IioDevice::start(device, IioImu::turn_rate)
-        });
-        let gyro = gyro.transpose()?;
+        let gyro = match &self.gyro {
+            Some(Gyro::Device(device)) => {
+                Some(IioDevice::start(device.open()?, IioImu::turn_rate)?)
+            }
+            Some(Gyro::Component) | None => None,
+        };
         let inputs = NavigationInputs { receiver, gyro };
         tokio::select! {
             end = self.run_on(inputs, slot) => end,
@@ -76,7 +78,8 @@ impl Part for GlobalPoseSensor {
 }
 
 impl GlobalPoseSensor {
-    /// Runs on custom inputs in place of [`receiver`](Self::receiver) and [`gyro`](Self::gyro).
+    /// Runs on custom inputs in place of [`receiver`](Self::receiver) and a device as
+    /// [`gyro`](Self::gyro).
     ///
     /// # Errors
     /// Why the component cannot continue.
@@ -96,6 +99,11 @@ impl GlobalPoseSensor {
         let query = QueryWheelOdometry {};
         let urn = wheel_odometry::URN;
         let counts = Sense::of(&component, urn, &query, self.hz, "wheel travel")?;
+        let rates = match (inputs.gyro, self.gyro) {
+            (Some(readings), _) => TurnRates::Device(readings),
+            (None, Some(Gyro::Component)) => TurnRates::of_component(&component, self.hz)?,
+            (None, _) => TurnRates::Absent,
+        };
         let sensor = Running {
             component,
             vehicle,
@@ -103,7 +111,7 @@ impl GlobalPoseSensor {
             navigator: Navigator::new(self.navigator),
             is_lost: false,
         };
-        sensor.work(inputs, counts).await
+        sensor.work(inputs.receiver, rates, counts).await
     }
 }
 
@@ -122,21 +130,23 @@ impl Running {
 
     async fn work(
         mut self,
-        mut inputs: NavigationInputs,
+        mut receiver: mpsc::Receiver<Vec<u8>>,
+        mut rates: TurnRates,
         mut counts: Sense<ReportWheelOdometry>,
     ) -> Result<Infallible, PartError> {
         let mut looks = interval(Self::LOOK);
         looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             tokio::select! {
-                octets = inputs.receiver.recv() => match octets {
+                octets = receiver.recv() => match octets {
                     Some(octets) => self.navigator.handle_octets(now(), &octets),
                     None => return Err(PartError::Broken(
                         "the GNSS receiver's input has ended".to_owned(),
                     )),
                 },
-                rate = next(&mut inputs.gyro) => {
-                    self.navigator.handle_rate(now(), rate);
+                rate = rates.next() => {
+                    let rate = rate?;
+                    self.navigator.handle_rate(rate.at, rate.value);
                     continue;
                 }
                 count = counts.next() => {
@@ -147,7 +157,7 @@ impl Running {
                 }
                 _ = looks.tick() => {}
             }
-            if let Some(pose) = self.observed.take_told_global() {
+            if let Some(pose) = self.observed.take_set_global_pose() {
                 self.navigator.set_heading(pose.yaw);
             }
             self.publish().await;
@@ -198,16 +208,6 @@ impl Running {
         self.component.changed::<QueryGlobalPose>().await;
         self.component.changed::<QueryGlobalPoseExt>().await;
     }
-}
-
-/// Waits for the next turn rate; forever without a gyroscope.
-async fn next(gyro: &mut Option<mpsc::Receiver<f64>>) -> f64 {
-    if let Some(rates) = gyro
-        && let Some(rate) = rates.recv().await
-    {
-        return rate;
-    }
-    std::future::pending().await
 }
 
 fn unknown(sampled_at: Option<Instant>) -> Motion {

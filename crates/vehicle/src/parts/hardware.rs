@@ -71,9 +71,14 @@ pub struct Sabertooth {
 
 #[cfg(feature = "serial")]
 impl Sabertooth {
+    /// A line that takes no data for this time is a fault.
+    const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
+
     fn start(&self) -> Result<[Box<dyn Actuator>; 2], PartError> {
-        let started = serial2::SerialPort::open(&self.device, self.baud)
-            .and_then(|line| OpenLoopMotor::sabertooth(line, self.address, self.motor));
+        let started = serial2::SerialPort::open(&self.device, self.baud).and_then(|mut line| {
+            line.set_write_timeout(Self::WRITE_TIMEOUT)?;
+            OpenLoopMotor::sabertooth(line, self.address, self.motor)
+        });
         let motors = started.map_err(|error| {
             PartError::Broken(format!(
                 "cannot use the motor controller on {}: {error}; check the device and the group of \

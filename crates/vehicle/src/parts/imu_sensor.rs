@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use tokio::time::timeout;
 
+use super::iio_device::next_reading;
 use super::{IioDevice, Part, PartError, Slot};
 use crate::mobility::both_versions;
 use crate::navigation::{IioImu, InertialSample};
@@ -58,7 +59,7 @@ impl Part for ImuSensor {
         let component = builder.live_on(slot.port)?;
         let mut is_lost = false;
         loop {
-            let sample = match timeout(self.silence, samples.recv()).await {
+            let sample = match timeout(self.silence, next_reading(&mut samples)).await {
                 Ok(Some(sample)) => Some(sample),
                 Ok(None) => return Err(PartError::Broken("the reading thread ended".to_owned())),
                 Err(_) => None,
@@ -69,20 +70,22 @@ impl Part for ImuSensor {
                 _ => {}
             }
             is_lost = sample.is_none();
+            let age = sample.map_or(Duration::ZERO, |it| it.at.elapsed());
+            let now = slot.time.system_time();
+            let sampled_at = now.checked_sub(age).unwrap_or(now);
             let InertialSample {
                 velocity,
                 acceleration,
-            } = sample.unwrap_or(InertialSample::UNKNOWN);
-            let now = slot.time.system_time();
+            } = sample.map_or(InertialSample::UNKNOWN, |it| it.value);
             let report = ReportVelocityState::from(velocity);
-            component.publish(report, now).await?;
+            component.publish(report, sampled_at).await?;
             let report = ReportVelocityStateExt::from(velocity);
-            component.publish(report, now).await?;
+            component.publish(report, sampled_at).await?;
             if has_accelerometer {
                 let report = ReportAccelerationState::from(acceleration);
-                component.publish(report, now).await?;
+                component.publish(report, sampled_at).await?;
                 let report = ReportAccelerationStateExt::from(acceleration);
-                component.publish(report, now).await?;
+                component.publish(report, sampled_at).await?;
             }
         }
     }

@@ -23,15 +23,15 @@ mod primitive_driver;
 mod range_sensor;
 mod stop_line;
 pub mod tester;
+mod turn_rates;
 mod vector_driver;
 mod velocity_sensor;
 
 use std::convert::Infallible;
 use std::future::Future;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use jaus::component::{self, Builder, Component, Kind};
-use jaus::node::{Node, Port};
+use jaus::node::{Node, Port, time_of_day};
 use jaus::service::TimeOfDay;
 
 pub use communicator::{Communicator, DEBUG_ADDRESS};
@@ -44,7 +44,7 @@ pub use hardware::GpioMotors;
 #[cfg(feature = "serial")]
 pub use hardware::Sabertooth;
 pub use hardware::{Drives, HBridgeMotors, Hardware, Motors, Servo, SteeringGear, Stop};
-pub use iio_device::IioDevice;
+pub use iio_device::{IioDevice, Reading, Readings};
 pub use imu_sensor::ImuSensor;
 pub use knowledge_store::{Broken, KnowledgeStore};
 pub use path_driver::PathDriver;
@@ -52,10 +52,27 @@ pub use planner::Planner;
 pub use pose_sensor::PoseSensor;
 pub use primitive_driver::PrimitiveDriver;
 pub use range_sensor::RangeSensor;
+pub use turn_rates::Gyro;
 pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
 
 /// A complete component, configured but not yet running.
+///
+/// ```no_run
+/// # use jaus::component::Kind;
+/// # use jaus::node::{Config, Node};
+/// # use jaus_vehicle::parts::{Part, Planner, Slot};
+/// # async fn example() -> Result<(), Box<dyn std::error::Error>> {
+/// let node = Node::start(Config::new(101, 36))?;
+/// let slot = Slot::new(node.attach(36)?, node, Kind::Vehicle, "Rover");
+/// let error = match Planner::default().run(slot).await {
+///     Ok(never) => match never {},
+///     Err(error) => error,
+/// };
+/// eprintln!("the planner has stopped: {error}");
+/// # Ok(())
+/// # }
+/// ```
 pub trait Part: Send + 'static {
     /// Runs the component. Ends only when it cannot continue. Dropping the future stops the
     /// component.
@@ -91,7 +108,7 @@ impl Slot {
             node: node.into(),
             kind,
             name: name.into(),
-            time: TimeOfDay::new(since_1970),
+            time: TimeOfDay::new(time_of_day),
         }
     }
 
@@ -122,14 +139,4 @@ pub enum PartError {
     /// operator.
     #[error("{0}")]
     Broken(String),
-}
-
-/// The host's time of day. Clocks before 1970 yield 1970.
-#[expect(
-    clippy::disallowed_methods,
-    reason = "parts run in real time, and their reports carry the time of day"
-)]
-fn since_1970() -> Duration {
-    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
-    since_1970.unwrap_or_default()
 }

@@ -21,7 +21,7 @@ use super::drivers::{Sense, shut_down};
 use super::{Part, PartError, Slot};
 use crate::ground::Missions;
 use crate::handoff::Handoff;
-use crate::mission::{Link, Settings, Vehicle};
+use crate::mission::{Footprint, Link, Settings};
 use jaus::address::JausId;
 use jaus::component::{AccessControl, Audience, Component, FindError, Management};
 use task::PlannerTask;
@@ -30,7 +30,7 @@ use task::PlannerTask;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planner {
     /// Dimensions of the vehicle.
-    pub vehicle: Vehicle,
+    pub vehicle: Footprint,
     /// Timeouts, retries and speed of missions.
     pub mission: Settings,
     /// Name of the map to plan on. A single map is used whatever its name.
@@ -46,7 +46,7 @@ pub struct Planner {
 impl Default for Planner {
     fn default() -> Self {
         Self {
-            vehicle: Vehicle::default(),
+            vehicle: Footprint::default(),
             mission: Settings::default(),
             map: "traversability".to_owned(),
             authority: 100,

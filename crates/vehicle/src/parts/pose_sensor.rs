@@ -131,7 +131,7 @@ impl Running {
             if counts.take_loss() {
                 freshness.forget();
             }
-            self.take_told();
+            self.take_set_pose();
             let pose = match heard {
                 Ok(report) => {
                     let count = WheelCount::from(&report?);
@@ -155,8 +155,8 @@ impl Running {
     }
 
     /// Applies the pose set by a client, if there is one.
-    fn take_told(&mut self) {
-        if let Some(pose) = self.observed.take_told() {
+    fn take_set_pose(&mut self) {
+        if let Some(pose) = self.observed.take_set_pose() {
             self.reckoning.set_pose(pose);
             let pose = self.reckoning.pose();
             tracing::info!("pose set to x {:.2} m, y {:.2} m", pose.x, pose.y);

@@ -32,6 +32,18 @@ use jaus::service::{MotionPolicy, StopCause};
 /// crosses an edge, whatever its client commands.
 ///
 /// It offers Primitive Driver, Wheel Odometry and Stage, with Management and Access Control.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use jaus_vehicle::parts::{Motors, PrimitiveDriver};
+///
+/// let driver = PrimitiveDriver {
+///     silence: Duration::from_millis(300),
+///     ..PrimitiveDriver::default()
+/// };
+/// assert!(matches!(driver.motors, Motors::Simulated(_)));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrimitiveDriver {
     /// The motors.
@@ -228,28 +240,28 @@ impl Running {
     }
 
     fn stage(&self, watchman: &Watchman) -> StageReport {
-        let told = |state, reason: String| StageReport {
+        let report = |state, reason: String| StageReport {
             state,
             reason,
             ..StageReport::default()
         };
         if let Some(fault) = self.odometer.fault() {
-            return told(StageState::Blocked, fault);
+            return report(StageState::Blocked, fault);
         }
         if let Some(reason) = watchman.emergency() {
-            return told(StageState::Blocked, reason.to_owned());
+            return report(StageState::Blocked, reason.to_owned());
         }
         if let Some(StopCause::Fault(fault)) = self.vehicle.last_stop() {
-            return told(StageState::Blocked, fault);
+            return report(StageState::Blocked, fault);
         }
         if let Some(cause) = self.vehicle.last_stop() {
             let reason = format!("stopped: {cause}");
-            return told(StageState::Idle, reason);
+            return report(StageState::Idle, reason);
         }
         match self.vehicle.is_under_way() {
             // Not blocked: the driver above it would stand down, but it may steer away.
-            true => told(StageState::Active, self.fence.held().unwrap_or_default()),
-            false => told(StageState::Idle, String::new()),
+            true => report(StageState::Active, self.fence.held().unwrap_or_default()),
+            false => report(StageState::Idle, String::new()),
         }
     }
 }

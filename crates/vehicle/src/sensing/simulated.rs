@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{Ray, Scan};
-use crate::motion::{Pose, Random};
+use crate::motion::{Noise, Pose};
 use crate::zones::Point;
 
 /// A round obstacle.
@@ -65,7 +65,7 @@ impl Default for RangerConfig {
 pub struct SimulatedRanger {
     config: RangerConfig,
     scenery: Scenery,
-    random: Random,
+    noise: Noise,
 }
 
 impl SimulatedRanger {
@@ -75,7 +75,7 @@ impl SimulatedRanger {
         Self {
             config,
             scenery,
-            random: Random::new(config.seed),
+            noise: Noise::new(config.seed),
         }
     }
 
@@ -95,7 +95,7 @@ impl SimulatedRanger {
             let ways = discs.iter().filter_map(|disc| disc.way(pose, bearing));
             let way = ways.fold(f64::INFINITY, f64::min);
             let range = if way < reach {
-                (way + noise * self.random.normal()).clamp(0.0, reach)
+                (way + noise * self.noise.normal()).clamp(0.0, reach)
             } else {
                 reach
             };

@@ -6,7 +6,7 @@ use super::*;
 use crate::actuator::{
     MotorConfig, Odometer, SimulatedMotor, SimulatedServo, SteeredDrive, Wheels, WheelsConfig,
 };
-use crate::mission::{Path, Terrain, Vehicle, plan};
+use crate::mission::{Footprint, Path, Terrain, plan};
 use crate::motion::{
     Ackermann, Curve, Fence, FenceConfig, Frame, Goal, Pilot, SkidSteer, SkidSteerConfig, Ticket,
 };
@@ -27,7 +27,7 @@ struct Bench {
     scenery: Scenery,
     discs: Vec<Disc>,
     lookout: Lookout,
-    vehicle: Vehicle,
+    vehicle: Footprint,
     plans_again: bool,
     /// The corners ahead, and the segment under way.
     corners: Vec<Point>,
@@ -63,9 +63,9 @@ impl Bench {
     fn new(pilot: Pilot, turning_radius: f64) -> Self {
         let fence = Fence::new(FenceConfig::default());
         let scenery = Scenery::default();
-        let vehicle = Vehicle {
+        let vehicle = Footprint {
             turning_radius,
-            ..Vehicle::default()
+            ..Footprint::default()
         };
         let mut bench = Self {
             pilot: pilot.with_fence(fence.clone()),

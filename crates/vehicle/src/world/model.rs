@@ -19,6 +19,28 @@ use crate::zones::ZoneId;
 ///
 /// Objects and descriptions are in memory and take at most some tens of megabytes. Cells remain in
 /// the file and are read on demand.
+///
+/// ```no_run
+/// # use std::path::Path;
+/// # use bytes::Bytes;
+/// # use jaus_vehicle::world::{Change, Raster, World};
+/// # fn example() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut world = World::open(Path::new("/var/lib/jaus/world.redb"))?;
+/// let map = Raster {
+///     name: "traversability".to_owned(),
+///     rows: 16,
+///     columns: 16,
+///     cell: 0.5,
+///     x: 0.0,
+///     y: 0.0,
+///     fill: 255,
+///     revision: 0,
+/// };
+/// world.apply(vec![Change::AddRaster(map, Bytes::new())])?;
+/// println!("{} maps", world.rasters().len());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct World {
     file: File,

@@ -63,6 +63,17 @@ pub struct Clearance {
 }
 
 /// The zones in force. Without any, the vehicle may be anywhere.
+///
+/// ```
+/// use jaus_vehicle::zones::{Polygon, ZoneId, Zones};
+///
+/// let mut zones = Zones::default();
+/// let yard = vec![(0.0, 0.0), (0.0, 20.0), (10.0, 20.0), (10.0, 0.0)];
+/// zones.set(ZoneId::Operating, Polygon::new(yard)?);
+/// let clearance = zones.clearance((8.0, 10.0)).map(|it| it.metres);
+/// assert_eq!(clearance, Some(2.0));
+/// # Ok::<(), jaus_vehicle::zones::PolygonError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Zones {
     polygons: BTreeMap<ZoneId, Polygon>,

@@ -16,15 +16,22 @@ use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::messages::mobility::{
-    QueryAccelerationState, QueryVelocityState, SetLocalVector, local_vector_driver,
+    QueryAccelerationState, QueryGlobalPose, QueryVelocityState, SetLocalVector,
+    local_vector_driver,
 };
+use jaus::node::now;
+use jaus_vehicle::motion::{Frame, Pose};
+use jaus_vehicle::navigation::{NavigatorConfig, SimulatedReceiver};
 use jaus_vehicle::parts::{
-    IioDevice, ImuSensor, Part, PoseSensor, PrimitiveDriver, VectorDriver, VelocitySensor,
+    GlobalPoseSensor, Gyro, IioDevice, ImuSensor, NavigationInputs, Part, PoseSensor,
+    PrimitiveDriver, VectorDriver, VelocitySensor,
 };
+use tokio::sync::mpsc;
 
 use crate::scene::{POSE, PRIMITIVE, Running, Scene, VECTOR, VELOCITY};
 
 const IMU: JausId = JausId::new(101, 52, 52);
+const GLOBAL_POSE: JausId = JausId::new(101, 43, 43);
 const YAW: &str = "in_anglvel_z_raw";
 const SOUND: &str = "100";
 
@@ -206,6 +213,86 @@ async fn a_driver_does_not_take_the_imu_for_the_sensor_of_its_speed() {
         })
         .await;
     for part in [imu, wheels, pose, driver, velocity] {
+        part.stop().await;
+    }
+}
+
+/// The receiver of a vehicle at rest.
+async fn receive(octets: mpsc::Sender<Vec<u8>>) {
+    let mut simulated = SimulatedReceiver::default();
+    let place = Frame::at(52.5, 13.4).to_global(&Pose::default());
+    loop {
+        let sentence = simulated.fix(now(), &place, None);
+        if octets.send(sentence.into_bytes()).await.is_err() {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(200)).await;
+    }
+}
+
+async fn heading(scene: &Scene) -> Option<f64> {
+    let query = QueryGlobalPose::all();
+    let report = scene.client.query(GLOBAL_POSE, &query).await.ok()?;
+    report.yaw_rad()
+}
+
+/// Waits until the heading turns left by 0.05 rad.
+async fn turns(scene: &Scene) {
+    let before = scene.until("a heading", || heading(scene)).await;
+    scene
+        .until("a left turn", || async {
+            (heading(scene).await? < before - 0.05).then_some(())
+        })
+        .await;
+}
+
+/// Waits until the heading is the same for a second.
+async fn does_not_turn(scene: &Scene) {
+    scene
+        .until("the same heading", || async {
+            let before = heading(scene).await?;
+            tokio::time::sleep(Duration::from_secs(1)).await;
+            let after = heading(scene).await?;
+            ((after - before).abs() < 0.001).then_some(())
+        })
+        .await;
+}
+
+// In real time, as the device is.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_imu_component_turns_the_heading_while_it_measures() {
+    let scene = Scene::new();
+    let mut device = Device::new("fused");
+    let (octets, receiver) = mpsc::channel(16);
+    let sensor = GlobalPoseSensor {
+        gyro: Some(Gyro::Component),
+        navigator: NavigatorConfig {
+            heading: Some(0.0),
+            ..NavigatorConfig::default()
+        },
+        ..GlobalPoseSensor::default()
+    };
+    let inputs = NavigationInputs {
+        receiver,
+        gyro: None,
+    };
+    let pose = scene.start(GLOBAL_POSE, |slot| sensor.run_on(inputs, slot));
+    let receiving = tokio::spawn(receive(octets));
+    does_not_turn(&scene).await;
+    let imu = device.start(&scene);
+    turns(&scene).await;
+    for fault in [Fault::Frozen, Fault::Writes("nan")] {
+        device.fail(fault).await;
+        does_not_turn(&scene).await;
+        device.mend(fault).await;
+        turns(&scene).await;
+    }
+    imu.stop().await;
+    does_not_turn(&scene).await;
+    let imu = device.start(&scene);
+    turns(&scene).await;
+    receiving.abort();
+    for part in [imu, pose] {
         part.stop().await;
     }
 }

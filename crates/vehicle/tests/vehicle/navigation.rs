@@ -20,16 +20,17 @@ use jaus::messages::mobility::{
     global_waypoint_driver, local_operating_zone,
 };
 use jaus::node::now;
+use jaus_test_kit::waiting::within_limit;
 use jaus_vehicle::ground::StageState;
 use jaus_vehicle::messages::ground::QueryWheelOdometry;
 use jaus_vehicle::motion::{Ackermann, DeadReckoning, Frame, Pose, WheelCount};
 use jaus_vehicle::navigation::{NavigatorConfig, SimulatedReceiver};
 use jaus_vehicle::parts::{
-    GlobalDriver, GlobalPoseSensor, KnowledgeStore, NavigationInputs, Part, PoseSensor,
+    GlobalDriver, GlobalPoseSensor, KnowledgeStore, NavigationInputs, Part, PartError, PoseSensor,
     PrimitiveDriver, SteeringGear, VelocitySensor,
 };
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::mission::zones::{keep_out, square};
 use crate::scene::{POSE, PRIMITIVE, Running, STORE, Scene, VELOCITY};
@@ -98,6 +99,31 @@ async fn a_receiver_on_a_serial_line_gives_a_position_that_does_not_outlive_its_
         })
         .await;
     running.stop().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_end_of_an_input_ends_the_sensor() {
+    for (name, has_receiver) in [("gyroscope", true), ("GNSS receiver", false)] {
+        let scene = Scene::new();
+        let (octets, receiver) = mpsc::channel(1);
+        let (rates, gyro) = watch::channel(None);
+        let inputs = NavigationInputs {
+            receiver,
+            gyro: Some(gyro),
+        };
+        let octets = has_receiver.then_some(octets);
+        let rates = (!has_receiver).then_some(rates);
+        let (tell, end) = oneshot::channel();
+        let running = scene.start(GLOBAL_POSE, |slot| async move {
+            let Err(error) = GlobalPoseSensor::default().run_on(inputs, slot).await;
+            tell.send(error.to_string()).unwrap();
+            Err(PartError::ShutDown)
+        });
+        let why = within_limit(end).await.unwrap();
+        assert_eq!(why, format!("the {name}'s input has ended"));
+        drop((octets, rates));
+        running.stop().await;
+    }
 }
 
 /// The satellites over a simulated vehicle: its true pose follows from its wheels.

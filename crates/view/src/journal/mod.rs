@@ -1,11 +1,10 @@
 //! The log of a node on disk: all traffic, in rotated files.
 //!
-//! A [`Journal`] has a [tap](Node::tap) of the node, which is its bounded queue, and a writer
-//! thread, so a slow card blocks nothing. Entries that the thread is too slow for are dropped and
-//! counted, and the log records how many and where. A file is closed at its size or age limit, and
-//! the oldest files are deleted before the directory exceeds its limit. Entries reach the operating
-//! system within a second, in whole blocks or lines: after a crash everything up to there is
-//! readable.
+//! A [`Journal`] reads a [tap](Node::tap) of the node, which is its bounded queue, and writes in a
+//! thread of its own, so a slow card blocks nothing. If the thread is too slow, entries are dropped
+//! and counted, and the log records how many and where. A file is closed at its size or age limit,
+//! and the oldest files are deleted before the directory exceeds its limit. Entries reach the
+//! operating system within a second, in whole blocks or lines, and remain readable after a crash.
 
 mod directory;
 mod packets;
@@ -33,38 +32,38 @@ use jaus::node::{Node, Tap, Tapped};
 const WAITING: usize = 8192;
 /// How often everything is handed to the operating system.
 const FLUSH: Duration = Duration::from_secs(1);
-/// The least that a file may be given: the longest datagram and its headers fit.
+/// The smallest limit of a file: the longest datagram and its headers fit.
 pub const LEAST_FILE: u64 = 128 << 10;
 
-/// What is written.
+/// The format of the files.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum JournalFormat {
-    /// Every datagram and fragment as it passed, as pcapng: for `jaus watch`, `jaus decode` and
-    /// Wireshark. What came by TCP or a serial line, or stayed within the node, has headers around it
-    /// as if it had been a datagram.
+    /// Every datagram and fragment unchanged, as pcapng: for `jaus watch`, `jaus decode` and
+    /// Wireshark. Messages of TCP connections and serial lines, and messages within the node, are
+    /// written as datagrams.
     #[default]
     Packets,
-    /// Whole messages as JSON, one a line: for people and their scripts.
+    /// Whole messages as JSON, one per line: for people and scripts.
     JsonLines,
 }
 
-/// Where a log is kept, and how much of it.
+/// The settings of a log: its directory, format and limits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JournalSettings {
-    /// The directory; it is made if it is not there.
+    /// The directory; created if it is missing.
     pub directory: PathBuf,
-    /// What is written.
+    /// The format.
     pub format: JournalFormat,
-    /// Octets of all files of the log together.
+    /// Limit of all files together, in octets.
     pub limit: u64,
-    /// Octets of one file, at least [`LEAST_FILE`] and at most half of the limit.
+    /// Limit of one file, in octets: at least [`LEAST_FILE`], at most half of `limit`.
     pub file_limit: u64,
-    /// The time that one file may span.
+    /// Age limit of one file.
     pub file_age: Duration,
 }
 
 impl JournalSettings {
-    /// 1 GiB in packets, in files of 64 MiB and an hour at most.
+    /// The default settings: pcapng, 1 GiB in all, files of at most 64 MiB and one hour.
     #[must_use]
     pub fn new(directory: impl Into<PathBuf>) -> Self {
         Self {
@@ -76,7 +75,7 @@ impl JournalSettings {
         }
     }
 
-    /// Another bound for all files together, with files of a sixteenth of it at most.
+    /// Sets the limit of all files together, and limits one file to a sixteenth of it.
     #[must_use]
     pub fn limited_to(self, octets: u64) -> Self {
         let file_limit = self.file_limit.min(octets / 16).max(LEAST_FILE);
@@ -88,19 +87,19 @@ impl JournalSettings {
     }
 }
 
-/// Why there can be no log.
+/// Why a log cannot be started.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum JournalError {
     /// The directory cannot be used.
     #[error("the log directory {directory} cannot be used: {source}")]
     Directory {
-        /// Which.
+        /// The directory.
         directory: String,
-        /// What the operating system says.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// Bounds that contradict each other.
+    /// The limits contradict each other.
     #[error(
         "a log of {limit} octets in files of {file_limit} cannot be: a file has at least {LEAST_FILE} \
          octets, and the log at least twice as many as a file"
@@ -111,17 +110,17 @@ pub enum JournalError {
         /// [`JournalSettings::file_limit`].
         file_limit: u64,
     },
-    /// No thread can be started.
+    /// The thread cannot be started.
     #[error("the log cannot be written: {0}")]
     Thread(io::Error),
 }
 
-/// What a log has done. The numbers only grow.
+/// Counts of a log since its start.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct JournalCounters {
     /// Packets or lines written.
     pub written: u64,
-    /// What passed and could not be written: the disk was too slow, full or gone.
+    /// Packets or messages not written, because the disk was too slow, full or missing.
     pub lost: u64,
 }
 
@@ -129,11 +128,22 @@ pub struct JournalCounters {
 struct Numbers {
     written: AtomicU64,
     lost: AtomicU64,
-    /// Where is written to now.
+    /// The current file.
     file: RwLock<Option<PathBuf>>,
 }
 
-/// A log that is being written. Dropping it writes what waits and ends it.
+/// A running log. Dropping it writes the waiting entries and ends it.
+///
+/// ```no_run
+/// # use jaus::node::Node;
+/// # use jaus_view::{Dictionary, Journal, JournalError, JournalSettings};
+/// # fn example(node: &Node) -> Result<(), JournalError> {
+/// let settings = JournalSettings::new("/var/log/jaus").limited_to(200 << 20);
+/// let journal = Journal::start(node, &settings, Dictionary::new())?;
+/// println!("{} packets written", journal.counters().written);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Journal {
     numbers: Arc<Numbers>,
@@ -142,11 +152,11 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Begins a log of everything that passes `node` from now on. `dictionary` has the messages
-    /// that are written with their fields, where the format is JSON.
+    /// Starts a log of all traffic of `node` from now on. `dictionary` decodes the messages if the
+    /// format is JSON.
     ///
     /// # Errors
-    /// A directory that cannot be used, or bounds that cannot be.
+    /// If the directory cannot be used, or the limits contradict each other.
     pub fn start(
         node: &Node,
         settings: &JournalSettings,
@@ -192,7 +202,7 @@ impl Journal {
         })
     }
 
-    /// What it has done so far.
+    /// Its counts so far.
     #[must_use]
     pub fn counters(&self) -> JournalCounters {
         JournalCounters {
@@ -201,7 +211,7 @@ impl Journal {
         }
     }
 
-    /// The file that is being written, once something has passed.
+    /// The current file; `None` before the first entry.
     #[must_use]
     pub fn file(&self) -> Option<PathBuf> {
         let file = self.numbers.file.read();
@@ -268,14 +278,15 @@ async fn write(
 #[derive(Debug)]
 struct Trouble {
     may_try: bool,
-    told: bool,
+    /// Whether the trouble was logged.
+    is_logged: bool,
 }
 
 impl Default for Trouble {
     fn default() -> Self {
         Self {
             may_try: true,
-            told: false,
+            is_logged: false,
         }
     }
 }
@@ -285,14 +296,14 @@ impl Trouble {
     fn note(&mut self, directory: &Path, result: io::Result<()>) -> bool {
         match result {
             Ok(()) => {
-                if self.may_try && std::mem::take(&mut self.told) {
+                if self.may_try && std::mem::take(&mut self.is_logged) {
                     tracing::info!("the log in {} is written again", directory.display());
                 }
                 true
             }
             Err(error) => {
                 self.may_try = false;
-                if !std::mem::replace(&mut self.told, true) {
+                if !std::mem::replace(&mut self.is_logged, true) {
                     let directory = directory.display();
                     tracing::warn!(
                         "the log in {directory} cannot be written, and is tried again: {error}"

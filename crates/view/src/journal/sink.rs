@@ -80,9 +80,9 @@ impl Sink {
         numbers.written.store(self.written, Ordering::Relaxed);
         numbers.lost.store(self.lost, Ordering::Relaxed);
         let path = self.open.as_ref().map(|open| &open.path);
-        let mut told = numbers.file.write().unwrap_or_else(PoisonError::into_inner);
-        if told.as_ref() != path {
-            *told = path.cloned();
+        let mut file = numbers.file.write().unwrap_or_else(PoisonError::into_inner);
+        if file.as_ref() != path {
+            *file = path.cloned();
         }
     }
 

@@ -7,6 +7,7 @@ mod streams;
 
 use std::borrow::Cow;
 use std::net::{IpAddr, SocketAddr};
+use std::ops::AddAssign;
 
 use bytes::Bytes;
 use etherparse::{
@@ -58,6 +59,15 @@ pub struct Counts {
     pub gaps: u64,
     /// Datagrams with missing, truncated or contradictory fragments.
     pub incomplete_datagrams: u64,
+}
+
+impl AddAssign for Counts {
+    fn add_assign(&mut self, other: Self) {
+        self.unknown_links += other.unknown_links;
+        self.foreign += other.foreign;
+        self.gaps += other.gaps;
+        self.incomplete_datagrams += other.incomplete_datagrams;
+    }
 }
 
 /// A UDP datagram, or a message of a TCP stream.

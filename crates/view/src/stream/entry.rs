@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 
 use serde_json::{Map, Value as Json};
 
+use crate::dictionary::Dictionary;
 use crate::line::{CARRIED, Line};
+use crate::words::quoted;
 use jaus::address::JausId;
 
 /// A message or an error as one JSON object.
@@ -124,9 +126,21 @@ impl Entry {
         self.json.get("carries")?.as_object()
     }
 
-    /// Formats one readable line: time, source and destination, name, and the fields.
+    /// The fields as [`body`](Self::body) has them, with the units of those whose definition the
+    /// library of the dictionary has.
+    fn body_with_units(&self, dictionary: &Dictionary) -> Option<Json> {
+        let mut json = self.json.clone();
+        let carried = json.get_mut("carries").and_then(Json::as_object_mut);
+        if let Some(carried) = carried {
+            dictionary.add_units(carried);
+        }
+        dictionary.add_units(&mut json);
+        Self::of_object(json).body()
+    }
+
+    /// Formats one readable line: time, source and destination, name, and the fields with their units.
     #[must_use]
-    pub fn in_words(&self, colours: bool) -> String {
+    pub fn in_words(&self, dictionary: &Dictionary, colours: bool) -> String {
         let paint = |code: &str, text: String| match colours {
             true => format!("\x1b[{code}m{text}\x1b[0m"),
             false => text,
@@ -137,24 +151,24 @@ impl Entry {
         let (source, destination) = (self.text("source"), self.text("destination"));
         let ends = format!(
             "{:>10} → {:<10}",
-            source.unwrap_or("?"),
-            destination.unwrap_or("?")
+            quoted(source.unwrap_or("?")),
+            quoted(destination.unwrap_or("?"))
         );
         let mut line = format!(
             "{} {} ",
-            paint("2", format!("{time:<12}")),
+            paint("2", format!("{:<12}", quoted(time))),
             paint("36", ends)
         );
         if let Some(direction) = self.text("direction") {
-            line += &paint("2", format!("{direction:<8} "));
+            line += &paint("2", format!("{:<8} ", quoted(direction)));
         }
-        line += &paint("1", self.name());
+        line += &paint("1", quoted(&self.name()).into_owned());
         if let Some(error) = self.text("error") {
-            let _ = write!(line, "  {}", paint("31", error.to_owned()));
-        } else if let Some(body) = self.body() {
+            let _ = write!(line, "  {}", paint("31", quoted(error).into_owned()));
+        } else if let Some(body) = self.body_with_units(dictionary) {
             let _ = write!(line, "  {}", shortened(&fields(&body)));
         } else if let Some(octets) = self.text("octets") {
-            let _ = write!(line, "  {}", shortened(octets));
+            let _ = write!(line, "  {}", shortened(&quoted(octets)));
         }
         line.trim_end().to_owned()
     }
@@ -181,6 +195,7 @@ fn fields(value: &Json) -> String {
         Json::Object(object) => join(
             object
                 .iter()
+                .map(|(name, value)| (quoted(name), value))
                 .map(|(name, value)| match value {
                     Json::Object(_) | Json::Array(_) => format!("{name}({})", fields(value)),
                     _ => format!("{name}={}", fields(value)),
@@ -196,12 +211,7 @@ fn fields(value: &Json) -> String {
                 })
                 .collect(),
         ),
-        Json::String(text) => {
-            // Text from a peer must not reach the terminal as control sequences.
-            text.chars()
-                .map(|c| if c.is_control() { '·' } else { c })
-                .collect()
-        }
+        Json::String(text) => quoted(text).into_owned(),
         other => other.to_string(),
     }
 }

@@ -29,6 +29,17 @@ pub(super) use passage::timestamp;
 pub(super) use seen::Seen;
 
 /// Converts traffic to entries.
+///
+/// ```
+/// use jaus_view::{Dictionary, Filter, MessageStream};
+///
+/// let filter: Filter = "message=ReportVelocityState".parse()?;
+/// let dictionary = Dictionary::new();
+/// let stream = MessageStream::new(&dictionary, filter);
+/// assert!(stream.read_json(r#"{"message": "ReportVelocityState"}"#)?.is_some());
+/// assert!(stream.read_json(r#"{"message": "QueryVelocityState"}"#)?.is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct MessageStream<'d> {
     messages: MessageLog<'d>,
@@ -71,14 +82,14 @@ impl<'d> MessageStream<'d> {
     }
 
     /// Reads a line of JSON written by this type or `jaus decode`; `None` if it does not match the
-    /// filter.
+    /// filter. A message that its writer had no definition for is decoded here.
     ///
     /// # Errors
     /// If the line is not a JSON object, with the reason.
     pub fn read_json(&self, line: &str) -> Result<Option<Entry>, String> {
         match serde_json::from_str(line) {
             Ok(Json::Object(object)) => {
-                let entry = Entry::of_object(object);
+                let entry = Entry::of_object(self.messages.decoded(object));
                 Ok(self.filter.passes(&entry).then_some(entry))
             }
             Ok(_) => Err("this is no JSON object".to_owned()),

@@ -122,5 +122,5 @@ fn way_in_words(way: Way, frame: &Frame, links: &mut Links) -> Vec<(&'static str
 pub(crate) fn timestamp(time: SystemTime) -> Timestamp {
     // Clocks before 1970 do not occur in practice.
     let time = time.duration_since(UNIX_EPOCH).unwrap_or_default();
-    Timestamp::new(time.as_secs() as i64, time.subsec_nanos(), 6)
+    Timestamp::since_1970(time, 6)
 }

@@ -197,14 +197,22 @@ fn acknowledgements_are_not_shown() {
 
 #[test]
 fn a_line_for_people_names_who_what_and_the_fields_and_hides_control_characters() {
+    let dictionary = Dictionary::new();
     assert_eq!(
-        velocity().in_words(false),
+        velocity().in_words(&dictionary, false),
         "12:00:00.000   101.2.33 → 42.1.1     sent     ReportVelocityState  Velocity_X=1.5 \
          State=Ready Records([Pose(X=1 Y=-2)] [Pose(X=5 Y=0)])"
     );
-    let hostile = entry(json!({"message": "M", "body": {"Name": "\u{1b}[2J"}}));
-    assert!(!hostile.in_words(false).contains('\u{1b}'));
-    assert!(velocity().in_words(true).contains("\u{1b}["));
+    let name = "\u{1b}[2J\r\nforged \u{202e}";
+    let hostile = entry(json!({
+        "source": name, "direction": name, "message": name, "body": {name: name},
+    }));
+    let shown = hostile.in_words(&dictionary, false);
+    assert!(!shown.contains(crate::disturbs_terminal), "{shown}");
+    let error = entry(json!({"message": "M", "error": name}));
+    let shown = error.in_words(&dictionary, false);
+    assert!(!shown.contains(crate::disturbs_terminal), "{shown}");
+    assert!(velocity().in_words(&dictionary, true).contains("\u{1b}["));
 }
 
 #[test]
@@ -233,6 +241,7 @@ fn event() -> Frame {
 #[test]
 fn an_event_is_shown_with_the_report_inside_and_matches_as_that_report() {
     let dictionary = Dictionary::new();
+    let complete = Dictionary::new().with_catalogue();
     for filter in [
         "",
         "message=Event",
@@ -247,10 +256,10 @@ fn an_event_is_shown_with_the_report_inside_and_matches_as_that_report() {
     ] {
         let mut stream = MessageStream::new(&dictionary, filter.parse().unwrap());
         let shown = stream.read_frame(at(0), &event());
-        let words = shown.expect(filter).in_words(false);
+        let words = shown.expect(filter).in_words(&complete, false);
         assert!(words.contains("Event: ReportVelocityState "), "{words}");
         assert!(words.contains("EventID=3 SequenceNumber=7"), "{words}");
-        assert!(words.contains("Velocity_X=1.5"), "{words}");
+        assert!(words.contains("Velocity_X=1.5 m/s"), "{words}");
     }
     for filter in ["velocity_x>2", "message=4403", "service=PoseSensor"] {
         let mut stream = MessageStream::new(&dictionary, filter.parse().unwrap());
@@ -276,4 +285,43 @@ fn an_event_in_an_event_is_opened_once_and_a_damaged_report_is_named() {
     assert_eq!(unknown["carries"]["octets"], "eeee01");
     assert!(unknown["carries"]["error"].is_string(), "{unknown}");
     assert!(shown(b"").get("carries").is_none());
+}
+
+#[test]
+fn what_the_writer_of_a_line_could_not_decode_is_decoded_and_filtered_here() {
+    let nothing = Dictionary::of(jaus::codec::Registry::new(&[]));
+    let dictionary = Dictionary::new();
+    let mut writer = MessageStream::new(&nothing, Filter::default());
+    for (frame, name) in [
+        (frame(1, b"\x02\x40\x02\0\0\0\0"), "ReportStatus"),
+        (event(), "ReportVelocityState"),
+    ] {
+        let line = writer.read_frame(at(0), &frame).unwrap().to_json();
+        assert!(!line.contains(name), "{line}");
+        let filter = format!("message={name}").parse().unwrap();
+        let stream = MessageStream::new(&dictionary, filter);
+        let read = stream.read_json(&line).unwrap();
+        let mut direct = MessageStream::new(&dictionary, Filter::default());
+        assert_eq!(read, direct.read_frame(at(0), &frame), "{line}");
+    }
+}
+
+#[test]
+fn enumerated_values_are_written_by_name_whichever_codec_has_read_them() {
+    let mut generated = Dictionary::new();
+    let mut read = Dictionary::of(jaus::codec::Registry::new(&[]));
+    read.load::<&std::path::Path>([]);
+    for dictionary in [&mut generated, &mut read] {
+        for (octets, field, value) in [
+            (&b"\x02\x40\x02\0\0\0\0"[..], "Status", json!("STANDBY")),
+            (b"\x02\x40\x77\0\0\0\0", "Status", json!(0x77)),
+        ] {
+            let octets = Bytes::from_static(octets);
+            let line = dictionary.line(&octets).to_json();
+            let line: Json = serde_json::from_str(&line).unwrap();
+            assert_eq!(line["body"][field], value, "{line}");
+            let request = crate::Request::from_json(&line.to_string()).unwrap();
+            assert_eq!(dictionary.write(&request).unwrap(), octets);
+        }
+    }
 }

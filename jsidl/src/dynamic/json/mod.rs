@@ -20,11 +20,13 @@
 //! A NaN is restored as the default quiet NaN.
 
 mod hex;
+mod leaves;
 mod read;
 mod write;
 
 use std::fmt;
 
+pub use leaves::{Leaf, for_each_number};
 pub use read::from_json;
 pub use write::to_json;
 

@@ -24,7 +24,7 @@ use super::control::{ControlId, ControlLost, ControlNews, ControlRefused};
 use crate::address::JausId;
 use crate::endpoint::Received;
 use crate::messages::core::management;
-use crate::service::{Audience, Directory, Outbox, Patience};
+use crate::service::{Audience, Directory, Outbox, Patience, State};
 
 /// Identifies one session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -232,10 +232,21 @@ impl Session {
         }
     }
 
+    /// Whether an emergency is the last that the peer has reported.
+    fn is_in_emergency(&self) -> bool {
+        match self.stage {
+            Stage::Held(held) => held.is_in_emergency(),
+            _ => self
+                .loss
+                .is_some_and(|(_, why)| why == SessionLoss::State(State::Emergency as u8)),
+        }
+    }
+
     fn obey(&mut self, now: Instant, order: SessionOrder) {
+        if matches!(order, SessionOrder::Target(TargetState::Ready)) && self.is_in_emergency() {
+            return;
+        }
         match (order, &mut self.stage) {
-            (SessionOrder::Target(TargetState::Ready), Stage::Held(held))
-                if held.is_in_emergency() => {}
             (SessionOrder::Target(target), stage) => {
                 self.settings.target = target;
                 if let Stage::Held(held) = stage {

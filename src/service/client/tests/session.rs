@@ -414,6 +414,54 @@ fn a_failed_peer_is_resumed_when_it_has_recovered_and_a_stopped_one_is_not() {
     }
 }
 
+/// A session whose peer has ended control and is in this state.
+fn dropped(loss: State) -> (Bench, SessionId) {
+    let (mut bench, session) = ready(Retake::Always);
+    reject(&mut bench, 1);
+    explain(&mut bench, loss, NOBODY);
+    let state = states(&mut bench).pop();
+    assert!(
+        matches!(
+            state,
+            Some(SessionState::Lost {
+                continues: true,
+                ..
+            })
+        ),
+        "{state:?}"
+    );
+    (bench, session)
+}
+
+/// Control is granted to a session that has lost it, and the peer stands by.
+fn grant_again(bench: &mut Bench) {
+    bench.run_ms(250);
+    explain(bench, State::Standby, NOBODY);
+    bench.sent.clear();
+    confirm(bench, 0);
+    report(bench, State::Standby);
+}
+
+#[test]
+fn a_target_that_is_set_while_the_peer_is_lost_holds_when_it_is_under_control_again() {
+    for (target, resumes) in [(TargetState::Ready, 1), (TargetState::Standby, 0)] {
+        let (mut bench, session) = dropped(State::Standby);
+        order(&mut bench, session, SessionOrder::Target(target));
+        grant_again(&mut bench);
+        assert_eq!(bench.sent::<Resume>().len(), resumes, "{target:?}");
+    }
+}
+
+#[test]
+fn a_peer_that_was_lost_in_an_emergency_is_not_resumed_by_an_order_given_before_its_end() {
+    let (mut bench, session) = dropped(State::Emergency);
+    order(&mut bench, session, RESUME);
+    grant_again(&mut bench);
+    assert!(bench.sent::<Resume>().is_empty());
+    order(&mut bench, session, RESUME);
+    assert_eq!(bench.sent::<Resume>().len(), 1);
+}
+
 #[test]
 fn a_peer_is_not_taken_from_a_client_that_has_it_meanwhile() {
     for retake in [Retake::Unopposed, Retake::WhenFree] {

@@ -86,7 +86,7 @@ impl ControlCommand {
                 command: self,
                 component,
                 session: None,
-                told: None,
+                printed: None,
                 output: Output::new(),
                 clock: Clock::start(),
             };
@@ -108,7 +108,7 @@ struct Operator<'c> {
     component: Component,
     session: Option<Session>,
     /// The last printed state.
-    told: Option<SessionState>,
+    printed: Option<SessionState>,
     output: Output,
     clock: Clock,
 }
@@ -181,7 +181,7 @@ impl Operator<'_> {
                 } = *self.command;
                 let settings = SessionSettings::new(authority).target(TargetState::AsFound);
                 let session = take_control(&self.component, address, settings, timeout).await?;
-                self.tell_state(session.state())?;
+                self.print_state(session.state())?;
                 session
             }
         };
@@ -208,7 +208,7 @@ impl Operator<'_> {
                 () = &mut end => return Ok(()),
                 state = session.changed() => {
                     let state = state.map_err(Failure::negative)?;
-                    self.tell_state(state)?;
+                    self.print_state(state)?;
                     if let SessionState::Lost { continues: false, .. } = state {
                         return Err(Failure::negative(state));
                     }
@@ -244,13 +244,13 @@ impl Operator<'_> {
         let state = self.session.as_ref().map(Session::state);
         let state = state.unwrap_or(SessionState::Released);
         match is_reached {
-            true => self.tell_state(state),
+            true => self.print_state(state),
             false => Err(Failure::negative(format_args!("not {wanted}: {state}"))),
         }
     }
 
-    fn tell_state(&mut self, state: SessionState) -> Result<(), Failure> {
-        if self.told.replace(state) == Some(state) {
+    fn print_state(&mut self, state: SessionState) -> Result<(), Failure> {
+        if self.printed.replace(state) == Some(state) {
             return Ok(());
         }
         let name = match state {

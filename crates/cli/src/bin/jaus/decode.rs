@@ -8,7 +8,7 @@ use bytes::Bytes;
 use clap::Args;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::{Output, say};
-use jaus_view::{self, Capture, Dictionary, Line, MessageLog, Network};
+use jaus_view::{self, Capture, Counts, Dictionary, Line, MessageLog, Network};
 
 use crate::definitions::Definitions;
 
@@ -90,7 +90,10 @@ impl Decode {
                 Err(error) => printer.print(&Line::from(&error))?,
             }
         }
-        report_unread(&network, &log);
+        report_skipped(network.counts(), log.incomplete_messages());
+        if log.stale_octets() > 0 {
+            tracing::info!(octets = log.stale_octets(), "skipped after the messages");
+        }
         Ok(())
     }
 }
@@ -156,9 +159,8 @@ fn read_hex(
     }
 }
 
-/// Reports on standard error what the capture holds besides the printed lines.
-fn report_unread(network: &Network, log: &MessageLog<'_>) {
-    let counts = network.counts();
+/// Reports on standard error what a capture holds besides its messages.
+pub(crate) fn report_skipped(counts: Counts, incomplete_messages: u64) {
     let notes = [
         (
             counts.foreign,
@@ -178,7 +180,7 @@ fn report_unread(network: &Network, log: &MessageLog<'_>) {
             "datagrams skipped: IP fragments are missing",
         ),
         (
-            log.incomplete_messages(),
+            incomplete_messages,
             "large messages skipped: fragments are missing",
         ),
     ];
@@ -186,8 +188,5 @@ fn report_unread(network: &Network, log: &MessageLog<'_>) {
         if count > 0 {
             say(format_args!("note: {count} {note}"));
         }
-    }
-    if log.stale_octets() > 0 {
-        tracing::info!(octets = log.stale_octets(), "skipped after the messages");
     }
 }

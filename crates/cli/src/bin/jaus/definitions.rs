@@ -64,6 +64,11 @@ impl Definitions {
 }
 
 impl Jsidl {
+    /// Whether any definitions are given.
+    pub(crate) const fn is_given(&self) -> bool {
+        !self.jsidl.is_empty()
+    }
+
     /// The messages of the built-in definitions and of `--jsidl`.
     pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
         let mut dictionary = built_in();

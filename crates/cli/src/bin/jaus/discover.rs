@@ -1,12 +1,13 @@
 //! `jaus discover`: prints subsystems, nodes, components and services.
 
+use std::io::stdout;
 use std::time::Duration;
 
 use clap::Args;
 use jaus::component::Component;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
-use jaus_cli::output::{Output, say};
+use jaus_cli::output::{Output, colours_wanted, say};
 use jaus_cli::runtime::{self, Clock};
 use jaus_cli::tree;
 
@@ -62,7 +63,7 @@ impl Discover {
     fn print_tree(&self, component: &Component) -> Result<Outcome, Failure> {
         let mut output = Output::new();
         let directory = component.directory();
-        let lines = tree::lines(&directory, Some(component.id()));
+        let lines = tree::lines(&directory, Some(component.id()), colours_wanted(&stdout()));
         if self.json {
             output.line(tree::json(&directory, component.id()))?;
         } else {
@@ -72,7 +73,8 @@ impl Discover {
             let searched = runtime::in_words(self.duration.unwrap_or(LOOK));
             say(format_args!(
                 "no answer within {searched}. Choose the network with --interface, name a host \
-                 that multicast does not reach with --peer, or search longer with --for"
+                 that multicast does not reach with --peer, or search longer with --for; `jaus \
+                 doctor` finds out what is wrong"
             ));
         }
         Ok(Outcome::complete_if(!lines.is_empty()))

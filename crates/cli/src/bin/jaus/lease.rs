@@ -9,7 +9,7 @@ use std::time::Duration;
 use jaus::address::JausId;
 use jaus::component::{Component, Session, SessionSettings, SessionState, TargetState};
 use jaus_cli::failure::Failure;
-use jaus_cli::runtime;
+use jaus_cli::{network, runtime};
 use tokio::time::timeout;
 
 /// Takes control of a component, and brings it into the target state of the settings.
@@ -38,7 +38,10 @@ pub(crate) async fn take_control(
             let waited = runtime::in_words(limit);
             Err(Failure::negative(match state {
                 SessionState::Requesting(_) | SessionState::Seeking => {
-                    format!("{peer} did not answer the request for control within {waited}")
+                    format!(
+                        "{peer} did not answer the request for control within {waited}. {}",
+                        network::REMEDY
+                    )
                 }
                 state => state.to_string(),
             }))

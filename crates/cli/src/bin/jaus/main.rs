@@ -14,9 +14,12 @@ mod doctor;
 #[cfg(target_os = "linux")]
 mod drive;
 mod encode;
+mod events;
 mod examine;
 mod jsidl;
 mod judge;
+#[cfg(feature = "secure")]
+mod keys;
 mod lease;
 mod list;
 mod load;
@@ -73,6 +76,8 @@ enum Command {
     #[cfg(target_os = "linux")]
     #[command(name = up::warden::NAME, hide = true)]
     Warden(up::warden::Warden),
+    #[cfg(feature = "secure")]
+    Keys(keys::Keys),
     Node(node::NodeCommand),
     Vehicle(vehicle::VehicleCommand),
     Monitor(monitor::Monitor),
@@ -100,6 +105,8 @@ enum Command {
     Jsidl(jsidl::Jsidl),
     Completions(manual::Completions),
     Man(manual::Man),
+    #[command(hide = true)]
+    Reference(manual::Reference),
 }
 
 impl Command {
@@ -112,6 +119,8 @@ impl Command {
             Self::Leash(leash) => leash.run(),
             #[cfg(target_os = "linux")]
             Self::Warden(warden) => warden.run(),
+            #[cfg(feature = "secure")]
+            Self::Keys(keys) => keys.run(),
             Self::Node(node) => node.run(),
             Self::Vehicle(vehicle) => vehicle.run(),
             Self::Monitor(monitor) => monitor.run(),
@@ -138,6 +147,7 @@ impl Command {
             Self::Jsidl(jsidl) => return jsidl.run(),
             Self::Completions(completions) => completions.run(Cli::command()),
             Self::Man(man) => man.run(Cli::command()),
+            Self::Reference(reference) => reference.run(Cli::command()),
         };
         outcome.map(ExitCode::from)
     }

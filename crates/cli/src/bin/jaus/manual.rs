@@ -1,5 +1,5 @@
-//! `jaus completions` and `jaus man`: the files that shells and `man` read, from the definition of
-//! the command line.
+//! `jaus completions`, `jaus man` and `jaus reference`: the files that shells, `man` and the book
+//! read, from the definition of the command line.
 
 use std::fs;
 use std::path::PathBuf;
@@ -8,6 +8,7 @@ use clap::{Args, Command};
 use clap_complete::Shell;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::Output;
+use jaus_cli::reference;
 
 /// Print the completions for a shell
 #[derive(Args)]
@@ -47,6 +48,18 @@ impl Man {
         let failure = |error| Failure::file(&self.directory, &error);
         fs::create_dir_all(&self.directory).map_err(failure)?;
         clap_mangen::generate_to(command, &self.directory).map_err(failure)?;
+        Ok(Outcome::Done)
+    }
+}
+
+/// Print the page of the commands in the book
+#[derive(Args)]
+pub(crate) struct Reference;
+
+impl Reference {
+    /// Prints the page of this command line.
+    pub(crate) fn run(&self, command: Command) -> Result<Outcome, Failure> {
+        reference::print(command, Command::new(""))?;
         Ok(Outcome::Done)
     }
 }

@@ -1,20 +1,22 @@
 //! `jaus node`: a discoverable node that prints its observations.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use clap::Args;
 use jaus::address::JausId;
-use jaus::component::{Component, Kind};
+use jaus::component::{Change, Component, Kind};
 use jaus::endpoint::Event;
-use jaus::node::{ComponentEvents, Events, Local, Node, units};
+use jaus::node::{ComponentEvents, Events, LinkReport, Local, Node, units};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::{Network, SubsystemKind};
-use jaus_cli::output::Output;
-use jaus_cli::runtime::{self, Clock, RunFor};
+use jaus_cli::runtime::{self, RunFor};
 use jaus_cli::statistics::{self, DropWatch};
 use jaus_cli::tree;
+use serde_json::json;
 use tokio::time::{MissedTickBehavior, interval};
+
+use crate::events::{EventFormat, EventPrinter};
 
 /// Run a node with one component that others can find
 ///
@@ -27,7 +29,10 @@ use tokio::time::{MissedTickBehavior, interval};
     jaus node --id 101.1 --local          component processes of this host may attach\n  \
     jaus node --config node.toml --stats\n  \
     jaus node --id 101.1 --stats=10s      prints counters every 10 s\n  \
-    jaus node --loopback                  for trying it on one computer")]
+    jaus node --loopback                  for trying it on one computer\n\n\
+    Events of --json: \"started\" with \"id\" and \"links\"; \"discovery\" with the object of `jaus \
+    discover --watch --json`; \"moved\" and \"conflict\" of peers' addresses; \"component\" for \
+    processes that attach; \"statistics\" with counters by name.")]
 pub(crate) struct NodeCommand {
     /// Print counters of received, sent and dropped messages at the end; with =TIME, such as =10s,
     /// also at that interval
@@ -58,6 +63,9 @@ pub(crate) struct NodeCommand {
     local: Option<Local>,
 
     #[command(flatten)]
+    format: EventFormat,
+
+    #[command(flatten)]
     network: Network,
 }
 
@@ -78,16 +86,16 @@ impl NodeCommand {
         let name = self.name.clone().or(identity.name);
         let name = name.unwrap_or_else(|| "jaus node".to_owned());
         runtime::run(async {
-            let node = Node::start(config).map_err(Failure::of)?;
+            let node = self.network.start(config)?;
             let events = (node.events(), node.component_events());
             let component = Component::builder(kind, name)
                 .attach(&node, id.component())
                 .map_err(Failure::of)?;
-            let mut output = Output::new();
-            introduce(&node, &component, &mut output)?;
-            let outcome = self.watch(&node, &component, events, &mut output).await;
+            let mut printer = self.format.printer();
+            introduce(&node, &component, &mut printer)?;
+            let outcome = self.watch(&node, &component, events, &mut printer).await;
             if self.stats.is_some() {
-                statistics::print(&node, &mut output)?;
+                print_statistics(&node, &mut printer)?;
             }
             drop(component);
             node.shutdown().await;
@@ -101,12 +109,11 @@ impl NodeCommand {
         node: &Node,
         component: &Component,
         (mut events, mut arrivals): (Events, ComponentEvents),
-        output: &mut Output,
+        printer: &mut EventPrinter,
     ) -> Result<Outcome, Failure> {
         let mut changes = component.watch();
         let end = self.run_for.end();
         tokio::pin!(end);
-        let clock = Clock::start();
         // Every message of the other component repeats the conflict; report it once.
         let mut conflicts = BTreeSet::new();
         let mut turns = interval(self.stats.filter(|time| !time.is_zero()).unwrap_or(LOG));
@@ -114,26 +121,51 @@ impl NodeCommand {
         turns.tick().await;
         let mut drops = DropWatch::default();
         loop {
-            let words = tokio::select! {
+            tokio::select! {
                 () = &mut end => return Ok(Outcome::Done),
                 _ = turns.tick() => {
                     drops.log(node);
                     if self.stats.is_some_and(|time| !time.is_zero()) {
-                        statistics::print(node, output)?;
+                        print_statistics(node, printer)?;
                     }
-                    continue;
                 }
-                Some(change) = changes.next() => tree::in_words(change, &component.directory()),
+                Some(change) = changes.next() => print_change(change, component, printer)?,
                 Some(event) = events.recv() => match event {
-                    Event::IdConflict { path, .. } if !conflicts.insert(path.peer) => None,
-                    event => in_words(&event),
+                    Event::IdConflict { path, .. } if !conflicts.insert(path.peer) => {}
+                    event => print_event(&event, printer)?,
                 },
-                Some(event) = arrivals.recv() => event.in_words(),
+                Some(event) = arrivals.recv() => {
+                    if let Some(words) = event.in_words() {
+                        printer.timed("component", json!({ "text": words }), &words)?;
+                    }
+                }
                 else => return Err(Failure::new("the node has stopped")),
-            };
-            if let Some(words) = words {
-                output.line(format_args!("{clock}  {words}"))?;
             }
+        }
+    }
+}
+
+/// Prints a change that discovery has found.
+pub(crate) fn print_change(
+    change: Change,
+    component: &Component,
+    printer: &mut EventPrinter,
+) -> Result<(), Failure> {
+    let directory = component.directory();
+    match tree::in_words(change, &directory) {
+        Some(words) => printer.timed("discovery", tree::change_json(change, &directory), words),
+        None => Ok(()),
+    }
+}
+
+fn print_statistics(node: &Node, printer: &mut EventPrinter) -> Result<(), Failure> {
+    match printer.output() {
+        Some(output) => statistics::print(node, output),
+        None => {
+            let counters = node.counters();
+            let counted = counters.iter().filter(|&(_, count)| count > 0);
+            let counters: BTreeMap<_, _> = counted.map(|(it, count)| (it.name(), count)).collect();
+            printer.plain("statistics", json!({ "counters": counters }), "")
         }
     }
 }
@@ -142,10 +174,22 @@ impl NodeCommand {
 pub(crate) fn introduce(
     node: &Node,
     component: &Component,
-    output: &mut Output,
+    printer: &mut EventPrinter,
 ) -> Result<(), Failure> {
+    let Some(output) = printer.output() else {
+        let link = |it: &LinkReport| {
+            json!({
+                "interface": it.interface.name,
+                "address": it.local.to_string(),
+                "group": it.group.map(|group| group.to_string()),
+            })
+        };
+        let links: Vec<_> = node.links().iter().map(link).collect();
+        let details = json!({ "id": component.id().to_string(), "links": links });
+        return printer.plain("started", details, "");
+    };
     let directory = component.directory();
-    for line in tree::lines(&directory, None) {
+    for line in tree::lines(&directory, None, false) {
         output.line(line)?;
     }
     for link in node.links() {
@@ -184,16 +228,25 @@ pub(crate) fn introduce(
     output.line("Press Ctrl-C to end.\n")
 }
 
-/// Describes endpoint events that discovery does not report.
-fn in_words(event: &Event) -> Option<String> {
+/// Prints endpoint events that discovery does not report.
+fn print_event(event: &Event, printer: &mut EventPrinter) -> Result<(), Failure> {
     match event {
         Event::PeerMoved { id, from, to } => {
-            Some(format!("{id} has moved from {} to {}", from.peer, to.peer))
+            let (from, to) = (from.peer.to_string(), to.peer.to_string());
+            printer.timed(
+                "moved",
+                json!({ "component": id.to_string(), "from": from, "to": to }),
+                format_args!("{id} has moved from {from} to {to}"),
+            )
         }
-        Event::IdConflict { id, path } => Some(format!(
-            "the node at {} also has our id {id}: choose another for one of them (--id)",
-            path.peer
-        )),
-        _ => None,
+        Event::IdConflict { id, path } => printer.timed(
+            "conflict",
+            json!({ "component": id.to_string(), "address": path.peer.to_string() }),
+            format_args!(
+                "the node at {} also has our id {id}: choose another for one of them (--id)",
+                path.peer
+            ),
+        ),
+        _ => Ok(()),
     }
 }

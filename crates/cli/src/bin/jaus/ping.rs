@@ -21,7 +21,7 @@ use jaus::node::Port;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::{self, Network};
 use jaus_cli::output::{Output, say};
-use jaus_cli::runtime;
+use jaus_cli::runtime::{self, size_within};
 use serde_json::{Value as Json, json};
 use tokio::time::{Instant, sleep_until, timeout_at};
 
@@ -40,7 +40,7 @@ const PADDING: u16 = 0xD7F0;
     jaus ping 101.1.33\n  \
     jaus ping 101.1.33 --count 10 --interval 100ms\n  \
     jaus ping 101.1.33 --json | jq .ms\n  \
-    jaus ping 101.1.33 --with acknowledgement --size 65536\n  \
+    jaus ping 101.1.33 --with acknowledgement --size 64KiB\n  \
     jaus ping 101.1.33 --peer 192.168.7.2      for a host that multicast does not reach")]
 pub(crate) struct Ping {
     /// The component to query: SUBSYSTEM.NODE.COMPONENT
@@ -63,10 +63,10 @@ pub(crate) struct Ping {
     #[arg(long, value_enum)]
     with: Option<Question>,
 
-    /// The size of the acknowledged message in octets, 2 to 16777216; implies --with
-    /// acknowledgement
-    #[arg(long, value_parser = clap::value_parser!(u32).range(2..=16 << 20))]
-    size: Option<u32>,
+    /// The size of the acknowledged message, such as 1500 or 64KiB, from 2 B to 16 MiB; implies
+    /// --with acknowledgement
+    #[arg(long, value_parser = |text: &str| size_within(text, 2, 16 << 20))]
+    size: Option<usize>,
 
     /// Print JSON: one object for each query, and the summary
     #[arg(long)]
@@ -239,7 +239,7 @@ impl Ping {
     }
 
     async fn have_acknowledged(&self, port: &Port) -> Result<Option<Answer>, Failure> {
-        let mut message = vec![0; self.size.unwrap_or(2) as usize];
+        let mut message = vec![0; self.size.unwrap_or(2)];
         message[..2].copy_from_slice(&PADDING.to_le_bytes());
         let start = Instant::now();
         let outgoing = Outgoing::new(port.id(), self.address, message.into());

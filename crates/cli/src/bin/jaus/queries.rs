@@ -1,5 +1,6 @@
 //! Messages on the command line: the name, and the fields as JSON or by their names.
 
+use bytes::Bytes;
 use clap::Args;
 use jaus_cli::failure::Failure;
 use jaus_view::{Dictionary, EncodedQuery, Request, Unreadable};
@@ -101,6 +102,20 @@ impl Fields {
             _ => encoded,
         }
     }
+}
+
+/// A report for people: its name, and its fields with units and names of values.
+pub(crate) fn in_words(dictionary: &Dictionary, octets: &Bytes) -> String {
+    let line = dictionary.line(octets);
+    let name = line.message.unwrap_or("unknown report");
+    let fields: String = match dictionary.fields_in_words(octets) {
+        Ok(fields) => fields
+            .iter()
+            .map(|it| format!("  {} {}", it.field, it.value))
+            .collect(),
+        Err(unreadable) => format!("  {unreadable}"),
+    };
+    format!("{name}{fields}")
 }
 
 fn has(known: &[String], field: &str) -> bool {

@@ -24,12 +24,12 @@ use tokio::time::{Instant, timeout_at};
 
 use crate::definitions::Definitions;
 use crate::offers::{not_offered, query_services};
-use crate::queries::{Fields, Named};
+use crate::queries::{Fields, Named, in_words};
 
 /// Interval of repeated queries without an answer.
 const AGAIN: Duration = Duration::from_millis(500);
 
-/// Query a component and print its report as JSON
+/// Query a component and print its report as JSON, or as text with units
 ///
 /// With a wildcard in the address (65535 or 255) all reports that arrive in time are printed. Exit
 /// status 1 means that there was no answer. If the component does not list the query's service, its
@@ -38,7 +38,7 @@ const AGAIN: Duration = Duration::from_millis(500);
 #[command(after_help = "Examples:\n  \
     jaus query 101.1.1 QueryIdentification '{\"QueryType\":2}'\n  \
     jaus query 101.1.1 QueryHeartbeatPulse\n  \
-    jaus query 101.1.33 QueryVelocityState --fields Velocity_X,Yaw_Rate\n  \
+    jaus query 101.1.33 QueryVelocityState --fields Velocity_X,Yaw_Rate --text\n  \
     jaus query 65535.255.255 QueryIdentification '{\"QueryType\":2}' --timeout 1s\n  \
     jaus query 101.1.1 QueryHeartbeatPulse --peer 192.168.7.2")]
 pub(crate) struct Query {
@@ -54,6 +54,10 @@ pub(crate) struct Query {
 
     #[command(flatten)]
     fields: Fields,
+
+    /// Print text with units instead of JSON
+    #[arg(long)]
+    text: bool,
 
     /// How long to wait for an answer, and with a wildcard for further ones
     #[arg(long, default_value = "2s", value_parser = runtime::duration)]
@@ -116,7 +120,13 @@ impl Query {
                 }
                 let line = dictionary.line(&received.payload);
                 complete &= !line.is_error();
-                output.line(answer(received.source, line)?)?;
+                output.line(match self.text {
+                    true => {
+                        let report = in_words(dictionary, &received.payload);
+                        format!("{}  {report}", received.source)
+                    }
+                    false => answer(received.source, line)?,
+                })?;
                 if !self.address.has_wildcard() {
                     return Ok(Outcome::complete_if(complete));
                 }

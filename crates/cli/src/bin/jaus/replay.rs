@@ -17,18 +17,20 @@ use std::time::Duration;
 use bytes::Bytes;
 use clap::Args;
 use jaus::address::JausId;
-use jaus::link::STANDARD_PORT;
+use jaus::link::{STANDARD_PORT, interface};
 use jaus::wire::judp;
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::output::{Output, say};
+use jaus_cli::output::say;
 use jaus_cli::runtime;
 use jaus_view::{Capture, Datagram, Filter, Line, MessageLog, Timestamp};
+use serde_json::{Value as Json, json};
 use socket2::SockRef;
 use tokio::net::UdpSocket;
 use tokio::time::{Instant, sleep_until};
 
 use crate::decode::network;
 use crate::definitions::Definitions;
+use crate::events::EventFormat;
 
 /// Send the datagrams of a capture again, with their original timing
 ///
@@ -42,7 +44,9 @@ use crate::definitions::Definitions;
     jaus replay drive.pcapng --to group --interface 127.0.0.1 --speed 10\n  \
     jaus replay drive.pcapng --to 10.0.0.7 --from 101.255.255 --loop 0\n  \
     jaus replay drive.pcapng --to group --start 90s --for 30s\n  \
-    jaus replay drive.pcapng --to group --filter 'service=Pose' --map 101=201")]
+    jaus replay drive.pcapng --to group --filter 'service=Pose' --map 101=201\n\n\
+    Events of --json: \"capture\" with the number of \"datagrams\", their \"span\" in seconds, their \
+    \"senders\" and what is \"left_out\"; \"sent\" with the number of \"datagrams\".")]
 pub(crate) struct Replay {
     /// The capture: pcap or pcapng from `jaus record`, tcpdump, Wireshark …
     file: PathBuf,
@@ -51,8 +55,8 @@ pub(crate) struct Replay {
     #[arg(long, value_name = "ADDRESS", required_unless_present = "dry_run")]
     to: Option<Target>,
 
-    /// Send from this address of this host; selects the network for multicast
-    #[arg(long, value_name = "ADDRESS")]
+    /// Send from this interface, by name or address; selects the network for multicast
+    #[arg(long, value_name = "INTERFACE", value_parser = interface_address)]
     interface: Option<IpAddr>,
 
     /// Speed factor; 0 sends without pauses
@@ -96,6 +100,9 @@ pub(crate) struct Replay {
     /// Print what would be sent, and exit
     #[arg(long)]
     dry_run: bool,
+
+    #[command(flatten)]
+    format: EventFormat,
 }
 
 /// A capture with a longer span is damaged or not worth the wait.
@@ -117,6 +124,26 @@ impl std::str::FromStr for Target {
         address.map(Self).map_err(|_| {
             format!("`{text}` is not an address: write 10.0.0.7, 10.0.0.7:3795 or group")
         })
+    }
+}
+
+/// The address of an interface of this host.
+fn interface_address(text: &str) -> Result<IpAddr, String> {
+    if let Ok(address) = text.parse() {
+        return Ok(address);
+    }
+    let present = interface::list().map_err(|error| error.to_string())?;
+    let of_name = || present.iter().filter(|it| it.name == text);
+    // Multicast is sent by IPv4.
+    let chosen = of_name()
+        .find(|it| it.address.is_ipv4())
+        .or_else(|| of_name().next());
+    match chosen {
+        Some(chosen) => Ok(chosen.address),
+        None => Err(format!(
+            "there is no network interface `{text}` on this host; choose from: {}",
+            interface::Available(present)
+        )),
     }
 }
 
@@ -206,8 +233,8 @@ struct Found {
 impl Replay {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         let found = self.read()?;
-        let mut output = Output::new();
-        output.line(format_args!("{found}"))?;
+        let mut printer = self.format.printer();
+        printer.plain("capture", found.to_json(), &found)?;
         let Some(Target(to)) = self.to.filter(|_| !self.dry_run) else {
             return Ok(Outcome::complete_if(!found.recorded.is_empty()));
         };
@@ -222,7 +249,12 @@ impl Replay {
                 () = end => Ok(()),
                 result = self.send(&socket, to, &found.recorded, &mut sent) => result,
             };
-            output.line(format_args!("{sent} datagrams sent to {to}"))?;
+            let details = json!({ "datagrams": sent, "to": to.to_string() });
+            printer.plain(
+                "sent",
+                details,
+                format_args!("{sent} datagrams sent to {to}"),
+            )?;
             result.map(|()| Outcome::Done)
         })
     }
@@ -360,10 +392,32 @@ impl Replay {
     }
 }
 
+impl Found {
+    /// Time from the beginning to the last datagram, in seconds.
+    fn span(&self) -> f64 {
+        let last = self.recorded.last().map(|last| last.after);
+        last.unwrap_or_default().as_secs_f64()
+    }
+
+    fn to_json(&self) -> Json {
+        json!({
+            "datagrams": self.recorded.len(),
+            "span": self.span(),
+            "senders": self.senders,
+            "left_out": {
+                "not_jaus": self.not_jaus,
+                "from_other_ids": self.others,
+                "unlike_the_filter": self.unlike,
+                "at_other_times": self.at_other_times,
+                "truncated": self.cut,
+            },
+        })
+    }
+}
+
 impl fmt::Display for Found {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let last = self.recorded.last().map(|last| last.after);
-        let seconds = last.unwrap_or_default().as_secs_f64();
+        let seconds = self.span();
         write!(f, "{} datagrams over {seconds:.1} s", self.recorded.len())?;
         for (sender, count) in &self.senders {
             write!(f, "\n  {count:>7} from {sender}")?;

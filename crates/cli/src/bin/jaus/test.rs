@@ -12,10 +12,12 @@ use jaus::component::{Component, Kind};
 use jaus::node::{Tap, Tapped};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
-use jaus_cli::output::Output;
 use jaus_cli::runtime;
 use jaus_vehicle::parts::tester::{MissionTest, figure, steps};
+use serde_json::{Value as Json, json};
 use tokio::sync::mpsc;
+
+use crate::events::{EventFormat, EventPrinter};
 
 /// Drive a mission through all components of a vehicle and check each answer
 ///
@@ -27,7 +29,10 @@ use tokio::sync::mpsc;
 #[command(after_help = "Examples:\n  \
     jaus test --loopback                 the vehicle 101 on this computer\n  \
     jaus test 101 --to 4,-2.5 --junit mission.xml\n  \
-    jaus test 105 --quiet                only the steps")]
+    jaus test 105 --quiet                only the steps\n\n\
+    Events of --json: \"message\" with \"source\", \"destination\", \"code\", \"name\" and \"sequence\"; \
+    \"step\" with \"name\", \"verdict\" (ok, failed, skipped), \"detail\" and \"ms\"; \"end\" with the \
+    numbers of \"steps\" and of those that \"passed\".")]
 pub(crate) struct TestCommand {
     /// The vehicle's subsystem
     #[arg(default_value = "101", value_parser = clap::value_parser!(u16).range(1..=65534))]
@@ -51,7 +56,7 @@ pub(crate) struct TestCommand {
 
     /// How long to wait for the end of the drive
     #[arg(long, value_name = "DURATION", default_value = "2min", value_parser = runtime::duration)]
-    drive: Duration,
+    drive_timeout: Duration,
 
     /// Write the steps to this file as a JUnit report
     #[arg(long, value_name = "FILE")]
@@ -64,6 +69,9 @@ pub(crate) struct TestCommand {
     /// Show messages of discovery and event renewal too
     #[arg(long, conflicts_with = "quiet")]
     all: bool,
+
+    #[command(flatten)]
+    format: EventFormat,
 
     #[command(flatten)]
     network: Network,
@@ -85,18 +93,18 @@ impl TestCommand {
     async fn drive(&self) -> Result<Vec<steps::Step>, Failure> {
         let (port, stay) = self.network.join_for_a_moment().await?;
         let begin = SystemTime::now();
-        let mut output = Output::new();
+        let mut printer = self.format.printer();
         let node = stay.node();
         let tap = node.as_ref().filter(|_| !self.quiet);
         let mut tap = tap.map(|node| node.tap(WAITING));
         if tap.is_none() && !self.quiet {
-            output.line(
+            printer.words(
                 "the messages pass through another process's node: see them with `jaus watch`",
             )?;
         }
         let tester = Component::builder(Kind::OperatorControlUnit, "Tester");
         let tester = tester.live_on(port).map_err(Failure::of)?;
-        output.line(format_args!(
+        printer.words(format_args!(
             "{} tests subsystem {}",
             tester.id(),
             self.subsystem
@@ -108,7 +116,7 @@ impl TestCommand {
             speed: self.speed,
             authority: self.authority,
             patience: self.timeout,
-            drive: self.drive,
+            drive: self.drive_timeout,
         };
         let until = runtime::end(None);
         tokio::pin!(until);
@@ -119,39 +127,70 @@ impl TestCommand {
             loop {
                 tokio::select! {
                     biased;
-                    Some(tapped) = next(&mut tap) => self.show(&tapped, begin, &mut output)?,
-                    Some(step) = told.recv() => output.line(step)?,
+                    Some(tapped) = next(&mut tap) => self.show(&tapped, begin, &mut printer)?,
+                    Some(step) = told.recv() => print_step(&step, &mut printer)?,
                     steps = &mut running => break steps,
                     () = &mut until => return Err(Failure::new("interrupted before the last step")),
                 }
             }
         };
         while let Ok(step) = told.try_recv() {
-            output.line(step)?;
+            print_step(&step, &mut printer)?;
         }
         let passed = steps
             .iter()
             .filter(|step| matches!(step.verdict, steps::Verdict::Pass(_)));
-        output.line(format_args!(
-            "{} of {} steps passed",
-            passed.count(),
-            steps.len()
-        ))?;
+        let (passed, all) = (passed.count(), steps.len());
+        printer.plain(
+            "end",
+            json!({ "passed": passed, "steps": all }),
+            format_args!("{passed} of {all} steps passed"),
+        )?;
         drop(tester);
         stay.end().await;
         Ok(steps)
     }
 
-    fn show(&self, tapped: &Tapped, begin: SystemTime, output: &mut Output) -> Result<(), Failure> {
+    fn show(
+        &self,
+        tapped: &Tapped,
+        begin: SystemTime,
+        printer: &mut EventPrinter,
+    ) -> Result<(), Failure> {
         match tapped {
-            Tapped::Lost(count) => output.line(format_args!("{count} messages were not shown")),
+            Tapped::Lost(count) => printer.plain(
+                "lost",
+                json!({ "messages": count }),
+                format_args!("{count} messages were not shown"),
+            ),
             Tapped::Passage(passage) => {
                 let lines = figure::lines(passage, begin).into_iter();
                 let mut lines = lines.filter(|line| self.all || !line.is_chatter());
-                lines.try_for_each(|line| output.line(line))
+                lines.try_for_each(|line| printer.plain("message", message_json(&line), &line))
             }
         }
     }
+}
+
+fn message_json(line: &figure::Line) -> Json {
+    json!({
+        "source": line.source.to_string(),
+        "destination": line.destination.to_string(),
+        "code": format!("{:04X}", line.code),
+        "name": line.name,
+        "sequence": line.sequence,
+    })
+}
+
+fn print_step(step: &steps::Step, printer: &mut EventPrinter) -> Result<(), Failure> {
+    let (verdict, detail) = match &step.verdict {
+        steps::Verdict::Pass(detail) => ("ok", detail.as_str()),
+        steps::Verdict::Fail(detail) => ("failed", detail.as_str()),
+        steps::Verdict::Skipped => ("skipped", ""),
+    };
+    let ms = (step.took.as_secs_f64() * 1e6).round() / 1e3;
+    let details = json!({ "name": step.name, "verdict": verdict, "detail": detail, "ms": ms });
+    printer.plain("step", details, step)
 }
 
 async fn next(tap: &mut Option<Tap>) -> Option<Tapped> {

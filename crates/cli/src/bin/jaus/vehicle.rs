@@ -1,10 +1,6 @@
 //! `jaus vehicle`: reference vehicle, a simulated platform with its JAUS services.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "the simulation runs in real time and reports the time of day"
-)]
 
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use jaus::address::JausId;
@@ -12,18 +8,18 @@ use jaus::component::{
     AccessControl, Builder, Component, Condition, Kind, Management, Standing, State, Time,
     TimeOfDay,
 };
-use jaus::node::Node;
+use jaus::node::{Node, time_of_day};
 use jaus::service::{MotionPolicy, StopCause};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
-use jaus_cli::output::Output;
-use jaus_cli::runtime::{self, Clock, RunFor, between, control_timeout};
-use jaus_cli::tree;
+use jaus_cli::runtime::{self, RunFor, between, control_timeout};
 use jaus_vehicle::handoff::Handoff;
 use jaus_vehicle::mobility::Vehicle;
 use jaus_vehicle::motion::{Frame, Limits, Motion, Pilot, SkidSteer, SkidSteerConfig};
+use serde_json::{Value as Json, json};
 use tokio::time::{MissedTickBehavior, interval};
 
+use crate::events::{EventFormat, EventPrinter};
 use crate::node;
 
 /// Run a simulated vehicle that can be controlled and driven
@@ -38,7 +34,10 @@ use crate::node;
     jaus vehicle --split                  Platform Management and Navigation as two components\n  \
     jaus vehicle --noise 0.1 --seed 7     with wheels that slip\n  \
     jaus vehicle --turning-radius 1       steers like a car\n  \
-    jaus -v vehicle                       also logs clients' commands")]
+    jaus -v vehicle                       also logs clients' commands\n\n\
+    Events of --json: \"started\" and \"discovery\" as of `jaus node`; \"standing\" with \"state\", \
+    \"controller\" and \"authority\"; \"motion\" with \"x\" and \"y\" in m, \"yaw\" in rad and \"speed\" \
+    in m/s; \"stopped\" with the cause.")]
 pub(crate) struct VehicleCommand {
     #[command(flatten)]
     run_for: RunFor,
@@ -57,7 +56,7 @@ pub(crate) struct VehicleCommand {
     authority: u8,
 
     /// The expected clients: `standard` clients renew control and repeat efforts; those of the
-    /// public contests do neither, so `contest` implies --control-timeout 0 and
+    /// public contests do neither, so `contest` implies --control-timeout never and
     /// --hold
     #[arg(long, value_enum, default_value_t)]
     profile: Profile,
@@ -74,6 +73,9 @@ pub(crate) struct VehicleCommand {
 
     #[command(flatten)]
     simulation: Simulation,
+
+    #[command(flatten)]
+    format: EventFormat,
 
     #[command(flatten)]
     network: Network,
@@ -132,7 +134,7 @@ impl VehicleCommand {
         let name = name.unwrap_or_else(|| "Rover".to_owned());
         let navigation = self.navigation(id)?;
         runtime::run(async {
-            let node = Node::start(config).map_err(Failure::of)?;
+            let node = self.network.start(config)?;
             let time = TimeOfDay::new(time_of_day);
             let vehicle = self.simulation.vehicle().with_clock(time.clone());
             let vehicle = vehicle.motion_policy(self.motion_policy());
@@ -152,18 +154,19 @@ impl VehicleCommand {
                 None
             };
             let driver = attach(driver, navigation)?;
-            let mut output = Output::new();
+            let mut printer = self.format.printer();
             if self.split {
-                output.line(format_args!(
+                printer.words(format_args!(
                     "{id} is Platform Management, {navigation} Navigation"
                 ))?;
             }
-            node::introduce(&node, &driver, &mut output)?;
-            let outcome = self.watch(&driver, &vehicle, &mut output).await;
+            node::introduce(&node, &driver, &mut printer)?;
+            let outcome = self.watch(&driver, &vehicle, &mut printer).await;
             drop((manager, driver));
             node.shutdown().await;
             if let Some(cause @ StopCause::Ended) = vehicle.last_stop() {
-                output.line(format_args!("stopped: {cause}"))?;
+                let details = json!({ "cause": cause.to_string() });
+                printer.plain("stopped", details, format_args!("stopped: {cause}"))?;
             }
             outcome
         })
@@ -201,7 +204,7 @@ impl VehicleCommand {
         &self,
         component: &Component,
         vehicle: &Vehicle,
-        output: &mut Output,
+        printer: &mut EventPrinter,
     ) -> Result<Outcome, Failure> {
         let mut changes = component.watch();
         let mut standings = component.watch_standing();
@@ -209,32 +212,32 @@ impl VehicleCommand {
         standings.mark_changed();
         let end = self.run_for.end();
         tokio::pin!(end);
-        let clock = Clock::start();
         let mut looks = interval(LOOK);
         looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut told = vehicle.motion();
         loop {
-            let words = tokio::select! {
+            tokio::select! {
                 () = &mut end => return Ok(Outcome::Done),
-                Some(change) = changes.next() => tree::in_words(change, &component.directory()),
+                Some(change) = changes.next() => node::print_change(change, component, printer)?,
                 Ok(()) = standings.changed() => {
                     let now = *standings.borrow_and_update();
                     if now.state == State::Initialize {
                         component.set_condition(Condition::Initialized).await;
                     }
                     let before = std::mem::replace(&mut standing, now);
-                    standing_in_words(&before, &now)
+                    if let Some(words) = standing_in_words(&before, &now) {
+                        printer.timed("standing", standing_json(&now), words)?;
+                    }
                 }
                 _ = looks.tick() => {
                     let motion = vehicle.motion();
                     let is_news = motion.pose != told.pose;
                     told = motion;
-                    is_news.then(|| in_words(&motion))
+                    if is_news {
+                        printer.timed("motion", motion_json(&motion), in_words(&motion))?;
+                    }
                 }
                 else => return Err(Failure::new("the node has stopped")),
-            };
-            if let Some(words) = words {
-                output.line(format_args!("{clock}  {words}"))?;
             }
         }
     }
@@ -289,12 +292,6 @@ fn drivable(
         .offer(vehicle.global_path_segment_driver().only_newest())
 }
 
-/// Time since the beginning of 1970; 0 if the clock is earlier.
-fn time_of_day() -> Duration {
-    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
-    since_1970.unwrap_or_default()
-}
-
 /// Describes changes of the component's state and controller.
 fn standing_in_words(before: &Standing, now: &Standing) -> Option<String> {
     let client = (now.controller != before.controller).then(|| match now.controller {
@@ -309,6 +306,19 @@ fn standing_in_words(before: &Standing, now: &Standing) -> Option<String> {
         (Some(client), Some(state)) => Some(format!("{client}; {state}")),
         (client, state) => client.or(state),
     }
+}
+
+fn standing_json(standing: &Standing) -> Json {
+    json!({
+        "state": standing.state.to_string(),
+        "controller": standing.controller.map(|it| it.id.to_string()),
+        "authority": standing.controller.map(|it| it.authority),
+    })
+}
+
+fn motion_json(motion: &Motion) -> Json {
+    let Motion { pose, velocity, .. } = motion;
+    json!({ "x": pose.x, "y": pose.y, "yaw": pose.yaw, "speed": velocity.x })
 }
 
 fn in_words(motion: &Motion) -> String {

@@ -98,7 +98,7 @@ impl<'a> Place<'a> {
     pub(crate) fn trouble(&mut self) -> Option<String> {
         let (side, process) = self.side.as_mut()?;
         let has_ended = process.has_ended();
-        has_ended.then(|| format!("what of {} was {side} has ended by itself", self.party.name))
+        has_ended.then(|| format!("{side} of {} has ended by itself", self.party.name))
     }
 
     /// Starts an act against the other party.
@@ -193,7 +193,7 @@ fn hexadecimal(id: JausId) -> String {
 /// The version that a party reports: the first line that its version command prints.
 pub(crate) fn version(party: &Party) -> String {
     let Some((program, arguments)) = party.version.split_first() else {
-        return "version not told".to_owned();
+        return "no version command".to_owned();
     };
     let filled =
         |word: &String| with_environment(&word.replace("{jaus}", env!("CARGO_BIN_EXE_jaus")));

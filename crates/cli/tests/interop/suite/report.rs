@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use jaus_cli::junit::{self, Case, CaseResult, Suite};
+use jaus_view::junit::{self, Case, CaseResult, Suite};
 
 use crate::suite::scenario::Scenario;
 use crate::suite::verdict::{Cell, Column, Verdict};
@@ -129,7 +129,7 @@ fn suite(column: &Column) -> Suite {
         class: format!("interop.{}.{}", column.peer, cell.scenario.key()),
         took: cell.took,
         result: match &cell.verdict {
-            Verdict::Passed => CaseResult::Passed,
+            Verdict::Passed => CaseResult::Passed(None),
             Verdict::NotApplicable(reason) => CaseResult::Skipped(reason.clone()),
             Verdict::Failed(reason) => CaseResult::Failed {
                 reason: reason.clone(),

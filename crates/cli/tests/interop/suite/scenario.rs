@@ -154,8 +154,8 @@ impl Scenario {
             Self::Large(size, transport) => {
                 format!("{}, {}", size.name.replace('-', " "), transport.title())
             }
-            Self::AnswererRestarts => "restart of who answers".to_owned(),
-            Self::ActorRestarts => "restart of who asks".to_owned(),
+            Self::AnswererRestarts => "restart of the answering party".to_owned(),
+            Self::ActorRestarts => "restart of the acting party".to_owned(),
             Self::Cable => "cable pulled".to_owned(),
             Self::Mixed => "mixed traffic".to_owned(),
         }

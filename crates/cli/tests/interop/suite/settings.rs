@@ -167,9 +167,9 @@ pub(crate) fn with_environment(word: &str) -> Result<String, String> {
     while let Some((before, behind)) = rest.split_once("${") {
         let (name, behind) = behind
             .split_once('}')
-            .ok_or_else(|| format!("`{word}`: there is no }} behind ${{"))?;
+            .ok_or_else(|| format!("`{word}`: there is no }} after ${{"))?;
         let value = std::env::var(name).map_err(|_| {
-            format!("`{word}`: set the environment variable {name}; README.md tells what to")
+            format!("`{word}`: set the environment variable {name}; README.md describes it")
         })?;
         filled = filled + before + &value;
         rest = behind;

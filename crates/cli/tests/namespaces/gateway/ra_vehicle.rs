@@ -10,7 +10,7 @@ use jaus::link::{Interfaces, Ip, Slab};
 use jaus::wire::Priority;
 use jaus_ra::carrier::To;
 use jaus_ra::gateway::RaGateway;
-use jaus_ra::node::{self, RaNode, Subsystem};
+use jaus_ra::node::{self, RaNode, RaSubsystemEntry};
 use jaus_ra::{Message, RaId};
 
 use jaus_test_kit::rover::Rover;
@@ -60,18 +60,18 @@ pub(crate) async fn play(interface: &str) {
     vehicle.run().await;
 }
 
-fn subsystem() -> Subsystem {
-    let component = |(component, name): (u8, &str)| node::Component {
+fn subsystem() -> RaSubsystemEntry {
+    let component = |(component, name): (u8, &str)| node::RaComponentEntry {
         component,
         instance: 1,
         name: name.to_owned(),
         services: Vec::new(),
     };
     let parts = [(32, "OCU"), (33, "Driver"), (38, "Pose"), (42, "Velocity")];
-    Subsystem {
+    RaSubsystemEntry {
         id: 20,
         name: "Sim".to_owned(),
-        nodes: vec![node::Node {
+        nodes: vec![node::RaNodeEntry {
             id: 1,
             name: "Sim node".to_owned(),
             components: parts.map(component).into(),
@@ -158,7 +158,7 @@ impl RaVehicle {
     }
 
     /// Starts to query and drive the JAUS vehicle when its subsystem appears.
-    fn look_at(&mut self, now: Instant, subsystem: &Subsystem) {
+    fn look_at(&mut self, now: Instant, subsystem: &RaSubsystemEntry) {
         if subsystem.components().any(|(id, _)| id == DRIVER) && self.next_effort.is_none() {
             println!("listed {} {}", subsystem.id, subsystem.name);
             self.say(now, POSE, 0x2402, &[1, 0]);

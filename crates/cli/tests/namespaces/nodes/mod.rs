@@ -104,8 +104,8 @@ fn a_process_that_plays_a_node() {
         "listener" => roles::listen().await,
         "announcer" => roles::announce().await,
         "vehicle" => roles::vehicle().await,
-        "train" => roles::train().await,
-        "station" => roles::station().await,
+        "batch-sender" => roles::send_batches().await,
+        "batch-receiver" => roles::receive_batches().await,
         "operator" => roles::operator().await,
         other => panic!("unknown role {other}"),
     });

@@ -159,20 +159,20 @@ pub(crate) async fn vehicle() {
     let rover = Component::builder(Kind::Vehicle, "Rover")
         .attach(&node, 33)
         .unwrap();
-    tell_changes(&rover).await;
+    print_changes(&rover).await;
 }
 
 /// An operator that looks for vehicles. Runs until killed.
 pub(crate) async fn operator() {
     let node = Node::start(config(102)).unwrap();
-    let desk = Component::builder(Kind::OperatorControlUnit, "Desk")
+    let operator = Component::builder(Kind::OperatorControlUnit, "Operator")
         .attach(&node, 1)
         .unwrap();
-    tell_changes(&desk).await;
+    print_changes(&operator).await;
 }
 
 /// Prints each subsystem that is found, once its services are known, and each that is lost.
-async fn tell_changes(component: &Component) {
+async fn print_changes(component: &Component) {
     let mut changes = component.watch();
     println!("\nstarted");
     while let Some(change) = changes.next().await {
@@ -187,24 +187,24 @@ async fn tell_changes(component: &Component) {
 }
 
 /// Octets per datagram of the batch: more than fit a frame.
-const CAR: usize = 3000;
+const LENGTH: usize = 3000;
 /// Number of datagrams in the batch.
-pub(crate) const CARS: usize = 20;
+pub(crate) const DATAGRAMS: usize = 20;
 
 /// Sends a batch of datagrams that do not fit a frame, from which the link learns its segment
 /// limit, and then a batch of datagrams that fit.
-pub(crate) async fn train() {
+pub(crate) async fn send_batches() {
     let mut link = UdpLink::open(&cable(), &udp::Settings::default()).unwrap();
     let mut transmit = Transmit {
         link: LinkId(0),
         to: To::Peer(SocketAddr::from(([10, 213, 77, 1], 3794)).into()),
         priority: Priority::Standard,
-        payload: vec![7; CARS * CAR].into(),
-        segment: Some(CAR),
+        payload: vec![7; DATAGRAMS * LENGTH].into(),
+        segment: Some(LENGTH),
     };
     println!("\nstarted");
     link.transmit(&transmit);
-    transmit.segment = Some(CAR / 3);
+    transmit.segment = Some(LENGTH / 3);
     link.transmit(&transmit);
     poll_fn(|cx| link.poll_flush(cx)).await;
     println!(
@@ -216,11 +216,11 @@ pub(crate) async fn train() {
 }
 
 /// Counts the datagrams of both batches.
-pub(crate) async fn station() {
+pub(crate) async fn receive_batches() {
     let mut link = UdpLink::open(&cable(), &udp::Settings::default()).unwrap();
     println!("\nlistening on {}", link.local());
     let mut slab = Slab::default();
-    for (count, length) in [(CARS, CAR), (3 * CARS, CAR / 3)] {
+    for (count, length) in [(DATAGRAMS, LENGTH), (3 * DATAGRAMS, LENGTH / 3)] {
         for _ in 0..count {
             let (_, datagram) = poll_fn(|cx| link.poll_recv(cx, &mut slab)).await;
             assert_eq!(datagram.len(), length);

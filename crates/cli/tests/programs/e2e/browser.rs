@@ -257,25 +257,12 @@ impl Browser {
         value.as_str().unwrap_or_default().to_owned()
     }
 
-    /// Roles and names of the controls as a screen reader hears them.
-    pub(crate) fn controls(&mut self) -> Vec<(String, String)> {
+    /// The nodes of the accessibility tree: what a screen reader knows of the page.
+    pub(crate) fn accessibility(&mut self) -> Vec<Accessible> {
         let tree = self.call("Accessibility.getFullAXTree", &json!({}));
         let nodes = tree["nodes"].as_array().unwrap();
-        let text = |value: &Value| {
-            value["value"]
-                .as_str()
-                .unwrap_or_default()
-                .trim()
-                .to_owned()
-        };
-        let controls = nodes.iter().filter(|node| {
-            let properties = node["properties"].as_array().into_iter().flatten();
-            let mut focusable = properties.filter(|it| it["name"] == "focusable");
-            node["ignored"] == false && focusable.any(|it| it["value"]["value"] == true)
-        });
-        controls
-            .map(|node| (text(&node["role"]), text(&node["name"])))
-            .collect()
+        let shown = nodes.iter().filter(|node| node["ignored"] == false);
+        shown.map(|node| Accessible::of(node, nodes)).collect()
     }
 
     /// Waits until an expression is true.
@@ -395,6 +382,26 @@ impl Browser {
         }
     }
 
+    /// Moves the focus to the next control.
+    pub(crate) fn tab(&mut self) {
+        for kind in ["rawKeyDown", "keyUp"] {
+            let event =
+                json!({ "type": kind, "code": "Tab", "key": "Tab", "windowsVirtualKeyCode": 9 });
+            self.call("Input.dispatchKeyEvent", &event);
+        }
+    }
+
+    /// Types text into the focused field, key by key.
+    pub(crate) fn type_keys(&mut self, text: &str) {
+        for letter in text.chars() {
+            let key = letter.to_string();
+            let down = json!({ "type": "keyDown", "key": key, "text": key });
+            self.call("Input.dispatchKeyEvent", &down);
+            let up = json!({ "type": "keyUp", "key": key });
+            self.call("Input.dispatchKeyEvent", &up);
+        }
+    }
+
     /// Presses Enter on the focused element, as a browser's own keyboard would.
     pub(crate) fn enter(&mut self) {
         let text = json!({ "type": "keyDown", "code": "Enter", "key": "Enter", "text": "\r",
@@ -417,6 +424,16 @@ impl Browser {
         );
     }
 
+    /// Shows text as on a terminal.
+    pub(crate) fn show_terminal(&mut self, text: &str) {
+        self.value(&format!(
+            "document.body.style.cssText = 'margin: 0; padding: 16px; background: #1e2127; color: #e6e6e6'; \
+             document.body.append(Object.assign(document.createElement('pre'), {{ textContent: {} }})); \
+             document.querySelector('pre').style.cssText = 'margin: 0; font: 15px/20px \"DejaVu Sans Mono\", monospace'",
+            json!(text)
+        ));
+    }
+
     /// Saves a screenshot in `target/e2e-screenshots`.
     pub(crate) fn screenshot(&mut self, name: &str) {
         // While the page resizes, no screenshot is possible.
@@ -431,6 +448,59 @@ impl Browser {
         let octets = from_base64(shot["data"].as_str().unwrap());
         std::fs::write(directory.join(name).with_extension("png"), octets).unwrap();
     }
+}
+
+/// A node of the accessibility tree.
+#[derive(Debug)]
+pub(crate) struct Accessible {
+    pub(crate) role: String,
+    pub(crate) name: String,
+    pub(crate) is_focusable: bool,
+    /// `polite` or `assertive` for a live region; empty otherwise.
+    pub(crate) live: String,
+    /// All text in it.
+    pub(crate) text: String,
+}
+
+impl Accessible {
+    fn of(node: &Value, nodes: &[Value]) -> Self {
+        let text = |value: &Value| {
+            value["value"]
+                .as_str()
+                .unwrap_or_default()
+                .trim()
+                .to_owned()
+        };
+        let properties = node["properties"].as_array().into_iter().flatten();
+        let property = |name: &str| {
+            let mut named = properties.clone().filter(|it| it["name"] == name);
+            named
+                .next()
+                .map(|it| it["value"].clone())
+                .unwrap_or_default()
+        };
+        let live = text(&property("live"));
+        Self {
+            role: text(&node["role"]),
+            name: text(&node["name"]),
+            is_focusable: property("focusable")["value"] == true,
+            live: if live == "off" { String::new() } else { live },
+            text: text_within(node, nodes),
+        }
+    }
+}
+
+fn text_within(node: &Value, nodes: &[Value]) -> String {
+    if node["role"]["value"] == "StaticText" {
+        return node["name"]["value"]
+            .as_str()
+            .unwrap_or_default()
+            .to_owned();
+    }
+    let ids = node["childIds"].as_array().into_iter().flatten();
+    let children = ids.filter_map(|id| nodes.iter().find(|it| it["nodeId"] == *id));
+    let texts: Vec<_> = children.map(|it| text_within(it, nodes)).collect();
+    texts.join(" ")
 }
 
 impl Drop for Browser {

@@ -5,7 +5,9 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
 use super::browser::{Browser, SCREENS};
-use super::steps::{emergency, look_from_all_screens, take_control};
+use super::steps::{
+    emergency, every_control_has_a_name, is_announced, look_from_all_screens, take_control,
+};
 use super::system::program;
 
 /// The number of this test's multicast group.
@@ -18,8 +20,7 @@ impl Running {
     /// Starts a program on a test's own multicast group, 239.255.77.`test`, and waits for a line that
     /// contains `beginning`. Returns the trimmed rest of that line.
     pub(crate) fn start(test: u8, name: &str, flags: &[&str], beginning: &str) -> (Self, String) {
-        let port = 20_000 + std::process::id() % 40_000;
-        let group = format!("239.255.77.{test}:{port}");
+        let group = Self::group(test);
         let mut command = Command::new(program(name));
         command.args(flags).args(["--loopback", "--group", &group]);
         let mut child = command
@@ -53,6 +54,12 @@ impl Running {
 }
 
 impl Running {
+    /// The multicast group of a test.
+    pub(crate) fn group(test: u8) -> String {
+        let port = 20_000 + std::process::id() % 40_000;
+        format!("239.255.77.{test}:{port}")
+    }
+
     /// Suspends the program (SIGSTOP) or resumes it (SIGCONT).
     fn suspend(&self, on: bool) {
         let signal = if on { "-STOP" } else { "-CONT" };
@@ -85,7 +92,8 @@ pub(crate) fn run() {
     page.wait("document.body.dataset.link === 'live'");
     page.wait("document.querySelector('#vehicle-name').textContent.includes('G-Bat')");
     one_button_leads_from_arrival_to_driving(&mut page);
-    every_control_has_a_name(&mut page);
+    every_view_is_accessible(&mut page);
+    shows_the_state_in_the_tree(&mut page, "ready");
     page.key_down("ArrowUp", "ArrowUp");
     page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
     page.screenshot("by-hand-keys");
@@ -110,6 +118,7 @@ pub(crate) fn run() {
     drop(station);
     page.wait("document.body.dataset.link === 'lost'");
     page.screenshot("by-hand-lost");
+    is_announced(&mut page, "No connection");
     let (_station, _) = Running::start(
         TEST,
         "jaus-ocu",
@@ -139,19 +148,22 @@ fn one_button_leads_from_arrival_to_driving(page: &mut Browser) {
     look_from_all_screens(page, "by-hand-ready");
 }
 
-/// On every view, a screen reader has a name for each control that can have the focus.
-fn every_control_has_a_name(page: &mut Browser) {
+/// On every view each control has a name, and changes of the state are announced.
+fn every_view_is_accessible(page: &mut Browser) {
     for view in ["vehicles", "system", "messages", "mission", "drive"] {
         page.press(&format!("[data-show={view}]"));
-        let controls = page.controls();
-        assert!(controls.len() > 10, "{controls:?}");
-        for (role, name) in &controls {
-            assert!(
-                !name.is_empty(),
-                "{view}: a {role} without a name: {controls:?}"
-            );
+        every_control_has_a_name(&page.accessibility());
+        for text in ["Ready", "Live", "control: you"] {
+            is_announced(page, text);
         }
     }
+}
+
+/// The tree of components shows the state of the vehicle's only one.
+fn shows_the_state_in_the_tree(page: &mut Browser, state: &str) {
+    page.wait(&format!(
+        "document.querySelector('#tree [data-key=\"c101.1.1\"]')?.dataset.state === '{state}'"
+    ));
 }
 
 /// While the vehicle is suspended, all values on the page are stale: the page says so and does not
@@ -182,5 +194,9 @@ fn names_what_is_gone(page: &mut Browser, vehicle: Running) {
         "/^Primitive Driver [0-9.]+ is gone$/.test(document.querySelector('#missing').textContent)",
     );
     page.wait("document.querySelector('#drive-line').textContent.includes('is gone')");
+    shows_the_state_in_the_tree(page, "gone");
+    is_announced(page, "is gone");
+    page.press("[data-show=system]");
+    page.screenshot("by-hand-tree-gone");
     look_from_all_screens(page, "by-hand-gone");
 }

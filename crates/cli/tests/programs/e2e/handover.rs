@@ -2,7 +2,7 @@
 
 use super::browser::{Browser, SCREENS};
 use super::by_hand::Running;
-use super::steps::{look_from_all_screens, take_control};
+use super::steps::{is_accessible, is_announced, look_from_all_screens, take_control};
 
 /// The number of this test's multicast group.
 const TEST: u8 = 4;
@@ -37,10 +37,13 @@ pub(crate) fn run() {
     take_control(&mut first);
 
     ask(&mut second, &mut first);
+    is_accessible(&mut first, "43.1.1 requests control");
+    is_announced(&mut first, "43.1.1 requests control");
     look_from_all_screens(&mut first, "handover-request");
     look_from_all_screens(&mut second, "handover-asking");
     first.press("#handover-no");
     second.wait("document.querySelector('#toasts').textContent.includes('refused')");
+    is_announced(&mut second, "refused");
     second.wait("document.body.dataset.control === 'none'");
 
     ask(&mut second, &mut first);

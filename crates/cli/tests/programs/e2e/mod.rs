@@ -5,10 +5,13 @@
 //! They need Chromium and network namespaces. Without these, the tests report this prominently and
 //! pass, but fail if `JAUS_EVIDENCE=required` is set.
 
+mod base_map;
 mod browser;
 mod by_hand;
 mod fleet;
 mod handover;
+mod keyboard;
+mod pictures;
 mod steps;
 mod system;
 mod watching;
@@ -41,6 +44,9 @@ fn a_mission_through_the_page_ends_by_the_death_of_the_planner_and_by_a_key() {
 
         take_over_by_keyboard(page);
         emergency(page);
+
+        says_when_the_emergency_of_a_mission_is_cleared(page);
+        shows_no_position_without_a_driver(system, page);
     });
 }
 
@@ -80,6 +86,31 @@ fn control_is_handed_over_between_the_pages_of_two_operators() {
 #[test]
 fn a_page_without_the_token_asks_for_it_where_it_would_stop_the_vehicle() {
     on_a_station(watching::run);
+}
+
+#[test]
+fn tiles_of_a_map_file_lie_where_they_belong_behind_the_vehicle() {
+    on_a_station(base_map::pictures);
+}
+
+#[test]
+fn vector_tiles_show_water_land_and_buildings_and_a_damaged_one_is_named() {
+    on_a_station(base_map::vectors);
+}
+
+#[test]
+fn without_a_global_pose_the_page_says_why_there_is_no_geographic_map() {
+    on_a_station(base_map::local_only);
+}
+
+#[test]
+fn a_mission_is_planned_driven_and_stopped_by_keyboard_alone() {
+    on_system(keyboard::run);
+}
+
+#[test]
+fn a_picture_of_the_monitor_is_taken_for_the_documentation() {
+    on_a_station(pictures::monitor);
 }
 
 /// Runs a test that starts its own vehicles and stations.
@@ -172,6 +203,44 @@ fn take_over_by_keyboard(page: &mut Browser) {
     page.key_up("KeyW", "w");
     page.wait("document.querySelector('#drive-source').textContent === 'Idle'");
     page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
+}
+
+/// An emergency ends a mission, which the page says until it is cleared.
+fn says_when_the_emergency_of_a_mission_is_cleared(page: &mut Browser) {
+    plan(page, 0.5, 1.5);
+    approve(page);
+    page.key_down("Escape", "Escape");
+    page.key_up("Escape", "Escape");
+    let line = "document.querySelector('#mission-line').textContent";
+    page.wait(&format!("/^(Stopped|Failed): .*emergency/.test({line})"));
+    let reason = page.text("#mission-line");
+    assert!(!reason.contains("cleared"), "{reason}");
+    page.press("#estop-clear");
+    page.press("#clear-yes");
+    page.wait("document.body.dataset.emergency === 'ready'");
+    page.wait(&format!("{line}.includes('the emergency is cleared')"));
+    assert!(!page.text("#mission-line").contains(&reason));
+}
+
+/// While the primitive driver is dead, the page shows the last position as old or none, and never
+/// one that nobody has reported.
+fn shows_no_position_without_a_driver(system: &System, page: &mut Browser) {
+    let at = ["north", "east"].map(|id| page.text(&format!("#{id}")));
+    assert!(at.iter().all(|it| it != "0.00"), "{at:?}");
+    page.value(
+        "(globalThis.seen = []), setInterval(() => seen.push(['north', 'east', 'heading'] \
+         .map(id => document.getElementById(id).textContent).join(' ')), 10), 0",
+    );
+    system.kill("jaus-primitive-driver");
+    page.wait("document.querySelector('#missing').textContent.includes('Primitive Driver')");
+    page.wait("document.querySelector('#north').closest('[data-old]')");
+    page.screenshot("7-without-driver");
+    let wrong = page.value("seen.filter(it => it.includes('0.00')).slice(0, 5)");
+    assert_eq!(wrong, serde_json::json!([]), "from {at:?}");
+    system.start("jaus-primitive-driver");
+    comes_alive(page);
+    let wrong = page.value("seen.filter(it => it.includes('0.00')).slice(0, 5)");
+    assert_eq!(wrong, serde_json::json!([]), "from {at:?}");
 }
 
 /// Drives a mission to its end.

@@ -2,7 +2,7 @@
 
 use super::browser::{Browser, SCREENS};
 use super::by_hand::Running;
-use super::steps::look_from_all_screens;
+use super::steps::{is_accessible, look_from_all_screens};
 
 /// The number of this test's multicast group.
 const TEST: u8 = 5;
@@ -37,6 +37,8 @@ pub(crate) fn run() {
 
     page.press("#estop");
     page.wait("!document.querySelector('#token-sheet').hidden");
+    page.wait("document.activeElement.id === 'token'");
+    is_accessible(&mut page, "Watching only");
     page.press("#token-no");
     page.key_down("Escape", "Escape");
     page.key_up("Escape", "Escape");

@@ -28,7 +28,7 @@ fn a_message_is_printed_with_the_promised_keys_in_their_order() {
             r#"{"time":"2015-06-08T16:36:58.436918Z","source":"42.1.1","destination":"105.1.255","#,
             r#""transport":"judp2","priority":"standard","broadcast":"global","ack":"none","#,
             r#""data":"single","sequence":1,"code":"2B00","message":"QueryIdentification","#,
-            r#""service":"urn:jaus:jss:core:Discovery","body":{"QueryType":2}}"#,
+            r#""service":"urn:jaus:jss:core:Discovery","body":{"QueryType":"Subsystem Identification"}}"#,
             "\n"
         )
     );

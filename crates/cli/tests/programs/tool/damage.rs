@@ -1,21 +1,10 @@
 //! Captures with random damage: everything readable is read, and nothing panics.
 
 use crate::support::{Message, RAW, ip_packet, pcap, pcapng};
+use jaus_test_kit::random::Random;
 use jaus_view::{Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network};
 
 /// A small generator with the same sequence in every run (xorshift64*).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        let number = self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33;
-        number as usize % limit
-    }
-}
-
 /// All lines decoded from a capture.
 fn lines(capture: &[u8], dictionary: &Dictionary) -> Vec<String> {
     let mut capture = match Capture::new(capture) {
@@ -72,7 +61,7 @@ fn packets() -> Vec<Vec<u8>> {
 #[test]
 fn no_damage_makes_the_reader_panic_or_write_a_broken_line() {
     let dictionary = Dictionary::new();
-    let mut random = Random(0x9E37_79B9_7F4A_7C15);
+    let mut random = Random::new(1);
     for whole in [pcap(RAW, &packets()), pcapng(RAW, &packets())] {
         assert!(lines(&whole, &dictionary).len() >= packets().len());
         for _ in 0..4000 {

@@ -73,7 +73,7 @@ fn a_line_of_hex_becomes_a_line_of_json_without_transport_keys() {
         run.stdout.lines().next().unwrap(),
         concat!(
             r#"{"code":"2B00","message":"QueryIdentification","#,
-            r#""service":"urn:jaus:jss:core:Discovery","body":{"QueryType":2}}"#
+            r#""service":"urn:jaus:jss:core:Discovery","body":{"QueryType":"Subsystem Identification"}}"#
         )
     );
     assert_eq!((run.json().len(), run.status), (2, 0));
@@ -108,6 +108,35 @@ fn a_message_is_encoded_by_name_or_by_code() {
     let run = run(&["encode"], input.as_bytes());
     assert_eq!(run.stdout, "002b02\n002b02\n002b02\n0222\n");
     assert_eq!((run.status, &*run.stderr), (0, ""));
+}
+
+#[test]
+fn a_service_chooses_between_messages_with_one_name() {
+    let line = b"{\"message\":\"ReportDigitalResourceEndpoint\",\"body\":[]}\n";
+    let service = "urn:jaus:jss:iop:DigitalResourceDiscovery@1.1";
+    let chosen = run(&["encode", "--service", service], line);
+    assert_eq!(
+        (&*chosen.stdout, chosen.status),
+        ("02f700\n", 0),
+        "{chosen:?}"
+    );
+    let unclear = run(&["encode"], line);
+    assert!(unclear.stdout.contains("--service URN"), "{unclear:?}");
+    assert_eq!(unclear.status, 1);
+}
+
+#[test]
+fn enumerated_values_are_printed_by_name_and_read_by_name_and_number() {
+    let standby = run(&["decode", "--hex"], b"02400200000000\n");
+    assert_eq!(standby.only_line()["body"]["Status"], "STANDBY");
+    let unnamed = run(&["decode", "--hex"], b"02407700000000\n");
+    assert_eq!(unnamed.only_line()["body"]["Status"], 0x77);
+    for status in [json!("STANDBY"), json!(2)] {
+        let body = json!({"Status": status, "Reserved": 0});
+        let line = json!({"message": "ReportStatus", "body": body}).to_string();
+        let encoded = run(&["encode"], line.as_bytes());
+        assert_eq!(encoded.stdout, "02400200000000\n", "{line}");
+    }
 }
 
 #[test]

@@ -13,7 +13,7 @@ const DATAGRAM: &str = "02 00 11 00 09 ff ff ff ff 07 01 e8 03 00 2b 02 00 00";
 fn a_message_is_explained_octet_by_octet() {
     let run = run(&["jsidl", "explain", "00", "2B", "02"], b"");
     let expected = "\
-QueryIdentification 2B00h of urn:jaus:jss:core:Discovery 1.1
+QueryIdentification 2B00h of urn:jaus:jss:core:Discovery@1.1
 
 offset  octets                   field             raw  meaning
      0  00 2B                    (message code)  2B00h  QueryIdentification

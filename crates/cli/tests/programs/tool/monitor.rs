@@ -60,6 +60,7 @@ fn one_table_fits_a_terminal_and_says_whether_somebody_is_there() {
     node.read_until("Ctrl-C");
     let once = [&["monitor", "--once", "--interval", "2s"], &*network].concat();
     let seen = run(&once, b"");
+    // The name of the component, which has that of the subsystem.
     assert!(
         seen.stdout.contains("112.1.1      A very … 127.0.0.1:"),
         "{}",
@@ -72,6 +73,23 @@ fn one_table_fits_a_terminal_and_says_whether_somebody_is_there() {
     );
     assert!(!seen.stdout.contains('\x1b'), "{}", seen.stdout);
     assert_eq!(seen.status, 0);
+}
+
+#[test]
+fn the_only_table_has_the_components_own_name_and_with_probe_the_round_trip() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let mut vehicle = Running::command(
+        "vehicle",
+        &[&["--id", "114.1.1", "--name", "Mule"], &*network].concat(),
+    );
+    vehicle.read_until("Ctrl-C");
+    let flags = ["monitor", "--once", "--probe", "--json", "--interval", "2s"];
+    let seen = run(&[&flags, &*network].concat(), b"");
+    let peer = &seen.only_line()["peers"][0];
+    assert_eq!(peer["name"], "Navigation", "{seen:?}");
+    assert_eq!(peer["subsystem"], "Mule", "{seen:?}");
+    assert!(peer["round_trip_ms"].as_f64() > Some(0.0), "{seen:?}");
 }
 
 #[test]

@@ -50,6 +50,8 @@ fn the_demo_drives_a_mission_round_an_obstacle_or_says_why_it_can_not() {
         let round = demo(steering);
         let told = [
             "system    an obstacle appears on the path",
+            "(the range sensor sees an obstacle on the path)",
+            "planner   all stages are ready: under way",
             "planner   arrived",
         ];
         in_order(&round.stdout, &told);

@@ -108,3 +108,19 @@ fn a_refused_subscription_is_a_negative_result_with_the_reason_of_the_peer() {
     );
     assert_eq!((refused.status, &*refused.stdout), (1, ""));
 }
+
+#[test]
+fn a_report_as_text_has_units_and_names_of_values() {
+    let (_vehicle, group) = vehicle("108.1.1");
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let asked = |query: &str| {
+        let arguments = ["query", "108.1.1", query, "--text"];
+        run(&[&arguments, &*network].concat(), b"").stdout
+    };
+    let velocity = asked("QueryVelocityState");
+    let begin = "108.1.1  ReportVelocityState  ";
+    assert!(velocity.starts_with(begin), "{velocity}");
+    assert!(velocity.contains("  Velocity_X 0 m/s"), "{velocity}");
+    let status = asked("QueryStatus");
+    assert!(status.contains("  Status STANDBY"), "{status}");
+}

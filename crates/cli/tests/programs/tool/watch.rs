@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use crate::support::run;
+use crate::support::{self, RAW, ip_packet, pcap, run};
 use bytes::Bytes;
 use futures_util::{SinkExt, StreamExt};
 use jaus::address::JausId;
@@ -30,6 +30,12 @@ const LIMIT: Duration = Duration::from_secs(30);
 /// Query Heartbeat Pulse, and the report.
 const QUERY: &[u8] = &[0x02, 0x22];
 const REPORT: &[u8] = &[0x02, 0x42];
+/// A message of the example of an own service, and the definition.
+const SET_LAMP: &[u8] = &[0x00, 0xD0, 0xCC];
+const LAMP: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../../examples/own-service/services"
+);
 
 /// A vehicle's node that joins UDP and TCP, an operator on UDP, and a board on TCP.
 fn two_networks() -> (Node, Port, Port) {
@@ -414,30 +420,30 @@ async fn jaus_watch_shows_what_passes_a_communicator_process() {
     };
     timeout(LIMIT, connected).await.unwrap();
     let watching = tokio::task::spawn_blocking(move || {
-        run(
-            &[
-                "watch",
-                "--at",
-                &debug,
-                "--message",
-                "QueryHeartbeat*",
-                "--for",
-                "3s",
-            ],
-            b"",
-        )
+        let watch = |flags: &[&str]| {
+            let live = ["watch", "--at", &debug, "--for", "3s"];
+            run(&[&live, flags].concat(), b"")
+        };
+        let lamp = ["--jsidl", LAMP, "--message", "SetLamp", "--json"];
+        std::thread::scope(|scope| {
+            let own = scope.spawn(|| watch(&lamp));
+            let seen = watch(&["--message", "QueryHeartbeat*"]);
+            (seen, own.join().unwrap())
+        })
     });
     let node = Node::start(Config::loopback(42, 1).group(group)).unwrap();
     let operator = node.attach(1).unwrap();
     while !watching.is_finished() {
         let query = Bytes::from_static(QUERY);
         let to = JausId::new(101, 1, 35);
-        operator
-            .send(Outgoing::new(operator.id(), to, query))
-            .unwrap();
+        for message in [query, Bytes::from_static(SET_LAMP)] {
+            operator
+                .send(Outgoing::new(operator.id(), to, message))
+                .unwrap();
+        }
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
-    let seen = watching.await.unwrap();
+    let (seen, own) = watching.await.unwrap();
     let _ = communicator.kill();
     let _ = communicator.wait();
     assert_eq!(seen.status, 0, "{seen:?}");
@@ -446,6 +452,35 @@ async fn jaus_watch_shows_what_passes_a_communicator_process() {
         assert!(line.contains("42.1.1 → 101.1.35"), "{line}");
         assert!(line.contains("received QueryHeartbeatPulse"), "{line}");
     }
+    // The communicator does not know this service; the viewer has its definition.
+    let lines = own.json();
+    assert!(!lines.is_empty(), "{own:?}");
+    for line in lines {
+        assert_eq!(line["message"], "SetLamp", "{line}");
+        assert_eq!(line["body"]["Brightness"], 80.0, "{line}");
+    }
+}
+
+#[test]
+fn a_file_is_watched_to_its_end_and_what_was_skipped_is_said() {
+    let scratch = Scratch::new("skipped");
+    std::fs::create_dir_all(&scratch.0).unwrap();
+    let file = scratch.0.join("some.pcap");
+    let mut foreign = ip_packet(b"this is not JAUS");
+    // Other ports.
+    foreign[20..24].copy_from_slice(&[0x9C, 0x40, 0x9C, 0x41]);
+    let message = ip_packet(&support::Message::new(QUERY).datagram());
+    std::fs::write(&file, pcap(RAW, &[message, foreign])).unwrap();
+    let seen = run(&["watch", file.to_str().unwrap()], b"");
+    assert!(seen.stdout.contains("QueryHeartbeatPulse"), "{seen:?}");
+    let note = "note: 1 datagrams and TCP segments skipped";
+    assert!(seen.stderr.contains(note), "{seen:?}");
+    let limited = run(&["watch", file.to_str().unwrap(), "--for", "1s"], b"");
+    assert!(
+        limited.stderr.contains("cannot be used with"),
+        "{limited:?}"
+    );
+    assert_eq!(limited.status, 2);
 }
 
 #[test]

@@ -41,7 +41,7 @@ pub(in crate::gateway) struct Course {
     /// The speed that follows after the last place.
     speed: Option<Bytes>,
     /// The last speed sent to the driver.
-    told_speed: Option<Bytes>,
+    reported_speed: Option<Bytes>,
     /// Whether it reports its speed, as far as known.
     pub(in crate::gateway) tells_speed: bool,
     said: Effects,
@@ -107,7 +107,7 @@ impl Course {
             under_way: false,
             handover: Handover::default(),
             speed: None,
-            told_speed: None,
+            reported_speed: None,
             tells_speed: true,
             said: Effects::default(),
         }
@@ -184,12 +184,12 @@ impl Course {
     /// The data of a report of the last speed sent to the driver, if the driver does not report its
     /// speed itself.
     pub(in crate::gateway) fn given_speed(&self) -> Option<Bytes> {
-        self.told_speed.clone().filter(|_| !self.tells_speed)
+        self.reported_speed.clone().filter(|_| !self.tells_speed)
     }
 
     /// Notes a speed that a client has set without a list.
     pub(in crate::gateway) fn note_speed(&mut self, data: Bytes) {
-        self.told_speed = Some(data);
+        self.reported_speed = Some(data);
     }
 
     /// Handles a report of the driver. Returns whether it was expected.
@@ -391,7 +391,7 @@ impl Course {
     }
 
     fn tell_speed(&mut self, speed: Bytes) {
-        self.told_speed = Some(speed.clone());
+        self.reported_speed = Some(speed.clone());
         self.said.to_ra.push((SetTravelSpeed::CODE, speed));
     }
 

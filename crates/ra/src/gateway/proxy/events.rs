@@ -149,8 +149,8 @@ impl RaClient {
             SubscriptionNews::Report { report, .. } => match event.words.to_ra(report) {
                 Ok((_, data)) => {
                     tally.add(Counter::ReportsToRa);
-                    let told = event.tell(data);
-                    self.said.extend(told);
+                    let answer = event.tell(data);
+                    self.said.extend(answer);
                 }
                 Err(refusal) => {
                     let code = code_of(report).unwrap_or_default();

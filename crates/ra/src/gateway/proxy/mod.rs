@@ -377,7 +377,7 @@ impl Proxy {
             None if request.provider == self.own && request.code == STATUS => {
                 self.connections.accept(now, id);
                 self.readiness.connect(now, id);
-                self.tell_readiness(now);
+                self.report_readiness(now);
             }
             None => self
                 .connections
@@ -504,7 +504,7 @@ impl Proxy {
         }
         self.stop_list_where_due(now, tally);
         self.to_ra.extend(said.to_ra);
-        self.tell_readiness(now);
+        self.report_readiness(now);
         for (client, payload) in said.to_clients {
             self.stack.send_octets(client, payload);
         }

@@ -62,7 +62,10 @@ pub(super) const fn moves(code: u16) -> bool {
 
 impl Proxy {
     /// Sends a command of the client in control to the RA component.
-    pub(super) fn give(&mut self, now: Instant, (code, data): (u16, Bytes)) {
+    pub(super) fn give(&mut self, now: Instant, (code, mut data): (u16, Bytes)) {
+        if code == SET_EFFORT {
+            data = stop::with_every_field(&data).unwrap_or(data);
+        }
         if moves(code)
             && let Some(client) = self.lease.controller()
         {

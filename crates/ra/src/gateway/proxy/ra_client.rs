@@ -43,7 +43,8 @@ pub(in crate::gateway) struct RaClient {
     pub(super) patience: Patience,
     ids: Ids,
     asked: BTreeMap<Inquiry, (Message, Target)>,
-    told: BTreeMap<SubscriptionId, ServiceConnection>,
+    /// Service connections of the RA component, by the subscription that serves each.
+    connections: BTreeMap<SubscriptionId, ServiceConnection>,
     pub(super) held_controls: BTreeMap<ControlId, HeldControl>,
     /// Its places, by the RA id of the driver.
     pub(super) entries: BTreeMap<RaId, (Target, Entries)>,
@@ -92,7 +93,7 @@ impl RaClient {
     /// Maximum number of pending queries.
     const MOST_ASKED: usize = 64;
     /// Maximum number of service connections.
-    const MOST_TOLD: usize = 64;
+    const MOST_CONNECTIONS: usize = 64;
     /// Maximum number of components under control.
     const MOST_GRIPS: usize = 32;
     /// After this time, control from before a restart has timed out everywhere.
@@ -109,7 +110,7 @@ impl RaClient {
             },
             ids,
             asked: BTreeMap::new(),
-            told: BTreeMap::new(),
+            connections: BTreeMap::new(),
             held_controls: BTreeMap::new(),
             entries: BTreeMap::new(),
             active: BTreeMap::new(),
@@ -129,8 +130,8 @@ impl RaClient {
 
     /// Whether requests, connections, events or control are active.
     pub(in crate::gateway) fn is_busy(&self) -> bool {
-        let is_told = !(self.told.is_empty() && self.events.is_empty());
-        is_told || !(self.asked.is_empty() && self.held_controls.is_empty())
+        let is_served = !(self.connections.is_empty() && self.events.is_empty());
+        is_served || !(self.asked.is_empty() && self.held_controls.is_empty())
     }
 
     /// Takes the queued messages to the RA component.
@@ -211,12 +212,12 @@ impl RaClient {
         match answer {
             Ok(report) => {
                 let place = places(&request, peer).filter(|it| it.query == request.code);
-                let told = match place {
+                let converted = match place {
                     Some(places) => place_report(places, &report),
                     None => self.words(request.destination, peer.minor).to_ra(&report),
                 };
-                let told = tell(now, &request, (&report, told), tally);
-                self.said.extend(told);
+                let answer = to_answer(now, &request, (&report, converted), tally);
+                self.said.extend(answer);
             }
             Err(none) => tally.refuse(now, Counter::Unanswered, request.code, none.peer),
         }
@@ -232,9 +233,9 @@ impl RaClient {
         tally: &mut Tally,
     ) {
         let request = Message::new(to, from, 0, Bytes::new());
-        let told = self.words(from, minor).to_ra(report);
-        let told = tell(now, &request, (report, told), tally);
-        self.said.extend(told);
+        let converted = self.words(from, minor).to_ra(report);
+        let answer = to_answer(now, &request, (report, converted), tally);
+        self.said.extend(answer);
     }
 
     /// Opens a service connection of the RA component.
@@ -249,7 +250,7 @@ impl RaClient {
         // The connection may exist at another rate.
         self.disconnect(now, id, stack);
         let report = request.code;
-        if self.told.len() >= Self::MOST_TOLD {
+        if self.connections.len() >= Self::MOST_CONNECTIONS {
             tally.refuse(now, Counter::TooManyConnections, report, request.client);
             return connections.refuse(id, ResponseCode::CONNECTION_REFUSED);
         }
@@ -260,12 +261,12 @@ impl RaClient {
         };
         match stack.subscribe(now, &topic, self.patience) {
             Ok(subscription) => {
-                let told = ServiceConnection {
+                let served = ServiceConnection {
                     connection: id,
                     words,
                     confirmed: false,
                 };
-                self.told.insert(subscription, told);
+                self.connections.insert(subscription, served);
             }
             Err(why) => {
                 tally.refuse(now, Counter::NotConverted, report, why);
@@ -276,9 +277,9 @@ impl RaClient {
 
     /// Closes a service connection of the RA component.
     pub(super) fn disconnect(&mut self, now: Instant, id: ConnectionId, stack: &mut Stack) {
-        let ended = self.told.iter().find(|(_, it)| it.connection == id);
+        let ended = self.connections.iter().find(|(_, it)| it.connection == id);
         if let Some((&subscription, _)) = ended {
-            self.told.remove(&subscription);
+            self.connections.remove(&subscription);
             stack.unsubscribe(now, subscription);
         }
     }
@@ -294,17 +295,17 @@ impl RaClient {
         if self.handle_event_news(now, id, &news, tally) {
             return;
         }
-        let Some(told) = self.told.get_mut(&id) else {
+        let Some(served) = self.connections.get_mut(&id) else {
             return;
         };
-        let connection = told.connection;
+        let connection = served.connection;
         match news {
             SubscriptionNews::Up { .. } => {
-                if !std::mem::replace(&mut told.confirmed, true) {
+                if !std::mem::replace(&mut served.confirmed, true) {
                     connections.accept(now, connection);
                 }
             }
-            SubscriptionNews::Report { report, .. } => match told.words.to_ra(&report) {
+            SubscriptionNews::Report { report, .. } => match served.words.to_ra(&report) {
                 Ok((_, data)) => {
                     tally.add(Counter::ReportsToRa);
                     connections.set_report(now, connection, data);
@@ -316,8 +317,8 @@ impl RaClient {
             },
             SubscriptionNews::Down { .. } => connections.clear_report(connection),
             SubscriptionNews::Ended(why) => {
-                let confirmed = told.confirmed;
-                self.told.remove(&id);
+                let confirmed = served.confirmed;
+                self.connections.remove(&id);
                 tally.refuse(now, Counter::Unanswered, CreateServiceConnection::CODE, why);
                 match confirmed {
                     true => connections.end(connection),
@@ -446,13 +447,13 @@ impl RaClient {
 }
 
 /// Converts a JAUS report to the answer to an RA message.
-fn tell(
+fn to_answer(
     now: Instant,
     request: &Message,
-    (report, told): (&Bytes, Result<(u16, Bytes), Refusal>),
+    (report, converted): (&Bytes, Result<(u16, Bytes), Refusal>),
     tally: &mut Tally,
 ) -> Option<Message> {
-    match told {
+    match converted {
         Ok((code, data)) => {
             tally.add(Counter::ReportsToRa);
             Some(request.answer(code, data))

@@ -23,8 +23,8 @@ use crate::messages::ra33::ReportComponentControl;
 pub(super) struct Readiness {
     connection: Option<ConnectionId>,
     /// Last reported readiness.
-    told: Option<bool>,
-    /// Whether JAUS clients were told that the component is not available.
+    reported: Option<bool>,
+    /// Whether JAUS clients were notified that the component is not available.
     was_reclaiming: bool,
     /// When to release the component again, if the connection remains without a client in control.
     release: Option<Instant>,
@@ -42,7 +42,7 @@ impl Readiness {
     /// Handles a connection of the RA component.
     pub(super) fn connect(&mut self, now: Instant, connection: ConnectionId) {
         self.connection = Some(connection);
-        self.told = None;
+        self.reported = None;
         self.release = Some(now + Self::GHOST);
     }
 
@@ -68,7 +68,7 @@ impl Proxy {
     }
 
     /// Reports readiness to the RA component, and availability of the component to JAUS clients.
-    pub(super) fn tell_readiness(&mut self, now: Instant) {
+    pub(super) fn report_readiness(&mut self, now: Instant) {
         let reclaiming = self.lease.is_reclaiming();
         if std::mem::replace(&mut self.readiness.was_reclaiming, reclaiming) && !reclaiming {
             self.mirror.outdate(STATUS);
@@ -78,7 +78,7 @@ impl Proxy {
         let Some(connection) = self.readiness.connection else {
             return;
         };
-        if self.readiness.told.replace(is_ready) != Some(is_ready) {
+        if self.readiness.reported.replace(is_ready) != Some(is_ready) {
             self.connections
                 .set_report(now, connection, status(is_ready));
             self.readiness.release = (!is_ready).then(|| now + Readiness::GHOST);

@@ -1,5 +1,6 @@
 //! Stop commands of RA drivers. Drivers based on OpenJAUS's library keep the last command in every
-//! state, so the stop is a command of the kind that moved them.
+//! state, so the stop is a command of the kind that moved them. They also keep the fields that a
+//! command leaves out, so every effort names all of them: the next one releases the brakes again.
 
 use bytes::Bytes;
 
@@ -47,8 +48,31 @@ pub(super) fn after(part: RaComponent, (code, data): (u16, &Bytes)) -> Option<(u
     }
 }
 
+/// A client's effort with 0 in each field that it leaves out, as JAUS drivers take it.
+pub(super) fn with_every_field(data: &Bytes) -> Option<Bytes> {
+    let given = decoded::<SetWrenchEffort>(SetWrenchEffort::CODE, data)?;
+    let zero = zero_effort().ok()?;
+    macro_rules! or_zero {
+        ($($field:ident)*) => { SetWrenchEffort { $($field: given.$field.or(zero.$field)),* } };
+    }
+    let effort = or_zero! {
+        propulsive_linear_effort_x propulsive_linear_effort_y propulsive_linear_effort_z
+        propulsive_rotational_effort_x propulsive_rotational_effort_y propulsive_rotational_effort_z
+        resistive_linear_effort_x resistive_linear_effort_y resistive_linear_effort_z
+        resistive_rotational_effort_x resistive_rotational_effort_y resistive_rotational_effort_z
+    };
+    encoded(&effort).map(|(_, data)| data)
+}
+
 /// No propulsion, and full brakes.
 fn no_effort() -> Result<SetWrenchEffort, OutOfRange> {
+    let mut effort = zero_effort()?;
+    effort.set_resistive_linear_effort_x_percent(100.0)?;
+    Ok(effort)
+}
+
+/// Neither propulsion nor brakes.
+fn zero_effort() -> Result<SetWrenchEffort, OutOfRange> {
     let mut effort = SetWrenchEffort::default();
     effort.set_propulsive_linear_effort_x_percent(0.0)?;
     effort.set_propulsive_linear_effort_y_percent(0.0)?;
@@ -56,7 +80,12 @@ fn no_effort() -> Result<SetWrenchEffort, OutOfRange> {
     effort.set_propulsive_rotational_effort_x_percent(0.0)?;
     effort.set_propulsive_rotational_effort_y_percent(0.0)?;
     effort.set_propulsive_rotational_effort_z_percent(0.0)?;
-    effort.set_resistive_linear_effort_x_percent(100.0)?;
+    effort.set_resistive_linear_effort_x_percent(0.0)?;
+    effort.set_resistive_linear_effort_y_percent(0.0)?;
+    effort.set_resistive_linear_effort_z_percent(0.0)?;
+    effort.set_resistive_rotational_effort_x_percent(0.0)?;
+    effort.set_resistive_rotational_effort_y_percent(0.0)?;
+    effort.set_resistive_rotational_effort_z_percent(0.0)?;
     Ok(effort)
 }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 
-fn ids(subsystem: &Subsystem) -> Vec<(u8, u8)> {
+fn ids(subsystem: &RaSubsystemEntry) -> Vec<(u8, u8)> {
     let ids = subsystem
         .components()
         .map(|(id, _)| (id.component, id.instance));

@@ -28,13 +28,13 @@ fn address(host: u8) -> SocketAddr {
     SocketAddr::from(([10, 77, 0, host], 3794))
 }
 
-fn component(component: u8, name: &str) -> Component {
+fn component(component: u8, name: &str) -> RaComponentEntry {
     let command = |code, presence| Command { code, presence };
-    Component {
+    RaComponentEntry {
         component,
         instance: 1,
         name: name.into(),
-        services: vec![Service {
+        services: vec![RaServiceEntry {
             kind: component.into(),
             inputs: vec![command(0x2402, 0)],
             outputs: vec![command(0x4402, 0x7F), command(0x4404, 0)],
@@ -42,11 +42,11 @@ fn component(component: u8, name: &str) -> Component {
     }
 }
 
-fn vehicle(id: u8) -> Subsystem {
-    Subsystem {
+fn vehicle(id: u8) -> RaSubsystemEntry {
+    RaSubsystemEntry {
         id,
         name: format!("Vehicle {id}"),
-        nodes: vec![Node {
+        nodes: vec![RaNodeEntry {
             id: 1,
             name: "Main".into(),
             components: vec![component(33, "Driver"), component(38, "Pose")],

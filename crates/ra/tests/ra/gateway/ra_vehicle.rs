@@ -3,8 +3,10 @@
 use std::time::Duration;
 
 use jaus::address::JausId;
+use jaus::codec::Message;
 use jaus::messages::core::{
-    QueryStatus, ReportStatus, Resume, SetEmergency, Standby, set_emergency,
+    ClearEmergency, QueryStatus, ReportStatus, Resume, SetEmergency, Standby, clear_emergency,
+    set_emergency,
 };
 use jaus::messages::mobility::{
     QueryGlobalPose, QueryVelocityState, ReportGlobalPose, ReportVelocityState, SetWrenchEffort,
@@ -15,6 +17,7 @@ use jaus::service::{
     Topic, When,
 };
 use jaus_ra::gateway::{Counter, Settings};
+use jaus_ra::messages::ra33;
 
 use crate::gateway::world::{COMMANDER, OPERATOR, World, stack, subsystem};
 use jaus_test_kit::rover::{Rover, SUBSYSTEM, bytes};
@@ -115,7 +118,7 @@ fn a_subscription_runs_at_its_rate_over_one_service_connection() {
     let (mut world, ra, operator) = world();
     let topic = |hz, presence_vector| Topic {
         peer: JAUS_POSE,
-        query: jaus::codec::Message::encode(&QueryGlobalPose { presence_vector }).unwrap(),
+        query: Message::encode(&QueryGlobalPose { presence_vector }).unwrap(),
         report: 0x4402,
         when: When::hz(hz),
     };
@@ -205,6 +208,38 @@ fn it_is_driven_by_who_controls_it_and_by_nobody_else() {
     }
     assert_eq!(efforts(&world), 5);
     assert_eq!(world.count(Counter::NotInControl), 6);
+}
+
+/// OpenJAUS's library keeps the fields that a command leaves out.
+#[test]
+fn an_effort_without_brakes_releases_those_of_the_stop_command() {
+    let (mut world, ra, operator) = world();
+    take_control(&mut world, operator, 127);
+    let emergency_code = set_emergency::EmergencyCode(1);
+    world.tell(operator, JAUS_DRIVER, &SetEmergency { emergency_code });
+    world.tell(
+        operator,
+        JAUS_DRIVER,
+        &ClearEmergency {
+            emergency_code: clear_emergency::EmergencyCode(1),
+        },
+    );
+    world.tell(operator, JAUS_DRIVER, &Resume {});
+    world.run(seconds(0.3));
+    let last = |world: &World| {
+        let rover = world.ra[ra].rover.as_ref().unwrap();
+        let data = rover.efforts.last().unwrap();
+        let payload = [&[0x05, 0x04][..], data].concat();
+        <ra33::SetWrenchEffort as Message>::decode(&payload.into()).unwrap()
+    };
+    let brakes = last(&world).resistive_linear_effort_x_percent();
+    assert_eq!(brakes, Some(100.0), "the stop command");
+    world.tell(operator, JAUS_DRIVER, &effort());
+    world.run(seconds(0.1));
+    let given = last(&world);
+    assert!((given.propulsive_linear_effort_x_percent().unwrap() - 40.0).abs() < 0.01);
+    assert_eq!(given.resistive_linear_effort_x_percent(), Some(0.0));
+    assert_eq!(given.propulsive_rotational_effort_z_percent(), Some(0.0));
 }
 
 #[test]
@@ -318,7 +353,7 @@ fn in_an_emergency_it_is_stopped_by_what_it_obeys_and_not_driven_until_that_is_o
     // Like OpenJAUS's, it obeys efforts in every state.
     let rover = world.ra[ra].rover.as_mut().unwrap();
     let stop = rover.efforts.last().unwrap();
-    assert_eq!(stop[..], bytes("7f00000000000000000000000000ff"));
+    assert_eq!(stop[..], bytes("ff0f000000000000000000000000ff0000000000"));
     assert_eq!(drive(&mut world), 2, "nobody drives it");
     assert_eq!(world.count(Counter::InEmergency), 1);
     // Another client has cleared the emergency; the next command detects it.

@@ -15,7 +15,7 @@ use jaus::service::{
 };
 use jaus_ra::carrier::To;
 use jaus_ra::gateway::{Action, Counter, Gateway, Settings};
-use jaus_ra::node::{self, RaNode, Subsystem};
+use jaus_ra::node::{self, RaNode, RaSubsystemEntry};
 use jaus_ra::{Message, RaId};
 
 use jaus_test_kit::rover::Rover;
@@ -146,7 +146,7 @@ impl World {
     }
 
     /// Adds an RA system. Returns its index.
-    pub(crate) fn add_ra(&mut self, subsystem: Subsystem, rover: Option<Rover>) -> usize {
+    pub(crate) fn add_ra(&mut self, subsystem: RaSubsystemEntry, rover: Option<Rover>) -> usize {
         let mut node = RaNode::new(node::Settings::default());
         node.announce(self.now, subsystem).unwrap();
         self.ra.push(RaPeer {
@@ -378,17 +378,17 @@ impl World {
 }
 
 /// An RA subsystem of one node with these components.
-pub(crate) fn subsystem(id: u8, name: &str, components: &[(u8, u8, &str)]) -> Subsystem {
-    let component = |&(component, instance, name): &(u8, u8, &str)| node::Component {
+pub(crate) fn subsystem(id: u8, name: &str, components: &[(u8, u8, &str)]) -> RaSubsystemEntry {
+    let component = |&(component, instance, name): &(u8, u8, &str)| node::RaComponentEntry {
         component,
         instance,
         name: name.to_owned(),
         services: Vec::new(),
     };
-    Subsystem {
+    RaSubsystemEntry {
         id,
         name: name.to_owned(),
-        nodes: vec![node::Node {
+        nodes: vec![node::RaNodeEntry {
             id: 1,
             name: format!("{name} node"),
             components: components.iter().map(component).collect(),

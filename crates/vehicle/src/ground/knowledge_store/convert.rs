@@ -138,7 +138,7 @@ fn places(points: &[PointRec]) -> Vec<Place> {
 }
 
 /// Converts an object to its report form.
-pub(super) fn told(id: ObjectId, object: &Object) -> ObjectSeq {
+pub(super) fn reported(id: ObjectId, object: &Object) -> ObjectSeq {
     let object_type = match object.geometry {
         Geometry::Point => ObjectType::POINT,
         Geometry::Line => ObjectType::LINE,

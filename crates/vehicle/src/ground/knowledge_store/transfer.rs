@@ -106,9 +106,9 @@ impl Transfer {
             && octets < Transfers::PART
             && part.len() < usize::from(u16::MAX)
         {
-            let told = convert::told(*id, object);
-            octets += told.encoded_len();
-            part.push(told);
+            let reported = convert::reported(*id, object);
+            octets += reported.encoded_len();
+            part.push(reported);
             self.objects.pop_front();
         }
         let request_id = self.request_id;

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use crate::mission::ground::Ground;
-use crate::mission::{NoPath, Path, Point, Terrain, Vehicle, plan, search, sight};
+use crate::mission::{Footprint, NoPath, Path, Point, Terrain, plan, search, sight};
 
 /// A map of 1 m cells from text whose first line is the south: `#` is closed, `.` open. The lower a
 /// digit, the worse the ground.
@@ -19,14 +19,14 @@ fn map(picture: &[&str]) -> Terrain {
 }
 
 /// A vehicle that fits within its cell.
-const THIN: Vehicle = Vehicle {
+const THIN: Footprint = Footprint {
     width: 0.0,
     margin: 0.0,
     turning_radius: 0.0,
 };
 
-fn wide(width: f64) -> Vehicle {
-    Vehicle { width, ..THIN }
+fn wide(width: f64) -> Footprint {
+    Footprint { width, ..THIN }
 }
 
 /// Distance of the path from the nearest centre of a closed cell.
@@ -56,7 +56,7 @@ fn closest(path: &Path, terrain: &Terrain) -> f64 {
 #[test]
 fn over_open_ground_the_path_is_one_straight_segment() {
     let terrain = map(&["................"; 16]);
-    let path = plan(&terrain, &Vehicle::default(), (0.5, 0.5), (14.2, 9.7)).unwrap();
+    let path = plan(&terrain, &Footprint::default(), (0.5, 0.5), (14.2, 9.7)).unwrap();
     assert_eq!(path.points(), [(0.5, 0.5), (14.2, 9.7)]);
     assert!((path.length() - 13.7_f64.hypot(9.2)).abs() < 1e-9);
 }
@@ -95,7 +95,7 @@ fn a_gap_is_taken_only_by_a_vehicle_that_fits() {
         ".........",
         ".........",
     ]);
-    let go = |vehicle: Vehicle| plan(&terrain, &vehicle, (1.5, 4.5), (5.5, 4.5));
+    let go = |vehicle: Footprint| plan(&terrain, &vehicle, (1.5, 4.5), (5.5, 4.5));
     assert_eq!(go(wide(0.9)).unwrap().points().len(), 2);
     assert!(matches!(go(wide(1.4)), Err(NoPath::Unreachable { .. })));
 }
@@ -140,8 +140,8 @@ fn each_mistake_is_told_with_what_to_do() {
         (
             inside,
             (3.5, 0.5),
-            "the destination at x 3.50 m, y 0.50 m is outside the map, which extends from x 0.00 \
-             m, y 0.00 m to x 3.00 m, y 3.00 m: choose one on the map",
+            "the destination at north 3.50 m, east 0.50 m is outside the map, which extends from \
+             north 0.00 m, east 0.00 m to north 3.00 m, east 3.00 m: choose one on the map",
         ),
         (inside, (f64::NAN, 0.5), "is outside the map"),
         (
@@ -152,7 +152,7 @@ fn each_mistake_is_told_with_what_to_do() {
         (
             (-0.1, 0.5),
             inside,
-            "the vehicle at x -0.10 m, y 0.50 m is outside the map",
+            "the vehicle at north -0.10 m, east 0.50 m is outside the map",
         ),
         (
             (1.5, 1.5),

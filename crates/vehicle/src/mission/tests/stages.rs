@@ -382,7 +382,7 @@ fn another_destination_replaces_the_mission() {
 #[test]
 fn what_is_no_destination_fails_with_what_would_do() {
     for (x, speed, says) in [
-        (f64::NAN, None, "x NaN m, y 0 m is invalid"),
+        (f64::NAN, None, "north NaN m, east 0 m is invalid"),
         (f64::INFINITY, None, "set finite numbers"),
         (
             0.0,

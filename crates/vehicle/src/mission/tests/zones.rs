@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::mission::{NoPath, Path, Point, Terrain, Vehicle, blocked_after, plan};
+use crate::mission::{Footprint, NoPath, Path, Point, Terrain, blocked_after, plan};
 use crate::zones::{Polygon, ZoneId, Zones};
 
 /// An open map of cells of `cell` metres, 20 m wide, from the origin.
@@ -30,7 +30,7 @@ fn least(path: &Path, zones: &Zones) -> f64 {
     });
     let clearance = |point| zones.clearance(point).map_or(f64::INFINITY, |it| it.metres);
     let least = points.map(clearance).fold(f64::INFINITY, f64::min);
-    least - Vehicle::default().width / 2.0
+    least - Footprint::default().width / 2.0
 }
 
 const WEDGE: [Point; 3] = [(3.3, 10.4), (16.8, 9.1), (17.2, 20.9)];
@@ -47,7 +47,7 @@ fn a_path_leads_round_keep_out_zones_and_stays_in_the_operating_zone() {
     ]);
     for cell in [1.0, 0.25] {
         let map = open(cell).within(Arc::clone(&zones));
-        let path = plan(&map, &Vehicle::default(), (2.0, 18.0), (18.5, 17.5)).unwrap();
+        let path = plan(&map, &Footprint::default(), (2.0, 18.0), (18.5, 17.5)).unwrap();
         let least = least(&path, &zones);
         assert!(least >= 0.0, "{cell}: {least:.2} m, {path:?}");
         assert!(path.length() < 45.0, "{cell}: {:.1} m", path.length());
@@ -59,7 +59,7 @@ fn where_zones_leave_no_way_the_reason_names_them() {
     let wall = [(8.0, -5.0), (9.0, -5.0), (9.0, 25.0), (8.0, 25.0)];
     let zones = zones(&[(ZoneId::KeepOut(5), &wall)]);
     let map = open(1.0).within(zones);
-    let go = |from, to| plan(&map, &Vehicle::default(), from, to).unwrap_err();
+    let go = |from, to| plan(&map, &Footprint::default(), from, to).unwrap_err();
     let error = go((2.0, 2.0), (18.0, 2.0));
     assert!(
         matches!(error, NoPath::Unreachable { .. }) && error.may_pass(),
@@ -77,7 +77,7 @@ fn a_vehicle_that_stopped_at_an_edge_can_leave_although_its_cell_is_barred() {
     let zones = zones(&[(ZoneId::KeepOut(5), &wall)]);
     for cell in [1.0, 0.25] {
         let map = open(cell).within(Arc::clone(&zones));
-        let path = plan(&map, &Vehicle::default(), (8.0, 4.0), (2.0, 4.0));
+        let path = plan(&map, &Footprint::default(), (8.0, 4.0), (2.0, 4.0));
         assert!(path.is_ok(), "{cell}: {path:?}");
     }
 }
@@ -89,7 +89,7 @@ fn zones_far_outside_the_map_bar_all_or_nothing_of_it() {
     let elsewhere = [(far, far), (far - 1.0, far), (far, far - 1.0)];
     let go = |id, vertices: &[Point]| {
         let map = open(1.0).within(zones(&[(id, vertices)]));
-        plan(&map, &Vehicle::default(), (2.0, 2.0), (18.0, 18.0)).is_ok()
+        plan(&map, &Footprint::default(), (2.0, 2.0), (18.0, 18.0)).is_ok()
     };
     assert!(go(ZoneId::Operating, &around));
     assert!(!go(ZoneId::Operating, &elsewhere));
@@ -99,7 +99,7 @@ fn zones_far_outside_the_map_bar_all_or_nothing_of_it() {
 
 #[test]
 fn a_new_zone_blocks_the_rest_of_a_path_but_not_what_lies_behind() {
-    let vehicle = Vehicle::default();
+    let vehicle = Footprint::default();
     let path = Path::new(vec![(2.0, 2.0), (2.0, 12.0), (12.0, 12.0)]);
     let blocked = |wall: &[Point], here, segment| {
         let map = open(0.25).within(zones(&[(ZoneId::KeepOut(5), wall)]));
@@ -120,7 +120,7 @@ fn a_planned_path_is_clear() {
     let zones = zones(&[(ZoneId::KeepOut(2), &WEDGE)]);
     for cell in [1.0, 0.25] {
         let map = open(cell).within(Arc::clone(&zones));
-        let vehicle = Vehicle::default();
+        let vehicle = Footprint::default();
         let path = plan(&map, &vehicle, (2.0, 18.0), (18.5, 17.5)).unwrap();
         assert_eq!(blocked_after(&map, &vehicle, (2.0, 18.0), &path, 0), None);
     }
@@ -128,7 +128,7 @@ fn a_planned_path_is_clear() {
 
 #[test]
 fn a_path_leads_round_obstacles_that_were_seen_also_from_close_before_them() {
-    let vehicle = Vehicle::default();
+    let vehicle = Footprint::default();
     let seen: Vec<Point> = (0..6)
         .map(|it| (10.1, 9.0 + 0.25 * f64::from(it)))
         .collect();

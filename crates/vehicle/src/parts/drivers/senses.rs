@@ -282,6 +282,17 @@ impl Sense<ReportVelocityState> {
         })
     }
 
+    /// The yaw rate about the vehicle's own axis, of a source that does not know the speed: an
+    /// inertial measurement unit.
+    pub(in crate::parts) fn yaw_rate(component: &Component, hz: f64) -> Result<Self, PartError> {
+        let sense = Self::velocity(component, hz)?;
+        Ok(Self {
+            is_suitable: |report| report.velocity_x.is_none() && report.yaw_rate.is_some(),
+            what: "turn rate",
+            ..sense
+        })
+    }
+
     /// Passes all reports to a remote platform.
     pub(in crate::parts) async fn steer(
         mut self,
@@ -302,7 +313,7 @@ impl Sense<ReportVelocityState> {
 
 /// Converts a stamp of version 1.0 reports to the time since the start of its month; `None` for
 /// stamp 0, which sensors without a clock send.
-pub(super) fn time_in_month(stamp: TimeStamp) -> Option<Duration> {
+pub(in crate::parts) fn time_in_month(stamp: TimeStamp) -> Option<Duration> {
     let hours = u64::from(stamp.day()) * 24 + u64::from(stamp.hour());
     let seconds = (hours * 60 + u64::from(stamp.minutes())) * 60 + u64::from(stamp.seconds());
     let time = Duration::from_millis(seconds * 1000 + u64::from(stamp.milliseconds()));

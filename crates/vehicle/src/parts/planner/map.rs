@@ -68,7 +68,7 @@ pub(in crate::parts) async fn fetch_from(
         let cells = fetch_cells(component, store, edition).await;
         if let Some(cells) = cells.map_err(in_words)? {
             tracing::info!(
-                "map \"{}\" of {store}, {} x {} cells, revision {}",
+                "map {:?} of {store}, {} x {} cells, revision {}",
                 about.name.to_string_lossy(),
                 about.rows,
                 about.columns,
@@ -92,17 +92,16 @@ pub(in crate::parts) async fn fetch_from(
 fn choose(maps: Vec<MapRec>, name: &str, store: JausId) -> Result<MapRec, String> {
     let names: Vec<_> = maps
         .iter()
-        .map(|map| format!("\"{}\"", map.name.to_string_lossy()))
+        .map(|map| format!("{:?}", map.name.to_string_lossy()))
         .take(8)
         .collect();
     let only = maps.len() == 1;
     let mut maps = maps.into_iter();
     match maps.find(|map| map.name == *name || only) {
         Some(map) => Ok(map),
-        None if names.is_empty() => Err(format!("{store} has no map: create one named \"{name}\"")),
+        None if names.is_empty() => Err(format!("{store} has no map: create one named {name:?}")),
         None => Err(format!(
-            "{store} has no map named \"{name}\", but {}: create one, or choose one of these with \
-             --map",
+            "{store} has no map named {name:?}, but {}: create one, or choose one of these with --map",
             names.join(", ")
         )),
     }
@@ -131,4 +130,24 @@ pub(super) async fn fetch_pose(component: &Component) -> Result<Point, String> {
     let pose = component.query(sensor, &query).await.map_err(in_words)?;
     let place = pose.x_m().zip(pose.y_m());
     place.ok_or_else(|| format!("{sensor} reports no pose: set the vehicle's pose"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_names_of_maps_in_an_error_are_escaped() {
+        let named = |name: &str| MapRec {
+            name: name.into(),
+            ..MapRec::default()
+        };
+        let maps = vec![named("\x1b[2Ja"), named("b\r\nfake \u{202e}")];
+        let store = JausId::new(101, 1, 61);
+        let error = choose(maps, "terrain", store).unwrap_err();
+        assert!(
+            error.contains(r#""\u{1b}[2Ja", "b\r\nfake \u{202e}""#),
+            "{error}"
+        );
+    }
 }

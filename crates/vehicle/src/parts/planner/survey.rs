@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::map::{self, Map};
-use crate::mission::{Path, Point, Terrain, Vehicle, blocked_after};
+use crate::mission::{Footprint, Path, Point, Terrain, blocked_after};
 use crate::zones::Zones;
 use jaus::component::Component;
 
@@ -24,7 +24,7 @@ pub(super) struct Survey {
 /// The path under way.
 #[derive(Debug, Clone)]
 pub(super) struct UnderWay {
-    pub(super) vehicle: Vehicle,
+    pub(super) vehicle: Footprint,
     pub(super) here: Point,
     pub(super) path: Arc<Path>,
     /// The segment that the vehicle drives, counted from 0.

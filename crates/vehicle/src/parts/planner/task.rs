@@ -28,7 +28,7 @@ use jaus::component::{
     Component, Retake, Session, SessionLoss, SessionSettings, SessionState, State,
 };
 use jaus::messages::core::QueryHeartbeatPulse;
-use jaus::node::now;
+use jaus::node::{now, sleep_until};
 
 /// Time limit for stopping the driver and releasing control.
 const HALT: Duration = Duration::from_secs(2);
@@ -64,7 +64,8 @@ pub(super) struct PlannerTask<'a> {
     /// The drivers, indexed by link.
     peers: [Option<JausId>; 3],
     controllers: [Option<JausId>; 3],
-    told: Option<(Run, Stage)>,
+    /// The last logged stage.
+    logged: Option<(Run, Stage)>,
 }
 
 impl<'a> PlannerTask<'a> {
@@ -91,7 +92,7 @@ impl<'a> PlannerTask<'a> {
             survey_at: None,
             peers: [None; 3],
             controllers: [None; 3],
-            told: None,
+            logged: None,
         }
     }
 
@@ -111,7 +112,7 @@ impl<'a> PlannerTask<'a> {
                     self.survey = None;
                     self.handle(done).await;
                 }
-                () = until(self.survey_at) => {
+                () = sleep_until(self.survey_at) => {
                     self.survey_at = None;
                     self.survey = self.survey();
                     self.check_obstacles().await;
@@ -120,7 +121,7 @@ impl<'a> PlannerTask<'a> {
                     Some(news) => self.hear(news).await,
                     None => return,
                 },
-                () = until(timeout) => {
+                () = sleep_until(timeout) => {
                     self.tell(|mission, now| mission.handle_time(now)).await;
                 }
                 why = lost(&mut self.session) => self.handle_lost(why).await,
@@ -146,10 +147,10 @@ impl<'a> PlannerTask<'a> {
     fn log(&mut self) {
         let (report, _) = self.missions.tell(|mission| mission.report().clone());
         let now = Some((report.run, report.stage));
-        if self.told == now || report.stage == Stage::Idle {
+        if self.logged == now || report.stage == Stage::Idle {
             return;
         }
-        self.told = now;
+        self.logged = now;
         let Run { mission, attempt } = report.run;
         let reason = match report.reason.as_str() {
             "" => String::new(),
@@ -507,12 +508,5 @@ async fn lost(session: &mut Option<Session>) -> Result<String, String> {
         if let Err(error) = session.changed().await {
             return Ok(error.to_string());
         }
-    }
-}
-
-async fn until(time: Option<Instant>) {
-    match time {
-        Some(time) => tokio::time::sleep_until(time.into()).await,
-        None => std::future::pending().await,
     }
 }

@@ -14,7 +14,7 @@ use crate::messages::ground::{
     ApproveMission, QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, ReportMission,
     SetDestination, mission_planner, raster_maps,
 };
-use crate::mission::{Link, Path, Point, Vehicle, plan};
+use crate::mission::{Footprint, Link, Path, Point, plan};
 use crate::parts::planner::{chain, map};
 use jaus::address::JausId;
 use jaus::codec::Query;
@@ -152,7 +152,7 @@ impl<T: FnMut(&Step)> Running<'_, T> {
             let maps: Vec<_> = maps
                 .map(|map| {
                     format!(
-                        "\"{}\" {} x {}",
+                        "{:?} {} x {}",
                         map.name.to_string_lossy(),
                         map.rows,
                         map.columns
@@ -172,12 +172,12 @@ impl<T: FnMut(&Step)> Running<'_, T> {
         })
         .await?;
         self.step(async {
-            let mut told = Vec::new();
+            let mut shown = Vec::new();
             for driver in cast.drivers {
                 let report = ask(component, driver, &QueryStage {}).await?;
-                told.push(format!("{driver} {:?}", report.state));
+                shown.push(format!("{driver} {:?}", report.state));
             }
-            Ok(((), told.join(", ")))
+            Ok(((), shown.join(", ")))
         })
         .await
     }
@@ -279,14 +279,14 @@ impl<'a> Reports<'a> {
                 }
                 if last.stage > Stage::ARRIVED {
                     return Err(format!(
-                        "{}: {}",
+                        "{}: {:?}",
                         name(last.stage),
                         last.reason.to_string_lossy()
                     ));
                 }
                 if now() > deadline {
                     return Err(format!(
-                        "still {} after {} s {}",
+                        "still {} after {} s {:?}",
                         name(last.stage),
                         limit.as_secs(),
                         last.reason.to_string_lossy()
@@ -410,9 +410,9 @@ async fn set_out(
 async fn choose(component: &Component, store: JausId, from: Point) -> Result<Point, String> {
     const AWAY: f64 = 4.0;
     let map = map::fetch_from(component, store, "traversability", None).await?;
-    let room = Vehicle {
+    let room = Footprint {
         margin: 0.3,
-        ..Vehicle::default()
+        ..Footprint::default()
     };
     let directions = (0..16).map(|turn| std::f64::consts::TAU * f64::from(turn) / 16.0);
     let places = [AWAY, AWAY / 2.0, AWAY * 2.0].map(|away| {
@@ -457,21 +457,21 @@ async fn approve(
     let seen = reports.until(Stage::DRIVING, reports.patience * 3).await?;
     let mut stages: Vec<_> = seen.iter().map(|report| report.stage).collect();
     stages.dedup();
-    let told: Vec<_> = stages.iter().map(|&stage| name(stage)).collect();
+    let shown: Vec<_> = stages.iter().map(|&stage| name(stage)).collect();
     let attempts = seen.last().map_or(0, |last| last.attempt);
     if attempts == 1 && !stages.is_sorted() {
-        return Err(format!("out of order: {}", told.join(", ")));
+        return Err(format!("out of order: {}", shown.join(", ")));
     }
-    Ok(((), format!("{} (attempt {attempts})", told.join(", "))))
+    Ok(((), format!("{} (attempt {attempts})", shown.join(", "))))
 }
 
 async fn look_at_chain(component: &Component, cast: &Cast) -> Result<((), String), String> {
     let [path, vector, primitive] = cast.drivers;
-    let mut told = Vec::new();
+    let mut shown = Vec::new();
     for (driver, commander) in [(path, cast.planner), (vector, path), (primitive, vector)] {
         let report = ask(component, driver, &QueryControl {}).await?;
         match chain::controller(&report) {
-            Some(client) if client == commander => told.push(format!("{client} → {driver}")),
+            Some(client) if client == commander => shown.push(format!("{client} → {driver}")),
             Some(client) => {
                 return Err(format!(
                     "{driver} is controlled by {client}, not by {commander}"
@@ -480,7 +480,7 @@ async fn look_at_chain(component: &Component, cast: &Cast) -> Result<((), String
             None => return Err(format!("{driver} is not controlled")),
         }
     }
-    Ok(((), told.join(", ")))
+    Ok(((), shown.join(", ")))
 }
 
 async fn arrive(

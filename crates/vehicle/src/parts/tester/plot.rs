@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Write};
 
-use super::steps::Plain;
+use jaus_view::junit::escaped;
 
 /// One line of a plot.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,7 +105,7 @@ impl Display for Plot {
              font-family=\"sans-serif\" font-size=\"13\">\n\
              <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n\
              <text x=\"{LEFT}\" y=\"28\" font-size=\"16\">{}</text>",
-            Plain(&self.title)
+            escaped(&self.title)
         )?;
         self.grid(f, &across, &up)?;
         for (index, line) in self.lines.iter().enumerate() {
@@ -119,7 +119,7 @@ impl Display for Plot {
                  stroke-dasharray=\"{dashes}\"/><text x=\"{}\" y=\"{}\">{}</text>",
                 x + 30.0,
                 y + 4.0,
-                Plain(&line.name)
+                escaped(&line.name)
             )?;
         }
         writeln!(f, "</svg>")
@@ -159,8 +159,8 @@ impl Plot {
              <text transform=\"translate(22 {middle:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
             f64::midpoint(LEFT, right),
             HEIGHT - 16.0,
-            Plain(&self.across),
-            Plain(&self.up)
+            escaped(&self.across),
+            escaped(&self.up)
         )
     }
 }

@@ -1,7 +1,9 @@
 //! Test steps: what was checked, with which result, in what time.
 
-use std::fmt::{self, Display, Write};
+use std::fmt::{self, Display};
 use std::time::Duration;
+
+use jaus_view::junit::{self, Case, CaseResult, Suite};
 
 /// Result of a step.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,52 +51,22 @@ pub fn all_pass(steps: &[Step]) -> bool {
 /// Formats the steps as a JUnit report for build servers.
 #[must_use]
 pub fn junit(suite: &str, steps: &[Step]) -> String {
-    let count =
-        |wanted: fn(&Verdict) -> bool| steps.iter().filter(|step| wanted(&step.verdict)).count();
-    let time: Duration = steps.iter().map(|step| step.took).sum();
-    let mut text = format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuite name=\"{}\" tests=\"{}\" \
-         failures=\"{}\" skipped=\"{}\" time=\"{:.3}\">\n",
-        Plain(suite),
-        steps.len(),
-        count(|verdict| matches!(verdict, Verdict::Fail(_))),
-        count(|verdict| matches!(verdict, Verdict::Skipped)),
-        time.as_secs_f64()
-    );
-    for step in steps {
-        let inside = match &step.verdict {
-            Verdict::Pass(detail) => format!("<system-out>{}</system-out>", Plain(detail)),
-            Verdict::Fail(detail) => format!("<failure message=\"{}\"/>", Plain(detail)),
-            Verdict::Skipped => "<skipped/>".to_owned(),
-        };
-        text.push_str(&format!(
-            "  <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\">{inside}</testcase>\n",
-            Plain(suite),
-            Plain(&step.name),
-            step.took.as_secs_f64()
-        ));
-    }
-    text.push_str("</testsuite>\n");
-    text
-}
-
-/// Text escaped for XML, with control characters replaced by spaces.
-pub(super) struct Plain<'a>(pub(super) &'a str);
-
-impl Display for Plain<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for letter in self.0.chars() {
-            match letter {
-                '<' => f.write_str("&lt;")?,
-                '>' => f.write_str("&gt;")?,
-                '&' => f.write_str("&amp;")?,
-                '"' => f.write_str("&quot;")?,
-                other if other.is_control() => f.write_char(' ')?,
-                other => f.write_char(other)?,
-            }
-        }
-        Ok(())
-    }
+    let case = |step: &Step| Case {
+        name: step.name.clone(),
+        class: suite.to_owned(),
+        took: step.took,
+        result: match &step.verdict {
+            Verdict::Pass(detail) => CaseResult::Passed(Some(detail.clone())),
+            Verdict::Fail(reason) => CaseResult::Failed {
+                reason: reason.clone(),
+                details: String::new(),
+            },
+            Verdict::Skipped => CaseResult::Skipped("an earlier step failed".to_owned()),
+        },
+    };
+    let cases = steps.iter().map(case).collect();
+    let name = suite.to_owned();
+    junit::document(suite, &[Suite { name, cases }])
 }
 
 #[cfg(test)]
@@ -114,10 +86,11 @@ mod tests {
             step("d", Verdict::Skipped),
         ];
         let text = junit("mission", &steps);
-        assert!(text.contains("tests=\"3\" failures=\"1\" skipped=\"1\" time=\"4.500\""));
+        let counts = "tests=\"3\" failures=\"1\" errors=\"0\" skipped=\"1\" time=\"4.500\"";
+        assert!(text.contains(counts), "{text}");
         assert!(text.contains("name=\"b &amp; c\""));
         assert!(text.contains("<failure message=\"&quot;no&quot;\"/>"));
-        assert!(text.contains("<system-out>x &gt; y </system-out>"));
+        assert!(text.contains("<system-out>x &gt; y\u{FFFD}</system-out>"));
         assert!(!all_pass(&steps) && all_pass(&steps[..1]));
     }
 }

@@ -18,7 +18,7 @@ use jaus_vehicle::messages::ground::{
     QueryMission, QueryRasterCells, QueryRasterMaps, QueryStage, ReportMission, ReportRasterCells,
     ReportRasterMaps, ReportStage, SetDestination, mission_planner, raster_maps, stage,
 };
-use jaus_vehicle::mission::{Settings, Vehicle as Size};
+use jaus_vehicle::mission::{Footprint, Settings};
 use jaus_vehicle::mobility::Vehicle;
 use jaus_vehicle::motion::{Frame, Limits, Pilot, SkidSteer, SkidSteerConfig};
 use jaus_vehicle::parts::{Part, Planner, Slot};
@@ -85,7 +85,7 @@ impl World {
     pub(crate) async fn new(subsystem: u16) -> Self {
         let group = own_group();
         let start = |subsystem| Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
-        let (node, desk) = (start(subsystem), start(subsystem + 1));
+        let (node, station) = (start(subsystem), start(subsystem + 1));
         let vehicle = vehicle();
         let path = Switch::default();
         let path = Driver {
@@ -124,7 +124,7 @@ impl World {
             panic!("{error}");
         });
         let operator = Component::builder(Kind::OperatorControlUnit, "Operator");
-        let operator = operator.attach(&desk, 1).unwrap();
+        let operator = operator.attach(&station, 1).unwrap();
         let planner_id = planner_of(&operator, subsystem).await;
         let control = operator.control(planner_id, 200).await.unwrap();
         control.resume().await.unwrap();
@@ -133,7 +133,7 @@ impl World {
             .await
             .unwrap();
         Self {
-            nodes: vec![node, desk],
+            nodes: vec![node, station],
             path,
             vector,
             primitive,
@@ -247,10 +247,10 @@ async fn planner_of(operator: &Component, subsystem: u16) -> JausId {
 
 fn settings() -> Planner {
     Planner {
-        vehicle: Size {
+        vehicle: Footprint {
             width: 0.6,
             margin: 0.1,
-            ..Size::default()
+            ..Footprint::default()
         },
         mission: Settings {
             pause: Duration::from_millis(200),

@@ -21,6 +21,7 @@ use jaus_vehicle::parts::{
     VectorDriver, VelocitySensor,
 };
 
+use crate::events::EventFormat;
 use network::OwnNetwork;
 use operator::{Ending, Operator};
 use story::{Story, Who};
@@ -38,7 +39,8 @@ use system::{OPERATOR, System, VEHICLE};
     jaus demo --stay                  starts no mission: drive on the page\n  \
     jaus demo --ackermann             a vehicle that steers like a car\n  \
     jaus demo --headless              without the page; ends when the vehicle arrives\n  \
-    jaus demo --to 3,-5 --headless --for 1min")]
+    jaus demo --to 3,-5 --headless --for 1min\n\n\
+    Events of --json: \"story\" with \"actor\" and \"text\"; \"end\" with \"arrived\".")]
 pub(crate) struct Demo {
     /// End after this time. With --headless, an unfinished mission then counts as failed: exit
     /// status 1 [default: at Ctrl-C; with --headless, when the mission is over]
@@ -64,6 +66,9 @@ pub(crate) struct Demo {
     /// Start no mission
     #[arg(long, conflicts_with = "headless")]
     stay: bool,
+
+    #[command(flatten)]
+    format: EventFormat,
 }
 
 /// A model car of scale 1:10, which fits through the gaps of the demo's map with its turning radius of
@@ -78,7 +83,7 @@ const CAR_WIDTH: f64 = 0.3;
 impl Demo {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         runtime::run(async {
-            let mut story = Story::new();
+            let mut story = Story::new(self.format);
             let network = OwnNetwork::take()?;
             self.opening(&network, &mut story)?;
             let mut system = System::new(network);
@@ -133,10 +138,10 @@ impl Demo {
         let vehicle = system.node(VEHICLE, 1)?;
         let wheels = system.node(VEHICLE, 2)?;
         let mind = system.node(VEHICLE, 3)?;
-        let desk = system.node(OPERATOR, 1)?;
+        let console = system.node(OPERATOR, 1)?;
         let communicator = Communicator {
             debug: (!self.headless).then_some(system.debug_address()),
-            beside: vec![wheels.clone(), mind.clone(), desk.clone()],
+            beside: vec![wheels.clone(), mind.clone(), console.clone()],
             ..Communicator::default()
         };
         start_part(system, story, &vehicle, 35, "communicator", communicator)?;
@@ -197,14 +202,14 @@ impl Demo {
         if !self.headless {
             let station = Station::default().open().await.map_err(Failure::of)?;
             let urls = station.urls();
-            start_part(system, story, &desk, 1, "operator's page", station)?;
+            start_part(system, story, &console, 1, "operator's page", station)?;
             for url in urls {
                 story.tell(Who::Operator, format_args!("the page is at {url}"))?;
             }
         }
         Component::builder(Kind::OperatorControlUnit, "Operator")
             .component_name("Demo")
-            .attach(&desk, 2)
+            .attach(&console, 2)
             .map_err(Failure::of)
     }
 
@@ -235,7 +240,7 @@ impl Demo {
         if self.stay {
             story.tell(
                 Who::Operator,
-                "leaves the vehicle to you: take control on the page; press Ctrl-C to end",
+                "leaves the vehicle to you: press Drive by hand on the page; press Ctrl-C to end",
             )?;
             std::future::pending::<()>().await;
         }
@@ -245,7 +250,7 @@ impl Demo {
         if !self.headless {
             story.tell(
                 Who::Operator,
-                "the vehicle is yours on the page; press Ctrl-C to end the demo",
+                "the vehicle is yours: press Drive by hand on the page; press Ctrl-C to end the demo",
             )?;
             std::future::pending::<()>().await;
         }
@@ -253,16 +258,13 @@ impl Demo {
     }
 
     fn closing(&self, ending: Option<Ending>, story: &mut Story) -> Result<Outcome, Failure> {
-        let words = match ending {
-            Some(Ending::Arrived) => ": the vehicle has arrived",
-            Some(Ending::Stopped) => ": the vehicle has not arrived",
-            None if self.headless => ": the vehicle has not arrived in time",
-            None => "",
+        let (arrived, words) = match ending {
+            Some(Ending::Arrived) => (Some(true), ": the vehicle has arrived"),
+            Some(Ending::Stopped) => (Some(false), ": the vehicle has not arrived"),
+            None if self.headless => (Some(false), ": the vehicle has not arrived in time"),
+            None => (None, ""),
         };
-        story.line(format_args!(
-            "\nThe demo ended after {:.1} s{words}.",
-            story.seconds()
-        ))?;
+        story.end(arrived, words)?;
         Ok(Outcome::complete_if(
             ending == Some(Ending::Arrived) || !self.headless,
         ))

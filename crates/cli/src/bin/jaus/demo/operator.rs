@@ -7,6 +7,7 @@ use jaus::address::JausId;
 use jaus::component::{Component, Control, Update, When};
 use jaus::messages::mobility::{QueryLocalPose, local_pose_sensor};
 use jaus_cli::failure::Failure;
+use jaus_cli::output::quoted;
 use jaus_vehicle::messages::ground::report_mission::Stage;
 use jaus_vehicle::messages::ground::{
     QueryMission, QueryPlannedPath, ReportMission, SetDestination, mission_planner,
@@ -145,7 +146,7 @@ impl<'s> Operator<'s> {
         };
         let reason = report.reason.to_string();
         if !reason.is_empty() {
-            words = format!("{words} ({reason})");
+            words = format!("{words} ({})", quoted(&reason));
         }
         if report.attempt > 1 {
             words = format!("{words}; attempt {} of {}", report.attempt, report.attempts);

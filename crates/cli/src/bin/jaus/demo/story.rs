@@ -3,8 +3,10 @@
 use std::fmt::Display;
 
 use jaus_cli::failure::Failure;
-use jaus_cli::output::{Output, colours_wanted};
-use jaus_cli::runtime::Clock;
+use jaus_cli::output::colours_wanted;
+use serde_json::json;
+
+use crate::events::{EventFormat, EventPrinter};
 
 /// The actor of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,24 +29,33 @@ impl Who {
 }
 
 pub(super) struct Story {
-    output: Output,
-    clock: Clock,
+    printer: EventPrinter,
     colours: bool,
 }
 
 impl Story {
-    pub(super) fn new() -> Self {
-        let colours = colours_wanted(&std::io::stdout());
+    pub(super) fn new(format: EventFormat) -> Self {
         Self {
-            output: Output::new(),
-            clock: Clock::start(),
-            colours,
+            printer: format.printer(),
+            colours: colours_wanted(&std::io::stdout()),
         }
     }
 
-    /// Prints a line that is not part of the story.
+    /// Prints a line for people that is not part of the story.
     pub(super) fn line(&mut self, words: impl Display) -> Result<(), Failure> {
-        self.output.line(words)
+        self.printer.words(words)
+    }
+
+    /// Prints the end: whether the vehicle has arrived, unless that does not matter.
+    pub(super) fn end(
+        &mut self,
+        arrived: Option<bool>,
+        words: impl Display,
+    ) -> Result<(), Failure> {
+        let seconds = self.printer.elapsed().as_secs_f64();
+        let words = format!("\nThe demo ended after {seconds:.1} s{words}.");
+        self.printer
+            .plain("end", json!({ "arrived": arrived }), words)
     }
 
     pub(super) fn tell(&mut self, who: Who, words: impl Display) -> Result<(), Failure> {
@@ -54,12 +65,11 @@ impl Story {
         } else {
             ("", "")
         };
-        self.output
-            .line(format_args!("{}  {on}{name:8}{off}  {words}", self.clock))
-    }
-
-    /// Seconds since the start.
-    pub(super) fn seconds(&self) -> f64 {
-        self.clock.elapsed().as_secs_f64()
+        let text = words.to_string();
+        self.printer.timed(
+            "story",
+            json!({ "actor": name, "text": text }),
+            format_args!("{on}{name:8}{off}  {text}"),
+        )
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use jaus_vehicle::mission::{Point, Terrain, Vehicle, plan};
+use jaus_vehicle::mission::{Footprint, Point, Terrain, plan};
 use jaus_vehicle::parts::KnowledgeStore;
 use jaus_vehicle::sensing::{Disc, Scenery};
 
@@ -10,7 +10,7 @@ use jaus_vehicle::sensing::{Disc, Scenery};
 pub(super) struct Surprise {
     /// What the vehicle's range sensor sees.
     pub(super) scenery: Scenery,
-    pub(super) vehicle: Vehicle,
+    pub(super) vehicle: Footprint,
 }
 
 impl Surprise {

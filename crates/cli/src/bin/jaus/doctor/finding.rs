@@ -10,6 +10,8 @@ use serde_json::{Value as Json, json};
 pub(super) enum Mark {
     Ok,
     Warning,
+    /// The warning that no other node was heard, which says nothing about this host.
+    Alone,
     Problem,
 }
 
@@ -17,7 +19,7 @@ impl Mark {
     const fn name(self) -> &'static str {
         match self {
             Self::Ok => "ok",
-            Self::Warning => "warning",
+            Self::Warning | Self::Alone => "warning",
             Self::Problem => "failed",
         }
     }
@@ -25,7 +27,7 @@ impl Mark {
     const fn colour(self) -> &'static str {
         match self {
             Self::Ok => "\x1b[32m",
-            Self::Warning => "\x1b[33m",
+            Self::Warning | Self::Alone => "\x1b[33m",
             Self::Problem => "\x1b[31m",
         }
     }
@@ -53,6 +55,10 @@ impl Finding {
 
     pub(super) fn warning(check: &'static str, what: impl Display) -> Self {
         Self::new(Mark::Warning, check, what)
+    }
+
+    pub(super) fn alone(check: &'static str, what: impl Display) -> Self {
+        Self::new(Mark::Alone, check, what)
     }
 
     pub(super) fn problem(check: &'static str, what: impl Display) -> Self {

@@ -92,25 +92,28 @@ pub(super) fn buffers(config: &Config) -> Option<Finding> {
 /// Compares the time of day with the monotonic clock.
 pub(super) struct ClockWatch {
     started: Instant,
-    told: SystemTime,
+    time_of_day: SystemTime,
 }
 
 impl ClockWatch {
     pub(super) fn start() -> Self {
         Self {
             started: Instant::now(),
-            told: SystemTime::now(),
+            time_of_day: SystemTime::now(),
         }
     }
 
     pub(super) fn finish(self) -> Finding {
         let passed = self.started.elapsed();
-        let told = match SystemTime::now().duration_since(self.told) {
+        let advanced = match SystemTime::now().duration_since(self.time_of_day) {
             Ok(forward) => forward.as_secs_f64(),
             Err(back) => -back.duration().as_secs_f64(),
         };
-        let since_1970 = self.told.duration_since(SystemTime::UNIX_EPOCH);
-        clock(since_1970.unwrap_or_default(), told - passed.as_secs_f64())
+        let since_1970 = self.time_of_day.duration_since(SystemTime::UNIX_EPOCH);
+        clock(
+            since_1970.unwrap_or_default(),
+            advanced - passed.as_secs_f64(),
+        )
     }
 }
 

@@ -1,10 +1,12 @@
 //! `jaus doctor`: checks everything that keeps nodes from finding each other, and suggests
-//! remedies. One file per check; a check returns [`Finding`]s. With `--peer` it examines one peer
-//! instead: see [`peer`].
+//! remedies. One file per check; a check returns [`Finding`]s. [`examine`](crate::examine) examines
+//! one peer.
 
 mod finding;
+mod group;
 mod host;
 mod neighbours;
+mod network;
 mod port;
 mod ra;
 
@@ -23,9 +25,10 @@ use jaus_cli::runtime;
 /// Find out why nodes do not find each other
 ///
 /// Checks this host's interfaces, port, buffers and clock, then listens on the network: does
-/// multicast loop back, which nodes are there, do two of them share an id? Needs no privileges.
-/// Give it the flags or the settings file of the node that does not work. Exit
-/// status 1 means that there are warnings or failures. `jaus examine` examines one peer.
+/// multicast loop back, which nodes are there, do their multicasts arrive, do two of them share an
+/// id? Needs no privileges. Give it the flags or the settings file of the node that does not work.
+/// Exit status 1 means that there are warnings or failures, for instance that no other node was
+/// heard. `jaus examine` examines one peer.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus doctor\n  \
@@ -34,7 +37,7 @@ use jaus_cli::runtime;
     jaus doctor --interface eth0 --for 10s\n  \
     jaus doctor --json | jq '.findings[] | select(.verdict != \"ok\")'")]
 pub(crate) struct Doctor {
-    /// How long to listen to the network
+    /// How long to listen to the network; up to 30s if a node is there whose multicasts do not arrive
     #[arg(long = "for", value_name = "DURATION", default_value = "3s", value_parser = runtime::duration)]
     duration: Duration,
 
@@ -59,13 +62,7 @@ impl Doctor {
     }
 
     async fn examine(&self, report: &mut Report) -> Result<(), Failure> {
-        let (id, config) = match self.network.for_examination() {
-            Ok(settings) => settings,
-            Err(failure) => {
-                let advice = "correct it: doctor cannot check anything else before";
-                return report.add(Finding::problem("settings", failure).advice(advice));
-            }
-        };
+        let (id, config) = self.network.for_examination()?;
         if self.network.has_file() {
             report.add(Finding::ok("settings", "the settings file can be read"))?;
         }
@@ -77,7 +74,8 @@ impl Doctor {
             say(format_args!("listening on the network for {seconds} s …"));
         }
         let clock = host::ClockWatch::start();
-        report.add_all(neighbours::look(config, id, listen).await)?;
+        let heard = network::look(config, id, listen, &report.findings).await;
+        report.add_all(heard)?;
         report.add(clock.finish())
     }
 }
@@ -90,8 +88,7 @@ fn ways(config: &Config) -> Vec<Finding> {
     }
     let (interfaces, mut findings) = host::interfaces(config);
     findings.splice(0..0, host::buffers(config));
-    let ports = interfaces.iter().flat_map(|it| port::check(config, it));
-    findings.extend(ports);
+    findings.extend(port::check(config, &interfaces));
     findings
 }
 
@@ -119,28 +116,43 @@ impl Report {
     }
 
     fn close(mut self) -> Result<Outcome, Failure> {
-        let count = |mark| self.findings.iter().filter(|f| f.mark == mark).count();
-        let (problems, warnings) = (count(Mark::Problem), count(Mark::Warning));
+        let conclusion = self.conclusion();
+        let (problems, warnings) = self.counts();
         if self.json {
             let findings: Vec<_> = self.findings.iter().map(Finding::to_json).collect();
             self.output.line(json!({
                 "failures": problems,
                 "warnings": warnings,
+                "conclusion": conclusion,
                 "findings": findings,
             }))?;
         } else {
-            self.output.line(match (problems, warnings) {
-                (0, 0) => "\nAll is well.".to_owned(),
-                _ => format!(
-                    "\n{}, {}.",
-                    counted(problems, "failure"),
-                    counted(warnings, "warning")
-                ),
-            })?;
+            self.output.line(format_args!("\n{conclusion}"))?;
         }
-        Ok(match (problems, warnings) {
-            (0, 0) => Outcome::Done,
-            _ => Outcome::Incomplete,
-        })
+        Ok(Outcome::complete_if((problems, warnings) == (0, 0)))
+    }
+
+    fn count(&self, mark: Mark) -> usize {
+        self.findings.iter().filter(|it| it.mark == mark).count()
+    }
+
+    /// The number of failures and of warnings.
+    fn counts(&self) -> (usize, usize) {
+        let warnings = self.count(Mark::Warning) + self.count(Mark::Alone);
+        (self.count(Mark::Problem), warnings)
+    }
+
+    fn conclusion(&self) -> String {
+        match self.counts() {
+            (0, 0) => "All is well.".to_owned(),
+            (0, 1) if self.count(Mark::Alone) == 1 => {
+                "This host is sound, but no other node was heard.".to_owned()
+            }
+            (problems, warnings) => format!(
+                "{}, {}.",
+                counted(problems, "failure"),
+                counted(warnings, "warning")
+            ),
+        }
     }
 }

@@ -1,153 +1,128 @@
-//! Checks on the network: whether multicast returns, which peers are present, and duplicate ids.
+//! The peers that were heard: who and where they are, and whether both sides can reach each other.
 
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
-use std::time::Duration;
+use std::net::SocketAddr;
 
-use jaus::address::JausId;
-use jaus::component::{Component, Directory, Kind};
-use jaus::endpoint::{Event, Path, Peer};
-use jaus::link::interface;
-use jaus::node::{Config, Events, LinkReport, Node};
+use ipnet::IpNet;
+use jaus::endpoint::{Peer, RouteState};
+use jaus::link::{Interface, interface};
 use jaus::wire::Version;
-use jaus_cli::runtime;
 
 use super::finding::Finding;
-use super::ra::RaSystems;
+use super::network::{Heard, node_of};
+
+const CHECK: &str = "neighbours";
 
 /// Maximum number of peers that are named one by one.
 const MOST: usize = 12;
 
-/// Runs a node with the settings, but with a temporary id and, if necessary, another port. `wanted`
-/// is the intended id of the node.
-pub(super) async fn look(config: Config, wanted: Option<JausId>, time: Duration) -> Vec<Finding> {
-    const CHECK: &str = "network";
-    let node = match Node::start(config.clone().or_any_free_port()) {
-        Ok(node) => node,
-        Err(error) => return vec![Finding::problem(CHECK, error)],
-    };
-    let mut events = node.events();
-    let mut ra = RaSystems::open(&config);
-    let started = Component::builder(Kind::OtherSubsystem, "jaus doctor").attach(&node, 1);
-    let component = match started {
-        Ok(component) => component,
-        Err(error) => return vec![Finding::problem(CHECK, error)],
-    };
-    let mut moved = BTreeMap::new();
-    tokio::select! {
-        () = runtime::end(Some(time)) => {}
-        () = watch(&mut events, &mut moved) => {}
-        () = ra.listen() => {}
+/// The findings about all peers.
+pub(super) fn findings(heard: &Heard) -> Vec<Finding> {
+    if heard.peers.is_empty() && heard.of_ra.is_empty() {
+        return vec![alone(heard)];
     }
-    let own = component.id();
-    let (directory, peers, links) = (component.directory(), node.peers(), node.links());
-    drop(component);
-    node.shutdown().await;
-    let peers: Vec<Peer> = peers.into_iter().filter(|peer| peer.id != own).collect();
-    let mut findings: Vec<Finding> = links.iter().filter_map(came_back).collect();
-    let of_ra: Vec<Finding> = ra.findings().collect();
-    if of_ra.is_empty() || !peers.is_empty() {
-        findings.extend(who(&peers, &directory));
-    }
-    findings.extend(of_ra);
-    findings.extend(moved.iter().map(|(&id, places)| two_of(id, places)));
-    findings.extend(wanted.map(|id| is_free(id, &peers)));
-    findings
-}
-
-/// Records ids received from more than one address.
-async fn watch(events: &mut Events, moved: &mut BTreeMap<JausId, BTreeSet<Path>>) {
-    while let Some(event) = events.recv().await {
-        if let Event::PeerMoved { id, from, to } = event {
-            moved.entry(id).or_default().extend([from, to]);
+    let here = interface::list().unwrap_or_default();
+    let (mut warnings, mut others) = (Vec::new(), Vec::new());
+    for peer in &heard.peers {
+        match out_of_reach(heard, peer, &here) {
+            Some(warning) => warnings.push(warning),
+            None => others.push(present(heard, peer)),
         }
     }
-}
-
-/// Checks whether our multicasts return on their own link.
-fn came_back(link: &LinkReport) -> Option<Finding> {
-    const CHECK: &str = "multicast";
-    let group = link.group?;
-    let name = &link.interface.name;
-    if link.counters.own_echo > 0 {
-        return Some(Finding::ok(
-            CHECK,
-            format_args!("multicast to {group} on {name} loops back"),
-        ));
-    }
-    let refused = match link.counters.send_errors {
-        0 => String::new(),
-        errors => format!(" (the host refused to send {errors} times)"),
-    };
-    let what = format!("multicast to {group} on {name} does not loop back{refused}");
-    Some(Finding::problem(CHECK, what).advice(
-        "likely a firewall, or a container without multicast: allow UDP to and from the group \
-         (`sudo nft list ruleset`, `sudo iptables -S`), or name the other nodes with --peer",
-    ))
-}
-
-fn who(peers: &[Peer], directory: &Directory) -> Vec<Finding> {
-    const CHECK: &str = "neighbours";
-    if peers.is_empty() {
-        return vec![Finding::ok(CHECK, "no other node was found").advice(
-            "if a node should be there: is it on the same network and group, does its firewall \
-             accept UDP 3794, does the switch or access point forward multicast (IGMP snooping \
-             without a querier does not)? `jaus examine ADDRESS` examines one host, even \
-             one that answers no multicast (Junior)",
-        )];
-    }
-    let one = |peer: &Peer| {
-        let name = directory
-            .subsystem(peer.id.subsystem())
-            .and_then(|subsystem| subsystem.identification())
-            .map_or_else(String::new, |told| format!(" of \"{}\"", told.name));
-        let old = match peer.version {
-            Version::As5669a => "",
-            Version::As5669 => ", uses the older AS5669",
-            Version::Ra => ", uses the old Reference Architecture",
-        };
-        Finding::ok(
-            CHECK,
-            format_args!("{}{name} is at {}{old}", peer.id, peer.path.peer),
-        )
-    };
-    let mut findings: Vec<Finding> = peers.iter().take(MOST).map(one).collect();
-    if let Some(more) = peers.len().checked_sub(MOST).filter(|&more| more > 0) {
+    // Warnings first, so that a large fleet does not hide them.
+    let mut findings: Vec<Finding> = warnings.into_iter().chain(others).collect();
+    let more = findings.len().saturating_sub(MOST);
+    findings.truncate(MOST);
+    if more > 0 {
         let words = format!("{more} more were found; `jaus discover` lists them");
         findings.push(Finding::ok(CHECK, words));
     }
+    findings.extend(heard.of_ra.iter().cloned());
     findings
 }
 
-/// One id at several addresses: a conflict on one network, possibly a single node on several
-/// networks.
-fn two_of(id: JausId, places: &BTreeSet<Path>) -> Finding {
-    const CHECK: &str = "ids";
-    let named: Vec<String> = places.iter().map(|path| path.peer.to_string()).collect();
-    let what = format!("{id} sends from {}", named.join(" and from "));
-    let links: BTreeSet<_> = places.iter().map(|path| path.link).collect();
-    if links.len() < places.len() {
-        return Finding::problem(CHECK, what)
-            .advice("two nodes have this id, so answers go astray: give one of them another id");
-    }
-    Finding::warning(CHECK, what).advice(
-        "harmless if that is one node on two networks; if they are two nodes, give one another id",
+/// No other node was heard.
+fn alone(heard: &Heard) -> Finding {
+    let seconds = heard.listened.as_secs_f64();
+    Finding::alone(
+        CHECK,
+        format_args!("no other node was heard in {seconds} s"),
+    )
+    .advice(
+        "if a node should be there: does it run, is it on the same network and group, does its \
+         firewall accept UDP 3794, does the switch or access point forward multicast (IGMP \
+         snooping without a querier does not)? Run `jaus doctor` there too; `jaus examine \
+         ADDRESS` examines one host, even one that answers no multicast (Junior)",
     )
 }
 
-/// Checks whether another node already uses the intended id.
-fn is_free(id: JausId, peers: &[Peer]) -> Finding {
-    const CHECK: &str = "ids";
-    let Some(peer) = peers.iter().find(|peer| peer.id == id) else {
-        return Finding::ok(CHECK, format_args!("no other node has the id {id}"));
+/// A peer's id and the name of its subsystem.
+fn named(heard: &Heard, peer: &Peer) -> String {
+    let subsystem = heard.directory.subsystem(peer.id.subsystem());
+    let identification = subsystem.and_then(|subsystem| subsystem.identification());
+    // Quoted, so that control characters are escaped.
+    let name = identification.map_or_else(String::new, |it| format!(" of {:?}", it.name));
+    format!("{}{name}", peer.id)
+}
+
+fn present(heard: &Heard, peer: &Peer) -> Finding {
+    let old = match peer.version {
+        Version::As5669a => "",
+        Version::As5669 => ", uses the older AS5669",
+        Version::Ra => ", uses the old Reference Architecture",
     };
-    let place = peer.path.peer;
-    let here = interface::list().unwrap_or_default();
-    let is_here = |ip| here.iter().any(|interface| interface.address == ip);
-    if place.socket().is_some_and(|address| is_here(address.ip())) {
-        return Finding::warning(CHECK, format_args!("{id} runs on this host, at {place}"))
-            .advice("harmless if that is your node; a second one needs another id");
+    let (name, place) = (named(heard, peer), peer.path.peer);
+    Finding::ok(CHECK, format_args!("{name} is at {place}{old}"))
+}
+
+/// The warning about a peer that only one side can reach.
+fn out_of_reach(heard: &Heard, peer: &Peer, here: &[Interface]) -> Option<Finding> {
+    let address = peer.path.peer.socket()?;
+    let mut links = heard.links.iter();
+    let link = links.find(|link| link.link == peer.path.link)?;
+    let name = named(heard, peer);
+    let is_reached = |it: &Interface| it.index == link.interface.index && it.reaches(address);
+    // A peer that has acknowledged a message is reached, for instance through a router.
+    if peer.route != RouteState::Verified && !here.iter().any(is_reached) {
+        return Some(elsewhere(&name, address, &link.interface));
     }
-    Finding::problem(CHECK, format_args!("{id} is taken by {place}"))
-        .advice("choose another id (--id), or stop the other node")
+    if !heard.mute.contains(&node_of(peer.id)) {
+        return None;
+    }
+    let seconds = heard.listened.as_secs_f64();
+    let (ip, interface) = (address.ip(), &link.interface.name);
+    let what = format_args!(
+        "{name} is at {address}, but none of its multicasts arrived on {interface} in {seconds} s"
+    );
+    Some(Finding::warning(CHECK, what).advice(format_args!(
+        "nodes here find it only if it hears them first. On its host, does a firewall drop \
+         outgoing multicast (`nft list ruleset`), and does multicast leave through the right \
+         interface (`jaus doctor` there)? Does the switch or access point forward multicast? \
+         Without multicast, name it: --peer {ip}"
+    )))
+}
+
+/// A peer whose address is in no network of the interface on which it was heard.
+fn elsewhere(name: &str, address: SocketAddr, interface: &Interface) -> Finding {
+    let ip = address.ip();
+    let ours = network(interface);
+    let theirs = network(&Interface {
+        address: ip,
+        ..interface.clone()
+    });
+    let device = &interface.name;
+    let what = format_args!(
+        "{name} at {address} is heard on {device}, but is not in its network {ours}: it is in \
+         another one, such as {theirs}, so messages to it may not arrive"
+    );
+    Finding::warning(CHECK, what).advice(format_args!(
+        "give both hosts addresses of one network: its host one in {ours}, or this host one in \
+         {theirs} (`ip address add`). If a router connects the two networks, `jaus examine {ip}` \
+         shows whether it is reached"
+    ))
+}
+
+/// The network of an interface, such as `10.0.0.0/24`.
+fn network(interface: &Interface) -> String {
+    let network = IpNet::new(interface.address, interface.prefix).map(|it| it.trunc());
+    network.map_or_else(|_| interface.address.to_string(), |it| it.to_string())
 }

@@ -1,21 +1,32 @@
 //! Checks whether the ports of a node are free, and which program occupies them.
 
-use std::net::TcpListener;
+use std::net::{SocketAddr, TcpListener};
 #[cfg(unix)]
 use std::path::Path;
 
 #[cfg(unix)]
 use jaus::link::junior;
 use jaus::link::udp::{PortTaken, Settings, UdpLink};
-use jaus::link::{Error, Interface};
+use jaus::link::{Error, Holder, Interface, Interfaces};
 use jaus::node::Config;
 
 use super::finding::Finding;
 
 const CHECK: &str = "port";
 
-/// Opens the sockets of a node on the interface, and closes them again.
-pub(super) fn check(config: &Config, interface: &Interface) -> Vec<Finding> {
+/// Opens the sockets of a node on each interface, and closes them again. A program that keeps a port
+/// from several sockets is one finding.
+pub(super) fn check(config: &Config, interfaces: &[Interface]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for finding in interfaces.iter().flat_map(|it| on_interface(config, it)) {
+        if !findings.contains(&finding) {
+            findings.push(finding);
+        }
+    }
+    findings
+}
+
+fn on_interface(config: &Config, interface: &Interface) -> Vec<Finding> {
     let settings = Settings {
         port: config.port,
         port_taken: PortTaken::Refuse,
@@ -26,31 +37,44 @@ pub(super) fn check(config: &Config, interface: &Interface) -> Vec<Finding> {
         receive_buffer: config.receive_buffer,
         ..Settings::default()
     };
-    let first = UdpLink::open(interface, &settings);
-    let Err(Error::PortTaken { .. }) = &first else {
-        return vec![judge(config, interface, first)];
+    let first = match UdpLink::open(interface, &settings) {
+        Ok(link) => return vec![free(config, &link)],
+        Err(first) => first,
+    };
+    let Error::PortTaken { address, holder } = &first else {
+        return vec![refused(config, first)];
     };
     // The group may be unreachable too.
     let any = Settings {
         port: 0,
         ..settings
     };
-    let group = UdpLink::open(interface, &any).err();
-    let group = group.map(|error| judge(config, interface, Err(error)));
-    [judge(config, interface, first)]
-        .into_iter()
-        .chain(group)
-        .collect()
+    match UdpLink::open(interface, &any) {
+        Ok(_) => vec![refused(config, first)],
+        Err(Error::GroupTaken {
+            group,
+            holder: of_group,
+        }) if group.port() == address.port() && of_group == *holder => {
+            vec![group_taken(config, group, &of_group)]
+        }
+        Err(group) => vec![refused(config, first), refused(config, group)],
+    }
 }
 
-fn judge(config: &Config, interface: &Interface, opened: Result<UdpLink, Error>) -> Finding {
-    match opened {
-        Ok(_) if config.port == 0 => Finding::ok(
+fn free(config: &Config, link: &UdpLink) -> Finding {
+    let name = &link.interface().name;
+    match config.port {
+        0 => Finding::ok(
             CHECK,
-            format_args!("any free UDP port will be used on {}", interface.name),
+            format_args!("any free UDP port will be used on {name}"),
         ),
-        Ok(link) => Finding::ok(CHECK, format_args!("UDP {} is free", link.local())),
-        Err(Error::PortTaken { address, holder }) => {
+        _ => Finding::ok(CHECK, format_args!("UDP {} is free", link.local())),
+    }
+}
+
+fn refused(config: &Config, error: Error) -> Finding {
+    match error {
+        Error::PortTaken { address, holder } => {
             let what = format!("UDP {address} is taken{holder}");
             if config.port_taken == PortTaken::UseFree {
                 return Finding::ok(CHECK, what)
@@ -61,20 +85,34 @@ fn judge(config: &Config, interface: &Interface, opened: Result<UdpLink, Error>)
                  (--port 3795, or 0 for any free one)",
             )
         }
-        Err(Error::GroupTaken { group, holder }) => Finding::problem(
-            CHECK,
-            format_args!(
-                "the multicast group {group} cannot be received: its port is bound{holder} to all \
-                 addresses without sharing, as Junior does"
-            ),
+        Error::GroupTaken { group, holder } => group_taken(config, group, &holder),
+        error => Finding::problem(CHECK, error),
+    }
+}
+
+fn group_taken(config: &Config, group: SocketAddr, holder: &Holder) -> Finding {
+    let what = format_args!(
+        "the multicast group {group} cannot be received: its port is bound{holder} to all \
+         addresses without sharing, as Junior does"
+    );
+    let as_client = as_client_of_junior(config);
+    Finding::problem(CHECK, what).advice(if holder.is_junior() {
+        format!("connect through it: {as_client} (junior = \"/tmp\" in a settings file)")
+    } else {
+        format!(
+            "if it is JuniorRTE, connect through it: {as_client}; otherwise stop that program, or \
+             run without the group: --group off --port 0, and --peer ADDRESS for each node"
         )
-        .advice(if holder.is_junior() {
-            "connect through it: the same flags and --junior (junior = \"/tmp\" in a settings file)"
-        } else {
-            "if it is JuniorRTE, connect through it with --junior; otherwise stop that program, \
-             or run without the group: --group off --port 0, and --peer ADDRESS for each node"
-        }),
-        Err(error) => Finding::problem(CHECK, error),
+    })
+}
+
+/// The flags for a client of Junior's node manager, which uses the manager's network instead of its
+/// own.
+fn as_client_of_junior(config: &Config) -> &'static str {
+    match (&config.interfaces, config.routing.forward) {
+        (Interfaces::Loopback, _) => "--junior instead of --loopback",
+        (_, true) => "the same flags and --junior, and no routing.forward",
+        (_, false) => "the same flags and --junior",
     }
 }
 

@@ -23,6 +23,8 @@ pub(super) struct Settings {
     pub(super) target: Target,
     /// Our own id.
     pub(super) own: JausId,
+    /// The sequence number before our first. A peer may take a node that begins with 1 for Junior.
+    pub(super) last_number: u16,
     /// The intended id of our node, if one is chosen.
     pub(super) wanted: Option<JausId>,
     /// Our port.
@@ -132,6 +134,10 @@ pub(super) struct Case {
     pub(super) reserved: Reserved,
     /// Whether a program there echoes messages without effect.
     pub(super) echoes: bool,
+    /// Whether it has not answered in time, so that the cause is searched for.
+    pub(super) is_silent: bool,
+    /// Whether it was queried by multicast.
+    pub(super) multicast_asked: bool,
     pub(super) unsent: VecDeque<Send>,
     sequence: u16,
 }
@@ -141,6 +147,7 @@ impl Case {
         Self {
             address: settings.target.address(),
             id: settings.target.id,
+            sequence: settings.last_number,
             settings,
             link: None,
             seen: Seen::default(),
@@ -153,8 +160,9 @@ impl Case {
             transfer: None,
             reserved: Reserved::default(),
             echoes: false,
+            is_silent: false,
+            multicast_asked: false,
             unsent: VecDeque::new(),
-            sequence: 0,
         }
     }
 
@@ -248,7 +256,7 @@ impl Case {
     }
 
     /// Messages from the peer's component to us since a mark.
-    pub(super) fn told(&self, mark: usize) -> impl DoubleEndedIterator<Item = &Heard> {
+    pub(super) fn received(&self, mark: usize) -> impl DoubleEndedIterator<Item = &Heard> {
         let (own, id) = (self.settings.own, self.id);
         self.seen.since(mark).iter().filter(move |heard| {
             heard.frame.destination == own
@@ -266,7 +274,7 @@ impl Case {
     /// All decodable reports of a kind.
     pub(super) fn reports<M: Message>(&self, mark: usize) -> impl Iterator<Item = M> {
         let of_kind = self
-            .told(mark)
+            .received(mark)
             .filter(|heard| heard.code() == Some(M::CODE));
         of_kind.filter_map(|heard| M::decode(&heard.frame.payload).ok())
     }
@@ -274,7 +282,7 @@ impl Case {
     /// The error of the first malformed report of a kind.
     pub(super) fn unreadable<M: Message>(&self, mark: usize) -> Option<String> {
         let mut of_kind = self
-            .told(mark)
+            .received(mark)
             .filter(|heard| heard.code() == Some(M::CODE));
         of_kind
             .find_map(|heard| M::decode(&heard.frame.payload).err())

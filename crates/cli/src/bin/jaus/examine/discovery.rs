@@ -38,7 +38,8 @@ pub(super) fn identified(case: &mut Case, mark: usize) -> Judgement {
         Type::OTHER_SUBSYSTEM => "another subsystem".to_owned(),
         other => format!("of type {}", other.0),
     };
-    let verdict = Verdict::ok(format!("\"{name}\", {kind}"));
+    // Quoted, so that control characters are escaped.
+    let verdict = Verdict::ok(format!("{name:?}, {kind}"));
     case.name = Some(name);
     Judgement::Over(verdict)
 }
@@ -62,7 +63,7 @@ pub(super) fn not_identified(case: &Case, mark: usize) -> Verdict {
     }
     let what = format!("{id} does not answer Query Identification");
     let cause = "the component has no Discovery service (a bare Junior client has no services)";
-    if case.told(0).next().is_some() {
+    if case.received(0).next().is_some() {
         return Verdict::failed(
             what,
             cause,
@@ -96,18 +97,36 @@ pub(super) fn multicast(case: &mut Case) -> Begin {
     if let Some(why) = &case.settings.no_group {
         return Begin::Over(Verdict::skipped(format!("no multicast here: {why}")));
     }
+    // An answer to an earlier query looks like one to the multicast, so it must have arrived. "any
+    // answer" and "identification" have sent a query each.
+    let answers = case.reports::<ReportIdentification>(0).count();
+    if case.went_well(Exchange::Identification) && answers < 2 {
+        return Begin::Ask(Question::silence(LATE));
+    }
+    Begin::Ask(ask_by_multicast(case))
+}
+
+/// Timeout of an answer to an earlier query.
+const LATE: Duration = Duration::from_millis(250);
+
+/// The query by multicast.
+pub(super) fn ask_by_multicast(case: &mut Case) -> Question {
+    case.multicast_asked = true;
     let mut sends = vec![case.ask_everybody(&query_identification())];
     if !case.went_well(Exchange::Identification) {
         sends.extend(case.call_alone());
     }
-    Begin::Ask(Question {
+    Question {
         sends,
         again: Some(Duration::from_millis(700)),
         patience: Duration::from_secs(2),
-    })
+    }
 }
 
 pub(super) fn multicast_answered(case: &mut Case, mark: usize) -> Judgement {
+    if !case.multicast_asked {
+        return Judgement::Wait;
+    }
     // Any component of its node may answer for all.
     let (own, id) = (case.settings.own, case.id);
     let answers = |heard: &&Heard| {
@@ -117,8 +136,8 @@ pub(super) fn multicast_answered(case: &mut Case, mark: usize) -> Judgement {
     if case.seen.since(mark).iter().any(|heard| answers(&heard)) {
         return Judgement::Over(Verdict::ok("a broadcast query is answered"));
     }
-    let mut told = case.told(mark);
-    if told.any(|heard| heard.frame.flags.acknowledgement().is_answer()) {
+    let mut received = case.received(mark);
+    if received.any(|heard| heard.frame.flags.acknowledgement().is_answer()) {
         return Judgement::Over(Verdict::ok("a broadcast message is acknowledged"));
     }
     Judgement::Wait

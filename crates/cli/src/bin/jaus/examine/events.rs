@@ -168,12 +168,12 @@ fn times(case: &Case, mark: usize) -> Vec<Duration> {
     };
     let report = answered_query(case).map(|(_, report, _)| report.to_le_bytes());
     let all = case
-        .told(mark)
+        .received(mark)
         .filter(|heard| heard.code() == Some(Event::CODE));
     let came = all.filter_map(|heard| {
-        let told = Event::decode(&heard.frame.payload).ok()?;
-        let of_it = report.is_some_and(|code| told.report_message.starts_with(&code));
-        (told.event_id == event.id && of_it).then_some(heard.at)
+        let event_report = Event::decode(&heard.frame.payload).ok()?;
+        let of_it = report.is_some_and(|code| event_report.report_message.starts_with(&code));
+        (event_report.event_id == event.id && of_it).then_some(heard.at)
     });
     let mut times: Vec<_> = came.collect();
     times.dedup_by(|later, before| later.saturating_sub(*before) < AT_ONCE);

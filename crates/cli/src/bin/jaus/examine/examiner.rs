@@ -1,13 +1,15 @@
 //! Runs an examination: sends, evaluates and records one exchange after the other. Driven by
 //! datagrams and time; it has no sockets and no clock.
 
+use std::net::SocketAddr;
 use std::time::Duration;
 
 use super::case::{Case, Question, Send, Settings};
 use super::exchange::{Exchange, Trial, Verdict};
 use super::judgement::{Begin, Judgement};
 use super::seen::{Arrival, Refusal, TcpAnswer};
-use super::{discovery, events, large, manners, ra, reach, reserved, standing};
+use super::silence::CLOSED_PORT;
+use super::{discovery, events, large, manners, ra, reach, reserved, silence, standing};
 
 /// An active exchange.
 struct Running {
@@ -28,7 +30,7 @@ pub(super) struct Examiner {
     plan: std::array::IntoIter<Exchange, 33>,
     running: Option<Running>,
     /// Number of trials returned so far.
-    told: usize,
+    returned: usize,
     done: bool,
 }
 
@@ -38,7 +40,7 @@ impl Examiner {
             case: Case::new(settings),
             plan: Exchange::ALL.into_iter(),
             running: None,
-            told: 0,
+            returned: 0,
             done: false,
         }
     }
@@ -58,9 +60,14 @@ impl Examiner {
         self.judge(now);
     }
 
-    /// Handles a refusal: the system reports that the peer's port or host is unreachable.
-    pub(super) fn handle_refusal(&mut self, now: Duration, refusal: Refusal) {
-        self.case.seen.refused.get_or_insert(refusal);
+    /// Handles a refusal: the system reports that the port or host of an address is unreachable.
+    pub(super) fn handle_refusal(&mut self, now: Duration, address: SocketAddr, refusal: Refusal) {
+        let seen = &mut self.case.seen;
+        if address.port() == CLOSED_PORT {
+            seen.closed_port_refused |= refusal == Refusal::Port;
+        } else {
+            seen.refused.get_or_insert(refusal);
+        }
         self.judge(now);
     }
 
@@ -75,9 +82,8 @@ impl Examiner {
         };
         if now >= running.deadline {
             let (exchange, mark, stage) = (running.exchange, running.mark, running.stage);
-            let verdict = at_the_end(exchange, &mut self.case, mark, stage);
-            self.close(now, verdict);
-            self.go_on(now);
+            let judgement = at_the_end(exchange, &mut self.case, mark, stage);
+            self.carry_on(now, judgement);
         } else if running.next.is_some_and(|next| now >= next) {
             running.next = running.question.again.map(|again| now + again);
             let sends = match running.exchange {
@@ -101,9 +107,9 @@ impl Examiner {
 
     /// The next completed exchange, and the one before it.
     pub(super) fn poll_trial(&mut self) -> Option<(&Trial, Option<&Trial>)> {
-        let trial = self.case.trials.get(self.told)?;
-        let before = self.told.checked_sub(1);
-        self.told += 1;
+        let trial = self.case.trials.get(self.returned)?;
+        let before = self.returned.checked_sub(1);
+        self.returned += 1;
         Some((
             trial,
             before.and_then(|before| self.case.trials.get(before)),
@@ -158,13 +164,21 @@ impl Examiner {
 
     /// Checks whether the received messages decide the exchange.
     fn judge(&mut self, now: Duration) {
-        let Some(running) = &mut self.running else {
+        let Some(running) = &self.running else {
             return;
         };
         let (exchange, mark, stage) = (running.exchange, running.mark, running.stage);
-        match judge(exchange, &mut self.case, mark, stage, now) {
+        let judgement = judge(exchange, &mut self.case, mark, stage, now);
+        self.carry_on(now, judgement);
+    }
+
+    fn carry_on(&mut self, now: Duration, judgement: Judgement) {
+        match judgement {
             Judgement::Wait => {}
             Judgement::Ask(question) => {
+                let Some(running) = &mut self.running else {
+                    return;
+                };
                 self.case.unsent.extend(question.sends.iter().cloned());
                 running.mark = self.case.seen.len();
                 running.stage = running.stage.saturating_add(1);
@@ -258,12 +272,15 @@ fn judge(exchange: Exchange, case: &mut Case, mark: usize, stage: u8, now: Durat
     }
 }
 
-/// The verdict after the timeout of an answer.
-fn at_the_end(exchange: Exchange, case: &mut Case, mark: usize, stage: u8) -> Verdict {
-    match exchange {
+/// The judgement after the timeout of an answer.
+fn at_the_end(exchange: Exchange, case: &mut Case, mark: usize, stage: u8) -> Judgement {
+    Judgement::Over(match exchange {
+        Exchange::Answer => return silence::unanswered(case),
+        Exchange::Multicast if !case.multicast_asked => {
+            return Judgement::Ask(discovery::ask_by_multicast(case));
+        }
         Exchange::Find => reach::not_found(case),
         Exchange::Reach => reach::not_refused(case, stage),
-        Exchange::Answer => reach::unanswered(case),
         Exchange::Framing => match case.address {
             Some(address) => ra::verdict(case, address, None),
             None => Verdict::skipped("its address is not known"),
@@ -292,5 +309,5 @@ fn at_the_end(exchange: Exchange, case: &mut Case, mark: usize, stage: u8) -> Ve
         Exchange::Rate => manners::some_answered(case, mark),
         Exchange::Reserved => reserved::over(case, mark, stage),
         Exchange::Sequence | Exchange::Stacks | Exchange::Ids => Verdict::skipped("query not sent"),
-    }
+    })
 }

@@ -114,7 +114,7 @@ pub(super) fn again(case: &mut Case, now: Duration) -> Vec<Send> {
 
 pub(super) fn acknowledged(case: &mut Case, size: u32, mark: usize, now: Duration) -> Judgement {
     let answers: Vec<u16> = case
-        .told(mark)
+        .received(mark)
         .filter(|heard| heard.frame.flags.acknowledgement() == Acknowledgement::Positive)
         .map(|heard| heard.frame.sequence)
         .collect();
@@ -165,7 +165,7 @@ fn is_back(case: &Case, size: u32) -> bool {
     let mark = case.transfer.as_ref().map_or(0, |transfer| transfer.since);
     let message = padded(size as usize);
     let mut single = case
-        .told(mark)
+        .received(mark)
         .filter(|heard| heard.code() == Some(PADDING));
     let large = || case.id.and_then(|id| case.seen.large_from(id, mark));
     single.any(|heard| heard.frame.payload == message)
@@ -279,7 +279,7 @@ pub(super) fn came_back(case: &mut Case, mark: usize, stage: u8) -> Judgement {
     let Some(id) = case.id else {
         return Judgement::Wait;
     };
-    let whole = case.told(mark).find(|heard| {
+    let whole = case.received(mark).find(|heard| {
         heard.code() == Some(ReportEvents::CODE)
             && ReportEvents::decode(&heard.frame.payload).is_ok()
     });
@@ -353,7 +353,7 @@ pub(super) fn not_back(case: &mut Case, mark: usize, stage: u8) -> Verdict {
         );
     }
     let fragments = case
-        .told(mark)
+        .received(mark)
         .filter(|heard| heard.frame.flags.data() != DataControl::Single);
     let fragments = fragments.count();
     let cancels = cancel_all(case);

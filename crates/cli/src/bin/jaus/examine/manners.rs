@@ -94,7 +94,7 @@ pub(super) fn sequence(case: &Case) -> Verdict {
     if let Some(skip) = case.nobody() {
         return skip;
     }
-    let mut messages: Vec<&Heard> = case.told(0).collect();
+    let mut messages: Vec<&Heard> = case.received(0).collect();
     // Acknowledgements repeat the number of the acknowledged message.
     messages.retain(|heard| !heard.frame.flags.acknowledgement().is_answer());
     if messages.len() < 3 {

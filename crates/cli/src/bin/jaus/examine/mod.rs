@@ -18,6 +18,7 @@ mod reach;
 mod report;
 mod reserved;
 mod seen;
+mod silence;
 mod sockets;
 mod standing;
 mod target;
@@ -25,6 +26,7 @@ mod target;
 mod tests;
 mod transfer;
 
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;
 
 use clap::Args;
@@ -89,6 +91,7 @@ impl Examine {
         let settings = Settings {
             target: self.target,
             own: JausId::new(config.subsystem, config.node, 1),
+            last_number: RandomState::new().build_hasher().finish() as u16,
             wanted,
             port: local.map_or(0, |local| local.port()),
             no_group: sockets.no_group.take(),
@@ -200,7 +203,7 @@ fn handle(examiner: &mut Examiner, begun: Instant, happening: Happening) {
     let now = begun.elapsed();
     match happening {
         Happening::Arrived(arrival) => examiner.handle_arrival(now, &arrival),
-        Happening::Refused(refusal) => examiner.handle_refusal(now, refusal),
+        Happening::Refused(address, refusal) => examiner.handle_refusal(now, address, refusal),
         Happening::Tcp(answer) => examiner.handle_tcp(now, answer),
     }
 }

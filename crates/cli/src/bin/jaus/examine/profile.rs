@@ -1,6 +1,6 @@
 //! Recognises known peers, with the evidence.
 
-use jaus::peer::{Certainty, LargeStyle, Peer, Recogniser, Sign, Verdict};
+use jaus::peer::{Certainty, Departure, LargeStyle, Recogniser, Sign, Verdict};
 use jaus::wire::{Version, ra::RaId};
 use serde_json::{Value as Json, json};
 
@@ -89,13 +89,25 @@ impl Profile {
             }
             Self::As5669a(verdict) => verdict,
         };
+        let reasons = verdict.reasons.iter().map(|sign| sign.explanation());
         let peer = verdict.peer;
-        if peer == Peer::Standard {
-            return vec!["none: it looks like a peer that conforms to the standard".to_owned()];
+        let mut lines = Vec::new();
+        match verdict.certainty {
+            Certainty::Unknown => {
+                lines.push("none: it looks like a peer that conforms to the standard".to_owned());
+                lines.extend(reasons.map(|reason| format!("although {reason}: no evidence alone")));
+                return lines;
+            }
+            Certainty::Guess => {
+                lines.push(format!("not recognised; it may be {}", peer.title()));
+                lines.extend(reasons.map(|reason| format!("because {reason}")));
+                return lines;
+            }
+            Certainty::Likely | Certainty::Certain => {
+                lines.push(format!("{} ({})", peer.title(), verdict.certainty));
+                lines.extend(reasons.map(|reason| format!("because {reason}")));
+            }
         }
-        let mut lines = vec![format!("{} ({})", peer.title(), verdict.certainty)];
-        let reasons = verdict.reasons.iter();
-        lines.extend(reasons.map(|sign| format!("because {}", sign.explanation())));
         if case.unprovoked().certain() != peer {
             let id = case.id.map_or_else(String::new, |id| id.to_string());
             let once = match verdict.certainty {
@@ -107,7 +119,7 @@ impl Profile {
                  id = \"{id}\", profile = \"{peer}\""
             ));
         }
-        let departures: Vec<_> = peer.departures().map(|departure| departure.name).collect();
+        let departures: Vec<_> = departures(verdict).map(|it| it.name).collect();
         if !departures.is_empty() {
             lines.push(format!("known departures: {}", departures.join("; ")));
         }
@@ -119,7 +131,7 @@ impl Profile {
             Self::Unknown => Json::Null,
             Self::Ra(subsystem) => json!({"peer": "ra", "subsystem": subsystem}),
             Self::As5669a(verdict) => {
-                let departures = verdict.peer.departures().map(|departure| {
+                let departures = departures(verdict).map(|departure| {
                     json!({"name": departure.name, "does": departure.does, "ours": departure.ours})
                 });
                 let reasons = verdict.reasons.iter().map(|sign| sign.explanation());
@@ -132,4 +144,11 @@ impl Profile {
             }
         }
     }
+}
+
+/// The departures of the peer, if it is certain which one it is.
+fn departures(verdict: &Verdict) -> impl Iterator<Item = &'static Departure> {
+    let is_certain = verdict.certainty == Certainty::Certain;
+    let all = is_certain.then(|| verdict.peer.departures());
+    all.into_iter().flatten()
 }

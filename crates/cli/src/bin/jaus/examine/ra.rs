@@ -89,7 +89,8 @@ pub(super) fn verdict(case: &Case, address: SocketAddr, name: Option<&str>) -> V
     let subsystem = of_ra(case, address)
         .next()
         .map(|heard| format!(": subsystem {}", RaId::from(heard.frame.source).subsystem));
-    let name = name.map(|name| format!(" \"{name}\""));
+    // Quoted, so that control characters are escaped.
+    let name = name.map(|name| format!(" {name:?}"));
     let multicast = of_ra(case, address).any(|heard| heard.listener == Listener::RaGroup);
     let multicast = if multicast {
         ", received on 224.1.0.1"

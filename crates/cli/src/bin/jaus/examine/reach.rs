@@ -1,6 +1,5 @@
 //! First exchanges: presence of the peer, its framing and its source port.
 
-use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::time::Duration;
 
@@ -8,14 +7,14 @@ use jaus::address::JausId;
 use jaus::messages::core::{
     QueryHeartbeatPulse, QueryIdentification, query_identification::QueryType,
 };
-use jaus::wire::ra::RaId;
 use jaus::wire::{Frame, Version, judp};
 
 use super::case::{Case, Question, Send, octets};
 use super::exchange::Verdict;
 use super::judgement::{Begin, Judgement};
 use super::ra;
-use super::seen::{Heard, Listener, Refusal};
+use super::seen::{Heard, Listener};
+use super::silence::{only_older, others, refused};
 
 pub(super) fn query_identification() -> QueryIdentification {
     QueryIdentification {
@@ -67,42 +66,16 @@ pub(super) fn not_found(case: &Case) -> Verdict {
     if others.is_empty() {
         return Verdict::failed(
             format!("neither {id} nor any other node was found in {seconds} s"),
-            "multicast does not pass between the hosts, or the peer is not running",
+            "multicast does not pass between the hosts, or the peer is not running or hangs",
             "give its address: jaus examine ID@ADDRESS; `jaus doctor` checks multicast \
              here",
         );
     }
     Verdict::failed(
-        format!(
-            "{id} was not found in {seconds} s, but {}",
-            others.join(", ")
-        ),
-        "it has another id, or is not running",
+        format!("{id} was not found in {seconds} s, but {others}"),
+        "it has another id, is not running, or hangs",
         "take the id from its settings, or give its address: jaus examine ADDRESS",
     )
-}
-
-/// Other peers, with their addresses.
-fn others(case: &Case) -> Vec<String> {
-    const SOME: usize = 6;
-    let all = case
-        .seen
-        .all()
-        .iter()
-        .filter(|heard| Some(heard.frame.source) != case.id);
-    let set: BTreeSet<(JausId, Option<RaId>, SocketAddr)> = all
-        .map(|heard| {
-            let of_ra = RaId::in_header(heard.frame.version, heard.frame.source);
-            (heard.frame.source, of_ra, heard.from)
-        })
-        .collect();
-    let named = set.iter().take(SOME);
-    named
-        .map(|(id, of_ra, from)| match of_ra {
-            Some(id) => format!("{id} at {from} (Reference Architecture)"),
-            None => format!("{id} at {from}"),
-        })
-        .collect()
 }
 
 /// Probes for a refused port, from a temporary socket that expects no answer.
@@ -145,47 +118,12 @@ pub(super) fn reached(case: &mut Case, stage: u8) -> Judgement {
     })
 }
 
-fn refused(case: &Case, address: SocketAddr, refusal: Refusal) -> Verdict {
-    let (ip, port) = (address.ip(), address.port());
-    if refusal == Refusal::Host {
-        return Verdict::failed(
-            format!("there is no route to {ip}, or no host has that address"),
-            "the host is off, or has another address, or is on another network",
-            format!("try `ip route get {ip}` and `ping {ip}`; check the cable and the address"),
-        );
-    }
-    let ports = other_ports(case, address);
-    if let Some(other) = ports.first() {
-        return Verdict::failed(
-            format!("{ip} reports UDP port {port} as closed, but {other} sends"),
-            "the peer has another port",
-            format!("use that: jaus examine {other}"),
-        );
-    }
-    Verdict::failed(
-        format!("{ip} reports UDP port {port} as closed"),
-        "no JAUS program runs there, or it is bound to another address or port of that host",
-        format!(
-            "on that host, `ss -ulpn 'sport = :{port}'` shows the listening program and its address"
-        ),
-    )
-}
-
 pub(super) fn not_refused(case: &Case, stage: u8) -> Verdict {
     match (case.address, case.seen.refused) {
         (Some(address), Some(refusal)) if stage > 0 => refused(case, address, refusal),
         (Some(address), _) => Verdict::ok(format!("UDP {address} is not refused")),
         (None, _) => Verdict::skipped("its address is not known"),
     }
-}
-
-/// Other sources of JAUS messages at the host.
-fn other_ports(case: &Case, address: SocketAddr) -> Vec<SocketAddr> {
-    let others = case.seen.of_host(address.ip());
-    let others = others
-        .map(|heard| heard.from)
-        .filter(|from| *from != address);
-    others.collect::<BTreeSet<_>>().into_iter().collect()
 }
 
 /// Requests any sign of life by unicast, so that any message in return is an answer.
@@ -222,7 +160,8 @@ fn any_sign(case: &mut Case, address: SocketAddr) -> Question {
 }
 
 pub(super) fn answered(case: &mut Case, mark: usize) -> Judgement {
-    let Some(address) = case.address else {
+    // After the timeout, an answer may be one to a multicast.
+    let Some(address) = case.address.filter(|_| !case.is_silent) else {
         return Judgement::Wait;
     };
     let own = case.settings.own;
@@ -265,110 +204,6 @@ fn overheard(case: &mut Case, address: SocketAddr) -> Judgement {
     }
 }
 
-/// The next exchange finds out which one.
-fn only_older(address: SocketAddr) -> Verdict {
-    Verdict::ok(format!("{} answers, but not in AS5669A", address.ip()))
-}
-
-/// No answer by unicast; there may be messages in the groups.
-pub(super) fn unanswered(case: &mut Case) -> Verdict {
-    let Some(address) = case.address else {
-        return not_refused(case, 0);
-    };
-    let ip = address.ip();
-    let seconds = case.settings.listen.as_secs_f64();
-    if let Some(refusal) = case.seen.refused {
-        return refused(case, address, refusal);
-    }
-    let framings = case.seen.framings(ip);
-    if framings.iter().any(|version| *version != Version::As5669a) {
-        return only_older(address);
-    }
-    let heard = case.seen.of_host(ip).next().cloned();
-    if let Some(heard) = heard {
-        return heard_only(case, address, &heard);
-    }
-    if let Some(beginning) = case.seen.unreadable_from(ip) {
-        return Verdict::failed(
-            format!("{ip} sends datagrams without JAUS framing: they start with {beginning}"),
-            "another program uses that port",
-            format!(
-                "on that host, `ss -ulpn 'sport = :{}'` shows which",
-                address.port()
-            ),
-        );
-    }
-    silent(case, address, seconds)
-}
-
-/// It multicasts, but does not answer us.
-fn heard_only(case: &mut Case, address: SocketAddr, heard: &Heard) -> Verdict {
-    let (id, from) = (heard.frame.source, heard.from);
-    if let Some(named) = case.settings.target.id.filter(|named| *named != id) {
-        return Verdict::failed(
-            format!("{named} does not answer there, but {id} sends from {from}"),
-            "the peer has another id",
-            format!("use that: jaus examine {id}@{from}"),
-        );
-    }
-    case.id = case.id.or(Some(id));
-    if from.port() != address.port() {
-        return Verdict::failed(
-            format!("{id} sends from {from}, and {address} does not answer"),
-            "the peer has another port",
-            format!("use that: jaus examine {from}"),
-        );
-    }
-    Verdict::failed(
-        format!("{id} sends from {from}, but does not answer queries to it"),
-        "its firewall blocks incoming UDP, or it answers to an address that is not ours",
-        format!(
-            "on that host, allow UDP {} (`nft list ruleset`); `jaus record` there shows whether \
-             our queries arrive",
-            address.port()
-        ),
-    )
-}
-
-fn silent(case: &Case, address: SocketAddr, seconds: f64) -> Verdict {
-    let elsewhere = case
-        .seen
-        .all()
-        .iter()
-        .find(|heard| Some(heard.frame.source) == case.id);
-    if let Some(heard) = elsewhere {
-        let (id, from) = (heard.frame.source, heard.from);
-        return Verdict::failed(
-            format!("{address} is silent, but {id} sends from {from}"),
-            "the peer has another address",
-            format!("use that: jaus examine {id}@{from}"),
-        );
-    }
-    let others = others(case);
-    if !others.is_empty() {
-        return Verdict::failed(
-            format!(
-                "{address} was silent for {seconds} s; others found: {}",
-                others.join(", ")
-            ),
-            "the address is wrong, the peer is not running, or its firewall drops UDP",
-            "compare the address with those found; check the peer and its firewall",
-        );
-    }
-    let remedy = if case.settings.target.id.is_some() {
-        "check both firewalls, and run `jaus doctor`; omit the id (jaus examine ADDRESS) \
-         to query any component there"
-    } else {
-        "give its id too (jaus examine ID@ADDRESS), check both firewalls, and run `jaus doctor`"
-    };
-    Verdict::failed(
-        format!("{address} was silent for {seconds} s, and no other node was found"),
-        "the peer is not running, a firewall on either side drops UDP, or no component there has \
-         that id",
-        remedy,
-    )
-}
-
 /// The framings that its host uses.
 pub(super) fn framing(case: &mut Case) -> Begin {
     if let Some(skip) = case.cut_off() {
@@ -398,7 +233,7 @@ pub(super) fn source_port(case: &mut Case) -> Begin {
     let (Some(address), Some(id)) = (case.address, case.id) else {
         return Begin::Over(Verdict::skipped("no answer"));
     };
-    let Some(from) = case.told(0).map(|heard| heard.from).next() else {
+    let Some(from) = case.received(0).map(|heard| heard.from).next() else {
         return Begin::Over(Verdict::skipped("nothing arrived by unicast"));
     };
     if from == address {
@@ -429,7 +264,7 @@ fn other_address(address: SocketAddr, from: SocketAddr, id: JausId) -> Verdict {
 }
 
 pub(super) fn asked_at_its_source(case: &mut Case, mark: usize) -> Judgement {
-    let Some(heard) = case.told(mark).next() else {
+    let Some(heard) = case.received(mark).next() else {
         return Judgement::Wait;
     };
     let (from, id) = (heard.from, heard.frame.source);
@@ -453,7 +288,7 @@ pub(super) fn deaf_source(case: &Case) -> Verdict {
         return Verdict::skipped("no answer");
     };
     let from = case
-        .told(0)
+        .received(0)
         .map(|heard| heard.from.port())
         .next()
         .unwrap_or(0);

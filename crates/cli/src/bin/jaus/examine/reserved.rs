@@ -77,8 +77,8 @@ pub(super) fn acknowledged(case: &mut Case, mark: usize, stage: u8) -> Judgement
 
 /// Number and priority of each acknowledgement since a mark.
 fn answers(case: &Case, mark: usize) -> impl Iterator<Item = (u16, Priority)> {
-    let told = case.told(mark).map(|heard| &heard.frame);
-    let answers = told.filter(|frame| frame.flags.acknowledgement().is_answer());
+    let received = case.received(mark).map(|heard| &heard.frame);
+    let answers = received.filter(|frame| frame.flags.acknowledgement().is_answer());
     answers.map(|frame| (frame.sequence, frame.flags.priority()))
 }
 

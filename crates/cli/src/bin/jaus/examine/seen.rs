@@ -66,6 +66,8 @@ pub(super) struct Seen {
     unreadable: Vec<(SocketAddr, String)>,
     /// Why the destination is unreachable, according to the system.
     pub(super) refused: Option<Refusal>,
+    /// Whether the destination's host refuses a port that is closed.
+    pub(super) closed_port_refused: bool,
     /// Result of the TCP connection.
     pub(super) tcp: Option<TcpAnswer>,
 }

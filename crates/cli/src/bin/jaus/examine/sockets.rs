@@ -35,7 +35,8 @@ pub(crate) const RA_GROUP: SocketAddrV4 =
 /// A network event.
 pub(super) enum Happening {
     Arrived(Arrival),
-    Refused(Refusal),
+    /// The system reports that this address is unreachable.
+    Refused(SocketAddr, Refusal),
     Tcp(TcpAnswer),
 }
 
@@ -57,7 +58,8 @@ pub(super) struct Sockets {
     pub(super) no_group: Option<String>,
     /// The interface of each host heard so far.
     routes: BTreeMap<IpAddr, usize>,
-    probe: Option<UdpSocket>,
+    /// Connected to the address that it probes.
+    probe: Option<(SocketAddr, UdpSocket)>,
     dialling: Option<Dialling>,
     buffer: Vec<u8>,
 }
@@ -104,7 +106,7 @@ impl Sockets {
             Send::To(address, frame) => {
                 let way = self.way_to(*address);
                 let link = self.links.get(way)?;
-                refusal(send_to(&link.unicast, *address, frame))
+                refusal(*address, send_to(&link.unicast, *address, frame))
             }
             Send::Group(frame) => {
                 for link in &self.links {
@@ -134,14 +136,15 @@ impl Sockets {
     }
 
     fn ask_port(&mut self, address: SocketAddr, frame: &Frame) -> Option<Happening> {
-        if self.probe.is_none() {
+        if self.probe.as_ref().is_none_or(|(to, _)| *to != address) {
             let ip = self.links.get(self.way_to(address))?.local.ip();
             match connected(ip, address) {
-                Ok(socket) => self.probe = Some(socket),
-                Err(error) => return refusal::<()>(Err(error)),
+                Ok(socket) => self.probe = Some((address, socket)),
+                Err(error) => return refusal::<()>(address, Err(error)),
             }
         }
-        refusal(SockRef::from(self.probe.as_ref()?).send(&encoded(frame)))
+        let (_, probe) = self.probe.as_ref()?;
+        refusal(address, SockRef::from(probe).send(&encoded(frame)))
     }
 
     /// Waits for the next event.
@@ -156,10 +159,11 @@ impl Sockets {
             self.dialling = None;
             return Poll::Ready(Happening::Tcp(answer));
         }
-        if let Some(probe) = &self.probe {
+        if let Some((to, probe)) = &self.probe {
+            let to = *to;
             // The runtime does not wake a task for an error alone.
             let error = SockRef::from(probe).take_error().ok().flatten();
-            if let Some(happening) = error.and_then(|error| refusal::<()>(Err(error))) {
+            if let Some(happening) = error.and_then(|error| refusal::<()>(to, Err(error))) {
                 self.probe = None;
                 return Poll::Ready(happening);
             }
@@ -176,7 +180,7 @@ impl Sockets {
                     return Poll::Ready(Happening::Arrived(arrival));
                 }
                 Poll::Ready(Err(error)) => {
-                    if let Some(happening) = refusal::<()>(Err(error)) {
+                    if let Some(happening) = refusal::<()>(to, Err(error)) {
                         self.probe = None;
                         return Poll::Ready(happening);
                     }
@@ -383,7 +387,7 @@ fn receive(
 }
 
 /// Interprets a system error as a refusal by the peer.
-fn refusal<T>(sent: io::Result<T>) -> Option<Happening> {
+fn refusal<T>(address: SocketAddr, sent: io::Result<T>) -> Option<Happening> {
     let refusal = match sent.err()?.kind() {
         io::ErrorKind::ConnectionRefused => Refusal::Port,
         io::ErrorKind::HostUnreachable
@@ -392,7 +396,7 @@ fn refusal<T>(sent: io::Result<T>) -> Option<Happening> {
         // For example a full queue: the query is repeated anyway.
         _ => return None,
     };
-    Some(Happening::Refused(refusal))
+    Some(Happening::Refused(address, refusal))
 }
 
 async fn dial(address: SocketAddr) -> TcpAnswer {

@@ -63,8 +63,8 @@ pub(super) fn acknowledgement(case: &mut Case) -> Begin {
 }
 
 pub(super) fn acknowledged(case: &mut Case, mark: usize) -> Judgement {
-    let mut told = case.told(mark);
-    let answer = told.find(|heard| heard.frame.flags.acknowledgement().is_answer());
+    let mut received = case.received(mark);
+    let answer = received.find(|heard| heard.frame.flags.acknowledgement().is_answer());
     let verdict = match answer.map(|heard| &heard.frame) {
         None => return Judgement::Wait,
         Some(frame) if frame.flags.acknowledgement() == Acknowledgement::Negative => {

@@ -12,13 +12,13 @@ use jaus::node;
 pub(crate) struct Target {
     /// Its id, if given.
     pub(super) id: Option<JausId>,
-    place: Option<node::Peer>,
+    place: Option<node::PeerAddress>,
 }
 
 impl Target {
     /// Its address, if given. The default port is 3794.
     pub(super) fn address(&self) -> Option<SocketAddr> {
-        self.place.map(node::Peer::address)
+        self.place.map(node::PeerAddress::address)
     }
 }
 
@@ -34,7 +34,7 @@ impl FromStr for Target {
                 place: None,
             });
         }
-        let place: node::Peer = text
+        let place: node::PeerAddress = text
             .parse()
             .map_err(|_| format!("\"{text}\" is neither an id nor an address: {FORMS}"))?;
         Ok(Self {

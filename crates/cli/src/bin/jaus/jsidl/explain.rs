@@ -14,6 +14,7 @@ use jaus_cli::failure::Failure;
 use jaus_cli::output::Output;
 use jsidl::Library;
 use jsidl::explain::{Explanation, ServiceName, Unexplained, explain, table};
+use jsidl::model::Id;
 
 use super::datagram::Datagram;
 use super::ra::ReferenceArchitecture;
@@ -33,7 +34,7 @@ const MOST: u64 = 4 << 20;
     jaus jsidl explain 002B02\n  \
     jaus jsidl explain 02 00 11 00 09 ff ff ff ff 07 01 e8 03 00 2b 02 00 00\n  \
     jaus jsidl explain message.bin --jsidl my-services/\n  \
-    jaus jsidl explain --service 'urn:jaus:jss:core:Time 1.0' 11 40 40 e2 01 00\n  \
+    jaus jsidl explain --service urn:jaus:jss:core:Time@1.0 11 40 40 e2 01 00\n  \
     jaus jsidl explain --ra 02 44 01 00 aa aa aa 2a\n  \
     jaus jsidl explain --json - < message.hex | jq .rows\n\n\
     Exit status: 0 decoded completely; 1 decoding stopped; 2 unknown message.")]
@@ -48,7 +49,7 @@ pub(crate) struct Arguments {
 
     /// The service to prefer where several define the same message code, with or without its
     /// version
-    #[arg(long, value_name = "URN[ VERSION]")]
+    #[arg(long, value_name = "URN[@VERSION]")]
     service: Option<String>,
 
     /// Explain a bare message by the definitions of the Reference Architecture (RA 3.x)
@@ -202,12 +203,19 @@ fn damaged(octets: &Bytes) -> Option<String> {
     first.err().map(|error| error.to_string())
 }
 
-/// For example `QueryIdentification 2B00h of urn:jaus:jss:core:Discovery 1.1`.
+/// For example `QueryIdentification 2B00h of urn:jaus:jss:core:Discovery@1.1`.
 fn title(explanation: &Explanation) -> String {
     format!(
         "{} {:04X}h of {}",
-        explanation.message, explanation.code, explanation.service
+        explanation.message,
+        explanation.code,
+        in_words(&explanation.service)
     )
+}
+
+/// A service as `--service` takes it.
+fn in_words(service: &Id) -> String {
+    format!("{}@{}", service.urn, service.version)
 }
 
 /// Where decoding stopped, and other services that define the code.
@@ -219,7 +227,7 @@ fn remarks(explanation: &Explanation) -> String {
         ));
     }
     if !explanation.others.is_empty() {
-        let others: Vec<_> = explanation.others.iter().map(ToString::to_string).collect();
+        let others: Vec<_> = explanation.others.iter().map(in_words).collect();
         text.push_str(&format!(
             "\nOther services define {:04X}h differently; choose with --service: {}\n",
             explanation.code,

@@ -13,14 +13,18 @@ use jaus::messages::core::{
     QueryHeartbeatPulse, QueryIdentification, ReportHeartbeatPulse, ReportIdentification,
     report_identification::Type,
 };
-use jaus::node::{Config, Events, Node, Port};
-use jaus::wire::Broadcast;
+use jaus::node::{Config, Events, Node, Port, Tap, Tapped, Way};
+use jaus::peer::Recogniser;
+use jaus::wire::{Broadcast, Frame, judp};
 use jaus_cli::failure::Failure;
 use tokio::time::{Instant, timeout_at};
 
 use super::recording::Recording;
 use super::step::{Form, Reach, Speaker};
 use super::verdict::ObservedMessage;
+
+/// Limit of messages by which the subject is recognised.
+const TAPPED: usize = 1024;
 
 /// Name of the judge.
 const NAME: &str = "jaus judge";
@@ -36,6 +40,8 @@ pub(super) struct JudgeNodes {
     form: Form,
     /// Queries that the subject has sent to the judge.
     asked: BTreeSet<u16>,
+    /// The traffic of the first node, until the subject is recognised by it.
+    tap: Option<Tap>,
     recording: Option<Recording>,
 }
 
@@ -88,6 +94,7 @@ impl JudgeNodes {
         ];
         Ok(Self {
             events: [main.events(), other.events()],
+            tap: Some(main.tap(TAPPED)),
             nodes: [main, other],
             ports,
             subject,
@@ -105,6 +112,29 @@ impl JudgeNodes {
     /// Sets the form of all further requests.
     pub(super) const fn use_form(&mut self, form: Form) {
         self.form = form;
+    }
+
+    /// Recognises the implementation of the subject by its messages to the first node so far, which
+    /// is done once.
+    pub(super) fn recognise(&mut self) -> Recogniser {
+        let mut recogniser = Recogniser::default();
+        let Some(mut tap) = self.tap.take() else {
+            return recogniser;
+        };
+        while let Some(tapped) = tap.try_next() {
+            let Tapped::Passage(passage) = tapped else {
+                continue;
+            };
+            if !matches!(passage.way, Way::In(_)) {
+                continue;
+            }
+            for mut frames in passage.datagrams().into_iter().flat_map(judp::frames) {
+                let read: Vec<Frame> = frames.by_ref().map_while(Result::ok).collect();
+                let of_it = read.iter().filter(|frame| frame.source == self.subject);
+                of_it.for_each(|frame| recogniser.handle_frame(frame, frames.remaining()));
+            }
+        }
+        recogniser
     }
 
     /// Whether the subject has sent this query to the judge.

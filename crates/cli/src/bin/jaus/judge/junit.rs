@@ -1,6 +1,6 @@
 //! Writes the run as JUnit XML: a suite per form, a case per step.
 
-use jaus_cli::junit::{self, Case, CaseResult, Suite};
+use jaus_view::junit::{self, Case, CaseResult, Suite};
 
 use super::report::Report;
 use super::step::Form;
@@ -31,8 +31,10 @@ fn case(report: &Report<'_>, subject: &Subject, result: &StepResult) -> Case {
         class: format!("jaus.judge.{}.{}", subject.id, result.form.name()),
         took: result.took,
         result: match &result.verdict {
-            Verdict::Passed => CaseResult::Passed,
-            Verdict::Skipped(reason) => CaseResult::Skipped(reason.clone()),
+            Verdict::Passed => CaseResult::Passed(None),
+            Verdict::Skipped(reason) | Verdict::LeftOut(reason) => {
+                CaseResult::Skipped(reason.clone())
+            }
             Verdict::Failed(reason) => CaseResult::Failed {
                 reason: reason.clone(),
                 details: report.step(result, true).join("\n"),

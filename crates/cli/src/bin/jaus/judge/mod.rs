@@ -1,6 +1,7 @@
 //! `jaus judge`: runs the acceptance tests of the public JAUS contests against a component, and
 //! explains failures.
 
+mod hazard;
 mod json;
 mod judge_nodes;
 mod junit;
@@ -35,6 +36,7 @@ use runner::Runner;
 use script::service::Services;
 use step::{Form, Name, Step};
 use subject::Subject;
+use verdict::StepResult;
 
 /// The judge's main component, as in the contests; the others are 42.2.1 to 42.2.4.
 const MAIN: JausId = JausId::new(42, 1, 1);
@@ -59,6 +61,7 @@ const MAIN: JausId = JausId::new(42, 1, 1);
 #[command(after_help = "Examples:\n  \
     jaus judge 101.1.1\n  \
     jaus judge 101.1.1 --only B12-B26 --unicast\n  \
+    jaus judge 152.1.1 --skip B8          for JAUS++, which does not survive it\n  \
     jaus judge 101.1.1 --peer 192.168.7.2 --junit judge.xml --record judge.pcapng\n  \
     jaus judge 101.1.1 --json | jq 'select(.verdict == \"failed\") | .step, .reason'")]
 pub(crate) struct Judge {
@@ -74,6 +77,13 @@ pub(crate) struct Judge {
     #[arg(long, value_name = "STEPS", value_delimiter = ',')]
     only: Vec<Span>,
 
+    /// Leave out these steps and those that depend on them, such as B8, which JAUS++ does not survive
+    ///
+    /// They are reported as skipped. Before the first step the judge names the steps that end a
+    /// component which it recognises.
+    #[arg(long, value_name = "STEPS", value_delimiter = ',')]
+    skip: Vec<Span>,
+
     /// Test this service, by URN or name, instead of the contests' steps (repeatable)
     ///
     /// The tests follow from the service's definition: each query is sent and its report checked; a
@@ -83,7 +93,7 @@ pub(crate) struct Judge {
     /// state, from the client in control and from another one, with the required answers and the
     /// state afterwards. Services that inherit from them share these states. Steps B3 to B10 test
     /// the transitions of Events.
-    #[arg(long, value_name = "URN", conflicts_with = "only")]
+    #[arg(long, value_name = "URN", conflicts_with_all = ["only", "skip"])]
     service: Vec<String>,
 
     /// Query by multicast only [default: first by multicast, then by unicast]
@@ -159,6 +169,12 @@ impl FromStr for Span {
     }
 }
 
+/// Whether a step is in any of these ranges.
+fn is_in(spans: &[Span], name: Name) -> bool {
+    let mut spans = spans.iter();
+    spans.any(|span| (span.first..=span.last).contains(&name))
+}
+
 impl Judge {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         let services = self.services()?;
@@ -188,9 +204,7 @@ impl Judge {
         if !self.service.is_empty() {
             return services.steps(|urn| subject?.version(urn));
         }
-        let spans = &self.only;
-        let in_span = |name: Name, span: &Span| (span.first..=span.last).contains(&name);
-        let chosen = |name| spans.is_empty() || spans.iter().any(|span| in_span(name, span));
+        let chosen = |name| self.only.is_empty() || is_in(&self.only, name);
         script::selected(script::steps(), chosen)
     }
 
@@ -253,6 +267,11 @@ impl Judge {
         outputs: &mut Outputs<'_>,
     ) -> Result<(), Failure> {
         let steps = self.steps(services, Some(subject));
+        let left_out = script::left_out(&steps, |name| is_in(&self.skip, name));
+        let to_run = steps.iter().filter(|it| !left_out.contains_key(&it.name));
+        if let Some(warning) = hazard::warning(subject, to_run) {
+            say(format_args!("warning: {warning}"));
+        }
         for form in self.forms() {
             outputs.form(form)?;
             runner.begin(form);
@@ -261,7 +280,10 @@ impl Judge {
                     continue;
                 }
                 outputs.step_begins(step)?;
-                let result = runner.carry_out(step, form, subject).await?;
+                let result = match left_out.get(&step.name) {
+                    Some(reason) => StepResult::left_out(step, form, reason),
+                    None => runner.carry_out(step, form, subject).await?,
+                };
                 outputs.step_ends(result)?;
             }
             runner.tidy().await?;

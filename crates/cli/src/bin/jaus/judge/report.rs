@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use bytes::Bytes;
+use jaus_cli::output::quoted;
 use jaus_view::{Content, Dictionary, to_hex};
 
 use super::step::Form;
@@ -34,7 +35,8 @@ impl<'d> Report<'d> {
     /// The component under test.
     pub(super) fn subject(&self, subject: &Subject) -> Vec<String> {
         let name = subject.name.as_ref();
-        let name = name.map_or(String::new(), |name| format!(" \"{name}\""));
+        // Quoted, so that control characters are escaped.
+        let name = name.map_or(String::new(), |name| format!(" {name:?}"));
         let Some(services) = &subject.services else {
             let id = subject.id;
             return vec![format!(
@@ -42,8 +44,9 @@ impl<'d> Report<'d> {
             )];
         };
         let mut lines = vec![format!("{}{name} offers", subject.id)];
-        let service =
-            |(urn, (major, minor)): (&String, &(u8, u8))| format!("    {urn} {major}.{minor}");
+        let service = |(urn, (major, minor)): (&String, &(u8, u8))| {
+            format!("    {} {major}.{minor}", quoted(urn))
+        };
         lines.extend(services.iter().map(service));
         lines
     }
@@ -61,14 +64,14 @@ impl<'d> Report<'d> {
         let verdict = match result.verdict {
             Verdict::Passed => self.coloured(GREEN, "ok     "),
             Verdict::Failed(_) => self.coloured(RED, "failed "),
-            Verdict::Skipped(_) => self.coloured(GREY, "skipped"),
+            Verdict::Skipped(_) | Verdict::LeftOut(_) => self.coloured(GREY, "skipped"),
         };
         let latencies = result.proceedings.iter().filter_map(|one| one.latency);
         let slowest = latencies
             .max()
             .map(|latency| format!("  {}", millis(latency)));
         let because = match &result.verdict {
-            Verdict::Skipped(reason) => format!("  ({reason})"),
+            Verdict::Skipped(reason) | Verdict::LeftOut(reason) => format!("  ({reason})"),
             _ => String::new(),
         };
         let (name, title) = (result.name, &result.title);
@@ -80,6 +83,7 @@ impl<'d> Report<'d> {
             lines.extend(said.flat_map(|proceeding| self.proceeding(proceeding)));
         }
         if let Verdict::Failed(reason) = &result.verdict {
+            let reason = quoted(reason);
             lines.push(format!(
                 "{INDENT}{}    {reason}",
                 self.coloured(RED, "reason")
@@ -176,12 +180,17 @@ pub(super) fn conclusion(subject: &Subject, tally: &Tally, against: &str) -> Str
     if tally.passed == 0 {
         return format!("no result for {id}: no step applies to its services");
     }
-    let skipped = match tally.skipped {
+    let besides = |number, what: &str| match number {
         0 => String::new(),
-        number => format!("; {} did not apply to its services", steps(number)),
+        number => format!("; {} {what}", steps(number)),
     };
+    let skipped = besides(
+        tally.skipped - tally.left_out,
+        "did not apply to its services",
+    );
+    let left_out = besides(tally.left_out, "left out");
     let passed = steps(tally.passed);
-    format!("{id} conforms to {against} as tested: {passed} passed{skipped}")
+    format!("{id} conforms to {against} as tested: {passed} passed{skipped}{left_out}")
 }
 
 /// The name and fields of a message.

@@ -11,6 +11,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use jaus::codec::Message;
 
+use super::judge_nodes::code_of;
 use super::memory::Memory;
 pub(super) use super::memory::{Speaker, Stream};
 
@@ -130,6 +131,8 @@ pub(super) enum Act {
 /// A message with its receiver and the required answers.
 pub(super) struct Exchange {
     pub(super) from: Speaker,
+    /// Code of the message; `None` if it is too short for one.
+    pub(super) code: Option<u16>,
     pub(super) content: Content,
     pub(super) reach: Reach,
     pub(super) expects: Vec<Expectation>,
@@ -260,6 +263,13 @@ impl Step {
         self
     }
 
+    /// The codes of its messages.
+    pub(super) fn codes(&self) -> impl Iterator<Item = u16> {
+        let of_acts = self.acts.iter().flat_map(Act::exchanges);
+        let all = of_acts.chain(&self.afterwards);
+        all.filter_map(|exchange| exchange.code)
+    }
+
     pub(super) fn act(mut self, act: Act) -> Self {
         self.acts.push(act);
         self
@@ -296,6 +306,7 @@ impl Exchange {
             move |memory: &Memory| message(memory)?.encode().map_err(|error| error.to_string());
         Self {
             from,
+            code: Some(M::CODE),
             content: Box::new(encode),
             reach: Reach::Node,
             expects: Vec::new(),
@@ -306,6 +317,7 @@ impl Exchange {
     pub(super) fn octets(from: Speaker, octets: Bytes) -> Self {
         Self {
             from,
+            code: code_of(&octets),
             content: Box::new(move |_| Ok(octets.clone())),
             reach: Reach::Node,
             expects: Vec::new(),
@@ -333,6 +345,20 @@ impl Exchange {
             expectation.in_parts = true;
         }
         self
+    }
+}
+
+impl Act {
+    /// The messages that it sends.
+    fn exchanges(&self) -> &[Exchange] {
+        match self {
+            Self::Exchange(exchange) | Self::Ignored { exchange, .. } => {
+                std::slice::from_ref(exchange)
+            }
+            Self::Until(until) => &until.exchanges,
+            Self::Throughout(throughout) => &throughout.exchanges,
+            Self::Asked { .. } | Self::Watch(_) | Self::Silence { .. } | Self::Pause(_) => &[],
+        }
     }
 }
 

@@ -13,6 +13,7 @@ use jaus::messages::core::{
     QueryHeartbeatPulse, QueryIdentification, ReportHeartbeatPulse, ReportIdentification,
     ReportServices,
 };
+use jaus::peer;
 use jaus_cli::failure::Failure;
 use tokio::time::Instant;
 
@@ -32,6 +33,8 @@ pub(super) struct Subject {
     pub(super) name: Option<String>,
     /// URNs with major and minor version; `None` if not reported.
     pub(super) services: Option<BTreeMap<String, (u8, u8)>>,
+    /// Its implementation, as far as recognised.
+    pub(super) implementation: peer::Verdict,
 }
 
 impl Subject {
@@ -66,7 +69,15 @@ impl Subject {
         is_there |= report.is_some();
         let services =
             report.and_then(|octets| services(&ReportServices::decode(&octets).ok()?, id));
-        Ok(is_there.then_some(Self { id, name, services }))
+        let mut recogniser = judge_nodes.recognise();
+        let listed = services.iter().flatten();
+        recogniser.handle_services(listed.map(|(urn, (major, minor))| (urn, *major, *minor)));
+        Ok(is_there.then(|| Self {
+            id,
+            name,
+            services,
+            implementation: recogniser.verdict(),
+        }))
     }
 
     /// Whether the subject still answers any query.

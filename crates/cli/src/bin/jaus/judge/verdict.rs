@@ -5,7 +5,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use jaus::address::JausId;
 
-use super::step::{Form, Name};
+use super::step::{Form, Name, Step};
 
 /// Result of a step.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -15,6 +15,8 @@ pub(super) enum Verdict {
     Failed(String),
     /// With the reason as text, such as a missing service.
     Skipped(String),
+    /// Skipped by the user's choice, with the reason as text.
+    LeftOut(String),
 }
 
 impl Verdict {
@@ -22,7 +24,7 @@ impl Verdict {
         match self {
             Self::Passed => "ok",
             Self::Failed(_) => "failed",
-            Self::Skipped(_) => "skipped",
+            Self::Skipped(_) | Self::LeftOut(_) => "skipped",
         }
     }
 
@@ -30,7 +32,7 @@ impl Verdict {
     pub(super) fn reason(&self) -> Option<&str> {
         match self {
             Self::Passed => None,
-            Self::Failed(reason) | Self::Skipped(reason) => Some(reason),
+            Self::Failed(reason) | Self::Skipped(reason) | Self::LeftOut(reason) => Some(reason),
         }
     }
 }
@@ -45,6 +47,20 @@ pub(super) struct StepResult {
     pub(super) took: Duration,
     /// Messages in order, up to the first failure.
     pub(super) proceedings: Vec<Proceeding>,
+}
+
+impl StepResult {
+    /// A step that the user has left out.
+    pub(super) fn left_out(step: &Step, form: Form, reason: &str) -> Self {
+        Self {
+            name: step.name,
+            title: step.title.to_string(),
+            form,
+            verdict: Verdict::LeftOut(reason.to_owned()),
+            took: Duration::ZERO,
+            proceedings: Vec::new(),
+        }
+    }
 }
 
 /// One exchange or observation of a step.
@@ -74,6 +90,8 @@ pub(super) struct Tally {
     pub(super) passed: usize,
     pub(super) failed: usize,
     pub(super) skipped: usize,
+    /// How many of the skipped steps the user has left out.
+    pub(super) left_out: usize,
     latencies: Vec<Duration>,
 }
 
@@ -83,6 +101,10 @@ impl Tally {
             Verdict::Passed => self.passed += 1,
             Verdict::Failed(_) => self.failed += 1,
             Verdict::Skipped(_) => self.skipped += 1,
+            Verdict::LeftOut(_) => {
+                self.skipped += 1;
+                self.left_out += 1;
+            }
         }
         let latencies = result.proceedings.iter().filter_map(|one| one.latency);
         self.latencies.extend(latencies);

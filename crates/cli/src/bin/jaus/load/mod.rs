@@ -40,7 +40,7 @@ const MOST_IN_PROCESS: u16 = 1000;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus load\n  \
-    jaus load --rates 9000,max --for 10s --json load.json --svg load.svg\n  \
+    jaus load --rates 9000,max --for 10s --save load.json --svg load.svg\n  \
     jaus load --components 50 --attach     on a running `jaus-communicator --local`\n  \
     jaus load --beside socketio.json --svg both.svg\n\n\
     Columns: messages per second, offered and acknowledged; messages sent, lost (not acknowledged \
@@ -84,9 +84,8 @@ pub(crate) struct LoadCommand {
     #[arg(long = "for", value_name = "DURATION", default_value = "5s", value_parser = row_time)]
     duration: Duration,
 
-    /// Octets of a message, from 14 to 1400
-    #[arg(long, value_name = "OCTETS", default_value = "170",
-        value_parser = clap::value_parser!(u16).range(HEAD as i64..=1400))]
+    /// The size of a message, such as 170 or 1kB, from 14 B to 1400 B
+    #[arg(long, value_name = "SIZE", default_value = "170", value_parser = message_size)]
     size: u16,
 
     /// What acknowledges a message
@@ -98,15 +97,19 @@ pub(crate) struct LoadCommand {
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "default")]
     attach: Option<Address>,
 
-    /// Write settings and rows into this file
+    /// Print JSON: an object with the settings, then one for each row
+    #[arg(long)]
+    json: bool,
+
+    /// Write settings and rows into this file, for --beside
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    save: Option<PathBuf>,
 
     /// Draw the round trips into this file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
 
-    /// Show the rows of this file beside the measured ones: a file of --json, or of the Socket.IO
+    /// Show the rows of this file beside the measured ones: a file of --save, or of the Socket.IO
     /// relay in benches/socketio
     #[arg(long, value_name = "FILE")]
     beside: Option<PathBuf>,
@@ -131,6 +134,12 @@ impl FromStr for Rate {
     }
 }
 
+fn message_size(text: &str) -> Result<u16, String> {
+    let size = runtime::size_within(text, HEAD, 1400)?;
+    // The bound fits.
+    Ok(size as u16)
+}
+
 fn row_time(text: &str) -> Result<Duration, String> {
     let time = runtime::duration(text)?;
     let is_bounded = time <= Duration::from_secs(3600);
@@ -143,9 +152,7 @@ impl LoadCommand {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         self.check()?;
         let beside = self.beside.as_deref().map(Report::read).transpose()?;
-        let rows = self.measure()?;
-        let complete = rows.iter().all(|row| row.lost + row.refused == 0);
-        let report = Report {
+        let mut report = Report {
             name: "JAUS".to_owned(),
             components: self.components,
             processes: self.processes,
@@ -153,13 +160,15 @@ impl LoadCommand {
             window: self.window,
             burst: self.burst,
             seconds: self.duration.as_secs_f64(),
-            rows,
+            rows: Vec::new(),
         };
-        if let Some(file) = &self.json {
+        report.rows = self.measure(&report)?;
+        let complete = report.rows.iter().all(|row| row.lost + row.refused == 0);
+        if let Some(file) = &self.save {
             let text = serde_json::to_string_pretty(&report).map_err(Failure::of)?;
             std::fs::write(file, text + "\n").map_err(|error| Failure::file(file, &error))?;
         }
-        if let Some(beside) = &beside {
+        if let (Some(beside), false) = (&beside, self.json) {
             let mut output = Output::new();
             output.line(format_args!("\n{}", beside.title()))?;
             output.line(Row::HEAD)?;
@@ -195,12 +204,38 @@ impl LoadCommand {
         Ok(())
     }
 
-    fn measure(&self) -> Result<Vec<Row>, Failure> {
+    fn measure(&self, settings: &Report) -> Result<Vec<Row>, Failure> {
         let mut output = Output::new();
         let mut fleet = match &self.attach {
             Some(address) => Fleet::attach(std::slice::from_ref(address), self),
             None => Fleet::start(self),
         }?;
+        if self.json {
+            output.line(serde_json::to_string(settings).map_err(Failure::of)?)?;
+        } else {
+            self.print_settings(&mut output)?;
+        }
+        let mut rows = Vec::with_capacity(self.rates.len());
+        for (number, &rate) in (1..).zip(&self.rates) {
+            let run = |pace| Run {
+                number,
+                pace,
+                burst: self.burst,
+                time: self.duration,
+                size: self.size.into(),
+                acknowledged_by: self.acknowledged_by,
+            };
+            let row = fleet.measure(rate, self.window, run)?;
+            match self.json {
+                true => output.line(serde_json::to_string(&row).map_err(Failure::of)?)?,
+                false => output.line(&row)?,
+            }
+            rows.push(row);
+        }
+        Ok(rows)
+    }
+
+    fn print_settings(&self, output: &mut Output) -> Result<(), Failure> {
         output.line(format_args!(
             "{} components in {} processes, {}; {} octets, bursts of {}, {} s for each row",
             self.components,
@@ -213,22 +248,7 @@ impl LoadCommand {
             self.burst,
             self.duration.as_secs_f64()
         ))?;
-        output.line(Row::HEAD)?;
-        let mut rows = Vec::with_capacity(self.rates.len());
-        for (number, &rate) in (1..).zip(&self.rates) {
-            let run = |pace| Run {
-                number,
-                pace,
-                burst: self.burst,
-                time: self.duration,
-                size: self.size.into(),
-                acknowledged_by: self.acknowledged_by,
-            };
-            let row = fleet.measure(rate, self.window, run)?;
-            output.line(&row)?;
-            rows.push(row);
-        }
-        Ok(rows)
+        output.line(Row::HEAD)
     }
 }
 

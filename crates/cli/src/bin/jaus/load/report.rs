@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::Rate;
 use super::process::Tally;
 
-/// Content of a `--json` file.
+/// Content of a `--save` file.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Report {
     /// Name of the measurement in the chart.
@@ -25,6 +25,7 @@ pub(super) struct Report {
     pub(super) burst: u32,
     /// Per row.
     pub(super) seconds: f64,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) rows: Vec<Row>,
 }
 

@@ -42,8 +42,8 @@ pub(crate) struct Monitor {
     #[arg(long, short, default_value = "1s", value_parser = runtime::duration)]
     interval: Duration,
 
-    /// Print one table after the first interval and exit; exit status 1 means that there are no
-    /// peers
+    /// Print one table after the first interval, with --probe after the second, and exit; exit
+    /// status 1 means that there are no peers
     #[arg(long)]
     once: bool,
 
@@ -94,7 +94,7 @@ impl Monitor {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         runtime::run(async {
             let (id, config) = self.network.for_own_node("jaus monitor")?;
-            let node = Node::start(config).map_err(Failure::of)?;
+            let node = self.network.start(config)?;
             let port = node.attach(id.component()).map_err(Failure::of)?;
             let mut probe = self.probe.then(|| Probe::new(port.sender())).transpose()?;
             let component = Component::builder(Kind::OtherSubsystem, "jaus monitor")
@@ -125,6 +125,8 @@ impl Monitor {
         if !self.once {
             screen.show(&self.view(&before, &before, component))?;
         }
+        // The only table waits for the answers to the probes.
+        let mut waits_for_answers = self.once && probe.is_some();
         loop {
             tokio::select! {
                 () = &mut end => return Ok(Outcome::Done),
@@ -133,6 +135,10 @@ impl Monitor {
             let sample = Sample::take(node);
             if let Some(probe) = probe {
                 probe.ask(&sample, component.id());
+            }
+            if std::mem::take(&mut waits_for_answers) {
+                before = sample;
+                continue;
             }
             let view = self.view(&before, &sample, component);
             screen.show(&view)?;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use jaus::address::JausId;
-use jaus::component::Directory;
+use jaus::component::{Directory, Identification, Level};
 use jaus::endpoint::{Counter, Peer};
 use jaus::node::{LinkReport, Node};
 use serde_json::{Value as Json, json};
@@ -28,7 +28,10 @@ pub(super) struct View {
 
 pub(super) struct PeerRow {
     pub(super) id: JausId,
+    /// Of the component.
     pub(super) name: String,
+    /// Name and kind of its subsystem.
+    pub(super) subsystem: String,
     pub(super) kind: String,
     pub(super) address: String,
     link: u16,
@@ -105,14 +108,15 @@ impl Sample {
         seconds: f64,
         directory: &Directory,
     ) -> PeerRow {
-        let told = directory
-            .subsystem(peer.id.subsystem())
-            .and_then(|subsystem| subsystem.identification());
+        let of = |level| directory.identification(level, peer.id);
+        let (own, subsystem) = (of(Level::Component), of(Level::Subsystem));
+        let name = |it: &Identification| it.name.clone();
         let per_second = |count: fn(&Peer) -> u64| rate(count(peer), before.map(count), seconds);
         PeerRow {
             id: peer.id,
-            name: told.map_or_else(String::new, |told| told.name.clone()),
-            kind: told.map_or_else(String::new, |told| told.kind.to_string()),
+            name: own.map(name).unwrap_or_default(),
+            subsystem: subsystem.map(name).unwrap_or_default(),
+            kind: subsystem.map_or_else(String::new, |it| it.kind.to_string()),
             address: peer.path.peer.to_string(),
             link: peer.path.link.0,
             header: peer.version.name(),
@@ -169,6 +173,7 @@ impl View {
             json!({
                 "id": peer.id.to_string(),
                 "name": peer.name,
+                "subsystem": peer.subsystem,
                 "kind": peer.kind,
                 "address": peer.address,
                 "link": peer.link,

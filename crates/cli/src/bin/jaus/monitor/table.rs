@@ -6,10 +6,12 @@ use terminal_size::{Height, Width, terminal_size};
 
 use super::sample::{DropRow, LinkRow, PeerRow, View};
 use jaus_cli::failure::Failure;
-use jaus_cli::output::{Output, disturbs_terminal};
+use jaus_cli::output::{Output, colours_wanted, disturbs_terminal};
 
 /// Maximum number of rows without a limit and without a terminal.
 const MOST: usize = 1000;
+/// The first words of the headings, which no row begins with.
+const HEADINGS: [&str; 3] = ["ID ", "LINK ", "DROPPED "];
 /// Assumed terminal size, if none is reported.
 const USUAL: (usize, usize) = (80, 24);
 /// Escape sequences: the alternate screen without a cursor, and back.
@@ -69,8 +71,14 @@ impl Screen {
                 let mut screen = String::from(if first { OPEN } else { "" });
                 screen.push_str(HOME);
                 let lines = lines(view, self.limit.unwrap_or(MOST).min(room));
+                let colours = colours_wanted(&stdout());
                 for line in lines.iter().take(height.saturating_sub(1)) {
-                    screen.extend(line.chars().take(width));
+                    let line: String = line.chars().take(width).collect();
+                    let is_heading = HEADINGS.iter().any(|it| line.starts_with(it));
+                    match is_heading && colours {
+                        true => screen.push_str(&format!("\x1b[1m{line}\x1b[0m")),
+                        false => screen.push_str(&line),
+                    }
                     screen.push_str(REST_OF_LINE);
                     screen.push_str("\r\n");
                 }
@@ -124,8 +132,9 @@ fn lines(view: &View, most: usize) -> Vec<String> {
 }
 
 fn peer_line(peer: &PeerRow) -> String {
-    let name = match (&*peer.name, &*peer.kind) {
-        ("", kind) => kind,
+    let name = match (&*peer.name, &*peer.subsystem) {
+        ("", "") => &*peer.kind,
+        ("", subsystem) => subsystem,
         (name, _) => name,
     };
     let round_trip = peer.round_trip.map_or_else(

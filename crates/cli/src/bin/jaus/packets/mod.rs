@@ -17,6 +17,7 @@ use jaus_cli::output::say;
 use jaus_view::Timestamp;
 
 /// A captured IP packet.
+#[derive(Clone)]
 pub(super) struct Packet {
     pub(super) interface: String,
     pub(super) time: Timestamp,

@@ -1,10 +1,11 @@
 //! `jaus record`: records the traffic of JAUS peers into a capture file.
 
+mod connections;
 mod filter;
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -12,28 +13,33 @@ use clap::Args;
 use jaus::link::Group;
 use jaus::node::units;
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::output::say;
+use jaus_cli::output::{self, say};
 use jaus_cli::runtime::{self, RunFor};
 use jaus_view::{CaptureWriter, InterfaceNumber, JAUS_PORT, LinkType};
+use serde_json::{Value as Json, json};
 use tokio::time::{MissedTickBehavior, interval};
 
+use crate::events::{EventFormat, EventPrinter};
 use crate::packets::{Packet, Source};
 use filter::Filter;
 
 /// Record JAUS traffic to a capture file, for `jaus decode`, `jaus replay` and Wireshark
 ///
 /// With the privilege to open packet sockets (root, or `setcap cap_net_raw+ep jaus`) it records all
-/// traffic of this host: UDP and TCP of the chosen ports, and datagrams of other ports whose
-/// content is JAUS. Without it, it records only the multicast group and prints a note. Press Ctrl-C
-/// to end; packets are on disk within a second.
+/// traffic of this host: UDP and TCP of the chosen ports, and datagrams and TCP connections of other
+/// ports whose content is JAUS. Without it, it records only the multicast group and prints a note.
+/// Press Ctrl-C to end; packets are on disk within a second.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus record drive.pcapng\n  \
     jaus record drive.pcapng --interface eth0 --for 1min\n  \
     jaus record drive.pcapng --size 500MB --quiet &\n  \
-    jaus decode drive.pcapng")]
+    jaus record - | jaus decode -\n  \
+    jaus decode drive.pcapng\n\n\
+    Events of --json, on standard output: \"progress\" each second and \"end\", with \"packets\" and \
+    \"octets\".")]
 pub(crate) struct Record {
-    /// The file to write (pcapng); it must not exist without --overwrite
+    /// The file to write (pcapng), which must not exist without --overwrite; - is standard output
     file: PathBuf,
 
     /// Overwrite an existing file
@@ -63,27 +69,45 @@ pub(crate) struct Record {
     /// Print no progress
     #[arg(long, short)]
     quiet: bool,
+
+    #[command(flatten)]
+    format: EventFormat,
 }
 
 impl Record {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        if self.format.is_json() && self.file == Path::new(STANDARD_OUTPUT) {
+            return Err(Failure::new(
+                "--json prints events on standard output, where `-` writes the recording: name a file",
+            ));
+        }
         runtime::run(async {
             let mut source = Source::open(&self.interface, self.group)?;
             let mut recording = Recording::create(&self.file, self.overwrite, &self.port)?;
-            let result = self.record(&mut source, &mut recording).await;
+            let mut progress = self.progress();
+            let result = self
+                .record(&mut source, &mut recording, &mut progress)
+                .await;
             recording.flush()?;
-            if !self.quiet {
-                say(format_args!(
-                    "{} in {}",
-                    recording.tally(),
-                    self.file.display()
-                ));
-            }
+            progress.end(&recording)?;
             result.map(|()| Outcome::complete_if(recording.packets > 0))
         })
     }
 
-    async fn record(&self, source: &mut Source, recording: &mut Recording) -> Result<(), Failure> {
+    fn progress(&self) -> Progress {
+        match (self.quiet, self.format.is_json()) {
+            (true, _) => Progress::Quiet,
+            (false, true) => Progress::Events(self.format.printer()),
+            (false, false) => Progress::Words,
+        }
+    }
+
+    async fn record(
+        &self,
+        source: &mut Source,
+        recording: &mut Recording,
+        progress: &mut Progress,
+    ) -> Result<(), Failure> {
         let end = self.run_for.end();
         tokio::pin!(end);
         let mut second = interval(Duration::from_secs(1));
@@ -94,9 +118,9 @@ impl Record {
                 () = &mut end => return Ok(()),
                 _ = second.tick() => {
                     recording.flush()?;
-                    if !self.quiet && recording.packets > told {
+                    if recording.packets > told {
                         told = recording.packets;
-                        say(recording.tally());
+                        progress.tell(recording)?;
                     }
                 }
                 packets = source.next() => {
@@ -111,10 +135,41 @@ impl Record {
     }
 }
 
+/// Where the progress is printed.
+enum Progress {
+    Quiet,
+    /// On standard error.
+    Words,
+    /// On standard output.
+    Events(EventPrinter),
+}
+
+impl Progress {
+    fn tell(&mut self, recording: &Recording) -> Result<(), Failure> {
+        match self {
+            Self::Quiet => {}
+            Self::Words => say(recording.tally()),
+            Self::Events(printer) => printer.plain("progress", recording.to_json(), "")?,
+        }
+        Ok(())
+    }
+
+    fn end(&mut self, recording: &Recording) -> Result<(), Failure> {
+        let file = recording.file.display();
+        match self {
+            Self::Quiet => {}
+            Self::Words if recording.file == Path::new(STANDARD_OUTPUT) => say(recording.tally()),
+            Self::Words => say(format_args!("{} in {file}", recording.tally())),
+            Self::Events(printer) => printer.plain("end", recording.to_json(), "")?,
+        }
+        Ok(())
+    }
+}
+
 /// The file with its counters.
 struct Recording {
     file: PathBuf,
-    writer: CaptureWriter<BufWriter<File>>,
+    writer: CaptureWriter<BufWriter<Box<dyn Write>>>,
     interfaces: BTreeMap<String, InterfaceNumber>,
     filter: Filter,
     packets: u64,
@@ -122,23 +177,13 @@ struct Recording {
 
 impl Recording {
     fn create(path: &Path, overwrite: bool, ports: &[u16]) -> Result<Self, Failure> {
-        let mut options = OpenOptions::new();
-        options.write(true).truncate(true);
-        let options = if overwrite {
-            options.create(true)
-        } else {
-            options.create_new(true)
+        let file: Box<dyn Write> = match path == Path::new(STANDARD_OUTPUT) {
+            true => Box::new(standard_output()?),
+            false => Box::new(new_file(path, overwrite)?),
         };
-        let file = options.open(path).map_err(|error| match error.kind() {
-            io::ErrorKind::AlreadyExists => Failure::new(format!(
-                "{} exists already: choose another name, or add --overwrite",
-                path.display()
-            )),
-            _ => Failure::file(path, &error),
-        })?;
         let program = concat!("jaus ", env!("CARGO_PKG_VERSION"));
         let writer = CaptureWriter::new(BufWriter::new(file), program)
-            .map_err(|error| Failure::file(path, &error))?;
+            .map_err(|error| failure(path, &error))?;
         Ok(Self {
             file: path.to_owned(),
             writer,
@@ -150,10 +195,15 @@ impl Recording {
 
     /// Writes a packet, if it is selected.
     fn take(&mut self, packet: &Packet) -> Result<(), Failure> {
-        if !self.filter.wants(&packet.octets) {
+        let Some(earlier) = self.filter.select(packet) else {
             return Ok(());
-        }
-        let failed = |error| Failure::file(&self.file, &error);
+        };
+        earlier.iter().try_for_each(|packet| self.write(packet))?;
+        self.write(packet)
+    }
+
+    fn write(&mut self, packet: &Packet) -> Result<(), Failure> {
+        let failed = |error| failure(&self.file, &error);
         let known = self.interfaces.get(&packet.interface).copied();
         let on = match known {
             Some(on) => on,
@@ -173,11 +223,54 @@ impl Recording {
 
     fn flush(&mut self) -> Result<(), Failure> {
         let flushed = self.writer.flush();
-        flushed.map_err(|error| Failure::file(&self.file, &error))
+        flushed.map_err(|error| failure(&self.file, &error))
+    }
+
+    fn to_json(&self) -> Json {
+        json!({ "packets": self.packets, "octets": self.writer.written() })
     }
 
     fn tally(&self) -> String {
-        let (packets, octets) = (self.packets, self.writer.written() as f64);
-        format!("{packets} packets recorded, {:.1} kB", octets / 1e3)
+        let written = output::size(self.writer.written());
+        format!("{} packets recorded, {written}", self.packets)
+    }
+}
+
+/// The name that stands for standard output.
+const STANDARD_OUTPUT: &str = "-";
+
+fn standard_output() -> Result<io::Stdout, Failure> {
+    let output = io::stdout();
+    match output.is_terminal() {
+        true => Err(Failure::new(
+            "standard output is a terminal, and a recording is not text: write to a file, or to a \
+             pipe as in `jaus record - | jaus decode -`",
+        )),
+        false => Ok(output),
+    }
+}
+
+fn new_file(path: &Path, overwrite: bool) -> Result<File, Failure> {
+    let mut options = OpenOptions::new();
+    options.write(true).truncate(true);
+    let options = if overwrite {
+        options.create(true)
+    } else {
+        options.create_new(true)
+    };
+    options.open(path).map_err(|error| match error.kind() {
+        io::ErrorKind::AlreadyExists => Failure::new(format!(
+            "{} exists already: choose another name, or add --overwrite",
+            path.display()
+        )),
+        _ => Failure::file(path, &error),
+    })
+}
+
+/// A recording that cannot be written on. A closed pipe is the end that its reader has chosen.
+fn failure(path: &Path, error: &io::Error) -> Failure {
+    match error.kind() {
+        io::ErrorKind::BrokenPipe => Failure::OutputClosed,
+        _ => Failure::file(path, error),
     }
 }

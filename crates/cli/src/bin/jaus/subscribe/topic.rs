@@ -13,6 +13,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::rate::Rate;
+use crate::queries::in_words;
 
 /// A subscription to one query.
 pub(super) struct Topic {
@@ -84,15 +85,7 @@ impl<'d> Printer<'d> {
         let line = self.dictionary.line(octets);
         topic.unreadable += u64::from(line.is_error());
         if !self.is_json {
-            let name = line.message.unwrap_or("unknown report");
-            let fields = match self.dictionary.fields_in_words(octets) {
-                Ok(fields) => fields
-                    .iter()
-                    .map(|it| format!("  {} {}", it.field, it.value))
-                    .collect(),
-                Err(unreadable) => format!("  {unreadable}"),
-            };
-            return self.timed(format_args!("{name}{fields}"));
+            return self.timed(in_words(self.dictionary, octets));
         }
         let report = Report {
             source: topic.subscription.peer().to_string(),

@@ -71,8 +71,7 @@ The file is TOML:
   directory = "~/.local/state/jaus"      # where the parts run; created if missing
   environment = { JAUS_LOG = "info" }
 
-  [parts.planner]                        # runs jaus-planner, from the directory of jaus or from \
-      PATH
+  [parts.planner]                        # runs jaus-planner, beside jaus or in PATH
   flags = { id = "101.3.36", peer = ["10.0.0.2", "10.0.0.3"], loopback = false }
 
   [parts.node]
@@ -83,9 +82,9 @@ The file is TOML:
 Flags have their long names; true gives a flag without a value, false takes one of [all] away, a
 list gives it several times. The order of the parts matters only for stopping: the last ends first.
 
-If `jaus up` itself is killed, the kernel sends SIGTERM to the parts, and a second process of \
-    `jaus up` ends their children and kills the rest after the grace period. A program survives \
-    only if it leaves its process group, or ignores SIGTERM and both processes are killed.
+If `jaus up` itself is killed, the kernel sends SIGTERM to the parts, and a second process of
+`jaus up` ends their children and kills the rest after the grace period. A program survives
+only if it leaves its process group, or ignores SIGTERM and both processes are killed.
 
 Exit status: 0 stopped on request; 1 a part was given up or failed for good; 2 the file is wrong."#;
 

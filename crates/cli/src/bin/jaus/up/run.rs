@@ -6,6 +6,7 @@
 
 use std::time::Instant;
 
+use jaus::node::sleep_until;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::counted;
 use nix::sys::signal::Signal;
@@ -80,13 +81,6 @@ impl Shutdown {
             _ = hangup.recv() => {}
             () = sleep_until(self.limit) => self.limit = None,
         }
-    }
-}
-
-async fn sleep_until(wake: Option<Instant>) {
-    match wake {
-        Some(wake) => tokio::time::sleep_until(wake.into()).await,
-        None => std::future::pending().await,
     }
 }
 

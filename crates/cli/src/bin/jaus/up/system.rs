@@ -22,7 +22,10 @@ pub(super) struct System {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Part {
     pub(super) name: String,
+    /// The program: a name, which is looked up in the directory of `jaus` and in `PATH`, or a path
+    /// relative to the file. The default is `jaus-` and the part's name.
     pub(super) program: PathBuf,
+    /// Arguments before the flags, passed unchanged.
     pub(super) arguments: Vec<String>,
     pub(super) environment: Vec<(String, String)>,
     /// Working directory; created if missing.
@@ -35,9 +38,12 @@ pub(super) struct Part {
 /// Whether a part restarts after it has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Restart {
+    /// Whatever its exit status; the default.
     #[default]
     Always,
+    /// Unless its exit status is 0.
     OnFailure,
+    /// Never.
     Never,
 }
 
@@ -119,10 +125,16 @@ impl System {
 /// Settings of `[all]` and of a part.
 #[derive(Debug, Clone, Default)]
 struct Common {
-    /// By name, as on the command line.
+    /// Flags by their long names. `true` sets a flag without a value, `false` removes one of `[all]`,
+    /// a list sets a flag several times. A flag of a part replaces that of `[all]`.
     flags: BTreeMap<String, Vec<String>>,
+    /// Environment variables, in addition to those of `jaus up`.
     environment: BTreeMap<String, String>,
+    /// The working directory, relative to the file; `~` is the home directory. It is created if
+    /// it is missing. The default is that of `jaus up`.
     directory: Option<PathBuf>,
+    /// Whether a part restarts after it has ended. The delay grows with each failure, up to 30 s.
+    /// After exit status 2, which reports wrong flags, a part never restarts.
     restart: Restart,
 }
 

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::say;
-use jaus_view::{Capture, Dictionary, Entry, Filter, MessageStream, Network};
+use jaus_view::{Capture, Counts, Filter, MessageStream, Network};
 
-use super::{Printer, lost_in};
+use super::{Printer, tell_lost};
+use crate::decode::report_skipped;
 
 /// Maximum length of a line of JSON.
 const LONGEST: u64 = 64 << 20;
@@ -16,8 +17,7 @@ const LONGEST: u64 = 64 << 20;
 pub(super) fn watch(
     places: &[PathBuf],
     filter: &Filter,
-    dictionary: &Dictionary,
-    printer: &mut Printer,
+    printer: &mut Printer<'_>,
 ) -> Result<Outcome, Failure> {
     let mut files = Vec::new();
     for place in places {
@@ -27,8 +27,9 @@ pub(super) fn watch(
             files.push(place.clone());
         }
     }
-    let mut stream = MessageStream::new(dictionary, filter.clone());
+    let mut stream = MessageStream::new(printer.dictionary, filter.clone());
     let mut complete = true;
+    let mut skipped = Counts::default();
     for path in &files {
         let failed = |error| Failure::file(path, &error);
         let mut file = BufReader::new(File::open(path).map_err(failed)?);
@@ -37,15 +38,14 @@ pub(super) fn watch(
             // An empty log: the power failed before the first write.
             None => true,
             Some(b'{') => read_lines(path, file, &stream, printer)?,
-            Some(_) => read_capture(path, file, &mut stream, printer)?,
+            Some(_) => {
+                let (is_complete, counts) = read_capture(path, file, &mut stream, printer)?;
+                skipped += counts;
+                is_complete
+            }
         };
     }
-    match stream.incomplete_messages() {
-        0 => {}
-        count => say(format_args!(
-            "note: {count} large messages skipped: fragments are missing"
-        )),
-    }
+    report_skipped(skipped, stream.incomplete_messages());
     Ok(Outcome::complete_if(complete))
 }
 
@@ -70,13 +70,13 @@ fn logs_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(files)
 }
 
-/// Returns whether all of it was readable.
+/// Returns whether all of it was readable, and what was skipped.
 fn read_capture(
     path: &Path,
     file: impl Read,
     stream: &mut MessageStream<'_>,
-    printer: &mut Printer,
-) -> Result<bool, Failure> {
+    printer: &mut Printer<'_>,
+) -> Result<(bool, Counts), Failure> {
     let name = path.display();
     let mut capture = match Capture::new(file) {
         Ok(capture) => capture,
@@ -102,7 +102,7 @@ fn read_capture(
             }
         }
     }
-    Ok(complete)
+    Ok((complete, network.counts()))
 }
 
 /// Returns whether all lines were readable.
@@ -110,7 +110,7 @@ fn read_lines(
     path: &Path,
     mut file: impl BufRead,
     stream: &MessageStream<'_>,
-    printer: &mut Printer,
+    printer: &mut Printer<'_>,
 ) -> Result<bool, Failure> {
     let name = path.display();
     let mut complete = true;
@@ -134,14 +134,5 @@ fn read_lines(
                 complete = false;
             }
         }
-    }
-}
-
-/// Losses are reported whatever the filter.
-fn tell_lost(line: &str, printer: &mut Printer) -> Result<(), Failure> {
-    let object = serde_json::from_str(line).ok();
-    match object.map(Entry::of_object).as_ref().and_then(lost_in) {
-        Some(count) => printer.lost(count),
-        None => Ok(()),
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use jaus::link::Group;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::runtime;
-use jaus_view::{Dictionary, Filter, Frame, LinkType, MessageStream, Network};
+use jaus_view::{Filter, Frame, LinkType, MessageStream, Network};
 
 use super::Printer;
 use crate::packets::Source;
@@ -14,14 +14,13 @@ pub(super) fn watch(
     interfaces: &[String],
     group: Group,
     filter: &Filter,
-    dictionary: &Dictionary,
     limit: Option<Duration>,
-    printer: &mut Printer,
+    printer: &mut Printer<'_>,
 ) -> Result<Outcome, Failure> {
     runtime::run(async {
         let mut source = Source::open(interfaces, group)?;
         let mut network = Network::by_content();
-        let mut stream = MessageStream::new(dictionary, filter.clone());
+        let mut stream = MessageStream::new(printer.dictionary, filter.clone());
         let end = runtime::end(limit);
         tokio::pin!(end);
         loop {

@@ -6,19 +6,26 @@ use futures_util::StreamExt;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::say;
 use jaus_cli::runtime;
-use jaus_view::{Entry, Filter};
-use serde_json::Value as Json;
+use jaus_view::{Filter, MessageStream};
 use tokio_tungstenite::tungstenite::{Error, Message};
 
-use super::Printer;
+use super::{Printer, tell_lost};
 
+/// Shows what a debug view sends. What it could not decode is decoded here. `filters_here`: after
+/// that, instead of in the debug view.
 pub(super) fn watch(
     address: &str,
     filter: &Filter,
+    filters_here: bool,
     limit: Option<Duration>,
-    printer: &mut Printer,
+    printer: &mut Printer<'_>,
 ) -> Result<Outcome, Failure> {
-    let url = url(address, filter);
+    let (there, here) = match filters_here {
+        true => (Filter::default(), filter.clone()),
+        false => (filter.clone(), Filter::default()),
+    };
+    let url = url(address, &there);
+    let stream = MessageStream::new(printer.dictionary, here);
     runtime::run(async {
         let (mut socket, _) = tokio_tungstenite::connect_async(&url)
             .await
@@ -31,9 +38,12 @@ pub(super) fn watch(
                 message = socket.next() => message,
             };
             match message {
-                Some(Ok(Message::Text(text))) => match serde_json::from_str(&text) {
-                    Ok(Json::Object(object)) => printer.object(&Entry::of_object(object))?,
-                    _ => return Err(Failure::new(format!("{address} sends no JSON objects"))),
+                Some(Ok(Message::Text(text))) => match stream.read_json(&text) {
+                    Ok(Some(entry)) => printer.object(&entry)?,
+                    Ok(None) => tell_lost(&text, printer)?,
+                    Err(_) => {
+                        return Err(Failure::new(format!("{address} sends no JSON objects")));
+                    }
                 },
                 Some(Ok(Message::Close(_))) | None => break,
                 Some(Ok(_)) => {}

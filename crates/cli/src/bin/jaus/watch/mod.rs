@@ -13,7 +13,7 @@ use jaus::link::Group;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::{Output, colours_wanted};
 use jaus_cli::runtime;
-use jaus_view::{Entry, Filter};
+use jaus_view::{Dictionary, Entry, Filter};
 
 use crate::definitions::Jsidl;
 use tally::Tally;
@@ -24,8 +24,9 @@ use tally::Tally;
 /// Live messages come from a communicator's debug view. A viewer that is too slow loses lines, and
 /// their number is shown. With --interface they come from the network itself, without a
 /// communicator: with the privilege to open packet sockets (root, or `setcap cap_net_raw+ep jaus`)
-/// all traffic of this host whose content is JAUS, otherwise the multicast group. Files are captures (from a communicator's --log, `jaus record`, Wireshark
-/// …), JSON lines, or directories with a communicator's log.
+/// all traffic of this host whose content is JAUS, otherwise the multicast group. Files are captures
+/// (from a communicator's --log, `jaus record`, Wireshark …), JSON lines, or directories with a
+/// communicator's log. With --jsidl, messages that the communicator could not decode are decoded here.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus watch\n  \
@@ -111,16 +112,18 @@ pub(crate) struct Watch {
     #[command(flatten)]
     jsidl: Jsidl,
 
-    /// End after this time [default: at Ctrl-C, or at the end of the files]
-    #[arg(long = "for", value_name = "DURATION", value_parser = runtime::duration)]
+    /// End after this time [default: at Ctrl-C]; not for files
+    #[arg(long = "for", value_name = "DURATION", value_parser = runtime::duration, conflicts_with = "files")]
     duration: Option<Duration>,
 }
 
 impl Watch {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         let filter = self.filter()?;
+        let dictionary = self.jsidl.load()?;
         let mut printer = Printer {
             output: Output::new(),
+            dictionary: &dictionary,
             form: match (self.stats, self.json) {
                 (true, _) => Form::Tally(Tally::default()),
                 (false, true) => Form::Json,
@@ -138,21 +141,20 @@ impl Watch {
         Ok(outcome)
     }
 
-    fn watch(&self, filter: &Filter, printer: &mut Printer) -> Result<Outcome, Failure> {
+    fn watch(&self, filter: &Filter, printer: &mut Printer<'_>) -> Result<Outcome, Failure> {
         if !self.files.is_empty() {
-            let dictionary = self.jsidl.load()?;
-            return files::watch(&self.files, filter, &dictionary, printer);
+            return files::watch(&self.files, filter, printer);
         }
+        let limit = self.duration;
         if self.interface.is_empty() {
-            return live::watch(&self.at, filter, self.duration, printer);
+            let filters_here = self.jsidl.is_given();
+            return live::watch(&self.at, filter, filters_here, limit, printer);
         }
-        let dictionary = self.jsidl.load()?;
         let chosen: &[String] = match self.interface.iter().any(|name| name == "all") {
             true => &[],
             false => &self.interface,
         };
-        let limit = self.duration;
-        interfaces::watch(chosen, self.group, filter, &dictionary, limit, printer)
+        interfaces::watch(chosen, self.group, filter, limit, printer)
     }
 
     fn filter(&self) -> Result<Filter, Failure> {
@@ -178,8 +180,9 @@ impl Watch {
 }
 
 /// Prints or counts messages.
-struct Printer {
+struct Printer<'d> {
     output: Output,
+    dictionary: &'d Dictionary,
     form: Form,
 }
 
@@ -189,10 +192,13 @@ enum Form {
     Tally(Tally),
 }
 
-impl Printer {
+impl Printer<'_> {
     fn entry(&mut self, entry: &Entry) -> Result<(), Failure> {
         match &mut self.form {
-            Form::Words { colours } => self.output.line(entry.in_words(*colours)),
+            Form::Words { colours } => {
+                let words = entry.in_words(self.dictionary, *colours);
+                self.output.line(words)
+            }
             Form::Json => self.output.line(entry.to_json()),
             Form::Tally(tally) => {
                 tally.add(entry);
@@ -221,6 +227,15 @@ impl Printer {
             Some(count) => self.lost(count),
             None => self.entry(entry),
         }
+    }
+}
+
+/// Prints the number of lost messages, if a line of JSON is one, whatever the filter.
+fn tell_lost(line: &str, printer: &mut Printer<'_>) -> Result<(), Failure> {
+    let object = serde_json::from_str(line).ok();
+    match object.map(Entry::of_object).as_ref().and_then(lost_in) {
+        Some(count) => printer.lost(count),
+        None => Ok(()),
     }
 }
 

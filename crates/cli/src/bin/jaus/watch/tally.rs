@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use jaus_cli::output::quoted;
 use jaus_view::{Entry, Timestamp};
 
 /// Maximum number of kinds, as an attacker may invent more.
@@ -19,11 +20,12 @@ pub(super) struct Tally {
 impl Tally {
     pub(super) fn add(&mut self, entry: &Entry) {
         self.total += 1;
-        let text = |key| entry.text(key).map(str::to_owned);
+        let text = |key| entry.text(key).map(|it| quoted(it).into_owned());
         let message = match entry.event_report() {
             Some(report) => format!("{report} (event)"),
             None => entry.name(),
         };
+        let message = quoted(&message).into_owned();
         let key = (text("source").unwrap_or_default(), message);
         if self.counts.len() < MOST || self.counts.contains_key(&key) {
             *self.counts.entry(key).or_default() += 1;

@@ -1,8 +1,9 @@
 //! `jaus judge` against correct, faulty, slow and silent peers.
 
 mod examples;
+mod hazard;
 mod outputs;
-mod peer;
+pub(super) mod peer;
 mod replay;
 mod right;
 mod safety;

@@ -56,6 +56,25 @@ fn what_is_not_offered_is_skipped_and_counted_and_the_rest_conforms_as_tested() 
 }
 
 #[test]
+fn names_of_a_peer_and_its_services_cannot_forge_lines_of_the_report() {
+    let flags = network();
+    let urn = "urn:ours:x\n  ok       C5   Emergency";
+    let peer = Peer::offering(&[liveness::URN, urn]).named("Pup\u{1b}]0;x\u{7}pet\n\u{202e}offers");
+    let _peer = peer.start(&flags);
+    let network: Vec<&str> = flags.iter().map(String::as_str).collect();
+    let judge = ["judge", "105.1.1", "--unicast", "--only", "A2"];
+    let run = run(&[&judge, &*network].concat(), b"");
+    for part in [
+        r#"105.1.1 "Pup\u{1b}]0;x\u{7}pet\n\u{202e}offers" offers"#,
+        r#"    "urn:ours:x\n  ok       C5   Emergency" 1.1"#,
+    ] {
+        assert!(run.stdout.contains(part), "no `{part}` in {}", run.stdout);
+    }
+    let is_raw = |c: char| c.is_control() && c != '\n' || c == '\u{202e}';
+    assert!(!run.stdout.contains(is_raw), "{run:?}");
+}
+
+#[test]
 fn a_run_is_written_down_in_every_form_that_is_asked_for() {
     let flags = network();
     let _peer = Peer::offering(&[liveness::URN, access_control::URN]).start(&flags);

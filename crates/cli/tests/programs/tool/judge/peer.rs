@@ -45,7 +45,10 @@ type Answer = (Option<JausId>, Bytes);
 /// Configuration of a peer.
 #[derive(Default)]
 pub(crate) struct Peer {
+    name: Option<&'static str>,
     services: Vec<&'static str>,
+    /// Whether its services have version 1.0 instead of 1.1.
+    has_first_versions: bool,
     /// Answers by the code of the request, in the order of the requests; the last one is repeated.
     answers: BTreeMap<u16, Vec<Vec<Answer>>>,
     delay: Duration,
@@ -73,6 +76,18 @@ impl Peer {
         peer.services.push(jaus::messages::core::transport::URN);
         peer.services.push(jaus::messages::core::discovery::URN);
         peer
+    }
+
+    /// Calls itself something else.
+    pub(crate) fn named(mut self, name: &'static str) -> Self {
+        self.name = Some(name);
+        self
+    }
+
+    /// Lists its services in version 1.0, as JAUS++ does.
+    pub(crate) fn in_first_versions(mut self) -> Self {
+        self.has_first_versions = true;
+        self
     }
 
     /// Adds the answer to the next request of this type.
@@ -172,7 +187,7 @@ impl Peer {
             };
         }
         let octets = match code {
-            QueryIdentification::CODE => identification(&request.payload).encode(),
+            QueryIdentification::CODE => self.identification(&request.payload).encode(),
             QueryServices::CODE => self.services().encode(),
             QueryHeartbeatPulse::CODE
                 if self.services.contains(&jaus::messages::core::liveness::URN) =>
@@ -184,11 +199,20 @@ impl Peer {
         vec![(None, octets.unwrap())]
     }
 
+    fn identification(&self, query: &Bytes) -> ReportIdentification {
+        let query = QueryIdentification::decode(query).unwrap();
+        ReportIdentification {
+            query_type: QueryType(query.query_type.0),
+            r#type: Type::VEHICLE,
+            identification: Text::from_static(self.name.unwrap_or("Puppet")),
+        }
+    }
+
     fn services(&self) -> ReportServices {
         let service = |urn: &&'static str| ServiceRec {
             uri: Text::from_static(urn),
             major_version_number: 1,
-            minor_version_number: 1,
+            minor_version_number: u8::from(!self.has_first_versions),
         };
         let component = ComponentSeq {
             component_rec: ComponentRec {
@@ -205,15 +229,6 @@ impl Peer {
                 component_list: vec![component],
             }],
         }
-    }
-}
-
-fn identification(query: &Bytes) -> ReportIdentification {
-    let query = QueryIdentification::decode(query).unwrap();
-    ReportIdentification {
-        query_type: QueryType(query.query_type.0),
-        r#type: Type::VEHICLE,
-        identification: Text::from_static("Puppet"),
     }
 }
 

@@ -27,7 +27,7 @@ pub(super) trait Scripted {
 #[derive(Debug)]
 enum Happening {
     Arrived(Arrival),
-    Refused(Refusal),
+    Refused(SocketAddr, Refusal),
     Tcp(TcpAnswer),
 }
 
@@ -62,9 +62,9 @@ impl Air {
             .push((self.now + WAY, Happening::Arrived(arrival)));
     }
 
-    pub(super) fn refuse(&mut self, refusal: Refusal) {
+    pub(super) fn refuse(&mut self, address: SocketAddr, refusal: Refusal) {
         self.flying
-            .push((self.now + WAY, Happening::Refused(refusal)));
+            .push((self.now + WAY, Happening::Refused(address, refusal)));
     }
 
     pub(super) fn answer_tcp(&mut self, answer: TcpAnswer) {
@@ -106,7 +106,9 @@ impl Air {
             let (_, happening) = self.flying.remove(0);
             match happening {
                 Happening::Arrived(arrival) => examiner.handle_arrival(self.now, &arrival),
-                Happening::Refused(refusal) => examiner.handle_refusal(self.now, refusal),
+                Happening::Refused(address, refusal) => {
+                    examiner.handle_refusal(self.now, address, refusal);
+                }
                 Happening::Tcp(answer) => examiner.handle_tcp(self.now, answer),
             }
         } else if self.next_beat <= timeout {

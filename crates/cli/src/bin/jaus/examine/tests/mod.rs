@@ -7,8 +7,9 @@ mod scripted;
 use std::time::Duration;
 
 use jaus::address::JausId;
-use jaus::peer::{Certainty, Peer};
+use jaus::peer::{Certainty, Implementation};
 use jaus_cli::failure::Outcome;
+use jaus_test_kit::snapshot;
 
 use super::case::Settings;
 use super::exchange::Exchange;
@@ -22,6 +23,7 @@ fn settings(target: &str) -> Settings {
     Settings {
         target: target.parse().unwrap(),
         own: OWN,
+        last_number: 0,
         wanted: None,
         port: 3794,
         no_group: None,
@@ -67,18 +69,10 @@ fn check(name: &str, settings: Settings, peer: &mut dyn air::Scripted) -> Outcom
     outcome
 }
 
-/// With `JAUS_BLESS` set, replaces the text of this name by the output.
 #[track_caller]
 fn check_text(name: &str, text: &str) {
-    let file = format!(
-        "{}/src/bin/jaus/examine/tests/{name}.txt",
-        env!("CARGO_MANIFEST_DIR")
-    );
-    if std::env::var_os("JAUS_BLESS").is_some() {
-        std::fs::write(&file, text).unwrap();
-    }
-    let expected = std::fs::read_to_string(&file).unwrap_or_default();
-    assert_eq!(text, expected, "{file}");
+    let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/src/bin/jaus/examine/tests");
+    snapshot::check(format!("{directory}/{name}.txt"), text);
 }
 
 /// The first failed exchange.
@@ -129,6 +123,38 @@ fn a_silent_host_and_a_closed_port_are_told_apart() {
         check("closed", settings("10.0.0.2"), &mut closed),
         Outcome::Incomplete
     );
+}
+
+#[test]
+fn a_program_that_holds_its_port_and_reads_nothing_is_said_to_hang() {
+    let mut hung = Silent {
+        hangs: true,
+        ..Silent::default()
+    };
+    let outcome = check("hung", settings("10.0.0.2"), &mut hung);
+    assert_eq!(outcome, Outcome::Incomplete);
+}
+
+#[test]
+fn a_peer_that_moved_is_named_with_its_new_address_whether_or_not_its_id_is_given() {
+    for (target, told) in [
+        (
+            "10.0.0.9",
+            "use its address: jaus examine 77.1.1@10.0.0.2:3794",
+        ),
+        (
+            "77.1.1@10.0.0.9",
+            "use that: jaus examine 77.1.1@10.0.0.2:3794",
+        ),
+    ] {
+        let mut peer = Vehicle::sound();
+        // It sends nothing by itself.
+        peer.calls = false;
+        let (text, outcome) = words(settings(target), &mut peer);
+        assert_eq!(outcome, Outcome::Incomplete);
+        assert!(text.contains(told), "{text}");
+        assert!(text.contains("the peer has another address"), "{text}");
+    }
 }
 
 #[test]
@@ -226,16 +252,24 @@ fn junior_without_services_acknowledges_and_no_more() {
 fn junior_is_told_by_the_message_types_that_it_takes_and_its_fork_by_zeros() {
     type Knob = fn(&mut Vehicle);
     let juniors: fn(u8) -> bool = |kind| kind & 0b11 == 0;
-    let cases: [(Knob, Peer, Certainty); 5] = [
-        (|_| {}, Peer::Standard, Certainty::Unknown),
+    let cases: [(Knob, Implementation, Certainty); 5] = [
+        (|_| {}, Implementation::Standard, Certainty::Unknown),
         (
             |v| v.takes_type = |_| true,
-            Peer::Standard,
+            Implementation::Standard,
             Certainty::Unknown,
         ),
-        (|v| v.zero_is_all = true, Peer::Standard, Certainty::Unknown),
-        (|_| {}, Peer::Junior, Certainty::Certain),
-        (|v| v.zero_is_all = true, Peer::Jts, Certainty::Certain),
+        (
+            |v| v.zero_is_all = true,
+            Implementation::Standard,
+            Certainty::Unknown,
+        ),
+        (|_| {}, Implementation::Junior, Certainty::Certain),
+        (
+            |v| v.zero_is_all = true,
+            Implementation::Jts,
+            Certainty::Certain,
+        ),
     ];
     for (number, (knob, peer, certainty)) in cases.into_iter().enumerate() {
         let mut scripted = Vehicle::sound();
@@ -288,6 +322,15 @@ fn each_exchange_that_fails_is_the_first_to_be_named() {
         told.push('\n');
     }
     check_text("failures", &told);
+}
+
+#[test]
+fn a_name_cannot_forge_a_line_of_the_report() {
+    let mut peer = Vehicle::sound();
+    peer.name = "Mule\u{1b}[2J\nfailed\u{202e}";
+    let (text, _) = printed(settings("10.0.0.2"), &mut peer);
+    let told = r#"identification     "Mule\u{1b}[2J\nfailed\u{202e}", a vehicle"#;
+    assert!(text.contains(told), "{text}");
 }
 
 #[test]

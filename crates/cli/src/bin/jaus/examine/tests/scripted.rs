@@ -25,6 +25,7 @@ pub(super) struct Subscription {
 /// A peer that passes everything, unless an option makes it fail.
 pub(super) struct Vehicle {
     pub(super) id: JausId,
+    pub(super) name: &'static str,
     pub(super) address: SocketAddr,
     pub(super) speaks_from: u16,
     pub(super) hears_at_source: bool,
@@ -76,6 +77,7 @@ impl Vehicle {
     pub(super) fn sound() -> Self {
         Self {
             id: JausId::new(77, 1, 1),
+            name: "Mule",
             address: ([10, 0, 0, 2], 3794).into(),
             speaks_from: 3794,
             hears_at_source: false,
@@ -194,7 +196,7 @@ impl Vehicle {
                 let report = ReportIdentification {
                     query_type: report_identification::QueryType::SUBSYSTEM_IDENTIFICATION,
                     r#type: report_identification::Type::VEHICLE,
-                    identification: Text::from("Mule"),
+                    identification: Text::from(self.name),
                 };
                 self.tell(from, &report, air);
             }
@@ -432,7 +434,9 @@ impl Scripted for Vehicle {
             Send::Group(_) => {}
             Send::Probe(to, _) => {
                 if to.ip() == self.address.ip() && *to != self.address {
-                    air.refuse(Refusal::Port);
+                    air.refuse(*to, Refusal::Port);
+                } else if to.ip() != self.address.ip() {
+                    air.refuse(*to, Refusal::Host);
                 }
             }
             Send::Connect(_) => air.answer_tcp(TcpAnswer::Refused),
@@ -462,19 +466,23 @@ impl Scripted for Vehicle {
     }
 }
 
-/// A silent host, a closed port, or an absent host.
+/// A silent host, a closed port, a program that hangs, or an absent host.
 #[derive(Default)]
 pub(super) struct Silent {
     pub(super) refuses: bool,
+    /// Refuses all ports but that of the program, which reads nothing.
+    pub(super) hangs: bool,
     pub(super) gone: bool,
 }
 
 impl Scripted for Silent {
     fn hear(&mut self, send: &Send, air: &mut Air) {
         match send {
-            Send::Probe(..) if self.refuses => air.refuse(Refusal::Port),
+            Send::Probe(to, _) if self.refuses || self.hangs && to.port() != 3794 => {
+                air.refuse(*to, Refusal::Port);
+            }
             // Meanwhile the system has searched for the host.
-            Send::To(..) if self.gone => air.refuse(Refusal::Host),
+            Send::To(to, _) if self.gone => air.refuse(*to, Refusal::Host),
             _ => {}
         }
     }

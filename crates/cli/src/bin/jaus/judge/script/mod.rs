@@ -15,6 +15,8 @@ pub(super) mod service;
 mod specimen;
 mod transitions;
 
+use std::collections::BTreeMap;
+
 use jaus::messages::{core, mobility as jss};
 
 use super::step::{Name, Step};
@@ -65,6 +67,23 @@ pub(super) fn selected(steps: Vec<Step>, chosen: impl Fn(Name) -> bool) -> Vec<S
     steps.into_iter().filter(is_wanted).collect()
 }
 
+/// The steps that a choice leaves out, with the reasons: the chosen ones, and those that depend on
+/// them.
+pub(super) fn left_out(steps: &[Step], chosen: impl Fn(Name) -> bool) -> BTreeMap<Name, String> {
+    let mut left_out = BTreeMap::new();
+    for step in steps {
+        let Name { part, .. } = step.name;
+        let mut before = step.rests_on.iter().map(|&number| Name { part, number });
+        if chosen(step.name) {
+            left_out.insert(step.name, "left out by --skip".to_owned());
+        } else if let Some(missing) = before.find(|name| left_out.contains_key(name)) {
+            let reason = format!("depends on {missing}, which --skip leaves out");
+            left_out.insert(step.name, reason);
+        }
+    }
+    left_out
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::step::Part;
@@ -98,5 +117,15 @@ mod tests {
         let chosen = selected(steps(), |name| name == only);
         let names: Vec<_> = chosen.iter().map(|step| step.name.to_string()).collect();
         assert_eq!(names, ["B15", "B17"]);
+    }
+
+    #[test]
+    fn a_step_that_is_left_out_takes_along_what_depends_on_it() {
+        let skip: Name = "B4".parse().unwrap();
+        let left_out = left_out(&steps(), |name| name == skip);
+        let names: Vec<_> = left_out.keys().map(ToString::to_string).collect();
+        assert_eq!(names, ["B4", "B5", "B8", "B9", "B10"]);
+        let reason = &left_out[&"B10".parse().unwrap()];
+        assert_eq!(reason, "depends on B4, which --skip leaves out");
     }
 }

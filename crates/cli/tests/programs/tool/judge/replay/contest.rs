@@ -1,13 +1,13 @@
 //! The judging tool of the 2015 competition: its scored run and a practice run. The vehicle's
 //! answers are compared with a file beside this one, reviewed by hand.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 use jaus::codec::Message;
 use jaus::messages::core::{CreateEvent, RejectEventRequest};
 use jaus::wire::Frame;
-use jaus_test_kit::evidence;
+use jaus_test_kit::{evidence, snapshot};
 use jaus_view::Dictionary;
 use serde_json::{Value as Json, json};
 
@@ -33,8 +33,6 @@ const CONTEST: [&str; 11] = [
     "LocalPoseSensor",
     "PrimitiveDriver",
 ];
-/// Variable that makes the test rewrite the files; review them afterwards.
-const RENEW: &str = "JAUS_RENEW_SNAPSHOTS";
 /// Short pauses: still long enough for a reset, during which the tool waited 1.5 s.
 const SHORT: Pauses = Pauses(Duration::from_millis(20));
 /// Pauses of the tool.
@@ -52,32 +50,18 @@ fn replay(capture: &str, pauses: Pauses) -> Option<Vec<Exchange>> {
     Some(exchanges)
 }
 
-/// Requires every answer, and compares the exchanges with the stored ones.
+/// Requires every answer, and compares the exchanges with the stored ones, one per line.
 #[track_caller]
-fn check(exchanges: &[Exchange], snapshot: &str) {
+fn check(exchanges: &[Exchange], file: &str) {
     let dictionary = Dictionary::new();
-    let lines: Vec<String> = exchanges
-        .iter()
-        .map(|exchange| line(&dictionary, exchange).to_string())
-        .collect();
-    let path = kept(snapshot);
-    if std::env::var_os(RENEW).is_some() {
-        std::fs::write(&path, lines.join("\n") + "\n").unwrap();
-    }
-    for (exchange, line) in exchanges.iter().zip(&lines) {
+    let mut lines = String::new();
+    for exchange in exchanges {
+        let line = line(&dictionary, exchange);
         assert!(is_answered(exchange), "no answer: {line}");
+        lines += &format!("{line}\n");
     }
-    let kept = std::fs::read_to_string(&path).unwrap();
-    let kept: Vec<&str> = kept.lines().collect();
-    for (number, (is, was)) in lines.iter().zip(&kept).enumerate() {
-        assert_eq!(is, was, "exchange {} of {}", number + 1, path.display());
-    }
-    assert_eq!(lines.len(), kept.len(), "exchanges in {}", path.display());
-}
-
-fn kept(snapshot: &str) -> PathBuf {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/tool/judge/replay");
-    here.join(snapshot)
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/tool/judge/replay");
+    snapshot::check(directory.join(file), &lines);
 }
 
 /// An exchange in readable form.

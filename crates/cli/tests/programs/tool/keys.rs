@@ -1,0 +1,165 @@
+//! `jaus keys`, and commands that reach a vehicle by a secure link alone.
+
+use std::path::PathBuf;
+
+use tempfile::TempDir;
+
+use super::judge::peer::free_port;
+use crate::support::{Run, Running, run};
+
+/// The folder with the keys of one host.
+struct Host(TempDir);
+
+impl Host {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn file(&self, name: &str) -> String {
+        let path: PathBuf = self.0.path().join(name);
+        path.to_str().unwrap().to_owned()
+    }
+
+    fn flags(&self) -> [String; 2] {
+        let [key, trusted] = ["node.key", "trusted_keys"].map(|name| self.file(name));
+        [format!("--key={key}"), format!("--trusted-keys={trusted}")]
+    }
+
+    fn keys(&self, arguments: &[&str]) -> Run {
+        let flags = self.flags();
+        let flags = flags.each_ref().map(String::as_str);
+        run(&[&["keys"], arguments, &flags].concat(), b"")
+    }
+
+    /// Makes the host's key and returns the public one.
+    fn new_key(&self) -> String {
+        let made = self.keys(&["new"]);
+        assert_eq!(made.status, 0, "{made:?}");
+        made.stdout.trim().to_owned()
+    }
+
+    fn trust(&self, name: &str, key: &str, ids: &str) {
+        let trusted = self.keys(&["trust", name, key, ids]);
+        assert_eq!((trusted.status, &*trusted.stderr), (0, ""), "{trusted:?}");
+    }
+}
+
+/// A vehicle that listens at a port, and the host of an operator, 60.255.255, that it trusts.
+fn vehicle_and_operator(id: &str) -> (Running, Host, Host, String) {
+    let (at_vehicle, at_operator) = (Host::new(), Host::new());
+    let (vehicle_key, operator_key) = (at_vehicle.new_key(), at_operator.new_key());
+    at_vehicle.trust("operator", &operator_key, "60.255.255");
+    at_operator.trust("rover", &vehicle_key, "115.255.255");
+    let address = format!("127.0.0.1:{}", free_port());
+    let listen = format!("--secure-listen={address}");
+    let flags = at_vehicle.flags();
+    let flags = flags.each_ref().map(String::as_str);
+    let mut vehicle = Running::command("vehicle", &[&["--id", id, &listen][..], &flags].concat());
+    vehicle.read_until("Ctrl-C");
+    (vehicle, at_vehicle, at_operator, address)
+}
+
+fn as_operator(host: &Host, address: &str, arguments: &[&str]) -> Run {
+    let flags = host.flags();
+    let flags = flags.each_ref().map(String::as_str);
+    run(
+        &[arguments, &["--secure-peer", address], &flags].concat(),
+        b"",
+    )
+}
+
+#[test]
+fn a_vehicle_is_found_and_queried_by_a_secure_link_alone() {
+    let (_vehicle, _, operator, address) = vehicle_and_operator("115.1.1");
+    let query = ["query", "115.1.1", "QueryIdentification", "--id", "60.1.1"];
+    let answered = as_operator(&operator, &address, &query);
+    assert_eq!(answered.status, 0, "{answered:?}");
+    assert!(answered.stdout.contains("Rover"), "{answered:?}");
+
+    let plain = run(
+        &[
+            "query",
+            "115.1.1",
+            "QueryIdentification",
+            "--loopback",
+            "--timeout",
+            "500ms",
+        ],
+        b"",
+    );
+    assert_eq!((plain.status, &*plain.stdout), (1, ""), "{plain:?}");
+}
+
+#[test]
+fn an_id_for_which_a_key_may_not_speak_gets_no_answer() {
+    let (_vehicle, _, operator, address) = vehicle_and_operator("115.1.2");
+    let query = [
+        "query",
+        "115.1.2",
+        "QueryIdentification",
+        "--timeout",
+        "2s",
+        "--id",
+    ];
+    let foreign = as_operator(&operator, &address, &[&query[..], &["61.1.1"]].concat());
+    assert_eq!((foreign.status, &*foreign.stdout), (1, ""), "{foreign:?}");
+}
+
+#[test]
+fn a_revoked_key_loses_its_link_and_gets_no_other() {
+    let (_vehicle, at_vehicle, operator, address) = vehicle_and_operator("115.1.3");
+    let flags = operator.flags();
+    let flags = flags.each_ref().map(String::as_str);
+    let watch = ["--watch", "--id", "60.1.1", "--secure-peer", &address];
+    let mut watching = Running::command("discover", &[&watch[..], &flags].concat());
+    watching.read_until("115.1.3");
+    let revoked = at_vehicle.keys(&["revoke", "operator"]);
+    assert_eq!(revoked.status, 0, "{revoked:?}");
+    watching.read_until("lost");
+    let query = [
+        "query",
+        "115.1.3",
+        "QueryIdentification",
+        "--timeout",
+        "1s",
+        "--id",
+        "60.1.1",
+    ];
+    assert_eq!(as_operator(&operator, &address, &query).status, 1);
+}
+
+#[test]
+fn keys_are_made_shown_listed_and_revoked_with_clear_errors() {
+    let host = Host::new();
+    let missing = host.keys(&["show"]);
+    assert_eq!(missing.status, 2, "{missing:?}");
+    let key = host.new_key();
+    assert_eq!(host.keys(&["show"]).stdout.trim(), key);
+    let again = host.keys(&["new"]);
+    assert_eq!(again.status, 2);
+    assert!(again.stderr.contains("peers trust its key"), "{again:?}");
+
+    host.trust("rover", &key, "101.255.255");
+    let listed = host.keys(&["list", "--json"]);
+    assert_eq!(listed.json()[0]["ids"][0], "101.255.255", "{listed:?}");
+    let twice = host.keys(&["trust", "other", &key, "102.255.255"]);
+    assert!(
+        twice.status == 2 && twice.stderr.contains("already"),
+        "{twice:?}"
+    );
+    assert_eq!(host.keys(&["revoke", "nobody"]).status, 1);
+    assert_eq!(host.keys(&["revoke", "rover"]).status, 0);
+    assert_eq!(host.keys(&["list"]).status, 1, "no key is left");
+}
+
+#[test]
+fn a_node_without_a_key_says_how_to_make_one() {
+    let host = Host::new();
+    let query = ["query", "115.1.4", "QueryIdentification", "--id", "60.1.1"];
+    let refused = as_operator(&host, "127.0.0.1", &query);
+    assert_eq!(refused.status, 2, "{refused:?}");
+    assert!(refused.stderr.contains("jaus keys new"), "{refused:?}");
+    host.new_key();
+    let refused = as_operator(&host, "127.0.0.1", &query);
+    assert!(refused.stderr.contains("jaus keys trust"), "{refused:?}");
+}

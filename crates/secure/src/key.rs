@@ -1,0 +1,312 @@
+//! A node's key: Ed25519, in a file that only its owner can read.
+
+use std::fmt;
+use std::fs::{self, OpenOptions};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::sync::Arc;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use ring::rand::SystemRandom;
+use ring::signature::Ed25519KeyPair;
+use rustls::pki_types::{PrivatePkcs8KeyDer, SubjectPublicKeyInfoDer, pem::PemObject as _};
+use rustls::sign::SigningKey;
+
+/// The octets before an Ed25519 key in a `SubjectPublicKeyInfo` (RFC 8410, section 4).
+const SPKI_PREFIX: [u8; 12] = [
+    0x30, 0x2A, 0x30, 0x05, 0x06, 0x03, 0x2B, 0x65, 0x70, 0x03, 0x21, 0x00,
+];
+/// Characters of a line of PEM.
+const PEM_LINE: usize = 64;
+
+/// Why a key cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum KeyError {
+    /// The file cannot be read or written.
+    #[error("the key file {}: {source}", .path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: io::Error,
+    },
+    /// The file exists, and a new key would replace it.
+    #[error(
+        "the key file {} exists: peers trust its key; remove the file first to replace it",
+        .0.display()
+    )]
+    Exists(PathBuf),
+    /// Other users of the host can read the file.
+    #[error(
+        "the key file {} can be read by other users (mode {mode:03o}): run `chmod 600 {}`; if \
+         they may have read it, make a new key",
+        .path.display(), .path.display()
+    )]
+    Readable {
+        /// The file.
+        path: PathBuf,
+        /// Its permission bits.
+        mode: u32,
+    },
+    /// The file does not contain an Ed25519 key.
+    #[error("the key file {} contains no Ed25519 private key in PKCS #8 PEM", .0.display())]
+    Malformed(PathBuf),
+    /// The operating system provides no random numbers.
+    #[error("the operating system provides no random numbers")]
+    NoRandomness,
+    /// A text is not a public key.
+    #[error("`{0}` is not a public key: 44 characters of base64 are expected")]
+    Text(String),
+}
+
+/// The private key of a node. It is never shown or logged.
+#[derive(Clone)]
+pub struct Key {
+    signing: Arc<dyn SigningKey>,
+    public: PublicKey,
+}
+
+impl Key {
+    /// Makes a new key and writes it to a file that only its owner can read.
+    ///
+    /// # Errors
+    /// If the file exists or cannot be written, or without random numbers.
+    pub fn create(path: &Path) -> Result<Self, KeyError> {
+        let document = Ed25519KeyPair::generate_pkcs8(&SystemRandom::new())
+            .map_err(|_| KeyError::NoRandomness)?;
+        let key = Self::from_pkcs8(document.as_ref())
+            .ok_or_else(|| KeyError::Malformed(path.to_owned()))?;
+        write_new(path, &pem(document.as_ref())).map_err(|source| match source.kind() {
+            io::ErrorKind::AlreadyExists => KeyError::Exists(path.to_owned()),
+            _ => in_file(path, source),
+        })?;
+        Ok(key)
+    }
+
+    /// Reads a key file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, can be read by other users too, or contains no Ed25519 key.
+    pub fn load(path: &Path) -> Result<Self, KeyError> {
+        check_mode(path)?;
+        let octets = fs::read(path).map_err(|source| in_file(path, source))?;
+        PrivatePkcs8KeyDer::from_pem_slice(&octets)
+            .ok()
+            .and_then(|der| Self::from_pkcs8(der.secret_pkcs8_der()))
+            .ok_or_else(|| KeyError::Malformed(path.to_owned()))
+    }
+
+    fn from_pkcs8(octets: &[u8]) -> Option<Self> {
+        let der = PrivatePkcs8KeyDer::from(octets);
+        let signing = rustls::crypto::ring::sign::any_eddsa_type(&der).ok()?;
+        let public = PublicKey::from_spki(signing.public_key()?.as_ref())?;
+        Some(Self { signing, public })
+    }
+
+    /// The public key.
+    #[must_use]
+    pub const fn public(&self) -> PublicKey {
+        self.public
+    }
+
+    pub(crate) fn signing(&self) -> Arc<dyn SigningKey> {
+        self.signing.clone()
+    }
+}
+
+impl fmt::Debug for Key {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Key")
+            .field("public", &self.public)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The public key of a node, as text 44 characters of base64.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PublicKey([u8; 32]);
+
+impl PublicKey {
+    /// From the octets of the key.
+    #[must_use]
+    pub const fn from_octets(octets: [u8; 32]) -> Self {
+        Self(octets)
+    }
+
+    pub(crate) fn from_spki(spki: &[u8]) -> Option<Self> {
+        let octets = spki.strip_prefix(&SPKI_PREFIX)?;
+        octets.try_into().ok().map(Self)
+    }
+
+    pub(crate) fn spki(self) -> SubjectPublicKeyInfoDer<'static> {
+        [&SPKI_PREFIX[..], &self.0].concat().into()
+    }
+}
+
+impl fmt::Display for PublicKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&BASE64.encode(self.0))
+    }
+}
+
+impl fmt::Debug for PublicKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl FromStr for PublicKey {
+    type Err = KeyError;
+
+    fn from_str(text: &str) -> Result<Self, KeyError> {
+        let octets = BASE64.decode(text).ok().and_then(|it| it.try_into().ok());
+        octets
+            .map(Self)
+            .ok_or_else(|| KeyError::Text(text.chars().take(60).collect()))
+    }
+}
+
+fn pem(octets: &[u8]) -> String {
+    let base64 = BASE64.encode(octets);
+    let mut text = "-----BEGIN PRIVATE KEY-----\n".to_owned();
+    let mut rest = base64.as_str();
+    while !rest.is_empty() {
+        let (line, after) = rest.split_at(rest.len().min(PEM_LINE));
+        text.push_str(line);
+        text.push('\n');
+        rest = after;
+    }
+    text + "-----END PRIVATE KEY-----\n"
+}
+
+fn in_file(path: &Path, source: io::Error) -> KeyError {
+    KeyError::File {
+        path: path.to_owned(),
+        source,
+    }
+}
+
+fn write_new(path: &Path, text: &str) -> io::Result<()> {
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let mut file = options.open(path)?;
+    file.write_all(text.as_bytes())?;
+    file.sync_all()
+}
+
+/// Refuses a file that its group or other users can read.
+#[cfg(unix)]
+fn check_mode(path: &Path) -> Result<(), KeyError> {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    let metadata = fs::metadata(path).map_err(|source| in_file(path, source))?;
+    match metadata.permissions().mode() & 0o777 {
+        mode if mode & 0o077 != 0 => Err(KeyError::Readable {
+            path: path.to_owned(),
+            mode,
+        }),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(not(unix))]
+fn check_mode(_: &Path) -> Result<(), KeyError> {
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_new_key_is_read_back_and_is_never_shown() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("node.key");
+        let key = Key::create(&path).unwrap();
+        assert_eq!(Key::load(&path).unwrap().public(), key.public());
+        let other = Key::create(&folder.path().join("other.key")).unwrap();
+        assert_ne!(other.public(), key.public());
+
+        let secret: String = fs::read_to_string(&path)
+            .unwrap()
+            .lines()
+            .skip(1)
+            .take(1)
+            .collect();
+        assert!(!format!("{key:?}").contains(&secret));
+        assert!(format!("{key:?}").contains(&key.public().to_string()));
+    }
+
+    #[test]
+    fn a_key_file_is_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("node.key");
+        let key = Key::create(&path).unwrap();
+        assert!(matches!(Key::create(&path), Err(KeyError::Exists(_))));
+        assert_eq!(Key::load(&path).unwrap().public(), key.public());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_key_file_that_others_can_read_is_refused_with_the_remedy() {
+        use std::os::unix::fs::PermissionsExt as _;
+
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("node.key");
+        Key::create(&path).unwrap();
+        assert_eq!(
+            fs::metadata(&path).unwrap().permissions().mode() & 0o777,
+            0o600
+        );
+        for mode in [0o640, 0o604, 0o644, 0o620] {
+            fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
+            let error = Key::load(&path).unwrap_err().to_string();
+            assert!(error.contains("chmod 600"), "{mode:o}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_file_without_a_key_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("node.key");
+        assert!(matches!(Key::load(&path), Err(KeyError::File { .. })));
+        let whole = {
+            Key::create(&path).unwrap();
+            fs::read_to_string(&path).unwrap()
+        };
+        for text in [
+            "",
+            "no key",
+            &whole[..whole.len() / 2],
+            &whole.replace("PRIVATE", "PUBLIC"),
+        ] {
+            fs::write(&path, text).unwrap();
+            assert!(
+                matches!(Key::load(&path), Err(KeyError::Malformed(_))),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_public_key_is_written_as_it_is_read() {
+        let key = PublicKey::from_octets([7; 32]);
+        assert_eq!(key.to_string().len(), 44);
+        assert_eq!(key.to_string().parse::<PublicKey>().unwrap(), key);
+        assert_eq!(PublicKey::from_spki(key.spki().as_ref()), Some(key));
+        for text in [
+            "",
+            "rover",
+            "AAAA",
+            &BASE64.encode([7; 31]),
+            &BASE64.encode([7; 33]),
+        ] {
+            assert!(text.parse::<PublicKey>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Whole nodes that have nothing but a secure link between them.
+
+use std::time::{Duration, SystemTime};
+
+use jaus::component::{Component, Handlers, Kind, Update, When};
+use jaus::messages::mobility::{
+    QueryAccelerationState, QueryAccelerationStateExt, ReportAccelerationState,
+    acceleration_state_sensor,
+};
+use jaus::node::{Config, Node};
+
+use super::*;
+use crate::trust::{Peer, Trust};
+
+/// Longer than any step takes.
+const LIMIT: Duration = Duration::from_secs(20);
+
+fn key(folder: &tempfile::TempDir, name: &str) -> Key {
+    Key::create(&folder.path().join(name)).unwrap()
+}
+
+fn trusting(name: &str, key: &Key, ids: &str) -> TrustFile {
+    TrustFile::of(Trust::new(vec![Peer {
+        name: name.to_owned(),
+        key: key.public(),
+        ids: vec![ids.parse().unwrap()],
+    }]))
+}
+
+fn node(subsystem: u16, link: SecureLink) -> Node {
+    let config = Config::new(subsystem, 1).without_udp();
+    Node::start_with(config, vec![Box::new(link)]).unwrap()
+}
+
+fn sensor(node: &Node) -> Component {
+    let sensor = Handlers::new(acceleration_state_sensor::LATEST)
+        .publishes::<QueryAccelerationState>()
+        .publishes::<QueryAccelerationStateExt>();
+    let builder = Component::builder(Kind::Vehicle, "Rover").offer(sensor);
+    builder.attach(node, 52).unwrap()
+}
+
+fn client(node: &Node) -> Component {
+    let builder = Component::builder(Kind::OperatorControlUnit, "Client");
+    builder.attach(node, 1).unwrap()
+}
+
+#[tokio::test]
+async fn a_sensor_is_found_queried_and_subscribed_over_a_secure_link_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let (rover_key, client_key) = (key(&folder, "rover"), key(&folder, "client"));
+    let any = "127.0.0.1:0".parse().unwrap();
+    let trust = trusting("client", &client_key, "60.255.255");
+    let at_rover = SecureLink::open(&rover_key, trust, Settings::new(any)).unwrap();
+    let settings = Settings::new(any).connect(at_rover.local().unwrap());
+    let trust = trusting("rover", &rover_key, "101.255.255");
+    let at_client = SecureLink::open(&client_key, trust, settings).unwrap();
+
+    let nodes = [node(101, at_rover), node(60, at_client)];
+    let (rover, client) = (sensor(&nodes[0]), client(&nodes[1]));
+    let mut report = ReportAccelerationState::default();
+    report.set_acceleration_x_m_per_s2(0.5).unwrap();
+    rover
+        .publish(report.clone(), SystemTime::now())
+        .await
+        .unwrap();
+
+    let exchange = async {
+        let found = client.find(acceleration_state_sensor::URN).await.unwrap();
+        assert_eq!(found, rover.id());
+        let query = QueryAccelerationState::none().with_acceleration_x();
+        let answer = client.query(found, &query).await.unwrap();
+        assert_eq!(answer.acceleration_x, report.acceleration_x);
+        let mut reports = client
+            .subscribe(found, &query, When::hz(20.0))
+            .await
+            .unwrap();
+        while let Some(update) = reports.next().await {
+            if matches!(update, Update::Report(_)) {
+                break;
+            }
+        }
+    };
+    tokio::time::timeout(LIMIT, exchange)
+        .await
+        .expect("an answer");
+    for node in nodes {
+        node.shutdown().await;
+    }
+}

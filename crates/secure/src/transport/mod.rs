@@ -1,0 +1,571 @@
+//! The protocol of a secure link, without I/O: handshakes, sessions, dials, and the check that each
+//! key speaks only for its own ids.
+//!
+//! The owner passes in UDP datagrams ([`Transport::handle_datagram`]), time
+//! ([`Transport::handle_timeout`]) and JUDP datagrams to send ([`Transport::send`],
+//! [`Transport::send_to_all`]). Then it polls until there is no more output:
+//! [`Transport::poll_arrival`] for what was received, [`Transport::poll_transmit`] for UDP datagrams,
+//! [`Transport::poll_timeout`] for when to call `handle_timeout`.
+//!
+//! The side that was dialled sends an empty datagram on a stream when it has accepted the key of the
+//! other side; with it the session begins for both.
+//!
+//! Two nodes that dial each other get two connections. Both sides keep the one that the smaller
+//! public key dialled, or else the newer one.
+
+mod dial;
+mod inlet;
+mod report;
+mod session;
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::net::{IpAddr, SocketAddr};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bytes::{Bytes, BytesMut};
+use jaus::endpoint::SessionId;
+use jaus::link::custom::Arrival;
+use jaus::wire::{Priority, judp};
+use quinn_proto::{
+    ClientConfig, ConnectionError, ConnectionHandle, DatagramEvent, Endpoint, EndpointConfig,
+    Event, IdleTimeout, Incoming, ServerConfig, StreamEvent, StreamId, TransportConfig, VarInt,
+};
+use rustls::pki_types::CertificateDer;
+
+pub use report::{Counters, SessionReport};
+
+use crate::key::{Key, PublicKey};
+use crate::tls::{self, Refusals};
+use crate::trust::TrustFile;
+use dial::Dial;
+use session::{STREAMS, Session};
+
+/// A session without a packet from the peer for this time has ended. The stack's own timeouts, which
+/// stop a vehicle, are of the same order.
+const IDLE: Duration = Duration::from_secs(5);
+/// The interval of keep-alives, which also keep a NAT's mapping.
+const KEEP_ALIVE: Duration = Duration::from_secs(1);
+/// Limit of unfinished handshakes.
+const MOST_HANDSHAKES: usize = 64;
+/// Limit of unfinished handshakes from one network address.
+const MOST_HANDSHAKES_PER_ADDRESS: usize = 8;
+/// From this number of unfinished handshakes on, a peer must first show that it receives at its
+/// address.
+const RETRY_FROM: usize = 4;
+/// Octets of QUIC datagrams that may wait in a connection. What exceeds them waits in the backlog of
+/// the session, where an urgent message can overtake it.
+const DATAGRAM_BUFFER: usize = 16 << 10;
+/// The shortest interval between warnings about refused keys.
+const WARNING_PAUSE: Duration = Duration::from_secs(10);
+
+/// Close codes of this protocol.
+mod code {
+    pub(super) const SHUTDOWN: u32 = 0;
+    pub(super) const DUPLICATE: u32 = 1;
+    pub(super) const REVOKED: u32 = 2;
+}
+
+/// The sessions of one node. See the [module](self).
+#[derive(Debug)]
+pub struct Transport {
+    own: PublicKey,
+    trust: TrustFile,
+    /// The edition of the trust with which the sessions were last compared.
+    edition: u64,
+    refusals: Refusals,
+    warned: Option<Instant>,
+    endpoint: Endpoint,
+    client: ClientConfig,
+    dials: Vec<Dial>,
+    sessions: BTreeMap<SessionId, Session>,
+    handles: HashMap<ConnectionHandle, SessionId>,
+    next: u64,
+    arrivals: VecDeque<Arrival>,
+    responses: VecDeque<(SocketAddr, Bytes)>,
+    counters: Counters,
+    buffer: Vec<u8>,
+}
+
+impl Transport {
+    /// Creates the transport of a node with this key. It accepts connections, and dials these
+    /// addresses until it has a session with each.
+    #[must_use]
+    pub fn new(key: &Key, trust: TrustFile, dials: impl IntoIterator<Item = SocketAddr>) -> Self {
+        let refusals = Refusals::default();
+        let (server, client) = tls::configs(key, &trust, &refusals);
+        let transport = Arc::new(transport_config());
+        let mut server = ServerConfig::with_crypto(server);
+        server.transport_config(transport.clone());
+        let mut client = ClientConfig::new(client);
+        client.transport_config(transport);
+        let config = Arc::new(EndpointConfig::default());
+        Self {
+            own: key.public(),
+            edition: trust.edition(),
+            trust,
+            refusals,
+            warned: None,
+            endpoint: Endpoint::new(config, Some(Arc::new(server)), true, None),
+            client,
+            dials: dials.into_iter().map(Dial::new).collect(),
+            sessions: BTreeMap::new(),
+            handles: HashMap::new(),
+            next: 0,
+            arrivals: VecDeque::new(),
+            responses: VecDeque::new(),
+            counters: Counters::default(),
+            buffer: Vec::new(),
+        }
+    }
+
+    /// Its counters so far.
+    #[must_use]
+    pub const fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// The established sessions.
+    pub fn sessions(&self) -> impl Iterator<Item = SessionReport> + '_ {
+        self.sessions.iter().filter_map(|(&id, session)| {
+            let peer = session.established()?;
+            Some(SessionReport {
+                session: id,
+                peer: peer.clone(),
+                address: session.connection.remote_address(),
+                dialed: session.dial.is_some(),
+                round_trip: session.connection.rtt(),
+                received: session.received,
+                sent: session.sent,
+                waiting: session.waiting(),
+            })
+        })
+    }
+
+    /// Processes a UDP datagram from this address.
+    pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, datagram: &[u8]) {
+        self.buffer.clear();
+        let data = BytesMut::from(datagram);
+        let event = self
+            .endpoint
+            .handle(now, from, None, None, data, &mut self.buffer);
+        match event {
+            Some(DatagramEvent::ConnectionEvent(handle, event)) => {
+                if let Some(&id) = self.handles.get(&handle)
+                    && let Some(session) = self.sessions.get_mut(&id)
+                {
+                    session.connection.handle_event(event);
+                    self.advance(now, id);
+                }
+            }
+            Some(DatagramEvent::NewConnection(incoming)) => self.admit(now, incoming),
+            Some(DatagramEvent::Response(response)) => self.respond(&response),
+            None => {}
+        }
+    }
+
+    /// Performs what is due: retransmissions, timeouts, dials; and closes the sessions of keys that
+    /// are no longer trusted.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        self.apply_trust(now);
+        self.dial(now);
+        let due: Vec<_> = self
+            .sessions
+            .iter_mut()
+            .filter_map(|(&id, it)| {
+                it.connection
+                    .poll_timeout()
+                    .filter(|&at| at <= now)
+                    .map(|_| id)
+            })
+            .collect();
+        for id in due {
+            if let Some(session) = self.sessions.get_mut(&id) {
+                session.connection.handle_timeout(now);
+            }
+            self.advance(now, id);
+        }
+    }
+
+    /// Queues a JUDP datagram for a session. It is dropped if the session has ended.
+    pub fn send(&mut self, session: SessionId, priority: Priority, datagram: Bytes) {
+        match self.sessions.get_mut(&session) {
+            Some(session) if session.established().is_some() => {
+                self.counters.send_overflows += session.queue(priority, datagram);
+            }
+            _ => self.counters.no_session += 1,
+        }
+    }
+
+    /// Queues a JUDP datagram for every session.
+    pub fn send_to_all(&mut self, priority: Priority, datagram: &Bytes) {
+        for session in self.sessions.values_mut() {
+            if session.established().is_some() {
+                self.counters.send_overflows += session.queue(priority, datagram.clone());
+            }
+        }
+    }
+
+    /// The next event.
+    pub fn poll_arrival(&mut self) -> Option<Arrival> {
+        self.arrivals.pop_front()
+    }
+
+    /// The next UDP datagram to send, and its destination.
+    pub fn poll_transmit(&mut self, now: Instant) -> Option<(SocketAddr, Bytes)> {
+        if let Some(response) = self.responses.pop_front() {
+            return Some(response);
+        }
+        for session in self.sessions.values_mut() {
+            session.flush();
+            self.buffer.clear();
+            if let Some(transmit) = session.connection.poll_transmit(now, 1, &mut self.buffer) {
+                let datagram = Bytes::copy_from_slice(&self.buffer[..transmit.size]);
+                return Some((transmit.destination, datagram));
+            }
+        }
+        None
+    }
+
+    /// When to call [`handle_timeout`](Self::handle_timeout) if nothing happens before.
+    pub fn poll_timeout(&mut self) -> Option<Instant> {
+        let sessions = self.sessions.values_mut();
+        let sessions = sessions.filter_map(|it| it.connection.poll_timeout());
+        let dials = self.dials.iter().filter_map(Dial::due);
+        sessions.chain(dials).min()
+    }
+
+    /// Closes all sessions and dials no more.
+    pub fn close(&mut self, now: Instant) {
+        self.dials.clear();
+        self.endpoint.set_server_config(None);
+        for id in self.sessions.keys().copied().collect::<Vec<_>>() {
+            self.end(now, id, code::SHUTDOWN, "the node stops");
+        }
+    }
+
+    /// Whether a peer does not know yet that its session has ended.
+    #[must_use]
+    pub fn is_closing(&self) -> bool {
+        self.sessions.values().any(|it| !it.ended)
+    }
+
+    /// Closes the sessions of keys that the trust file no longer lists, and applies changes of ids.
+    fn apply_trust(&mut self, now: Instant) {
+        let edition = self.trust.edition();
+        if edition == self.edition {
+            return;
+        }
+        self.edition = edition;
+        let mut revoked = Vec::new();
+        for (&id, session) in &mut self.sessions {
+            let Some(peer) = &mut session.peer else {
+                continue;
+            };
+            match self.trust.find(peer.key) {
+                Some(trusted) => *peer = trusted,
+                None => revoked.push(id),
+            }
+        }
+        for id in revoked {
+            self.end(now, id, code::REVOKED, "the key is no longer trusted");
+        }
+    }
+
+    fn dial(&mut self, now: Instant) {
+        for index in 0..self.dials.len() {
+            let Some(address) = self.dials[index].start(now) else {
+                continue;
+            };
+            let client = self.client.clone();
+            match self.endpoint.connect(now, client, address, "jaus") {
+                Ok((handle, connection)) => {
+                    let id = self.insert(Session::new(handle, connection, Some(index)));
+                    self.dials[index].session = Some(id);
+                }
+                Err(error) => {
+                    tracing::warn!(%address, %error, "cannot dial the secure peer");
+                    self.dials[index].lost(now, false);
+                }
+            }
+        }
+    }
+
+    /// Decides on a new connection from a peer.
+    fn admit(&mut self, now: Instant, incoming: Incoming) {
+        let from = incoming.remote_address().ip();
+        let (all, near) = self.handshakes(from);
+        if all >= MOST_HANDSHAKES || near >= MOST_HANDSHAKES_PER_ADDRESS {
+            self.counters.handshakes_dropped += 1;
+            self.endpoint.ignore(incoming);
+            return;
+        }
+        self.buffer.clear();
+        if all >= RETRY_FROM && !incoming.remote_address_validated() && incoming.may_retry() {
+            if let Ok(response) = self.endpoint.retry(incoming, &mut self.buffer) {
+                self.respond(&response);
+            }
+            return;
+        }
+        match self.endpoint.accept(incoming, now, &mut self.buffer, None) {
+            Ok((handle, connection)) => {
+                let id = self.insert(Session::new(handle, connection, None));
+                self.advance(now, id);
+            }
+            Err(error) => {
+                self.counters.handshakes_failed += 1;
+                if let Some(response) = error.response {
+                    self.respond(&response);
+                }
+            }
+        }
+    }
+
+    /// The connections without an authenticated peer: all, and those from one address.
+    fn handshakes(&self, from: IpAddr) -> (usize, usize) {
+        let unfinished = self.sessions.values().filter(|it| it.peer.is_none());
+        let near = |it: &&Session| it.connection.remote_address().ip() == from;
+        (unfinished.clone().count(), unfinished.filter(near).count())
+    }
+
+    fn insert(&mut self, session: Session) -> SessionId {
+        let id = SessionId(self.next);
+        self.next += 1;
+        self.handles.insert(session.handle, id);
+        self.sessions.insert(id, session);
+        id
+    }
+
+    fn respond(&mut self, response: &quinn_proto::Transmit) {
+        let datagram = Bytes::copy_from_slice(&self.buffer[..response.size]);
+        self.responses.push_back((response.destination, datagram));
+    }
+
+    /// Processes the events of a connection.
+    fn advance(&mut self, now: Instant, id: SessionId) {
+        loop {
+            let Some(session) = self.sessions.get_mut(&id) else {
+                return;
+            };
+            while let Some(event) = session.connection.poll_endpoint_events() {
+                if let Some(event) = self.endpoint.handle_event(session.handle, event) {
+                    session.connection.handle_event(event);
+                }
+            }
+            let Some(event) = session.connection.poll() else {
+                break;
+            };
+            match event {
+                // The dialling side waits for the greeting.
+                Event::Connected if session.dial.is_some() => {}
+                Event::Connected => self.establish(now, id),
+                Event::ConnectionLost { reason } => self.lose(now, id, &reason),
+                Event::DatagramReceived => self.read_datagrams(now, id),
+                Event::Stream(StreamEvent::Opened { .. }) => {
+                    for stream in session.accept_streams() {
+                        self.read_stream(now, id, stream);
+                    }
+                }
+                Event::Stream(StreamEvent::Readable { id: stream }) => {
+                    self.read_stream(now, id, stream);
+                }
+                // The next flush tries every stream and datagram again.
+                Event::HandshakeDataReady | Event::DatagramsUnblocked | Event::Stream(_) => {}
+            }
+        }
+        if let Some(session) = self.sessions.get(&id)
+            && session.connection.is_drained()
+        {
+            self.handles.remove(&session.handle);
+            self.sessions.remove(&id);
+        }
+    }
+
+    /// Handles a completed handshake.
+    fn establish(&mut self, now: Instant, id: SessionId) {
+        let Some(session) = self.sessions.get_mut(&id) else {
+            return;
+        };
+        // The handshake has found it in the trust file, which may have changed meanwhile.
+        let Some(peer) = peer_key(session).and_then(|key| self.trust.find(key)) else {
+            self.end(now, id, code::REVOKED, "the key is no longer trusted");
+            return;
+        };
+        let (key, address) = (peer.key, session.connection.remote_address());
+        tracing::info!(peer = peer.name, %address, "secure session established");
+        session.peer = Some(peer);
+        self.counters.established += 1;
+        match session.dial {
+            Some(dial) => self.dials[dial].established(id),
+            None => session.greet(),
+        }
+        self.keep_one(now, key, id);
+    }
+
+    /// Leaves one session with a peer; `newer` was established just now.
+    fn keep_one(&mut self, now: Instant, key: PublicKey, newer: SessionId) {
+        let same = |(&id, it): (&SessionId, &Session)| {
+            (id != newer && it.established().is_some_and(|it| it.key == key)).then_some(id)
+        };
+        let Some(older) = self.sessions.iter().find_map(same) else {
+            return;
+        };
+        let we_dialed = |id| {
+            self.sessions
+                .get(&id)
+                .is_some_and(|it: &Session| it.dial.is_some())
+        };
+        let (kept, other) = match (we_dialed(older), we_dialed(newer)) {
+            (one, two) if one == two => (newer, older),
+            (ours, _) if ours == (self.own < key) => (older, newer),
+            _ => (newer, older),
+        };
+        for dial in &mut self.dials {
+            if dial.session == Some(other) {
+                dial.session = Some(kept);
+            }
+        }
+        self.end(
+            now,
+            other,
+            code::DUPLICATE,
+            "another session with the same key",
+        );
+    }
+
+    /// Handles the loss of a connection.
+    fn lose(&mut self, now: Instant, id: SessionId, reason: &ConnectionError) {
+        let Some(session) = self.sessions.get_mut(&id) else {
+            return;
+        };
+        let address = session.connection.remote_address();
+        if let Some(peer) = session.established() {
+            tracing::warn!(peer = peer.name, %address, %reason, "secure session lost");
+        } else if session.peer.is_none() {
+            self.counters.handshakes_failed += 1;
+            if self.warned.is_none_or(|at| now >= at + WARNING_PAUSE) {
+                self.warned = Some(now);
+                let untrusted = self.refusals.take();
+                warn_of_handshake(address, reason, untrusted);
+            }
+        }
+        self.mark_ended(now, id);
+    }
+
+    /// Closes a session from this side.
+    fn end(&mut self, now: Instant, id: SessionId, code: u32, reason: &'static str) {
+        if let Some(session) = self.sessions.get_mut(&id)
+            && !session.ended
+        {
+            if let Some(peer) = session.established() {
+                tracing::info!(peer = peer.name, reason, "secure session closed");
+            }
+            let reason = Bytes::from_static(reason.as_bytes());
+            session
+                .connection
+                .close(now, VarInt::from_u32(code), reason);
+            self.mark_ended(now, id);
+        }
+    }
+
+    fn mark_ended(&mut self, now: Instant, id: SessionId) {
+        let Some(session) = self.sessions.get_mut(&id) else {
+            return;
+        };
+        if session.established().is_some() {
+            self.arrivals.push_back(Arrival::Closed(id));
+        }
+        session.ended = true;
+        let was_good = session.peer.is_some();
+        for dial in &mut self.dials {
+            if dial.session == Some(id) {
+                dial.lost(now, was_good);
+            }
+        }
+    }
+
+    fn read_datagrams(&mut self, now: Instant, id: SessionId) {
+        let mut datagrams = Vec::new();
+        if let Some(session) = self.sessions.get_mut(&id) {
+            datagrams.extend(std::iter::from_fn(|| session.connection.datagrams().recv()));
+        }
+        for datagram in datagrams {
+            self.receive(now, id, datagram);
+        }
+    }
+
+    fn read_stream(&mut self, now: Instant, id: SessionId, stream: StreamId) {
+        let mut datagrams = Vec::new();
+        if let Some(session) = self.sessions.get_mut(&id) {
+            session.read(stream, |datagram| datagrams.push(datagram));
+        }
+        for datagram in datagrams {
+            self.receive(now, id, datagram);
+        }
+    }
+
+    /// Accepts a JUDP datagram if its sender may speak for the source of every message in it.
+    fn receive(&mut self, now: Instant, id: SessionId, octets: Bytes) {
+        let Some(session) = self.sessions.get_mut(&id) else {
+            return;
+        };
+        if octets.is_empty() && session.dial.is_some() && session.peer.is_none() {
+            self.establish(now, id);
+            return;
+        }
+        let Some(peer) = session.established() else {
+            return;
+        };
+        let Ok(frames) = judp::frames(octets.clone()) else {
+            self.counters.malformed += 1;
+            return;
+        };
+        let foreign = frames
+            .flatten()
+            .find(|frame| !peer.speaks_for(frame.source));
+        if let Some(frame) = foreign {
+            self.counters.foreign_ids += 1;
+            tracing::debug!(peer = peer.name, source = %frame.source, "refused: foreign id");
+            return;
+        }
+        session.received += 1;
+        self.arrivals.push_back(Arrival::Datagram {
+            session: id,
+            octets,
+        });
+    }
+}
+
+/// Parameters of every connection.
+fn transport_config() -> TransportConfig {
+    let mut config = TransportConfig::default();
+    config
+        .max_concurrent_uni_streams(VarInt::from_u32(STREAMS))
+        .max_concurrent_bidi_streams(VarInt::from_u32(0))
+        .max_idle_timeout(IdleTimeout::try_from(IDLE).ok())
+        .keep_alive_interval(Some(KEEP_ALIVE))
+        .datagram_send_buffer_size(DATAGRAM_BUFFER);
+    config
+}
+
+fn peer_key(session: &Session) -> Option<PublicKey> {
+    let identity = session.connection.crypto_session().peer_identity()?;
+    let certificates = identity.downcast::<Vec<CertificateDer<'static>>>().ok()?;
+    PublicKey::from_spki(certificates.first()?)
+}
+
+fn warn_of_handshake(address: SocketAddr, reason: &ConnectionError, untrusted: Option<PublicKey>) {
+    match (untrusted, reason) {
+        (Some(key), _) => tracing::warn!(
+            %address, %key,
+            "refused a key that is not trusted; to trust it, add it to the trust file"
+        ),
+        (None, ConnectionError::ConnectionClosed(_)) => tracing::warn!(
+            %address, %reason,
+            "the peer refused the handshake: its trust file may lack the key of this node"
+        ),
+        _ => tracing::warn!(%address, %reason, "no secure session"),
+    }
+}

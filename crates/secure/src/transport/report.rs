@@ -1,0 +1,50 @@
+//! What a transport reports about itself.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use jaus::endpoint::SessionId;
+
+use crate::trust::Peer;
+
+/// Counts of a transport since it was created.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Counters {
+    /// Sessions established.
+    pub established: u64,
+    /// Handshakes that failed, most often because a side does not trust the key of the other.
+    pub handshakes_failed: u64,
+    /// Connections ignored because too many handshakes were unfinished.
+    pub handshakes_dropped: u64,
+    /// Datagrams refused because a message in them came from an id for which the key of their
+    /// sender may not speak.
+    pub foreign_ids: u64,
+    /// Datagrams that were no JUDP.
+    pub malformed: u64,
+    /// Datagrams dropped because the peer or the network was too slow.
+    pub send_overflows: u64,
+    /// Datagrams dropped because their session had ended.
+    pub no_session: u64,
+}
+
+/// The current state of a session.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SessionReport {
+    /// Its number, as in [`Remote::Session`](jaus::endpoint::Remote::Session).
+    pub session: SessionId,
+    /// The authenticated peer.
+    pub peer: Peer,
+    /// The address that the peer sends from at present.
+    pub address: SocketAddr,
+    /// Whether this node opened it.
+    pub dialed: bool,
+    /// The estimated round trip.
+    pub round_trip: Duration,
+    /// JUDP datagrams received on it.
+    pub received: u64,
+    /// JUDP datagrams sent on it.
+    pub sent: u64,
+    /// JUDP datagrams that wait for the network.
+    pub waiting: usize,
+}
