@@ -322,7 +322,7 @@ mod tests {
     fn each_limit_counts_on_its_own() {
         let path = Path {
             link: LinkId(0),
-            peer: super::super::Remote::Line,
+            peer: Remote::Line,
         };
         let (all, new) = (Err(Counter::MessageRate), Err(Counter::NewIdRate));
         let two = Rate::new(1, 2);

@@ -211,6 +211,10 @@ impl TrustFile {
 
     /// Reads the file again whenever it has changed, as long as the trust is in use. Must be called
     /// within a tokio runtime. A file that has become unusable changes nothing, and is logged.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "the task only looks at a file, and ends with the trust"
+    )]
     pub fn follow(&self) {
         if let Some(path) = &self.path {
             tokio::spawn(follow(Arc::downgrade(&self.trust), path.clone()));

@@ -236,7 +236,7 @@ mod tests {
             major: 1,
             minor: 2,
         };
-        let component = Component {
+        let component = ComponentEntry {
             id: JausId::new(101, 1, 7),
             identification: None,
             services: Some(vec![offer].into()),

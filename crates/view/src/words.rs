@@ -116,8 +116,7 @@ pub fn quoted(text: &str) -> Cow<'_, str> {
 /// or change the direction of the text after it, so that a name reads as another one.
 #[must_use]
 pub fn disturbs_terminal(c: char) -> bool {
-    let changes_direction =
-        || matches!(c, '\u{061C}' | '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
+    let changes_direction = || matches!(c, '\u{061C}' | '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
     let separates_lines = || matches!(c, '\u{2028}' | '\u{2029}');
     c.is_control() || changes_direction() || separates_lines()
 }

@@ -132,7 +132,11 @@ fn services_tell_jauspp_and_the_profiles() {
     // Any peer may offer these, for instance our own vehicle.
     let mut of_profile = after(&[("urn:jaus:jss:iop:CostMap2D", 1, 1)]);
     assert_eq!(of_profile.verdict().certainty, Certainty::Unknown);
-    assert_eq!(of_profile.presumed(), Implementation::Iop, "a 0 of it means all");
+    assert_eq!(
+        of_profile.presumed(),
+        Implementation::Iop,
+        "a 0 of it means all"
+    );
     of_profile.note(Sign::ZeroInDestination);
     assert_eq!(of_profile.certain(), Implementation::Iop);
     let of_core = after(&[("urn:jaus:jss:core:Events", 1, 0)]);

@@ -1,4 +1,8 @@
 //! Whole nodes that have nothing but a secure link between them.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the nodes run in real time, within a limit"
+)]
 
 use std::time::{Duration, SystemTime};
 

@@ -99,7 +99,7 @@ impl Files {
         let path = self.files.key()?;
         make_folder(&path)?;
         let key = Key::create(&path).map_err(Failure::of)?;
-        say(&format!(
+        say(format_args!(
             "the key is in {}; on each peer run: jaus keys trust NAME {} IDS",
             path.display(),
             key.public()

@@ -8,7 +8,7 @@ use jaus::component::{
     AccessControl, Builder, Component, Condition, Kind, Management, Standing, State, Time,
     TimeOfDay,
 };
-use jaus::node::{Node, time_of_day};
+use jaus::node::time_of_day;
 use jaus::service::{MotionPolicy, StopCause};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;

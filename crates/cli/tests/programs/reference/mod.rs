@@ -56,7 +56,7 @@ fn the_page_of_commands_is_what_the_tool_says() {
     let reference = run(&["reference"], b"");
     assert_eq!(reference.status, 0, "{}", reference.stderr);
     let page = format!("{COMMANDS}{}", reference.stdout);
-    snapshot::check(&workspace("docs/commands.md"), &page);
+    snapshot::check(workspace("docs/commands.md"), &page);
 }
 
 #[test]
@@ -72,10 +72,10 @@ fn the_page_of_programs_is_what_they_say() {
     }
     page.push_str(COMMON);
     page.push_str(&common.unwrap());
-    snapshot::check(&workspace("docs/programs.md"), &page);
+    snapshot::check(workspace("docs/programs.md"), &page);
 }
 
 #[test]
 fn the_page_of_settings_is_what_the_code_says() {
-    snapshot::check(&workspace("docs/settings.md"), &settings::page());
+    snapshot::check(workspace("docs/settings.md"), &settings::page());
 }
