@@ -114,9 +114,13 @@ impl KeyFiles {
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Table {
+    /// Accept secure links at this address, by default on port 3795. Flag: `--secure-listen`.
     listen: Option<Address>,
+    /// Connect to these peers. Flag: `--secure-peer`.
     peers: Vec<Address>,
+    /// The file of this node's key. Flag: `--key`.
     key: Option<PathBuf>,
+    /// The file of the keys that this node trusts. Flag: `--trusted-keys`.
     trusted_keys: Option<PathBuf>,
 }
 

@@ -43,6 +43,12 @@ width = 1.2
 
 ";
 
+const SECURE: &str = "## [secure]
+
+An authenticated, encrypted link to other nodes of this stack; [Secure links](secure-links.md) explains it.
+
+";
+
 const SYSTEM: &str = "## A system
 
 The file of `jaus up` names the programs of one machine: a section `[parts.NAME]` for each, and `[all]` for what
@@ -75,6 +81,8 @@ pub(super) fn page() -> String {
         write_section(section, &flags, &mut page);
     }
     page.push_str(COMPONENT);
+    page.push_str(SECURE);
+    write_secure(&mut page);
     page.push_str("## Values\n\n");
     write_units(&mut page);
     for (name, (about, keys)) in &types.values {
@@ -202,6 +210,26 @@ fn with_settings_only(about: &str) -> String {
         }
     }
     kept
+}
+
+/// The keys of the secure link.
+fn write_secure(page: &mut String) {
+    let source = Source::read("crates/cli/src/secure.rs");
+    let Shape::Table(fields) = source.find("Table").unwrap().shape else {
+        panic!("it has keys");
+    };
+    page.push_str("| key | value | description |\n|---|---|---|\n");
+    for field in &fields {
+        assert!(!field.about.is_empty(), "{} has no description", field.name);
+        let value = match (&field.kind, field.name.as_str()) {
+            (Kind::List(_), _) => "list of addresses",
+            (_, "listen") => "address",
+            _ => "path",
+        };
+        let about = field.about.replace('\n', " ");
+        let _ = writeln!(page, "| `{}` | {value} | {about} |", field.name);
+    }
+    page.push('\n');
 }
 
 /// The keys of the file of `jaus up`.
