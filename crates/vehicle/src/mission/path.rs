@@ -45,11 +45,11 @@ impl Footprint {
 /// A drivable path of straight segments.
 ///
 /// ```
-/// use jaus_vehicle::mission::{Terrain, Vehicle, plan};
+/// use jaus_vehicle::mission::{Footprint, Terrain, plan};
 ///
 /// // 20 x 20 cells of half a metre; 255 is open ground.
 /// let terrain = Terrain::new(20, 20, 0.5, (0.0, 0.0), vec![255; 400])?;
-/// let path = plan(&terrain, &Vehicle::default(), (1.0, 1.0), (9.0, 9.0))?;
+/// let path = plan(&terrain, &Footprint::default(), (1.0, 1.0), (9.0, 9.0))?;
 /// assert_eq!(path.segments().len(), 1);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

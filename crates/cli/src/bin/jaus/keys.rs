@@ -53,7 +53,8 @@ struct TrustKey {
     name: String,
 
     /// Its public key, as `jaus keys show` prints it there
-    key: PublicKey,
+    #[arg(value_name = "KEY")]
+    public_key: PublicKey,
 
     /// The ids that it may speak for: 101.255.255 for all of subsystem 101
     #[arg(required = true)]
@@ -121,7 +122,7 @@ impl TrustKey {
         make_folder(&path)?;
         let peer = Peer {
             name: self.name.clone(),
-            key: self.key,
+            key: self.public_key,
             ids: self.ids.clone(),
         };
         edit::trust(&path, &peer).map_err(Failure::of)?;

@@ -9,7 +9,7 @@ const TEST: u8 = 9;
 
 const TERMINAL: Screen = Screen {
     name: "terminal",
-    size: (760, 260),
+    size: (880, 260),
     dark: true,
 };
 
@@ -43,7 +43,7 @@ pub(crate) fn monitor() {
         .unwrap();
     let tables = String::from_utf8(tables.stdout).unwrap();
     let table = tables.rfind("ID ").map(|at| &tables[at..]).unwrap();
-    assert!(table.contains("G-Bat"), "{tables}");
+    assert!(table.contains("Primitive Driver"), "{tables}");
     let mut page = Browser::start(None);
     page.look_on(TERMINAL);
     page.show_terminal(&format!("$ jaus monitor --probe\n{table}"));

@@ -7,6 +7,9 @@ use tempfile::TempDir;
 use super::judge::peer::free_port;
 use crate::support::{Run, Running, run};
 
+/// The fields of the query: the identification of the subsystem.
+const WHICH: &str = r#"{"QueryType":2}"#;
+
 /// The folder with the keys of one host.
 struct Host(TempDir);
 
@@ -71,7 +74,14 @@ fn as_operator(host: &Host, address: &str, arguments: &[&str]) -> Run {
 #[test]
 fn a_vehicle_is_found_and_queried_by_a_secure_link_alone() {
     let (_vehicle, _, operator, address) = vehicle_and_operator("115.1.1");
-    let query = ["query", "115.1.1", "QueryIdentification", "--id", "60.1.1"];
+    let query = [
+        "query",
+        "115.1.1",
+        "QueryIdentification",
+        WHICH,
+        "--id",
+        "60.1.1",
+    ];
     let answered = as_operator(&operator, &address, &query);
     assert_eq!(answered.status, 0, "{answered:?}");
     assert!(answered.stdout.contains("Rover"), "{answered:?}");
@@ -81,6 +91,7 @@ fn a_vehicle_is_found_and_queried_by_a_secure_link_alone() {
             "query",
             "115.1.1",
             "QueryIdentification",
+            WHICH,
             "--loopback",
             "--timeout",
             "500ms",
@@ -97,6 +108,7 @@ fn an_id_for_which_a_key_may_not_speak_gets_no_answer() {
         "query",
         "115.1.2",
         "QueryIdentification",
+        WHICH,
         "--timeout",
         "2s",
         "--id",
@@ -120,6 +132,7 @@ fn a_revoked_key_loses_its_link_and_gets_no_other() {
         "query",
         "115.1.3",
         "QueryIdentification",
+        WHICH,
         "--timeout",
         "1s",
         "--id",
@@ -155,7 +168,14 @@ fn keys_are_made_shown_listed_and_revoked_with_clear_errors() {
 #[test]
 fn a_node_without_a_key_says_how_to_make_one() {
     let host = Host::new();
-    let query = ["query", "115.1.4", "QueryIdentification", "--id", "60.1.1"];
+    let query = [
+        "query",
+        "115.1.4",
+        "QueryIdentification",
+        WHICH,
+        "--id",
+        "60.1.1",
+    ];
     let refused = as_operator(&host, "127.0.0.1", &query);
     assert_eq!(refused.status, 2, "{refused:?}");
     assert!(refused.stderr.contains("jaus keys new"), "{refused:?}");

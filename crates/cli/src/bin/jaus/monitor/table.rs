@@ -58,7 +58,7 @@ impl Screen {
         match self.style {
             Style::Json => self.output.line(view.to_json()),
             Style::Lines => {
-                let lines = lines(view, self.limit.unwrap_or(MOST));
+                let lines = lines(view, self.limit.unwrap_or(MOST), usize::MAX);
                 let gap = if first { "" } else { "\n" };
                 self.output.line(format_args!("{gap}{}", lines.join("\n")))
             }
@@ -70,7 +70,7 @@ impl Screen {
                 let room = height.saturating_sub(others).max(1);
                 let mut screen = String::from(if first { OPEN } else { "" });
                 screen.push_str(HOME);
-                let lines = lines(view, self.limit.unwrap_or(MOST).min(room));
+                let lines = lines(view, self.limit.unwrap_or(MOST).min(room), width);
                 let colours = colours_wanted(&stdout());
                 for line in lines.iter().take(height.saturating_sub(1)) {
                     let line: String = line.chars().take(width).collect();
@@ -105,13 +105,41 @@ fn size() -> (usize, usize) {
     }
 }
 
-/// The whole table, with at most `most` peers.
-fn lines(view: &View, most: usize) -> Vec<String> {
+/// The width of all columns of peers but the name, with the spaces between them.
+const OTHER_COLUMNS: usize = 72;
+/// The narrowest and the widest column of names.
+const NAMES: (usize, usize) = (8, 26);
+
+/// The width of the column of names: that of the longest name, as far as a screen has room for it.
+fn name_width(view: &View, screen: usize) -> usize {
+    let (narrowest, widest) = NAMES;
+    let names = view.peers.iter().map(|peer| name(peer).chars().count());
+    let longest = names.max().unwrap_or(0).clamp(narrowest, widest);
+    longest.min(screen.saturating_sub(OTHER_COLUMNS).max(narrowest))
+}
+
+/// The name of the component, or else of its subsystem, or else its kind.
+fn name(peer: &PeerRow) -> &str {
+    match (&*peer.name, &*peer.subsystem) {
+        ("", "") => &peer.kind,
+        ("", subsystem) => subsystem,
+        (name, _) => name,
+    }
+}
+
+/// The whole table, with at most `most` peers, for a screen of this width.
+fn lines(view: &View, most: usize, screen: usize) -> Vec<String> {
+    let width = name_width(view, screen);
     let mut lines = vec![format!(
-        "{:12} {:8} {:20} {:>5} {:>6} {:>5} {:>4} {:>3} {:>5} {:>3}",
+        "{:12} {:width$} {:20} {:>5} {:>6} {:>5} {:>4} {:>3} {:>5} {:>3}",
         "ID", "NAME", "ADDRESS", "in/s", "oct/s", "out/s", "lost", "rep", "ms", "ago"
     )];
-    lines.extend(view.peers.iter().take(most).map(peer_line));
+    lines.extend(
+        view.peers
+            .iter()
+            .take(most)
+            .map(|peer| peer_line(peer, width)),
+    );
     match view.peers.len() {
         0 => lines.push("no peers yet".to_owned()),
         number if number > most => lines.push(format!("… and {} more", number - most)),
@@ -131,20 +159,15 @@ fn lines(view: &View, most: usize) -> Vec<String> {
     lines
 }
 
-fn peer_line(peer: &PeerRow) -> String {
-    let name = match (&*peer.name, &*peer.subsystem) {
-        ("", "") => &*peer.kind,
-        ("", subsystem) => subsystem,
-        (name, _) => name,
-    };
+fn peer_line(peer: &PeerRow, width: usize) -> String {
     let round_trip = peer.round_trip.map_or_else(
         || "-".to_owned(),
         |time| format!("{:.2}", time.as_secs_f64() * 1e3),
     );
     format!(
-        "{:12} {:8} {:20} {:>5} {:>6} {:>5} {:>4} {:>3} {:>5} {:>3}",
+        "{:12} {:width$} {:20} {:>5} {:>6} {:>5} {:>4} {:>3} {:>5} {:>3}",
         peer.id.to_string(),
-        clipped(name, 8),
+        clipped(name(peer), width),
         clipped(&peer.address, 20),
         short(peer.received),
         short(peer.received_octets),

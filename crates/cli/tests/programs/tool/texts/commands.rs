@@ -103,6 +103,8 @@ fn filled_in(word: &str) -> Option<String> {
         "ADDRESS" => Some("192.168.7.2".to_owned()),
         "ID" => Some("101.1.1".to_owned()),
         "POLICY" => Some("stop".to_owned()),
+        "IDS" => Some("101.255.255".to_owned()),
+        "KEY" | "OPERATORS_KEY" | "VEHICLES_KEY" => Some(format!("{}=", "A".repeat(43))),
         word => Some(word.replace('…', "")),
     }
 }
@@ -130,6 +132,10 @@ fn error(command: &[String]) -> Option<String> {
         Err(error) => error.to_string(),
     };
     let first = error.lines().next().unwrap_or_default();
+    // A text may name a flag without its value.
+    if first.contains("a value is required for") {
+        return None;
+    }
     Some(format!("{}: {first}", command.join(" ")))
 }
 

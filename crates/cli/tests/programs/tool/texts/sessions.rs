@@ -53,7 +53,7 @@ const BESIDES: [(&str, &str); 3] = [
     ("jaus subscribe", "wait $send; echo $? >> statuses"),
     (
         "jaus control",
-        "jaus query 101.1.1 QueryVelocityState --fields Velocity_X --loopback > stopped",
+        "jaus query 101.1.1 QueryVelocityState --fields Velocity_X --timeout 20s --loopback > stopped",
     ),
 ];
 
@@ -99,7 +99,9 @@ struct Ran {
 /// build, and compares their output with what is shown.
 fn run(session: &Block, place: &str, besides: &[(&str, &str)]) -> Ran {
     let commands = parts(&session.content);
-    let directory = std::env::temp_dir().join(format!("jaus-session-{}", std::process::id()));
+    let name = place.replace(['/', ':'], "-");
+    let directory =
+        std::env::temp_dir().join(format!("jaus-session-{}-{name}", std::process::id()));
     std::fs::create_dir_all(&directory).unwrap();
     let network = own_group().join(" ");
     let group = network.split(' ').next_back().unwrap();
