@@ -1,5 +1,4 @@
-//! A vehicle that can be driven: it obeys the client in control while it is ready, and stops
-//! whenever it must not act. `cargo run --example operator` drives it. A subsystem number may be given.
+//! A vehicle that obeys the client in control while it is ready. The operator's example drives it.
 
 use jaus::component::{Call, Component, Handlers, Kind, Management};
 use jaus::messages::mobility::{
@@ -42,7 +41,6 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
         .management(Management::new())
         .attach(&node, 33)?;
     println!("{} is up; Ctrl-C ends it", rover.id());
-
     let mut standing = rover.watch_standing();
     loop {
         tokio::select! {
