@@ -3,8 +3,7 @@
 
 use std::time::Instant;
 
-use super::picture::age;
-use super::state;
+use super::state::{self, age};
 use jaus::messages::mobility::ReportGlobalPose;
 use jaus_vehicle::motion::{Frame, GlobalPose, Pose, wrap};
 

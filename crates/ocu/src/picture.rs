@@ -13,7 +13,7 @@ use super::missing::{Absence, GonePart, GoneParts};
 use super::report::{Mission, MissionStage, Report};
 use super::role::Role;
 use super::sample_clock::{SampleClock, Stamp};
-use super::state;
+use super::state::{self, age};
 use jaus::address::JausId;
 use jaus::service::{ComponentEntry, Directory, State};
 use jaus_vehicle::messages::handoff::enhanced_access_control;
@@ -504,12 +504,6 @@ fn sampled_at(clock: &mut Option<SampleClock>, now: Instant, stamp: Option<Stamp
 
 fn state_name(code: u8) -> &'static str {
     State::from_code(code).map_or("unknown", State::name)
-}
-
-/// Milliseconds since `then`.
-pub(super) fn age(now: Instant, then: Instant) -> u64 {
-    let age = now.saturating_duration_since(then).as_millis();
-    u64::try_from(age).unwrap_or(u64::MAX)
 }
 
 #[cfg(test)]

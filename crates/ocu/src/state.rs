@@ -1,6 +1,8 @@
 //! Snapshots for pages: the selected vehicle, the list of vehicles, and the tree of components. Each
 //! one is complete, so that a reconnecting page needs nothing else. Unknown values are `null`.
 
+use std::time::Instant;
+
 use serde::Serialize;
 
 /// Snapshot of the selected vehicle.
@@ -355,4 +357,10 @@ impl Map {
     pub(crate) const fn edition(&self) -> Edition {
         (self.id, self.revision)
     }
+}
+
+/// Milliseconds since `then`.
+pub(super) fn age(now: Instant, then: Instant) -> u64 {
+    let age = now.saturating_duration_since(then).as_millis();
+    u64::try_from(age).unwrap_or(u64::MAX)
 }

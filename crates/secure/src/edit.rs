@@ -67,7 +67,7 @@ fn in_file(path: &Path, source: io::Error) -> TrustError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::PublicKey;
+    use crate::key::PublicKey;
 
     fn peer(name: &str, octet: u8) -> Peer {
         Peer {

@@ -17,7 +17,7 @@ use std::time::{Duration, SystemTime};
 
 use jaus::address::JausId;
 
-use crate::key::PublicKey;
+use crate::key::{KeyError, PublicKey};
 
 /// How often a running node looks whether its trust file has changed.
 const FOLLOW_INTERVAL: Duration = Duration::from_secs(1);
@@ -51,7 +51,7 @@ pub enum TrustError {
         /// The line's number, from 1.
         line: usize,
         /// The reason.
-        source: crate::KeyError,
+        source: KeyError,
     },
     /// An id is malformed.
     #[error("line {line}: `{text}` is not an id such as 101.1.33, or 101.255.255 for all of 101")]

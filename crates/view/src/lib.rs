@@ -24,6 +24,7 @@ mod request;
 mod stream;
 mod time;
 pub mod tree;
+mod units;
 mod words;
 
 pub use capture::{Capture, CaptureError, CaptureWriter, Frame, InterfaceNumber, LinkType};

@@ -4,6 +4,7 @@
 
 mod finding;
 mod group;
+mod heard;
 mod host;
 mod neighbours;
 mod network;

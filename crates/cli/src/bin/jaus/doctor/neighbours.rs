@@ -8,7 +8,7 @@ use jaus::link::{Interface, interface};
 use jaus::wire::Version;
 
 use super::finding::Finding;
-use super::network::{Heard, node_of};
+use super::heard::{Heard, node_of};
 
 const CHECK: &str = "neighbours";
 

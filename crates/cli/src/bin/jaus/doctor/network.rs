@@ -2,11 +2,10 @@
 //! are present, and duplicate ids.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 use std::time::Duration;
 
 use jaus::address::JausId;
-use jaus::component::{AttachError, Component, Directory, Kind};
+use jaus::component::{AttachError, Component, Kind};
 use jaus::endpoint::{Event, Path, Peer};
 use jaus::link::interface;
 use jaus::link::udp::Settings;
@@ -17,30 +16,9 @@ use jaus_cli::runtime;
 
 use super::finding::{Finding, Mark};
 use super::group::GroupLinks;
+use super::heard::{Heard, NodeId, node_of};
 use super::neighbours;
 use super::ra::RaSystems;
-
-/// A subsystem and a node.
-pub(super) type NodeId = (u16, u8);
-
-pub(super) const fn node_of(id: JausId) -> NodeId {
-    (id.subsystem(), id.node())
-}
-
-/// Everything that was heard.
-pub(super) struct Heard {
-    /// Other components.
-    pub(super) peers: Vec<Peer>,
-    pub(super) directory: Arc<Directory>,
-    pub(super) links: Vec<LinkReport>,
-    /// Nodes that were heard, but not by multicast.
-    pub(super) mute: BTreeSet<NodeId>,
-    pub(super) listened: Duration,
-    /// Ids received from more than one address.
-    moved: BTreeMap<JausId, BTreeSet<Path>>,
-    /// Systems of the Reference Architecture.
-    pub(super) of_ra: Vec<Finding>,
-}
 
 /// Runs a node with the settings, but with a temporary id and, if necessary, another port. `wanted`
 /// is the intended id of the node; `before` are the findings so far.

@@ -7,12 +7,20 @@ use std::time::Duration;
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::Message;
+use jaus::messages::core::{QueryIdentification, query_identification::QueryType};
 use jaus::wire::{Acknowledgement, Broadcast, Flags, Frame, Priority, Version};
 
 use super::exchange::{Exchange, Mark, Trial, Verdict};
 use super::seen::{Heard, Reserved, Seen};
 use super::target::Target;
 use super::transfer::Transfer;
+
+/// The query that every node answers: the identification of its subsystem.
+pub(super) fn query_identification() -> QueryIdentification {
+    QueryIdentification {
+        query_type: QueryType::SUBSYSTEM_IDENTIFICATION,
+    }
+}
 
 /// Code of messages without effect: user-defined (AS5710 leaves D000h and above to users).
 pub(super) const PADDING: u16 = 0xD7F0;

@@ -10,10 +10,9 @@ use jaus::messages::core::{
 };
 use jaus_cli::output::counted;
 
-use super::case::{Case, Offer, Question};
+use super::case::{Case, Offer, Question, query_identification};
 use super::exchange::{Exchange, Mark, Verdict};
 use super::judgement::{Begin, Judgement};
-use super::reach::query_identification;
 use super::seen::{Heard, Listener};
 
 pub(super) fn identification(case: &mut Case) -> Begin {

@@ -280,7 +280,7 @@ fn at_the_end(exchange: Exchange, case: &mut Case, mark: usize, stage: u8) -> Ju
             return Judgement::Ask(discovery::ask_by_multicast(case));
         }
         Exchange::Find => reach::not_found(case),
-        Exchange::Reach => reach::not_refused(case, stage),
+        Exchange::Reach => silence::not_refused(case, stage),
         Exchange::Framing => match case.address {
             Some(address) => ra::verdict(case, address, None),
             None => Verdict::skipped("its address is not known"),

@@ -4,23 +4,15 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use jaus::address::JausId;
-use jaus::messages::core::{
-    QueryHeartbeatPulse, QueryIdentification, query_identification::QueryType,
-};
+use jaus::messages::core::QueryHeartbeatPulse;
 use jaus::wire::{Frame, Version, judp};
 
-use super::case::{Case, Question, Send, octets};
+use super::case::{Case, Question, Send, octets, query_identification};
 use super::exchange::Verdict;
 use super::judgement::{Begin, Judgement};
 use super::ra;
 use super::seen::{Heard, Listener};
-use super::silence::{only_older, others, refused};
-
-pub(super) fn query_identification() -> QueryIdentification {
-    QueryIdentification {
-        query_type: QueryType::SUBSYSTEM_IDENTIFICATION,
-    }
-}
+use super::silence::{not_refused, only_older, others};
 
 /// Locates a peer that is named by its id only.
 pub(super) fn find(case: &mut Case) -> Begin {
@@ -116,14 +108,6 @@ pub(super) fn reached(case: &mut Case, stage: u8) -> Judgement {
         sends,
         ..Question::silence(Duration::from_secs(1))
     })
-}
-
-pub(super) fn not_refused(case: &Case, stage: u8) -> Verdict {
-    match (case.address, case.seen.refused) {
-        (Some(address), Some(refusal)) if stage > 0 => refused(case, address, refusal),
-        (Some(address), _) => Verdict::ok(format!("UDP {address} is not refused")),
-        (None, _) => Verdict::skipped("its address is not known"),
-    }
 }
 
 /// Requests any sign of life by unicast, so that any message in return is an answer.

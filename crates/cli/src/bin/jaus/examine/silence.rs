@@ -11,10 +11,9 @@ use jaus::messages::core::QueryHeartbeatPulse;
 use jaus::wire::ra::RaId;
 use jaus::wire::{Frame, Version};
 
-use super::case::{Case, Question, Send, octets};
+use super::case::{Case, Question, Send, octets, query_identification};
 use super::exchange::Verdict;
 use super::judgement::Judgement;
-use super::reach::{not_refused, query_identification};
 use super::seen::{Heard, Refusal};
 
 /// A UDP port that is closed on every host: IANA reserves it. A host that refuses it, but not the
@@ -172,6 +171,15 @@ fn moved(case: &Case, address: SocketAddr) -> Option<Verdict> {
         "the peer has another address",
         format!("use that: jaus examine {id}@{from}"),
     ))
+}
+
+/// The verdict on the port, after `stage` datagrams to it.
+pub(super) fn not_refused(case: &Case, stage: u8) -> Verdict {
+    match (case.address, case.seen.refused) {
+        (Some(address), Some(refusal)) if stage > 0 => refused(case, address, refusal),
+        (Some(address), _) => Verdict::ok(format!("UDP {address} is not refused")),
+        (None, _) => Verdict::skipped("its address is not known"),
+    }
 }
 
 /// The verdict on a refused port or host.

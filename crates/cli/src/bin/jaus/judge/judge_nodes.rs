@@ -20,7 +20,7 @@ use jaus_cli::failure::Failure;
 use tokio::time::{Instant, timeout_at};
 
 use super::recording::Recording;
-use super::step::{Form, Reach, Speaker};
+use super::step::{Form, Reach, Speaker, code_of};
 use super::verdict::ObservedMessage;
 
 /// Limit of messages by which the subject is recognised.
@@ -57,11 +57,6 @@ impl Heard {
     pub(super) fn code(&self) -> Option<u16> {
         code_of(&self.octets)
     }
-}
-
-/// The code at the start of a message.
-pub(super) fn code_of(octets: &Bytes) -> Option<u16> {
-    octets.first_chunk().map(|&code| u16::from_le_bytes(code))
 }
 
 impl JudgeNodes {

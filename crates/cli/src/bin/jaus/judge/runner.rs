@@ -417,7 +417,7 @@ const TIDYING: Duration = Duration::from_millis(100);
 
 /// The name of a message, or its code.
 fn name_of(octets: &Bytes) -> String {
-    let Some(code) = super::judge_nodes::code_of(octets) else {
+    let Some(code) = super::step::code_of(octets) else {
         return "a message without a code".to_owned();
     };
     let known = jaus_vehicle::messages::registry().by_code(code).next();

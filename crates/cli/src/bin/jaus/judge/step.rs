@@ -11,9 +11,13 @@ use std::time::Duration;
 use bytes::Bytes;
 use jaus::codec::Message;
 
-use super::judge_nodes::code_of;
 use super::memory::Memory;
 pub(super) use super::memory::{Speaker, Stream};
+
+/// The code at the start of a message.
+pub(super) fn code_of(octets: &Bytes) -> Option<u16> {
+    octets.first_chunk().map(|&code| u16::from_le_bytes(code))
+}
 
 /// Origin of steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -17,8 +17,8 @@ use jaus::peer;
 use jaus_cli::failure::Failure;
 use tokio::time::Instant;
 
-use super::judge_nodes::{JudgeNodes, SETTLING, code_of};
-use super::step::{Reach, Speaker};
+use super::judge_nodes::{JudgeNodes, SETTLING};
+use super::step::{Reach, Speaker, code_of};
 use crate::offers::{query_services, services};
 
 /// Attempts of each query, because the first datagrams may be lost while addresses are learned.

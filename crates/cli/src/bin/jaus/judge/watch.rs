@@ -7,8 +7,7 @@ use jaus::codec::Message;
 use jaus::messages::core::Event;
 use tokio::time::Instant;
 
-use super::judge_nodes::code_of;
-use super::step::{Check, Stream, Watch};
+use super::step::{Check, Stream, Watch, code_of};
 
 /// Tolerance of a stream's mean interval, relative to its period.
 const MEAN_SLACK: f64 = 0.1;
