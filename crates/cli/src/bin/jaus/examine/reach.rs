@@ -12,7 +12,7 @@ use super::exchange::Verdict;
 use super::judgement::{Begin, Judgement};
 use super::ra;
 use super::seen::{Heard, Listener};
-use super::silence::{not_refused, only_older, others};
+use super::silence::{only_older, others};
 
 /// Locates a peer that is named by its id only.
 pub(super) fn find(case: &mut Case) -> Begin {
