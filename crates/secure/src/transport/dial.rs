@@ -32,7 +32,10 @@ impl Dial {
 
     /// When the next attempt is due, unless there is a session or this is the first attempt.
     pub(super) const fn due(&self) -> Option<Instant> {
-        self.due
+        match self.session {
+            Some(_) => None,
+            None => self.due,
+        }
     }
 
     /// The address, if an attempt is due.

@@ -398,7 +398,12 @@ impl Transport {
         session.peer = Some(peer);
         self.counters.established += 1;
         match session.dial {
-            Some(dial) => self.dials[dial].established(id),
+            // There are no dials any more after `close`.
+            Some(dial) => {
+                if let Some(dial) = self.dials.get_mut(dial) {
+                    dial.established(id);
+                }
+            }
             None => session.greet(),
         }
         self.keep_one(now, key, id);
@@ -511,7 +516,7 @@ impl Transport {
         let Some(session) = self.sessions.get_mut(&id) else {
             return;
         };
-        if octets.is_empty() && session.dial.is_some() && session.peer.is_none() {
+        if octets.is_empty() && session.is_awaiting_greeting() {
             self.establish(now, id);
             return;
         }

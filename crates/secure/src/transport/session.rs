@@ -75,6 +75,11 @@ impl Session {
         self.peer.as_ref().filter(|_| !self.ended)
     }
 
+    /// Whether this side has dialled, and the peer has not accepted its key yet.
+    pub(super) const fn is_awaiting_greeting(&self) -> bool {
+        self.dial.is_some() && self.peer.is_none() && !self.ended
+    }
+
     /// Datagrams that wait for the network.
     pub(super) fn waiting(&self) -> usize {
         self.backlog.len()

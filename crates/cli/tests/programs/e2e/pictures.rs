@@ -9,7 +9,7 @@ const TEST: u8 = 9;
 
 const TERMINAL: Screen = Screen {
     name: "terminal",
-    size: (880, 260),
+    size: (930, 260),
     dark: true,
 };
 

