@@ -167,7 +167,7 @@ fn a_program_that_holds_the_port_is_one_failure_whose_remedy_is_accepted() {
                 ),
             };
             assert!(advice.contains(told), "{advice}");
-            // Nobody else is there, but the port is in order.
+            // No other node is there, but the port is in order.
             let (status, report) = doctor(hosts, PEERS, &remedy);
             assert_eq!((status, only_complaint(&report)[1]), (1, "neighbours"));
         }

@@ -1,4 +1,4 @@
-//! What was heard on the network while the doctor listened.
+//! What `jaus doctor` received from the network during its check.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -18,13 +18,13 @@ pub(super) const fn node_of(id: JausId) -> NodeId {
     (id.subsystem(), id.node())
 }
 
-/// Everything that was heard.
+/// The nodes and systems that were found.
 pub(super) struct Heard {
     /// Other components.
     pub(super) peers: Vec<Peer>,
     pub(super) directory: Arc<Directory>,
     pub(super) links: Vec<LinkReport>,
-    /// Nodes that were heard, but not by multicast.
+    /// Nodes from which only unicast was received.
     pub(super) mute: BTreeSet<NodeId>,
     pub(super) listened: Duration,
     /// Ids received from more than one address.

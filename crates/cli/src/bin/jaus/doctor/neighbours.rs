@@ -40,7 +40,7 @@ pub(super) fn findings(heard: &Heard) -> Vec<Finding> {
     findings
 }
 
-/// No other node was heard.
+/// The warning that no other node was found.
 fn alone(heard: &Heard) -> Finding {
     let seconds = heard.listened.as_secs_f64();
     Finding::alone(
@@ -101,7 +101,7 @@ fn out_of_reach(heard: &Heard, peer: &Peer, here: &[Interface]) -> Option<Findin
     )))
 }
 
-/// A peer whose address is in no network of the interface on which it was heard.
+/// A peer whose address is in no network of the interface that received its messages.
 fn elsewhere(name: &str, address: SocketAddr, interface: &Interface) -> Finding {
     let ip = address.ip();
     let ours = network(interface);
