@@ -117,6 +117,7 @@ impl Network {
     /// For the examination of a node before its start: its id, if one is chosen, and its settings,
     /// but with a temporary id.
     pub fn for_examination(&self) -> Result<(Option<JausId>, Config), Failure> {
+        self.require_plain()?;
         let (identity, node) = self.settings()?;
         let id = self.chosen_id(&identity, &node);
         Ok((id, self.with_flags(node, passing_id())?))
@@ -250,6 +251,21 @@ impl Network {
             .live_on(port)
             .map_err(Failure::of)?;
         Ok((component, sender, stay))
+    }
+
+    /// Refuses a secure link, for a command that examines plain links only.
+    ///
+    /// # Errors
+    /// If flags or the settings file name a secure link.
+    pub fn require_plain(&self) -> Result<(), Failure> {
+        #[cfg(feature = "secure")]
+        if self.secure.settings(self.file())?.is_some() {
+            return Err(Failure::new(
+                "this command uses plain links only: omit --secure-listen and --secure-peer, or \
+                 choose a settings file without [secure]",
+            ));
+        }
+        Ok(())
     }
 
     /// Starts a node with these settings, and with a secure link if flags or the settings file

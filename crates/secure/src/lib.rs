@@ -1,6 +1,6 @@
 //! Authenticated, encrypted links between the nodes of a JAUS system.
 //!
-//! JAUS has no authentication: whoever can send a datagram to a vehicle can drive it. AS5669 does
+//! JAUS has no authentication: any host that can send to a vehicle can drive it. AS5669 does
 //! not allow the payload to change, so this crate leaves the messages as they are and carries their
 //! JUDP datagrams through QUIC: TLS 1.3, congestion control, and connections that survive a change
 //! of address.

@@ -183,3 +183,16 @@ fn a_node_without_a_key_says_how_to_make_one() {
     let refused = as_operator(&host, "127.0.0.1", &query);
     assert!(refused.stderr.contains("jaus keys trust"), "{refused:?}");
 }
+
+#[test]
+fn commands_that_use_plain_links_refuse_a_secure_one() {
+    for command in [
+        &["judge", "115.1.5"][..],
+        &["examine", "115.1.5"],
+        &["doctor"],
+    ] {
+        let refused = run(&[command, &["--secure-peer", "127.0.0.1"]].concat(), b"");
+        assert_eq!(refused.status, 2, "{refused:?}");
+        assert!(refused.stderr.contains("plain links only"), "{refused:?}");
+    }
+}

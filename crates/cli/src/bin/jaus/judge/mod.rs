@@ -228,6 +228,7 @@ impl Judge {
     }
 
     async fn judge(&self, address: JausId, services: &Services) -> Result<Outcome, Failure> {
+        self.network.require_plain()?;
         let (id, config) = self.network.for_own_node_as(MAIN, "jaus judge")?;
         let recording = self.record.as_deref().map(Recording::create).transpose()?;
         let dictionary = self.jsidl.load()?;
