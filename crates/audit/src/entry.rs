@@ -1,0 +1,125 @@
+//! One entry of the log.
+
+use std::fmt::Display;
+use std::time::SystemTime;
+
+use serde::{Serialize, Serializer};
+
+/// How an action ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Outcome {
+    /// It was done, or passed on to the component that decides.
+    Allowed,
+    /// A rule forbids it.
+    Refused,
+    /// It was allowed and went wrong.
+    Failed,
+}
+
+/// Who did what, and with what result.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Entry {
+    /// When; in the log as RFC 3339 in UTC, to the millisecond.
+    #[serde(serialize_with = "rfc3339")]
+    pub time: SystemTime,
+    /// The name of the key or user, as this node's files know it.
+    pub who: String,
+    /// What was done: the name of a message, or a word such as `login`.
+    pub what: String,
+    /// To whom: a JAUS id, or a user.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub to: Option<String>,
+    /// The result.
+    pub result: Outcome,
+    /// The reason for the result, or details.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
+    /// The JAUS id that acted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
+    /// The network address of who acted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub address: Option<String>,
+    /// The public key of who acted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub key: Option<String>,
+    /// How often, if more than once.
+    #[serde(skip_serializing_if = "is_once")]
+    pub times: u64,
+}
+
+impl Entry {
+    /// An entry of this moment.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "the log records real time, whatever clock the node runs by"
+    )]
+    pub fn new(who: impl Display, what: impl Display, result: Outcome) -> Self {
+        Self {
+            time: SystemTime::now(),
+            who: who.to_string(),
+            what: what.to_string(),
+            to: None,
+            result,
+            why: None,
+            id: None,
+            address: None,
+            key: None,
+            times: 1,
+        }
+    }
+
+    /// To whom it was done.
+    #[must_use]
+    pub fn to(mut self, whom: impl Display) -> Self {
+        self.to = Some(whom.to_string());
+        self
+    }
+
+    /// The reason for the result, or details.
+    #[must_use]
+    pub fn because(mut self, why: impl Display) -> Self {
+        self.why = Some(why.to_string());
+        self
+    }
+
+    /// The JAUS id that acted.
+    #[must_use]
+    pub fn id(mut self, id: impl Display) -> Self {
+        self.id = Some(id.to_string());
+        self
+    }
+
+    /// The network address of who acted.
+    #[must_use]
+    pub fn address(mut self, address: impl Display) -> Self {
+        self.address = Some(address.to_string());
+        self
+    }
+
+    /// The public key of who acted.
+    #[must_use]
+    pub fn key(mut self, key: impl Display) -> Self {
+        self.key = Some(key.to_string());
+        self
+    }
+
+    /// Whether it differs from another entry in nothing but time.
+    pub(crate) fn repeats(&self, other: &Self) -> bool {
+        let Self { time, times, .. } = other;
+        let (time, times) = (*time, *times);
+        Self { time, times, ..self.clone() } == *other
+    }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_once(times: &u64) -> bool {
+    *times == 1
+}
+
+fn rfc3339<S: Serializer>(time: &SystemTime, to: S) -> Result<S::Ok, S::Error> {
+    to.collect_str(&humantime::format_rfc3339_millis(*time))
+}
