@@ -7,7 +7,7 @@ use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::endpoint::Received;
-use jaus::messages::core::{CreateEvent, QueryHeartbeatPulse};
+use jaus::messages::core::{CreateEvent, QueryHeartbeatPulse, ReportHeartbeatPulse};
 use jaus::service::{Discovery, Kind, Liveness, Profile, Scope, Stack, Timing, Transport};
 use jaus::wire::{Broadcast, Priority};
 use jaus_test_kit::figures::Figures;
@@ -117,6 +117,11 @@ fn fire_events(subscriptions: u16) -> f64 {
     let (mut reports, mut took) = (0, Duration::ZERO);
     while reports < 1000 {
         now += Duration::from_millis(101);
+        // A silent client would be asked whether it still exists.
+        for number in 0..subscriptions.min(CLIENTS) {
+            let alive = ReportHeartbeatPulse.encode().unwrap();
+            stack.handle_message(now, &from(client(number), alive));
+        }
         let start = Instant::now();
         stack.handle_timeout(now);
         let fired = drain(&mut stack);
