@@ -15,7 +15,7 @@ use super::arrival::Arrival;
 use super::egress::Hop;
 use super::{Counter, Endpoint, Path, Peer, Rate, To};
 use crate::address::JausId;
-use crate::wire::{Broadcast, DataControl, Frame, Framing, Version, ra};
+use crate::wire::{Broadcast, DataControl, Frame, Version, ra};
 
 /// How long after a peer was heard on one path its broadcasts from another path count as late
 /// copies.
@@ -121,7 +121,7 @@ impl Endpoint {
     /// without a group, and static peers that groups do not reach.
     fn hops_everywhere_but(&self, from: Path, destination: JausId) -> Vec<Hop> {
         let mut singly = self.peers.broadcast_copies(destination);
-        if self.egress.framing(from.link) == Framing::Jtcp {
+        if !self.egress.is_datagram(from) {
             singly.extend(self.peers.paths_on(from.link));
         }
         singly.sort_unstable();
