@@ -18,7 +18,7 @@ use super::failure::Failure;
 use super::identity::OwnId;
 pub use super::identity::{Identity, SubsystemKind};
 #[cfg(feature = "secure")]
-use super::secure::SecureFlags;
+use super::secure::{Secure, SecureFlags};
 use super::settings;
 
 #[derive(Args, Debug)]
@@ -117,7 +117,6 @@ impl Network {
     /// For the examination of a node before its start: its id, if one is chosen, and its settings,
     /// but with a temporary id.
     pub fn for_examination(&self) -> Result<(Option<JausId>, Config), Failure> {
-        self.require_plain()?;
         let (identity, node) = self.settings()?;
         let id = self.chosen_id(&identity, &node);
         Ok((id, self.with_flags(node, passing_id())?))
@@ -253,13 +252,22 @@ impl Network {
         Ok((component, sender, stay))
     }
 
+    /// The settings of the secure link; `None` if neither flags nor the settings file ask for one.
+    ///
+    /// # Errors
+    /// An unreadable file, or an invalid table.
+    #[cfg(feature = "secure")]
+    pub fn secure(&self) -> Result<Option<Secure>, Failure> {
+        self.secure.settings(self.file())
+    }
+
     /// Refuses a secure link, for a command that examines plain links only.
     ///
     /// # Errors
     /// If flags or the settings file name a secure link.
     pub fn require_plain(&self) -> Result<(), Failure> {
         #[cfg(feature = "secure")]
-        if self.secure.settings(self.file())?.is_some() {
+        if self.secure()?.is_some() {
             return Err(Failure::new(
                 "this command uses plain links only: omit --secure-listen and --secure-peer, or \
                  choose a settings file without [secure]",
@@ -275,9 +283,9 @@ impl Network {
     /// A key or trust file that cannot be used, or a node that cannot be started.
     pub fn start(&self, config: Config) -> Result<Node, Failure> {
         #[cfg(feature = "secure")]
-        if let Some(secure) = self.secure.settings(self.file())? {
-            let (config, link) = secure.open(config)?;
-            return Node::start_with(config, vec![Box::new(link)]).map_err(Failure::of);
+        if let Some(secure) = self.secure()? {
+            let config = Secure::restrict(config)?;
+            return Node::start_with(config, vec![Box::new(secure.open()?)]).map_err(Failure::of);
         }
         Node::start(config).map_err(Failure::of)
     }

@@ -8,6 +8,7 @@ use std::str::FromStr;
 use clap::Args;
 use jaus::link::Interfaces;
 use jaus::node::Config;
+use jaus_audit::{AuditLog, Limits};
 use jaus_secure::{Key, SecureLink, TrustFile};
 use serde::Deserialize;
 
@@ -64,6 +65,10 @@ pub struct SecureFlags {
     /// interface for it is named (repeatable)
     #[arg(long, value_name = "ADDRESS")]
     secure_peer: Vec<Address>,
+
+    /// Write an audit log to this file: sessions, refused messages, control, emergencies
+    #[arg(long, value_name = "FILE")]
+    audit: Option<PathBuf>,
 
     #[command(flatten)]
     files: KeyFiles,
@@ -122,6 +127,8 @@ struct Table {
     key: Option<PathBuf>,
     /// The file of the keys that this node trusts. Flag: `--trusted-keys`.
     trusted_keys: Option<PathBuf>,
+    /// The file of the audit log: sessions, refused messages, control, emergencies. Flag: `--audit`.
+    audit: Option<PathBuf>,
 }
 
 /// The settings of a secure link.
@@ -129,6 +136,7 @@ struct Table {
 pub struct Secure {
     listen: Option<Address>,
     peers: Vec<Address>,
+    audit: Option<PathBuf>,
     files: KeyFiles,
 }
 
@@ -142,6 +150,7 @@ impl SecureFlags {
         let secure = Secure {
             listen: self.secure_listen.or(table.listen),
             peers: [&table.peers[..], &self.secure_peer].concat(),
+            audit: self.audit.clone().or(table.audit),
             files: KeyFiles {
                 key: self.files.key.clone().or(table.key),
                 trusted_keys: self.files.trusted_keys.clone().or(table.trusted_keys),
@@ -153,36 +162,65 @@ impl SecureFlags {
 }
 
 impl Secure {
-    /// Opens the link, and takes plain JUDP from the node's settings unless they name interfaces
-    /// for it.
+    /// This node's key.
     ///
     /// # Errors
-    /// A key or trust file that cannot be used, plain TCP connections beside the link, or an address
-    /// that cannot be listened on.
-    pub fn open(self, mut config: Config) -> Result<(Config, SecureLink), Failure> {
+    /// If its file cannot be used.
+    pub fn key(&self) -> Result<Key, Failure> {
+        Key::load(&self.files.key()?).map_err(remedied)
+    }
+
+    /// The keys that this node trusts.
+    ///
+    /// # Errors
+    /// If their file cannot be used.
+    pub fn trust(&self) -> Result<TrustFile, Failure> {
+        TrustFile::load(&self.files.trusted_keys()?)
+            .map_err(|error| Failure::new(format!("{error}; `jaus keys trust` writes that file")))
+    }
+
+    /// The addresses of the peers to connect to.
+    pub fn peers(&self) -> Vec<SocketAddr> {
+        self.peers.iter().map(|Address(peer)| *peer).collect()
+    }
+
+    /// The node's settings beside the link: plain JUDP only on interfaces that they name.
+    ///
+    /// # Errors
+    /// Plain TCP connections.
+    pub fn restrict(config: Config) -> Result<Config, Failure> {
         if config.tcp != jaus::node::Tcp::default() {
             return Err(Failure::new(
                 "plain TCP connections ([tcp]) and a secure link contradict each other: remove one",
             ));
         }
-        if config.interfaces == Interfaces::All {
-            config = config.without_udp();
+        match config.interfaces {
+            Interfaces::All => Ok(config.without_udp()),
+            _ => Ok(config),
         }
-        let key = Key::load(&self.files.key()?).map_err(remedied)?;
-        let trust = TrustFile::load(&self.files.trusted_keys()?).map_err(|error| {
-            Failure::new(format!("{error}; `jaus keys trust` writes that file"))
-        })?;
+    }
+
+    /// Opens the link.
+    ///
+    /// # Errors
+    /// A key or trust file that cannot be used, or an address that cannot be listened on.
+    pub fn open(&self) -> Result<SecureLink, Failure> {
+        let (key, trust) = (self.key()?, self.trust()?);
         let any = || match self.peers.first() {
             Some(Address(SocketAddr::V6(_))) => SocketAddr::from(([0; 16], 0)),
             _ => SocketAddr::from(([0; 4], 0)),
         };
         let listen = self.listen.map_or_else(any, |Address(address)| address);
         let mut settings = jaus_secure::Settings::new(listen);
-        for Address(peer) in &self.peers {
-            settings = settings.connect(*peer);
+        for peer in self.peers() {
+            settings = settings.connect(peer);
         }
-        let link = SecureLink::open(&key, trust, settings).map_err(Failure::of)?;
-        Ok((config, link))
+        let mut link = SecureLink::open(&key, trust, settings).map_err(Failure::of)?;
+        if let Some(path) = &self.audit {
+            let log = AuditLog::open(path, Limits::default()).map_err(Failure::of)?;
+            link = link.audited(log);
+        }
+        Ok(link)
     }
 }
 
@@ -213,34 +251,16 @@ mod tests {
 
     #[test]
     fn plain_udp_remains_only_on_named_interfaces() {
-        let folder = tempfile::tempdir().unwrap();
-        let [key, trusted] = ["node.key", "trusted_keys"].map(|name| folder.path().join(name));
-        Key::create(&key).unwrap();
-        std::fs::write(&trusted, "").unwrap();
-        let opened = |config: Config| {
-            let secure = Secure {
-                listen: Some("127.0.0.1:0".parse().unwrap()),
-                peers: Vec::new(),
-                files: KeyFiles {
-                    key: Some(key.clone()),
-                    trusted_keys: Some(trusted.clone()),
-                },
-            };
-            let runtime = tokio::runtime::Builder::new_current_thread()
-                .enable_all()
-                .build();
-            let _guard = runtime.as_ref().unwrap().enter();
-            secure.open(config).map(|(config, _)| config.interfaces)
-        };
+        let restricted = |config| Secure::restrict(config).map(|it| it.interfaces);
         let none = Interfaces::Only(Vec::new());
-        assert_eq!(opened(Config::new(101, 1)).unwrap(), none);
+        assert_eq!(restricted(Config::new(101, 1)).unwrap(), none);
         let named = Config::new(101, 1).interfaces(["lo"]);
-        assert_eq!(opened(named.clone()).unwrap(), named.interfaces);
+        assert_eq!(restricted(named.clone()).unwrap(), named.interfaces);
         assert_eq!(
-            opened(Config::loopback(101, 1)).unwrap(),
+            restricted(Config::loopback(101, 1)).unwrap(),
             Interfaces::Loopback
         );
         let tcp = Config::new(101, 1).tcp_listen("127.0.0.1:0".parse().unwrap());
-        assert!(opened(tcp).is_err());
+        assert!(restricted(tcp).is_err());
     }
 }

@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::Path;
 
+use crate::rules::Rules;
 use crate::trust::{Peer, Trust, TrustError, line_of};
 
 /// Adds a peer to a trust file, which is created if necessary.
@@ -20,6 +21,35 @@ pub fn trust(path: &Path, peer: &Peer) -> Result<(), TrustError> {
     replace(path, &text)
 }
 
+/// Replaces the rules of the peer with this name; returns whether it was there. A running node
+/// applies them within seconds.
+///
+/// # Errors
+/// If the file cannot be read or written, or has a malformed line.
+pub fn allow(path: &Path, name: &str, rules: &Rules) -> Result<bool, TrustError> {
+    let text = text_of(path)?;
+    let trust = Trust::parse(&text)?;
+    let Some(peer) = trust.peers().iter().find(|it| it.name == name) else {
+        return Ok(false);
+    };
+    let line = line_of(&Peer {
+        rules: rules.clone(),
+        ..peer.clone()
+    });
+    let changed: String = text
+        .lines()
+        .map(|it| {
+            if is_of(name, it) {
+                line.clone()
+            } else {
+                format!("{it}\n")
+            }
+        })
+        .collect();
+    replace(path, &changed)?;
+    Ok(true)
+}
+
 /// Removes the peer with this name from a trust file; returns whether it was there. A running node
 /// closes its session within seconds.
 ///
@@ -28,14 +58,18 @@ pub fn trust(path: &Path, peer: &Peer) -> Result<(), TrustError> {
 pub fn revoke(path: &Path, name: &str) -> Result<bool, TrustError> {
     let text = text_of(path)?;
     Trust::parse(&text)?;
-    let names = |line: &&str| line.split_whitespace().next() == Some(name);
-    let rest: Vec<_> = text.lines().filter(|line| !names(line)).collect();
+    let rest: Vec<_> = text.lines().filter(|line| !is_of(name, line)).collect();
     if rest.len() == text.lines().count() {
         return Ok(false);
     }
     let rest: String = rest.iter().flat_map(|line| [*line, "\n"]).collect();
     replace(path, &rest)?;
     Ok(true)
+}
+
+/// Whether a line is that of the peer with this name.
+fn is_of(name: &str, line: &str) -> bool {
+    line.split_whitespace().next() == Some(name)
 }
 
 fn text_of(path: &Path) -> Result<String, TrustError> {
@@ -74,6 +108,7 @@ mod tests {
             name: name.to_owned(),
             key: PublicKey::from_octets([octet; 32]),
             ids: vec!["101.255.255".parse().unwrap(), "102.1.1".parse().unwrap()],
+            rules: Rules::default(),
         }
     }
 
@@ -94,6 +129,23 @@ mod tests {
         assert!(!revoke(&path, "rover").unwrap());
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.starts_with("# our team\nconsole "), "{text}");
+    }
+
+    #[test]
+    fn the_rules_of_a_peer_are_replaced_and_the_other_lines_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trusted_keys");
+        fs::write(&path, "# our team\n").unwrap();
+        trust(&path, &peer("rover", 1)).unwrap();
+        trust(&path, &peer("console", 2)).unwrap();
+        let rules: Rules = "control=127 with=101.255.255".parse().unwrap();
+        assert!(allow(&path, "console", &rules).unwrap());
+        assert!(!allow(&path, "tablet", &rules).unwrap());
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with("# our team\nrover "), "{text}");
+        let peers = Trust::parse(&text).unwrap();
+        assert_eq!(peers.peers()[0], peer("rover", 1));
+        assert_eq!(peers.peers()[1].rules, rules);
     }
 
     #[test]

@@ -9,8 +9,10 @@ use std::sync::Arc;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
+use ring::digest;
 use ring::rand::SystemRandom;
 use ring::signature::Ed25519KeyPair;
+use rustls::SignatureScheme;
 use rustls::pki_types::{PrivatePkcs8KeyDer, SubjectPublicKeyInfoDer, pem::PemObject as _};
 use rustls::sign::SigningKey;
 
@@ -110,6 +112,16 @@ impl Key {
     #[must_use]
     pub const fn public(&self) -> PublicKey {
         self.public
+    }
+
+    /// A secret for another purpose, the same whenever the node runs with this key.
+    pub(crate) fn secret_for(&self, purpose: &[u8]) -> digest::Digest {
+        let signer = self.signing.choose_scheme(&[SignatureScheme::ED25519]);
+        // Ed25519 signs everything, and the same text always in the same way.
+        let signature = signer
+            .and_then(|it| it.sign(purpose).ok())
+            .unwrap_or_default();
+        digest::digest(&digest::SHA256, &signature)
     }
 
     pub(crate) fn signing(&self) -> Arc<dyn SigningKey> {

@@ -37,10 +37,11 @@
 pub mod edit;
 mod key;
 mod link;
+pub mod rules;
 mod tls;
 pub mod transport;
 mod trust;
 
 pub use key::{Key, KeyError, PublicKey};
-pub use link::{OpenError, SecureLink, Settings};
+pub use link::{OpenError, Reached, SecureLink, Settings};
 pub use trust::{Peer, Trust, TrustError, TrustFile};

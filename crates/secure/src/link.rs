@@ -1,6 +1,9 @@
 //! The secure link of a node: a UDP socket around the [`Transport`].
 #![expect(clippy::disallowed_types, reason = "this module owns the socket")]
 
+mod audit;
+mod probe;
+
 use std::io;
 use std::net::SocketAddr;
 use std::task::{Context, Poll};
@@ -10,12 +13,15 @@ use bytes::Bytes;
 use jaus::endpoint::{Remote, To, Transmit};
 use jaus::link::custom::{Arrival, CustomLink};
 use jaus::node;
+use jaus_audit::AuditLog;
 use tokio::io::ReadBuf;
 use tokio::net::UdpSocket;
 
 use crate::key::Key;
 use crate::transport::Transport;
 use crate::trust::TrustFile;
+
+pub use probe::Reached;
 
 /// UDP datagrams to read before the node's other links have their turn.
 const BATCH: usize = 64;
@@ -70,6 +76,7 @@ pub struct SecureLink {
     leaving: Option<(SocketAddr, Bytes)>,
     buffer: Box<[u8]>,
     timeout: Option<Instant>,
+    audit: Option<AuditLog>,
 }
 
 impl SecureLink {
@@ -88,7 +95,16 @@ impl SecureLink {
             leaving: None,
             buffer: vec![0; LONGEST].into(),
             timeout: Some(node::now()),
+            audit: None,
         })
+    }
+
+    /// Writes sessions, refused messages, and what concerns control, emergencies and configuration
+    /// to this log.
+    #[must_use]
+    pub fn audited(mut self, log: AuditLog) -> Self {
+        self.audit = Some(log);
+        self
     }
 
     /// The address that it listens on.
@@ -103,6 +119,13 @@ impl SecureLink {
     #[must_use]
     pub const fn transport(&self) -> &Transport {
         &self.transport
+    }
+
+    fn write_records(&mut self) {
+        if let Some(log) = &self.audit {
+            let records = std::iter::from_fn(|| self.transport.poll_record());
+            records.for_each(|record| log.write(audit::entry(record)));
+        }
     }
 
     /// Reads what the kernel has received; returns whether there may be more.
@@ -162,6 +185,7 @@ impl CustomLink for SecureLink {
             }
         }
         self.timeout = self.transport.poll_timeout();
+        self.write_records();
         Poll::Ready(())
     }
 

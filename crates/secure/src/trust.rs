@@ -1,12 +1,13 @@
-//! The keys that a node trusts, and the ids that each of them may speak for.
+//! The keys that a node trusts, the ids that each of them may speak for, and what it may do.
 //!
-//! A trust file has a line for each key: a name for people, the public key, and the ids, separated
-//! by commas. `255` and `65535` are wildcards as in JAUS addresses.
+//! A trust file has a line for each key: a name for people, the public key, the ids, separated by
+//! commas, and its [rules](Rules). `255` and `65535` are wildcards as in JAUS addresses. A key
+//! without rules may observe.
 //!
 //! ```text
-//! # name     public key                                    speaks for
+//! # name     public key                                    speaks for         may
 //! rover      WkE5vXW4lFyQ3nDzGnUlnQ0Xs0mB5bqkVHk0pJ1Yd2s=  101.255.255
-//! console    0b2yKQZ0C3r1mHqkqfM3d5bq0f5fY1b5o8hGxqj9n3E=  60.1.255,60.2.255
+//! console    0b2yKQZ0C3r1mHqkqfM3d5bq0f5fY1b5o8hGxqj9n3E=  60.1.255,60.2.255  control=127
 //! ```
 
 use std::fs;
@@ -18,6 +19,7 @@ use std::time::{Duration, SystemTime};
 use jaus::address::JausId;
 
 use crate::key::{KeyError, PublicKey};
+use crate::rules::{RuleError, Rules};
 
 /// How often a running node looks whether its trust file has changed.
 const FOLLOW_INTERVAL: Duration = Duration::from_secs(1);
@@ -39,7 +41,7 @@ pub enum TrustError {
     /// The file is longer than 1 MiB.
     #[error("the trust file {} is longer than 1 MiB", .0.display())]
     TooLong(PathBuf),
-    /// A line has not three parts.
+    /// A line lacks a part.
     #[error("line {line}: write a name, a public key and the ids, such as `rover KEY 101.255.255`")]
     Parts {
         /// Its number, from 1.
@@ -60,6 +62,14 @@ pub enum TrustError {
         line: usize,
         /// The text.
         text: String,
+    },
+    /// A rule is malformed.
+    #[error("line {line}: {source}")]
+    Rule {
+        /// The line's number, from 1.
+        line: usize,
+        /// The reason.
+        source: RuleError,
     },
     /// A key or name appears twice.
     #[error("line {line}: `{name}` or its key is already in line {first}: remove one of them")]
@@ -82,6 +92,8 @@ pub struct Peer {
     pub key: PublicKey,
     /// The ids that it may speak for; with wildcards.
     pub ids: Vec<JausId>,
+    /// What it may do.
+    pub rules: Rules,
 }
 
 impl Peer {
@@ -140,8 +152,8 @@ impl Trust {
 }
 
 fn parse_line(line: usize, text: &str) -> Result<Peer, TrustError> {
-    let parts: Vec<_> = text.split_whitespace().collect();
-    let [name, key, ids] = parts[..] else {
+    let mut words = text.split_whitespace();
+    let (Some(name), Some(key), Some(ids)) = (words.next(), words.next(), words.next()) else {
         return Err(TrustError::Parts { line });
     };
     let key = key
@@ -153,17 +165,26 @@ fn parse_line(line: usize, text: &str) -> Result<Peer, TrustError> {
             text: text.chars().take(60).collect(),
         })
     });
+    let rules = Rules::parse(words).map_err(|source| TrustError::Rule { line, source })?;
     Ok(Peer {
         name: name.to_owned(),
         key,
         ids: ids.collect::<Result<_, _>>()?,
+        rules,
     })
 }
 
 /// The line of a peer in a trust file.
 pub(crate) fn line_of(peer: &Peer) -> String {
     let ids: Vec<_> = peer.ids.iter().map(JausId::to_string).collect();
-    format!("{} {} {}\n", peer.name, peer.key, ids.join(","))
+    let line = format!(
+        "{} {} {} {}",
+        peer.name,
+        peer.key,
+        ids.join(","),
+        peer.rules
+    );
+    format!("{}\n", line.trim_end())
 }
 
 /// The trust of a running node, shared by its link and its handshakes. Replacing it takes effect at
@@ -232,6 +253,19 @@ impl TrustFile {
     pub fn find(&self, key: PublicKey) -> Option<Peer> {
         let inner = self.trust.read().unwrap_or_else(PoisonError::into_inner);
         inner.1.find(key).cloned()
+    }
+
+    /// The number of trusted keys.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        let inner = self.trust.read().unwrap_or_else(PoisonError::into_inner);
+        inner.1.peers().len()
+    }
+
+    /// Whether no key is trusted.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
     }
 
     /// How often the trust was replaced.

@@ -14,6 +14,7 @@ use jaus::messages::mobility::{
 use jaus::node::{Config, Node};
 
 use super::*;
+use crate::rules::Rules;
 use crate::trust::{Peer, Trust};
 
 /// Longer than any step takes.
@@ -28,6 +29,7 @@ fn trusting(name: &str, key: &Key, ids: &str) -> TrustFile {
         name: name.to_owned(),
         key: key.public(),
         ids: vec![ids.parse().unwrap()],
+        rules: Rules::default(),
     }]))
 }
 
@@ -84,6 +86,50 @@ async fn a_sensor_is_found_queried_and_subscribed_over_a_secure_link_alone() {
                 break;
             }
         }
+    };
+    tokio::time::timeout(LIMIT, exchange)
+        .await
+        .expect("an answer");
+    for node in nodes {
+        node.shutdown().await;
+    }
+}
+
+#[tokio::test]
+async fn a_relay_joins_nodes_that_have_no_link_with_each_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let keys = ["relay", "rover", "client"].map(|name| key(&folder, name));
+    let any = "127.0.0.1:0".parse().unwrap();
+    let peers = [
+        ("rover", &keys[1], "101.255.255"),
+        ("client", &keys[2], "60.255.255"),
+    ];
+    let peers = peers.map(|(name, key, ids)| Peer {
+        name: name.to_owned(),
+        key: key.public(),
+        ids: vec![ids.parse().unwrap()],
+        rules: Rules::default(),
+    });
+    let trust = TrustFile::of(Trust::new(peers.into()));
+    let at_relay = SecureLink::open(&keys[0], trust, Settings::new(any)).unwrap();
+    let settings = Settings::new(any).connect(at_relay.local().unwrap());
+    let open = |own: &Key| {
+        let trust = trusting("relay", &keys[0], "65535.255.255");
+        SecureLink::open(own, trust, settings.clone()).unwrap()
+    };
+    let mut config = Config::new(200, 1).without_udp();
+    config.routing.forward = true;
+    let relay = Node::start_with(config, vec![Box::new(at_relay)]).unwrap();
+    let nodes = [relay, node(101, open(&keys[1])), node(60, open(&keys[2]))];
+    let (rover, client) = (sensor(&nodes[1]), client(&nodes[2]));
+    rover
+        .publish(ReportAccelerationState::default(), SystemTime::now())
+        .await
+        .unwrap();
+    let exchange = async {
+        let found = client.find(acceleration_state_sensor::URN).await.unwrap();
+        let query = QueryAccelerationState::none().with_acceleration_x();
+        client.query(found, &query).await.unwrap();
     };
     tokio::time::timeout(LIMIT, exchange)
         .await

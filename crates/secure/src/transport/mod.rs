@@ -15,10 +15,13 @@
 
 mod dial;
 mod inlet;
+mod record;
 mod report;
+mod screen;
 mod session;
 #[cfg(test)]
 mod tests;
+mod traffic;
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::net::{IpAddr, SocketAddr};
@@ -28,13 +31,14 @@ use std::time::{Duration, Instant};
 use bytes::{Bytes, BytesMut};
 use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
-use jaus::wire::{Priority, judp};
 use quinn_proto::{
     ClientConfig, ConnectionError, ConnectionHandle, DatagramEvent, Endpoint, EndpointConfig,
-    Event, IdleTimeout, Incoming, ServerConfig, StreamEvent, StreamId, TransportConfig, VarInt,
+    Event, IdleTimeout, Incoming, ServerConfig, StreamEvent, TransportConfig, VarInt,
 };
+use ring::hmac;
 use rustls::pki_types::CertificateDer;
 
+pub use record::{Act, Fault, Record};
 pub use report::{Counters, SessionReport};
 
 use crate::key::{Key, PublicKey};
@@ -85,6 +89,7 @@ pub struct Transport {
     next: u64,
     arrivals: VecDeque<Arrival>,
     responses: VecDeque<(SocketAddr, Bytes)>,
+    records: VecDeque<Record>,
     counters: Counters,
     buffer: Vec<u8>,
 }
@@ -101,7 +106,10 @@ impl Transport {
         server.transport_config(transport.clone());
         let mut client = ClientConfig::new(client);
         client.transport_config(transport);
-        let config = Arc::new(EndpointConfig::default());
+        // With the same secret after a restart, peers notice at once that their session is gone.
+        let resets = key.secret_for(b"jaus/1 stateless reset");
+        let resets = hmac::Key::new(hmac::HMAC_SHA256, resets.as_ref());
+        let config = Arc::new(EndpointConfig::new(Arc::new(resets)));
         Self {
             own: key.public(),
             edition: trust.edition(),
@@ -116,6 +124,7 @@ impl Transport {
             next: 0,
             arrivals: VecDeque::new(),
             responses: VecDeque::new(),
+            records: VecDeque::new(),
             counters: Counters::default(),
             buffer: Vec::new(),
         }
@@ -186,25 +195,6 @@ impl Transport {
                 session.connection.handle_timeout(now);
             }
             self.advance(now, id);
-        }
-    }
-
-    /// Queues a JUDP datagram for a session. It is dropped if the session has ended.
-    pub fn send(&mut self, session: SessionId, priority: Priority, datagram: Bytes) {
-        match self.sessions.get_mut(&session) {
-            Some(session) if session.established().is_some() => {
-                self.counters.send_overflows += session.queue(priority, datagram);
-            }
-            _ => self.counters.no_session += 1,
-        }
-    }
-
-    /// Queues a JUDP datagram for every session.
-    pub fn send_to_all(&mut self, priority: Priority, datagram: &Bytes) {
-        for session in self.sessions.values_mut() {
-            if session.established().is_some() {
-                self.counters.send_overflows += session.queue(priority, datagram.clone());
-            }
         }
     }
 
@@ -406,6 +396,7 @@ impl Transport {
             }
             None => session.greet(),
         }
+        self.record(id, Act::Connected);
         self.keep_one(now, key, id);
     }
 
@@ -448,13 +439,23 @@ impl Transport {
         let address = session.connection.remote_address();
         if let Some(peer) = session.established() {
             tracing::warn!(peer = peer.name, %address, %reason, "secure session lost");
+            let reason = reason.to_string();
+            self.record(id, Act::Disconnected { reason });
         } else if session.peer.is_none() {
             self.counters.handshakes_failed += 1;
+            let untrusted = self.refusals.take();
+            let fault = Fault::of(reason, untrusted);
             if self.warned.is_none_or(|at| now >= at + WARNING_PAUSE) {
                 self.warned = Some(now);
-                let untrusted = self.refusals.take();
-                warn_of_handshake(address, reason, untrusted);
+                let remedy = fault.remedy().unwrap_or_default();
+                tracing::warn!(%address, %fault, remedy, "no secure session");
             }
+            self.push_record(Record {
+                peer: None,
+                key: untrusted,
+                address,
+                act: Act::HandshakeFailed(fault),
+            });
         }
         self.mark_ended(now, id);
     }
@@ -464,13 +465,16 @@ impl Transport {
         if let Some(session) = self.sessions.get_mut(&id)
             && !session.ended
         {
-            if let Some(peer) = session.established() {
-                tracing::info!(peer = peer.name, reason, "secure session closed");
-            }
-            let reason = Bytes::from_static(reason.as_bytes());
+            let peer = session.established().map(|it| it.name.clone());
+            let octets = Bytes::from_static(reason.as_bytes());
             session
                 .connection
-                .close(now, VarInt::from_u32(code), reason);
+                .close(now, VarInt::from_u32(code), octets);
+            if let Some(peer) = peer {
+                tracing::info!(peer, reason, "secure session closed");
+                let reason = reason.to_owned();
+                self.record(id, Act::Disconnected { reason });
+            }
             self.mark_ended(now, id);
         }
     }
@@ -490,57 +494,6 @@ impl Transport {
             }
         }
     }
-
-    fn read_datagrams(&mut self, now: Instant, id: SessionId) {
-        let mut datagrams = Vec::new();
-        if let Some(session) = self.sessions.get_mut(&id) {
-            datagrams.extend(std::iter::from_fn(|| session.connection.datagrams().recv()));
-        }
-        for datagram in datagrams {
-            self.receive(now, id, datagram);
-        }
-    }
-
-    fn read_stream(&mut self, now: Instant, id: SessionId, stream: StreamId) {
-        let mut datagrams = Vec::new();
-        if let Some(session) = self.sessions.get_mut(&id) {
-            session.read(stream, |datagram| datagrams.push(datagram));
-        }
-        for datagram in datagrams {
-            self.receive(now, id, datagram);
-        }
-    }
-
-    /// Accepts a JUDP datagram if its sender may speak for the source of every message in it.
-    fn receive(&mut self, now: Instant, id: SessionId, octets: Bytes) {
-        let Some(session) = self.sessions.get_mut(&id) else {
-            return;
-        };
-        if octets.is_empty() && session.is_awaiting_greeting() {
-            self.establish(now, id);
-            return;
-        }
-        let Some(peer) = session.established() else {
-            return;
-        };
-        let Ok(frames) = judp::frames(octets.clone()) else {
-            self.counters.malformed += 1;
-            return;
-        };
-        let foreign = frames
-            .flatten()
-            .find(|frame| !peer.speaks_for(frame.source));
-        if let Some(frame) = foreign {
-            self.counters.foreign_ids += 1;
-            tracing::debug!(peer = peer.name, source = %frame.source, "refused: foreign id");
-            return;
-        }
-        session.received += 1;
-        self.arrivals.push_back(Arrival::Datagram {
-            session: id,
-            octets,
-        });
-    }
 }
 
 /// Parameters of every connection.
@@ -559,18 +512,4 @@ fn peer_key(session: &Session) -> Option<PublicKey> {
     let identity = session.connection.crypto_session().peer_identity()?;
     let certificates = identity.downcast::<Vec<CertificateDer<'static>>>().ok()?;
     PublicKey::from_spki(certificates.first()?)
-}
-
-fn warn_of_handshake(address: SocketAddr, reason: &ConnectionError, untrusted: Option<PublicKey>) {
-    match (untrusted, reason) {
-        (Some(key), _) => tracing::warn!(
-            %address, %key,
-            "refused a key that is not trusted; to trust it, add it to the trust file"
-        ),
-        (None, ConnectionError::ConnectionClosed(_)) => tracing::warn!(
-            %address, %reason,
-            "the peer refused the handshake: its trust file may lack the key of this node"
-        ),
-        _ => tracing::warn!(%address, %reason, "no secure session"),
-    }
 }

@@ -17,9 +17,15 @@ pub struct Counters {
     pub handshakes_failed: u64,
     /// Connections ignored because too many handshakes were unfinished.
     pub handshakes_dropped: u64,
-    /// Datagrams refused because a message in them came from an id for which the key of their
-    /// sender may not speak.
+    /// Messages refused because they came from an id for which the key of their sender may not
+    /// speak.
     pub foreign_ids: u64,
+    /// Messages refused by the [rules](crate::rules::Rules) of the key of their sender.
+    pub refused: u64,
+    /// Messages not sent to a peer because the rules separate it from their source.
+    pub separated: u64,
+    /// Notices of peers that they refused a message of this node.
+    pub notices: u64,
     /// Datagrams that were no JUDP.
     pub malformed: u64,
     /// Datagrams dropped because the peer or the network was too slow.

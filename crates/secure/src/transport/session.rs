@@ -6,6 +6,7 @@
 //! take yet waits in a backlog, most urgent first.
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use bytes::{Buf as _, Bytes};
 use jaus::link::backlog::{Backlog, Bounds};
@@ -35,6 +36,8 @@ pub(super) struct Session {
     pub(super) peer: Option<Peer>,
     /// Whether it has ended and only waits for late packets of the peer.
     pub(super) ended: bool,
+    /// When the peer was last told that a message of its was refused.
+    pub(super) noticed: Option<Instant>,
     backlog: Backlog<(Priority, Bytes)>,
     outlets: [Outlet; Priority::ALL.len()],
     inlets: BTreeMap<StreamId, Inlet>,
@@ -62,6 +65,7 @@ impl Session {
             dial,
             peer: None,
             ended: false,
+            noticed: None,
             backlog: Backlog::new(WAITING),
             outlets: Default::default(),
             inlets: BTreeMap::new(),

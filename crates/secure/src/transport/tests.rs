@@ -7,9 +7,10 @@
 use std::collections::BTreeMap;
 
 use jaus::address::JausId;
-use jaus::wire::{DataControl, Flags, Frame};
+use jaus::wire::{DataControl, Flags, Frame, Priority, judp};
 
 use super::*;
+use crate::rules::Rules;
 use crate::trust::{Peer, Trust};
 
 /// The one-way delay of the network.
@@ -45,6 +46,7 @@ fn peer(name: &str, key: &Key, ids: &str) -> Peer {
         name: name.to_owned(),
         key: key.public(),
         ids: vec![ids.parse().unwrap()],
+        rules: Rules::everything(),
     }
 }
 
@@ -239,7 +241,7 @@ fn a_key_speaks_only_for_its_own_ids() {
     both.extend_from_slice(&judp("61.1.1", 20)[1..]);
     network.send(1, Priority::Standard, &both.into());
     network.run(SECOND);
-    assert_eq!(network.hosts[0].received, [own]);
+    assert_eq!(network.hosts[0].received, [own.clone(), own]);
     assert_eq!(network.counters(0).foreign_ids, 3);
 }
 
@@ -403,3 +405,5 @@ fn a_node_that_stops_tells_its_peers() {
     network.run(4 * DELAY);
     assert!(network.session(1).is_none());
 }
+
+mod rules;

@@ -2,12 +2,14 @@
 
 use std::fs;
 use std::path::Path;
+use std::str::FromStr;
 
 use clap::{Args, Subcommand};
 use jaus::address::JausId;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::{Output, say};
 use jaus_cli::secure::KeyFiles;
+use jaus_secure::rules::Rules;
 use jaus_secure::{Key, Peer, PublicKey, Trust, edit};
 use serde_json::json;
 
@@ -20,6 +22,8 @@ use serde_json::json;
 #[command(after_help = "Examples:\n  \
     jaus keys new\n  \
     jaus keys trust rover WkE5vXW4lFyQ3nDzGnUlnQ0Xs0mB5bqkVHk0pJ1Yd2s= 101.255.255\n  \
+    jaus keys trust console 0b2yKQZ0C3r1mHqkqfM3d5bq0f5fY1b5o8hGxqj9n3E= 60.1.255 control=127\n  \
+    jaus keys allow console control=200 clear-emergency\n  \
     jaus keys list\n  \
     jaus keys revoke rover")]
 pub(crate) struct Keys {
@@ -33,11 +37,13 @@ enum Action {
     New(Files),
     /// Print the public key
     Show(Files),
-    /// Trust the key of a peer for these ids
+    /// Trust the key of a peer for these ids; it may observe, unless there are rules
     Trust(TrustKey),
+    /// Replace the rules of a peer: what it may do besides observing
+    Allow(Allow),
     /// No longer trust a peer; its links to running nodes end
     Revoke(Revoke),
-    /// List the trusted keys and the ids that they may speak for
+    /// List the trusted keys, the ids that they may speak for, and their rules
     List(List),
 }
 
@@ -56,12 +62,54 @@ struct TrustKey {
     #[arg(value_name = "KEY")]
     public_key: PublicKey,
 
-    /// The ids that it may speak for: 101.255.255 for all of subsystem 101
-    #[arg(required = true)]
-    ids: Vec<JausId>,
+    /// The ids that it may speak for, separated by commas: 101.255.255 for all of subsystem 101
+    ids: Ids,
+
+    #[command(flatten)]
+    rules: RuleWords,
 
     #[command(flatten)]
     files: KeyFiles,
+}
+
+#[derive(Args)]
+struct Allow {
+    /// The peer's name
+    name: String,
+
+    #[command(flatten)]
+    rules: RuleWords,
+
+    #[command(flatten)]
+    files: KeyFiles,
+}
+
+/// The rules of a peer.
+#[derive(Args)]
+struct RuleWords {
+    /// What it may do besides observing: command, control=AUTHORITY, clear-emergency, configure; and
+    /// its limits: with=IDS, only=NAMES, except=NAMES (services, messages or codes)
+    #[arg(value_name = "RULE")]
+    rules: Vec<String>,
+}
+
+impl RuleWords {
+    fn rules(&self) -> Result<Rules, Failure> {
+        self.rules.join(" ").parse().map_err(Failure::of)
+    }
+}
+
+/// Ids, separated by commas.
+#[derive(Clone)]
+struct Ids(Vec<JausId>);
+
+impl FromStr for Ids {
+    type Err = <JausId as FromStr>::Err;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let ids = text.split(',').map(str::parse);
+        ids.collect::<Result<_, _>>().map(Self)
+    }
 }
 
 #[derive(Args)]
@@ -89,6 +137,7 @@ impl Keys {
             Action::New(it) => it.make(),
             Action::Show(it) => it.show(),
             Action::Trust(it) => it.add(),
+            Action::Allow(it) => it.replace(),
             Action::Revoke(it) => it.remove(),
             Action::List(it) => it.list(),
         }
@@ -123,25 +172,38 @@ impl TrustKey {
         let peer = Peer {
             name: self.name.clone(),
             key: self.public_key,
-            ids: self.ids.clone(),
+            ids: self.ids.0.clone(),
+            rules: self.rules.rules()?,
         };
         edit::trust(&path, &peer).map_err(Failure::of)?;
         Ok(Outcome::Done)
     }
 }
 
+impl Allow {
+    fn replace(&self) -> Result<Outcome, Failure> {
+        let path = self.files.trusted_keys()?;
+        let is_there = edit::allow(&path, &self.name, &self.rules.rules()?);
+        done_if_there(is_there.map_err(Failure::of)?, &self.name, &path)
+    }
+}
+
 impl Revoke {
     fn remove(&self) -> Result<Outcome, Failure> {
         let path = self.files.trusted_keys()?;
-        if edit::revoke(&path, &self.name).map_err(Failure::of)? {
-            return Ok(Outcome::Done);
-        }
-        Err(Failure::negative(format!(
-            "`{}` is not in {}: see `jaus keys list`",
-            self.name,
-            path.display()
-        )))
+        let was_there = edit::revoke(&path, &self.name).map_err(Failure::of)?;
+        done_if_there(was_there, &self.name, &path)
     }
+}
+
+fn done_if_there(is_there: bool, name: &str, path: &Path) -> Result<Outcome, Failure> {
+    if is_there {
+        return Ok(Outcome::Done);
+    }
+    Err(Failure::negative(format!(
+        "`{name}` is not in {}: see `jaus keys list`",
+        path.display()
+    )))
 }
 
 impl List {
@@ -154,14 +216,16 @@ impl List {
             let ids: Vec<_> = peer.ids.iter().map(JausId::to_string).collect();
             if self.json {
                 let key = peer.key.to_string();
-                output.line(json!({ "name": peer.name, "key": key, "ids": ids }))?;
+                let rules = peer.rules.to_string();
+                output
+                    .line(json!({ "name": peer.name, "key": key, "ids": ids, "rules": rules }))?;
             } else {
-                output.line(format_args!(
-                    "{:16} {}  {}",
-                    peer.name,
-                    peer.key,
-                    ids.join(", ")
-                ))?;
+                let (name, key, ids) = (&peer.name, peer.key, ids.join(","));
+                let rules = match peer.rules.to_string() {
+                    none if none.is_empty() => "observe".to_owned(),
+                    rules => rules,
+                };
+                output.line(format_args!("{name:16} {key}  {ids}  {rules}"))?;
             }
         }
         Ok(Outcome::complete_if(!trust.peers().is_empty()))

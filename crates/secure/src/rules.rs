@@ -1,0 +1,297 @@
+//! What a trusted key may do: the words after the ids in a trust file.
+//!
+//! | word | the key may |
+//! |---|---|
+//! | `observe` | query, subscribe, report, and set an emergency; every trusted key may |
+//! | `command` | send commands as well |
+//! | `control=127` | send commands, and take control of components with an authority up to 127 |
+//! | `clear-emergency` | clear emergencies |
+//! | `configure` | shut components down, reset them, set their time |
+//! | `with=101.255.255,102.1.255` | exchange messages with these ids alone |
+//! | `only=PrimitiveDriver,D103h` | of all commands, send these alone |
+//! | `except=SetTravelSpeed,Time` | send none of these, whether commands or queries |
+//!
+//! `only` and `except` name services, messages or message codes. They also apply to the message
+//! inside a request for an event, but not to those inside a mission.
+//!
+//! Everybody may set an emergency, because a stop must never fail for lack of a right.
+
+mod permission;
+mod selection;
+
+use std::fmt;
+use std::str::FromStr;
+
+use jaus::address::JausId;
+use jaus::wire::{DataControl, Frame};
+
+use permission::Permission;
+pub use selection::{Selection, UnknownName};
+
+/// What a trusted key may do. The default is to observe.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Rules {
+    /// Whether it may send commands.
+    pub command: bool,
+    /// The greatest authority with which it may take control; `None` if it may not.
+    pub control: Option<u8>,
+    /// Whether it may clear emergencies.
+    pub clear_emergency: bool,
+    /// Whether it may shut components down, reset them, and set their time.
+    pub configure: bool,
+    /// The only ids with which it may exchange messages, with wildcards; all if empty.
+    pub with: Vec<JausId>,
+    /// The only commands that it may send; all if empty.
+    pub only: Selection,
+    /// Messages that it may not send.
+    pub except: Selection,
+}
+
+/// Why a message is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, thiserror::Error)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// The destination is not among [`Rules::with`].
+    #[error("its key may not exchange messages with this id")]
+    Elsewhere,
+    /// A command without [`Rules::command`].
+    #[error("its key may only observe: add `command` or `control=AUTHORITY` to its line")]
+    Command,
+    /// Control is requested without [`Rules::control`].
+    #[error("its key may not take control: add `control=AUTHORITY` to its line")]
+    Control,
+    /// Control is requested with too great an authority.
+    #[error("authority {asked}, but its key may take control with at most {most}")]
+    Authority {
+        /// The requested authority.
+        asked: u8,
+        /// The greatest one allowed.
+        most: u8,
+    },
+    /// An emergency is cleared without [`Rules::clear_emergency`].
+    #[error("its key may not clear emergencies: add `clear-emergency` to its line")]
+    ClearEmergency,
+    /// A component is configured without [`Rules::configure`].
+    #[error("its key may not shut down, reset or set the time: add `configure` to its line")]
+    Configure,
+    /// The command is not among [`Rules::only`], or the message is among [`Rules::except`].
+    #[error("`only` or `except` in the line of its key excludes this message")]
+    Excluded,
+    /// The message is too short to have a message code.
+    #[error("it has no message code")]
+    NoCode,
+}
+
+impl Rules {
+    /// Everything, with every authority.
+    #[must_use]
+    pub fn everything() -> Self {
+        Self {
+            command: true,
+            control: Some(u8::MAX),
+            clear_emergency: true,
+            configure: true,
+            ..Self::default()
+        }
+    }
+
+    /// Checks a frame from the key. Later fragments pass: without the first one they are nothing.
+    ///
+    /// # Errors
+    /// The rule that forbids it.
+    pub fn check(&self, frame: &Frame) -> Result<(), Refusal> {
+        if !self.may_reach(frame.destination) {
+            return Err(Refusal::Elsewhere);
+        }
+        if is_continuation(frame) {
+            return Ok(());
+        }
+        let mut message = &frame.payload[..];
+        while let Some(carried) = self.check_message(message)? {
+            message = carried;
+        }
+        Ok(())
+    }
+
+    /// Checks a message by itself; returns the one that it carries.
+    fn check_message<'m>(&self, message: &'m [u8]) -> Result<Option<&'m [u8]>, Refusal> {
+        let code = message.first_chunk().ok_or(Refusal::NoCode)?;
+        let code = u16::from_le_bytes(*code);
+        let permission = Permission::of(code, message);
+        self.check_permission(permission)?;
+        let carried = permission::carried(code, message);
+        // Of a request that carries a command, the command counts.
+        let is_selected = permission != Permission::Command
+            || carried.is_some()
+            || self.only.is_empty()
+            || self.only.contains(code);
+        if !is_selected || self.except.contains(code) {
+            return Err(Refusal::Excluded);
+        }
+        Ok(carried)
+    }
+
+    fn check_permission(&self, permission: Permission) -> Result<(), Refusal> {
+        let (allowed, refusal) = match permission {
+            Permission::Observe => return Ok(()),
+            Permission::Control { authority } => return self.check_authority(authority),
+            Permission::Command => (self.command || self.control.is_some(), Refusal::Command),
+            Permission::ClearEmergency => (self.clear_emergency, Refusal::ClearEmergency),
+            Permission::Configure => (self.configure, Refusal::Configure),
+        };
+        if allowed { Ok(()) } else { Err(refusal) }
+    }
+
+    fn check_authority(&self, asked: u8) -> Result<(), Refusal> {
+        let most = self.control.ok_or(Refusal::Control)?;
+        if asked > most {
+            return Err(Refusal::Authority { asked, most });
+        }
+        Ok(())
+    }
+
+    /// Whether it may send to this id, which may have wildcards, or receive from it.
+    #[must_use]
+    pub fn may_reach(&self, id: JausId) -> bool {
+        self.with.is_empty() || self.with.iter().any(|with| overlap(*with, id))
+    }
+
+    /// Whether it may send to, or receive from, any of these ids.
+    #[must_use]
+    pub fn may_reach_any(&self, ids: &[JausId]) -> bool {
+        ids.iter().any(|id| self.may_reach(*id))
+    }
+}
+
+/// Whether some id matches both.
+fn overlap(one: JausId, other: JausId) -> bool {
+    one.matches(other) || other.matches(one) || {
+        // Each has a wildcard where the other has none, such as 101.255.1 and 65535.1.255.
+        let equal = |a: u16, b: u16, any: u16| a == b || a == any || b == any;
+        let any = JausId::EVERYONE;
+        equal(one.subsystem(), other.subsystem(), any.subsystem())
+            && equal(one.node().into(), other.node().into(), any.node().into())
+            && equal(
+                one.component().into(),
+                other.component().into(),
+                any.component().into(),
+            )
+    }
+}
+
+/// Whether a frame has no message code of its own: a later fragment or an acknowledgement.
+fn is_continuation(frame: &Frame) -> bool {
+    frame.is_acknowledgement()
+        || matches!(frame.flags.data(), DataControl::Middle | DataControl::Last)
+}
+
+/// Whether an audit log holds this frame also if it passes: it concerns control, an emergency or the
+/// configuration of a component.
+pub(crate) fn is_recorded(frame: &Frame) -> bool {
+    !is_continuation(frame) && frame.code().is_some_and(permission::is_recorded)
+}
+
+/// Why a word is no rule.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RuleError {
+    /// The word is unknown.
+    #[error(
+        "`{0}` is not a rule: write observe, command, control=AUTHORITY, clear-emergency, configure, \
+         with=IDS, only=NAMES or except=NAMES"
+    )]
+    Word(String),
+    /// The authority is malformed.
+    #[error("`{0}` is not an authority: write a number from 0 to 255, such as control=127")]
+    Authority(String),
+    /// An id is malformed.
+    #[error("`{0}` is not an id such as 101.1.33, or 101.255.255 for all of 101")]
+    Id(String),
+    /// A service or message is unknown.
+    #[error(transparent)]
+    Name(#[from] UnknownName),
+    /// `only` or `with` has no entries, which would mean everything.
+    #[error("`{0}=` has no entries: leave it out, or list what it is about")]
+    Empty(String),
+}
+
+impl FromStr for Rules {
+    type Err = RuleError;
+
+    /// Reads words, separated by white space.
+    fn from_str(text: &str) -> Result<Self, RuleError> {
+        Self::parse(text.split_whitespace())
+    }
+}
+
+impl Rules {
+    pub(crate) fn parse<'t>(words: impl Iterator<Item = &'t str>) -> Result<Self, RuleError> {
+        let mut rules = Self::default();
+        for word in words {
+            let (name, value) = word.split_once('=').unwrap_or((word, ""));
+            match (name, word.contains('=')) {
+                ("observe", false) => {}
+                ("command", false) => rules.command = true,
+                ("clear-emergency", false) => rules.clear_emergency = true,
+                ("configure", false) => rules.configure = true,
+                ("with" | "only" | "except", true) if value.is_empty() => {
+                    return Err(RuleError::Empty(name.to_owned()));
+                }
+                ("control", true) => rules.control = Some(authority(value)?),
+                ("with", true) => rules.with = ids(value)?,
+                ("only", true) => rules.only = value.parse()?,
+                ("except", true) => rules.except = value.parse()?,
+                _ => return Err(RuleError::Word(shortened(word))),
+            }
+        }
+        Ok(rules)
+    }
+}
+
+fn authority(text: &str) -> Result<u8, RuleError> {
+    let unknown = |_| RuleError::Authority(shortened(text));
+    text.parse().map_err(unknown)
+}
+
+fn ids(text: &str) -> Result<Vec<JausId>, RuleError> {
+    let id = |text: &str| text.parse().map_err(|_| RuleError::Id(shortened(text)));
+    text.split(',').map(id).collect()
+}
+
+/// As much of a text as an error shows.
+fn shortened(text: &str) -> String {
+    text.chars().take(60).collect()
+}
+
+impl fmt::Display for Rules {
+    /// The words of a trust file; nothing for the default.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut words = Vec::new();
+        let flags = [
+            (self.command, "command"),
+            (self.clear_emergency, "clear-emergency"),
+            (self.configure, "configure"),
+        ];
+        words.extend(
+            flags
+                .iter()
+                .filter(|(is_set, _)| *is_set)
+                .map(|(_, word)| (*word).to_owned()),
+        );
+        words.extend(self.control.map(|most| format!("control={most}")));
+        if !self.with.is_empty() {
+            let ids: Vec<_> = self.with.iter().map(JausId::to_string).collect();
+            words.push(format!("with={}", ids.join(",")));
+        }
+        for (name, selection) in [("only", &self.only), ("except", &self.except)] {
+            if !selection.is_empty() {
+                words.push(format!("{name}={selection}"));
+            }
+        }
+        f.write_str(&words.join(" "))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,81 @@
+//! A selection of messages by service, name or code.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::str::FromStr;
+
+use jaus::messages::registry;
+
+/// Messages, as in `PrimitiveDriver,SetTravelSpeed,D103h`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Selection {
+    codes: BTreeSet<u16>,
+    /// As it was written.
+    text: String,
+}
+
+impl Selection {
+    /// Whether it selects nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.codes.is_empty()
+    }
+
+    /// Whether it selects messages with this code.
+    #[must_use]
+    pub fn contains(&self, code: u16) -> bool {
+        self.codes.contains(&code)
+    }
+}
+
+/// A name that is neither a service, a message nor a code.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{0}` is not a service, a message or a message code: write a name as `jaus list services` and \
+     `jaus list messages` show it, or four hexadecimal digits and an h, such as D103h"
+)]
+pub struct UnknownName(String);
+
+impl FromStr for Selection {
+    type Err = UnknownName;
+
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        let mut codes = BTreeSet::new();
+        for name in text.split(',') {
+            let found = codes_of(name);
+            if found.is_empty() {
+                return Err(UnknownName(super::shortened(name)));
+            }
+            codes.extend(found);
+        }
+        Ok(Self {
+            codes,
+            text: text.to_owned(),
+        })
+    }
+}
+
+impl fmt::Display for Selection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// The codes that a name stands for; none if it is unknown.
+fn codes_of(name: &str) -> Vec<u16> {
+    let digits = name.strip_suffix(['h', 'H']).filter(|it| it.len() == 4);
+    if let Some(code) = digits.and_then(|it| u16::from_str_radix(it, 16).ok()) {
+        return vec![code];
+    }
+    let services = registry()
+        .services()
+        .filter(|it| names_service(it.id.urn, name));
+    let inputs = services.flat_map(|it| it.inputs.iter().copied());
+    let messages = registry().by_name(name).map(|it| it.code);
+    inputs.chain(messages).collect()
+}
+
+/// Whether a name is a service's: its URN, or what follows the last colon of it.
+fn names_service(urn: &str, name: &str) -> bool {
+    urn == name || urn.rsplit(':').next() == Some(name)
+}

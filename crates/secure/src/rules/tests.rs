@@ -1,0 +1,197 @@
+use bytes::Bytes;
+use jaus::codec::Message;
+use jaus::messages::core::{
+    ClearEmergency, QueryIdentification, RequestControl, SetEmergency, Shutdown, Standby,
+};
+use jaus::messages::mobility::{QueryVelocityState, SetTravelSpeed, SetWrenchEffort};
+use jaus::wire::Flags;
+
+use super::*;
+
+const VEHICLE: JausId = JausId::new(101, 1, 1);
+
+fn frame(payload: impl Into<Bytes>) -> Frame {
+    Frame::new(JausId::new(60, 1, 1), VEHICLE, payload.into())
+}
+
+fn check(rules: &str, message: &impl Message) -> Result<(), Refusal> {
+    let payload = message.encode().unwrap();
+    rules.parse::<Rules>().unwrap().check(&frame(payload))
+}
+
+fn request(authority_code: u8) -> RequestControl {
+    RequestControl { authority_code }
+}
+
+#[test]
+fn a_key_without_rules_observes_and_may_stop() {
+    assert_eq!(check("", &QueryVelocityState::default()), Ok(()));
+    assert_eq!(check("", &QueryIdentification::default()), Ok(()));
+    assert_eq!(check("", &SetEmergency::default()), Ok(()));
+    assert_eq!(
+        check("observe", &SetWrenchEffort::default()),
+        Err(Refusal::Command)
+    );
+    assert_eq!(check("", &Standby), Err(Refusal::Command));
+    assert_eq!(check("", &request(0)), Err(Refusal::Control));
+    assert_eq!(check("", &Shutdown), Err(Refusal::Configure));
+    assert_eq!(
+        check("", &ClearEmergency::default()),
+        Err(Refusal::ClearEmergency)
+    );
+}
+
+#[test]
+fn control_is_limited_by_authority() {
+    let refused = Refusal::Authority {
+        asked: 128,
+        most: 127,
+    };
+    assert_eq!(check("control=127", &request(127)), Ok(()));
+    assert_eq!(check("control=127", &request(128)), Err(refused));
+    assert_eq!(check("control=127", &SetWrenchEffort::default()), Ok(()));
+    assert_eq!(check("command", &request(1)), Err(Refusal::Control));
+    let no_authority = frame(&b"\x0D\x00"[..]);
+    let rules: Rules = "control=127".parse().unwrap();
+    assert!(rules.check(&no_authority).is_err());
+}
+
+#[test]
+fn each_further_right_has_its_word() {
+    assert_eq!(check("clear-emergency", &ClearEmergency::default()), Ok(()));
+    assert_eq!(check("configure", &Shutdown), Ok(()));
+    assert_eq!(
+        check("configure", &SetWrenchEffort::default()),
+        Err(Refusal::Command)
+    );
+}
+
+#[test]
+fn only_and_except_select_by_service_message_and_code() {
+    let wrench = SetWrenchEffort::default();
+    let speed = SetTravelSpeed::default();
+    for rules in [
+        "command only=PrimitiveDriver",
+        "command only=SetWrenchEffort",
+        "command only=0405h",
+    ] {
+        assert_eq!(check(rules, &wrench), Ok(()), "{rules}");
+        assert_eq!(check(rules, &speed), Err(Refusal::Excluded), "{rules}");
+        assert_eq!(
+            check(rules, &QueryVelocityState::default()),
+            Ok(()),
+            "{rules}"
+        );
+    }
+    assert_eq!(
+        check("command except=SetTravelSpeed", &speed),
+        Err(Refusal::Excluded)
+    );
+    assert_eq!(check("command except=SetTravelSpeed", &wrench), Ok(()));
+    let query = QueryVelocityState::default();
+    assert_eq!(
+        check("except=VelocityStateSensor", &query),
+        Err(Refusal::Excluded)
+    );
+}
+
+#[test]
+fn a_command_inside_an_event_needs_the_same_rights() {
+    // Create Command Event: request 1, 10 s, a Set Wrench Effort of 3 octets.
+    let event = frame(&b"\xF6\x01\x01\x0A\0\0\0\x04\0\0\0\x05\x04\0\0"[..]);
+    let check = |rules: &str| rules.parse::<Rules>().unwrap().check(&event);
+    assert_eq!(check(""), Err(Refusal::Command));
+    assert_eq!(check("command"), Ok(()));
+    assert_eq!(check("command only=SetWrenchEffort"), Ok(()));
+    assert_eq!(check("command only=SetTravelSpeed"), Err(Refusal::Excluded));
+    assert_eq!(
+        check("command except=SetWrenchEffort"),
+        Err(Refusal::Excluded)
+    );
+    // Create Event: request 1, periodic, a Query Velocity State.
+    let event = frame(&b"\xF0\x01\x01\0\0\x01\x04\0\0\0\x04\x24\0\0"[..]);
+    let check = |rules: &str| rules.parse::<Rules>().unwrap().check(&event);
+    assert_eq!(check(""), Ok(()));
+    assert_eq!(check("except=QueryVelocityState"), Err(Refusal::Excluded));
+}
+
+#[test]
+fn an_unknown_code_in_the_range_of_commands_is_a_command() {
+    let rules = Rules::default();
+    for (code, is_allowed) in [
+        (0xDABCu16, false),
+        (0xEABC, true),
+        (0xFABC, true),
+        (0x1ABC, false),
+    ] {
+        let frame = frame(code.to_le_bytes().to_vec());
+        assert_eq!(rules.check(&frame).is_ok(), is_allowed, "{code:04X}");
+    }
+    assert_eq!(rules.check(&frame(&b"\x05"[..])), Err(Refusal::NoCode));
+}
+
+#[test]
+fn the_first_fragment_decides_on_a_large_message() {
+    let rules = Rules::default();
+    let fragment = |data, payload: &'static [u8]| Frame {
+        flags: Flags::default().with_data(data),
+        ..frame(payload)
+    };
+    assert!(
+        rules
+            .check(&fragment(DataControl::First, b"\x05\x04\0"))
+            .is_err()
+    );
+    assert!(
+        rules
+            .check(&fragment(DataControl::Middle, b"\x05\x04\0"))
+            .is_ok()
+    );
+}
+
+#[test]
+fn with_limits_the_ids_also_where_both_sides_have_wildcards() {
+    let rules: Rules = "with=101.255.255,102.1.255".parse().unwrap();
+    for (id, reached) in [
+        ("101.1.1", true),
+        ("102.1.9", true),
+        ("102.2.9", false),
+        ("103.1.1", false),
+        ("65535.255.255", true),
+        ("65535.1.255", true),
+        ("103.255.255", false),
+    ] {
+        assert_eq!(rules.may_reach(id.parse().unwrap()), reached, "{id}");
+    }
+    let elsewhere = Frame {
+        destination: JausId::new(103, 1, 1),
+        ..frame(&b"\x00\x2B\x02"[..])
+    };
+    assert_eq!(rules.check(&elsewhere), Err(Refusal::Elsewhere));
+}
+
+#[test]
+fn rules_are_written_as_they_are_read() {
+    let text = "command clear-emergency configure control=127 with=101.255.255 \
+                only=PrimitiveDriver,D103h except=Time";
+    let rules: Rules = text.parse().unwrap();
+    assert_eq!(rules.to_string(), text);
+    assert_eq!(rules.to_string().parse::<Rules>().unwrap(), rules);
+    assert_eq!(Rules::default().to_string(), "");
+}
+
+#[test]
+fn a_wrong_word_is_named_with_what_to_write() {
+    for (text, words) in [
+        ("drive", "`drive` is not a rule: write observe"),
+        ("control", "`control` is not a rule"),
+        ("control=256", "`256` is not an authority"),
+        ("with=101", "`101` is not an id"),
+        ("only=PrimitiveDrive", "`PrimitiveDrive` is not a service"),
+        ("only=", "`only=` has no entries"),
+        ("command=1", "`command=1` is not a rule"),
+    ] {
+        let error = text.parse::<Rules>().unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}

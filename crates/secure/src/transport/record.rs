@@ -1,0 +1,114 @@
+//! What an audit log should hold of the sessions of a node.
+
+use std::net::SocketAddr;
+
+use jaus::address::JausId;
+use quinn_proto::ConnectionError;
+
+use crate::key::PublicKey;
+use crate::rules::Refusal;
+
+/// Something worth an entry in an audit log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Record {
+    /// The name of the peer's key in the trust file; `None` if the key is not trusted.
+    pub peer: Option<String>,
+    /// The peer's key, as far as it is known.
+    pub key: Option<PublicKey>,
+    /// The peer's address.
+    pub address: SocketAddr,
+    /// What happened.
+    pub act: Act,
+}
+
+/// What happened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Act {
+    /// A session was established.
+    Connected,
+    /// A session has ended.
+    Disconnected {
+        /// The reason.
+        reason: String,
+    },
+    /// No session was established.
+    HandshakeFailed(Fault),
+    /// A message came from an id for which the key may not speak.
+    ForeignId {
+        /// The id.
+        source: JausId,
+        /// The destination.
+        destination: JausId,
+    },
+    /// A message was refused; or it concerns control, an emergency or the configuration of a
+    /// component, and was passed to it.
+    Message {
+        /// Its name, or its code.
+        name: String,
+        /// The sender.
+        source: JausId,
+        /// The destination.
+        destination: JausId,
+        /// The rule that forbids it, if it was refused.
+        refusal: Option<Refusal>,
+    },
+    /// A component answered the peer's request for control.
+    Control {
+        /// The component.
+        component: JausId,
+        /// The peer's id.
+        client: JausId,
+        /// Whether it has control.
+        is_granted: bool,
+    },
+}
+
+/// Why no session was established.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Fault {
+    /// The peer's key is not trusted here.
+    #[error("the key {0} is not trusted here")]
+    UntrustedKey(PublicKey),
+    /// The peer ended the handshake, most often because it does not trust the key of this node.
+    #[error("the peer refused the handshake ({0})")]
+    RefusedByPeer(String),
+    /// Nothing came from the peer.
+    #[error("no answer")]
+    NoAnswer,
+    /// Any other reason.
+    #[error("{0}")]
+    Other(String),
+}
+
+impl Fault {
+    pub(super) fn of(error: &ConnectionError, untrusted: Option<PublicKey>) -> Self {
+        match (untrusted, error) {
+            (Some(key), _) => Self::UntrustedKey(key),
+            (None, ConnectionError::ConnectionClosed(_)) => Self::RefusedByPeer(error.to_string()),
+            (None, ConnectionError::TimedOut) => Self::NoAnswer,
+            (None, _) => Self::Other(error.to_string()),
+        }
+    }
+
+    /// What to do about it, unless only the reason itself tells.
+    #[must_use]
+    pub const fn remedy(&self) -> Option<&'static str> {
+        match self {
+            Self::UntrustedKey(_) => Some(
+                "compare the key with what `jaus keys show` prints on the peer's host, then                  `jaus keys trust` it",
+            ),
+            Self::RefusedByPeer(_) => Some(
+                "on the peer's host, `jaus keys trust` the key that `jaus keys show` prints here; \
+                 the log of the peer names the key that it refused",
+            ),
+            Self::NoAnswer => Some(
+                "is the peer running with --secure-listen, and does its firewall let this UDP port \
+                 pass?",
+            ),
+            Self::Other(_) => None,
+        }
+    }
+}

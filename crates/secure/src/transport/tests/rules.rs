@@ -1,0 +1,212 @@
+//! What a key may do, and what one peer learns of another.
+
+use jaus::codec::Message as _;
+use jaus::messages::core::{ConfirmControl, RequestControl, SetEmergency};
+use jaus::messages::mobility::SetWrenchEffort;
+
+use super::*;
+
+/// A vehicle whose rules for the operator are these.
+fn vehicle_with_rules(rules: &str) -> (Network, [TrustFile; 2], [Key; 2]) {
+    let (mut network, trust, keys) = vehicle_and_operator();
+    replace_rules(&trust[0], &keys[1], rules);
+    network.run(SECOND);
+    (network, trust, keys)
+}
+
+fn replace_rules(trust: &TrustFile, operator: &Key, rules: &str) {
+    let operator = Peer {
+        rules: rules.parse().unwrap(),
+        ..peer("operator", operator, "60.255.255")
+    };
+    trust.replace(Trust::new(vec![operator]));
+}
+
+fn message(source: &str, destination: &str, message: &impl jaus::codec::Message) -> Bytes {
+    let (source, destination) = (source.parse().unwrap(), destination.parse().unwrap());
+    let payload = message.encode().unwrap();
+    judp::encode(&Frame::new(source, destination, payload)).unwrap()
+}
+
+fn records(network: &mut Network, host: usize) -> Vec<Act> {
+    let transport = &mut network.hosts[host].transport;
+    std::iter::from_fn(|| transport.poll_record())
+        .map(|it| it.act)
+        .collect()
+}
+
+#[test]
+fn a_key_that_may_observe_commands_nothing_and_is_told_so() {
+    let (mut network, ..) = vehicle_with_rules("");
+    let wrench = message("60.1.1", "101.1.1", &SetWrenchEffort::default());
+    let stop = message("60.1.1", "101.1.1", &SetEmergency::default());
+    for datagram in [&wrench, &stop, &wrench] {
+        network.send(1, Priority::Standard, datagram);
+    }
+    network.run(SECOND);
+    assert_eq!(network.hosts[0].received, [stop]);
+    assert_eq!(network.counters(0).refused, 2);
+    assert_eq!(network.counters(1).notices, 1, "one a second");
+    let refused = |act: &Act| matches!(act, Act::Message { name, refusal: Some(_), .. } if name == "SetWrenchEffort");
+    assert_eq!(
+        records(&mut network, 0)
+            .iter()
+            .filter(|it| refused(it))
+            .count(),
+        2
+    );
+}
+
+#[test]
+fn a_request_beyond_the_authority_of_a_key_is_denied_in_the_words_of_jaus() {
+    let (mut network, ..) = vehicle_with_rules("control=127");
+    let request = |authority_code| message("60.1.1", "101.1.1", &RequestControl { authority_code });
+    network.send(1, Priority::Standard, &request(128));
+    network.send(1, Priority::Standard, &request(127));
+    network.run(SECOND);
+    assert_eq!(network.hosts[0].received, [request(127)]);
+    let answer = network.hosts[1].received.pop().unwrap();
+    let frame = judp::frames(answer).unwrap().next().unwrap().unwrap();
+    assert_eq!(
+        (frame.source, frame.destination),
+        (JausId::new(101, 1, 1), JausId::new(60, 1, 1))
+    );
+    let confirm = ConfirmControl::decode(&frame.payload).unwrap();
+    assert_eq!(confirm.response_code.0, 2, "insufficient authority");
+}
+
+#[test]
+fn rules_that_change_apply_to_running_sessions() {
+    let (mut network, trust, keys) = vehicle_with_rules("");
+    let wrench = message("60.1.1", "101.1.1", &SetWrenchEffort::default());
+    replace_rules(&trust[0], &keys[1], "command");
+    network.run(SECOND);
+    network.send(1, Priority::Standard, &wrench);
+    network.run(SECOND);
+    assert_eq!(network.hosts[0].received, std::slice::from_ref(&wrench));
+    replace_rules(&trust[0], &keys[1], "observe");
+    network.run(SECOND);
+    network.send(1, Priority::Standard, &wrench);
+    network.run(SECOND);
+    assert_eq!(network.hosts[0].received, [wrench]);
+    assert!(network.hosts[0].closed.is_empty(), "the session remains");
+}
+
+#[test]
+fn of_a_packed_datagram_the_allowed_messages_pass() {
+    let (mut network, ..) = vehicle_with_rules("");
+    let stop = message("60.1.1", "101.1.1", &SetEmergency::default());
+    let wrench = message("60.1.1", "101.1.1", &SetWrenchEffort::default());
+    let mut packed = stop.to_vec();
+    packed.extend_from_slice(&wrench[1..]);
+    packed.extend_from_slice(&stop[1..]);
+    network.send(1, Priority::Standard, &packed.into());
+    network.run(SECOND);
+    let twice = [&stop[..], &stop[1..]].concat();
+    assert_eq!(network.hosts[0].received, [Bytes::from(twice)]);
+}
+
+#[test]
+fn control_emergencies_and_sessions_are_recorded() {
+    let (mut network, ..) = vehicle_with_rules("control=127");
+    let request = message("60.1.1", "101.1.1", &RequestControl { authority_code: 1 });
+    network.send(1, Priority::Standard, &request);
+    network.send(
+        1,
+        Priority::Standard,
+        &message("60.1.1", "101.1.1", &SetEmergency::default()),
+    );
+    network.run(SECOND);
+    network.send(
+        0,
+        Priority::Standard,
+        &message("101.1.1", "60.1.1", &ConfirmControl::default()),
+    );
+    network.run(SECOND);
+    let acts = records(&mut network, 0);
+    let names: Vec<_> = acts
+        .iter()
+        .map(|act| match act {
+            Act::Connected => "connected",
+            Act::Message {
+                name,
+                refusal: None,
+                ..
+            } => name,
+            Act::Control {
+                is_granted: true, ..
+            } => "granted",
+            _ => "other",
+        })
+        .collect();
+    assert_eq!(
+        names,
+        ["connected", "RequestControl", "SetEmergency", "granted"]
+    );
+}
+
+/// A relay with two vehicles, 101 and 102, and two operators, 61 and 62; each operator has one
+/// vehicle. The hosts in this order.
+fn relay() -> Network {
+    let keys: [Key; 5] = std::array::from_fn(|_| key());
+    let names = ["rover", "truck", "anna", "bert"];
+    let ids = ["101.255.255", "102.255.255", "61.255.255", "62.255.255"];
+    let rules = [
+        "with=61.255.255",
+        "",
+        "control=127 with=101.255.255",
+        "control=127 with=102.255.255",
+    ];
+    let peers = (0..4).map(|it| Peer {
+        rules: rules[it].parse().unwrap(),
+        ..peer(names[it], &keys[it + 1], ids[it])
+    });
+    let mut network = Network::new();
+    network.add(&keys[0], &TrustFile::of(Trust::new(peers.collect())), &[]);
+    for key in &keys[1..] {
+        let relay = peer("relay", &keys[0], "65535.255.255");
+        network.add(key, &trusting([relay]), &[address(1)]);
+    }
+    network.run(SECOND);
+    network
+}
+
+/// Passes on what the relay has received, to all others, as a router does without routes.
+fn pass_on(network: &mut Network) {
+    network.run(SECOND);
+    for datagram in std::mem::take(&mut network.hosts[0].received) {
+        network.hosts[0]
+            .transport
+            .send_to_all(Priority::Standard, &datagram);
+    }
+    network.run(SECOND);
+}
+
+#[test]
+fn a_relay_separates_vehicles_and_operators_by_its_rules() {
+    let mut network = relay();
+    let heartbeat = message("101.1.1", "65535.255.255", &SetEmergency::default());
+    let hello = message("61.1.1", "65535.255.255", &SetEmergency::default());
+    network.send(1, Priority::Standard, &heartbeat);
+    network.send(3, Priority::Standard, &hello);
+    network.send(
+        3,
+        Priority::Standard,
+        &message("61.1.1", "102.1.1", &SetEmergency::default()),
+    );
+    pass_on(&mut network);
+    let received = |host: usize| network.hosts[host].received.clone();
+    // Each gets its own broadcast back too; a router does not send there.
+    assert_eq!(received(1), std::slice::from_ref(&hello));
+    assert!(
+        received(2).is_empty(),
+        "the truck may reach all, but Anna may not reach the truck"
+    );
+    assert_eq!(received(3), [heartbeat]);
+    assert!(received(4).is_empty(), "Bert may reach the truck alone");
+    assert_eq!(
+        network.counters(0).refused,
+        1,
+        "Anna's message to the truck"
+    );
+}

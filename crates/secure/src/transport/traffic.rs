@@ -1,0 +1,235 @@
+//! The datagrams of established sessions: screened on both ways, recorded, answered where refused.
+
+use std::time::{Duration, Instant};
+
+use bytes::{BufMut as _, Bytes, BytesMut};
+use jaus::codec::Message as _;
+use jaus::endpoint::SessionId;
+use jaus::link::custom::Arrival;
+use jaus::messages::core::{RequestControl, confirm_control::ResponseCode};
+use jaus::wire::{Frame, Priority, judp};
+use quinn_proto::StreamId;
+
+use super::Transport;
+use super::record::{Act, Record};
+use super::screen::{self, Stop};
+use super::session::Session;
+use crate::rules::is_recorded;
+use crate::trust::Peer;
+
+/// The first octet of a notice: text for the peer, about a message of its that was refused. No
+/// JAUS transport begins with it.
+const NOTICE: u8 = 0xFE;
+/// The longest text of a notice, in octets.
+const LONGEST_NOTICE: usize = 300;
+/// The shortest interval between notices of a session.
+const NOTICE_PAUSE: Duration = Duration::from_secs(1);
+/// Records that may wait for their reader.
+const MOST_RECORDS: usize = 256;
+
+impl Transport {
+    /// Queues a JUDP datagram for a session. It is dropped if the session has ended.
+    pub fn send(&mut self, session: SessionId, priority: Priority, datagram: Bytes) {
+        self.record_granted_control(session, &datagram);
+        let is_established = |it: &Session| it.established().is_some();
+        if !self.sessions.get(&session).is_some_and(is_established) {
+            self.counters.no_session += 1;
+            return;
+        }
+        let Some(datagram) = self.permitted(session, datagram) else {
+            return;
+        };
+        if let Some(session) = self.sessions.get_mut(&session) {
+            self.counters.send_overflows += session.queue(priority, datagram);
+        }
+    }
+
+    /// Queues a JUDP datagram for every session.
+    pub fn send_to_all(&mut self, priority: Priority, datagram: &Bytes) {
+        let established = self
+            .sessions
+            .iter()
+            .filter(|(_, it)| it.established().is_some());
+        for id in established.map(|(&id, _)| id).collect::<Vec<_>>() {
+            self.send(id, priority, datagram.clone());
+        }
+    }
+
+    /// What of a datagram may go to this session, if the rules separate peers from each other.
+    fn permitted(&mut self, session: SessionId, datagram: Bytes) -> Option<Bytes> {
+        let peers = || self.sessions.values().filter_map(Session::established);
+        if peers().all(|peer| peer.rules.with.is_empty()) {
+            return Some(datagram);
+        }
+        let to = self.sessions.get(&session)?.established()?;
+        let screened = screen::screen(&datagram, |frame| {
+            let speaks = |peer: &&Peer| peer.speaks_for(frame.source);
+            let origins: Vec<_> = peers().filter(speaks).collect();
+            let is_open = screen::may_pass(frame.source, &origins, to);
+            is_open.then_some(()).ok_or(Stop::ForeignId)
+        })?;
+        let stopped = screened.frames.iter().filter(|(_, it)| it.is_err()).count();
+        self.counters.separated += stopped as u64;
+        screened.passed
+    }
+
+    /// Records the answer of a component to a request for control.
+    fn record_granted_control(&mut self, id: SessionId, datagram: &Bytes) {
+        let Ok(frames) = judp::frames(datagram.clone()) else {
+            return;
+        };
+        for frame in frames.map_while(Result::ok) {
+            if let Some(answer) = screen::confirmed_control(&frame) {
+                let act = Act::Control {
+                    component: frame.source,
+                    client: frame.destination,
+                    is_granted: answer == ResponseCode::CONTROL_ACCEPTED,
+                };
+                self.record(id, act);
+            }
+        }
+    }
+
+    /// Reads the QUIC datagrams of a session.
+    pub(super) fn read_datagrams(&mut self, now: Instant, id: SessionId) {
+        let mut datagrams = Vec::new();
+        if let Some(session) = self.sessions.get_mut(&id) {
+            datagrams.extend(std::iter::from_fn(|| session.connection.datagrams().recv()));
+        }
+        for datagram in datagrams {
+            self.receive(now, id, &datagram);
+        }
+    }
+
+    /// Reads a stream of a session.
+    pub(super) fn read_stream(&mut self, now: Instant, id: SessionId, stream: StreamId) {
+        let mut datagrams = Vec::new();
+        if let Some(session) = self.sessions.get_mut(&id) {
+            session.read(stream, |datagram| datagrams.push(datagram));
+        }
+        for datagram in datagrams {
+            self.receive(now, id, &datagram);
+        }
+    }
+
+    /// Processes a JUDP datagram, a greeting or a notice.
+    fn receive(&mut self, now: Instant, id: SessionId, octets: &Bytes) {
+        let Some(session) = self.sessions.get_mut(&id) else {
+            return;
+        };
+        if octets.is_empty() && session.is_awaiting_greeting() {
+            self.establish(now, id);
+            return;
+        }
+        let Some(peer) = session.established() else {
+            return;
+        };
+        if octets.first() == Some(&NOTICE) {
+            let text = String::from_utf8_lossy(&octets[1..octets.len().min(1 + LONGEST_NOTICE)]);
+            tracing::warn!(peer = peer.name, notice = ?text, "the peer refused a message");
+            self.counters.notices += 1;
+            return;
+        }
+        let Some(screened) = screen::incoming(peer, octets) else {
+            self.counters.malformed += 1;
+            return;
+        };
+        session.received += 1;
+        for (frame, decision) in &screened.frames {
+            self.handle_decision(now, id, frame, *decision);
+        }
+        if let Some(octets) = screened.passed {
+            let session = id;
+            self.arrivals
+                .push_back(Arrival::Datagram { session, octets });
+        }
+    }
+
+    fn handle_decision(
+        &mut self,
+        now: Instant,
+        id: SessionId,
+        frame: &Frame,
+        decision: Result<(), Stop>,
+    ) {
+        let (source, destination) = (frame.source, frame.destination);
+        let code = frame.code().unwrap_or_default();
+        let message = |refusal| Act::Message {
+            name: screen::name_of(code),
+            source,
+            destination,
+            refusal,
+        };
+        match decision {
+            Ok(()) if is_recorded(frame) => self.record(id, message(None)),
+            Ok(()) => {}
+            Err(Stop::ForeignId) => {
+                self.counters.foreign_ids += 1;
+                self.record(
+                    id,
+                    Act::ForeignId {
+                        source,
+                        destination,
+                    },
+                );
+            }
+            Err(Stop::Rule(refusal)) => {
+                self.counters.refused += 1;
+                self.record(id, message(Some(refusal)));
+                self.answer_refusal(now, id, frame, &screen::sentence(frame, refusal));
+            }
+        }
+    }
+
+    /// Tells the peer what was refused: in the words of JAUS if it asked for control, and in a
+    /// notice.
+    fn answer_refusal(&mut self, now: Instant, id: SessionId, frame: &Frame, sentence: &str) {
+        let Some(session) = self.sessions.get_mut(&id) else {
+            return;
+        };
+        let mut dropped = 0;
+        if frame.code() == Some(RequestControl::CODE)
+            && frame.destination.is_unicast()
+            && let Ok(denial) = screen::denial_of_control(frame)
+        {
+            dropped += session.queue(frame.flags.priority(), denial);
+        }
+        if session.noticed.is_none_or(|at| now >= at + NOTICE_PAUSE) {
+            session.noticed = Some(now);
+            let name = session.established().map_or("", |it| &it.name);
+            tracing::warn!(peer = name, "refused {sentence}");
+            let mut notice = BytesMut::new();
+            notice.put_u8(NOTICE);
+            notice.put_slice(&sentence.as_bytes()[..sentence.len().min(LONGEST_NOTICE)]);
+            dropped += session.queue(Priority::Standard, notice.freeze());
+        }
+        self.counters.send_overflows += dropped;
+    }
+
+    /// Adds a record about an established session.
+    pub(super) fn record(&mut self, id: SessionId, act: Act) {
+        let Some(session) = self.sessions.get(&id) else {
+            return;
+        };
+        let address = session.connection.remote_address();
+        self.push_record(Record {
+            peer: session.peer.as_ref().map(|it| it.name.clone()),
+            key: session.peer.as_ref().map(|it| it.key),
+            address,
+            act,
+        });
+    }
+
+    /// Adds a record; the oldest goes if nobody takes them.
+    pub(super) fn push_record(&mut self, record: Record) {
+        if self.records.len() == MOST_RECORDS {
+            self.records.pop_front();
+        }
+        self.records.push_back(record);
+    }
+
+    /// The next record for an audit log. At most 256 wait; then the oldest is dropped.
+    pub fn poll_record(&mut self) -> Option<Record> {
+        self.records.pop_front()
+    }
+}
