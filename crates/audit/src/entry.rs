@@ -111,7 +111,11 @@ impl Entry {
     pub(crate) fn repeats(&self, other: &Self) -> bool {
         let Self { time, times, .. } = other;
         let (time, times) = (*time, *times);
-        Self { time, times, ..self.clone() } == *other
+        Self {
+            time,
+            times,
+            ..self.clone()
+        } == *other
     }
 }
 

@@ -75,7 +75,11 @@ impl AuditLog {
 
     /// Adds an entry. Never waits: if the disk is too slow, the entry is lost and counted.
     pub fn write(&self, entry: Entry) {
-        let entries = self.0.entries.lock().unwrap_or_else(PoisonError::into_inner);
+        let entries = self
+            .0
+            .entries
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         let Some(entries) = &*entries else { return };
         if let Err(TrySendError::Full(_)) = entries.try_send(entry) {
             self.0.lost.fetch_add(1, Ordering::Relaxed);

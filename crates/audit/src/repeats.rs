@@ -42,7 +42,11 @@ impl Repeats {
     pub(crate) fn take(&mut self, now: Option<Instant>) -> Vec<Entry> {
         let is_due = |recent: &mut Recent| now.is_none_or(|now| recent.due <= now);
         let due = self.0.extract_if(.., is_due).filter(|it| it.again > 0);
-        due.map(|it| Entry { times: it.again, ..it.entry }).collect()
+        due.map(|it| Entry {
+            times: it.again,
+            ..it.entry
+        })
+        .collect()
     }
 
     /// When the next period ends.
@@ -52,7 +56,10 @@ impl Repeats {
 }
 
 #[cfg(test)]
-#[expect(clippy::disallowed_methods, reason = "virtual time starts at any instant")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
 mod tests {
     use super::*;
     use crate::Outcome;
@@ -73,7 +80,10 @@ mod tests {
         assert_eq!(repeats.due(), Some(start + PERIOD));
         let counted = repeats.take(repeats.due());
         assert_eq!(counted.len(), 1);
-        assert_eq!((counted[0].what.as_str(), counted[0].times), ("SetWrenchEffort", 999));
+        assert_eq!(
+            (counted[0].what.as_str(), counted[0].times),
+            ("SetWrenchEffort", 999)
+        );
         assert!(repeats.is_new(start + PERIOD, &entry("SetWrenchEffort")));
     }
 

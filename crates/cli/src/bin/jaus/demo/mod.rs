@@ -3,6 +3,8 @@
 
 mod network;
 mod operator;
+#[cfg(feature = "secure")]
+mod secure;
 mod story;
 mod surprise;
 mod system;
@@ -38,6 +40,7 @@ use system::{OPERATOR, System, VEHICLE};
     jaus demo                         with the page; runs until Ctrl-C\n  \
     jaus demo --stay                  starts no mission: drive on the page\n  \
     jaus demo --ackermann             a vehicle that steers like a car\n  \
+    jaus demo --secure                over authenticated, encrypted links\n  \
     jaus demo --headless              without the page; ends when the vehicle arrives\n  \
     jaus demo --to 3,-5 --headless --for 1min\n\n\
     Events of --json: \"story\" with \"actor\" and \"text\"; \"end\" with \"arrived\".")]
@@ -67,6 +70,11 @@ pub(crate) struct Demo {
     #[arg(long, conflicts_with = "headless")]
     stay: bool,
 
+    /// Link the nodes by authenticated, encrypted links instead of plain JUDP
+    #[cfg(feature = "secure")]
+    #[arg(long)]
+    secure: bool,
+
     #[command(flatten)]
     format: EventFormat,
 }
@@ -85,8 +93,7 @@ impl Demo {
         runtime::run(async {
             let mut story = Story::new(self.format);
             let network = OwnNetwork::take()?;
-            self.opening(&network, &mut story)?;
-            let mut system = System::new(network);
+            let mut system = self.system(network)?;
             let started = self.start(&mut system, &mut story).await;
             let surprise = Surprise {
                 scenery: system.scenery(),
@@ -105,21 +112,39 @@ impl Demo {
         })
     }
 
-    fn opening(&self, network: &OwnNetwork, story: &mut Story) -> Result<(), Failure> {
-        story.line(
+    fn system(&self, network: OwnNetwork) -> Result<System, Failure> {
+        let system = System::new(network);
+        #[cfg(feature = "secure")]
+        if self.secure {
+            return Ok(system.secured_by(secure::SecureLinks::make()?));
+        }
+        Ok(system)
+    }
+
+    /// How the nodes communicate.
+    fn way(&self) -> &'static str {
+        #[cfg(feature = "secure")]
+        if self.secure {
+            return "over secure links (QUIC) to the\nvehicle's first node, which relays between them";
+        }
+        "over UDP on the loopback interface"
+    }
+
+    fn opening(&self, system: &System, story: &mut Story) -> Result<(), Failure> {
+        story.line(format_args!(
             "A ground vehicle and its operator control unit start on this computer. Every part is a\n\
              JAUS component that could also run as a program on its own board. They find each other\n\
-             by Discovery and communicate over UDP on the loopback interface.\n",
-        )?;
-        if network.is_further() {
+             by Discovery and communicate {}.\n",
+            self.way()
+        ))?;
+        if let Some(group) = system.own_group() {
             story.line(format_args!(
                 "Another demo runs on this computer. So that the two do not mix, this one has the\n\
-                 multicast group {}.\n",
-                network.group()
+                 multicast group {group}.\n",
             ))?;
         }
         let jaus = std::env::args().next().unwrap_or_else(|| "jaus".to_owned());
-        let flags = network.flags();
+        let flags = system.flags();
         story.line(format_args!(
             "Meanwhile, try in another terminal:\n  \
              {jaus} discover {flags}\n  \
@@ -128,7 +153,7 @@ impl Demo {
         ))?;
         match self.headless {
             true => story.line(""),
-            false => story.line(format_args!("  {jaus} watch{}\n", network.watch_flags())),
+            false => story.line(format_args!("  {jaus} watch{}\n", system.watch_flags())),
         }
     }
 
@@ -139,6 +164,7 @@ impl Demo {
         let wheels = system.node(VEHICLE, 2)?;
         let mind = system.node(VEHICLE, 3)?;
         let console = system.node(OPERATOR, 1)?;
+        self.opening(system, story)?;
         let communicator = Communicator {
             debug: (!self.headless).then_some(system.debug_address()),
             beside: vec![wheels.clone(), mind.clone(), console.clone()],

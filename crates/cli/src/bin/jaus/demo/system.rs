@@ -8,6 +8,7 @@ use std::{fs, process};
 
 use jaus::address::JausId;
 use jaus::component::Kind;
+use jaus::link::Group;
 use jaus::node::{Config, Node};
 use jaus_cli::failure::Failure;
 use jaus_vehicle::parts::{KnowledgeStore, Part, PartError, Slot};
@@ -15,6 +16,8 @@ use jaus_vehicle::sensing::Scenery;
 use tokio::task::JoinSet;
 
 use super::network::OwnNetwork;
+#[cfg(feature = "secure")]
+use super::secure::SecureLinks;
 
 /// The operator's subsystem.
 pub(super) const OPERATOR: u16 = 42;
@@ -32,6 +35,9 @@ pub(super) struct System {
     /// What the range sensor sees.
     scenery: Scenery,
     parts: JoinSet<(&'static str, PartError)>,
+    /// The links between the nodes, if these are secure.
+    #[cfg(feature = "secure")]
+    secure: Option<SecureLinks>,
 }
 
 impl System {
@@ -45,7 +51,25 @@ impl System {
             ),
             scenery: Scenery::default(),
             parts: JoinSet::new(),
+            #[cfg(feature = "secure")]
+            secure: None,
         }
+    }
+
+    /// Links the nodes by secure links instead of plain JUDP.
+    #[cfg(feature = "secure")]
+    pub(super) fn secured_by(mut self, links: SecureLinks) -> Self {
+        self.secure = Some(links);
+        self
+    }
+
+    /// The flags by which other commands join the system.
+    pub(super) fn flags(&self) -> String {
+        #[cfg(feature = "secure")]
+        if let Some(links) = &self.secure {
+            return links.flags();
+        }
+        self.network.flags()
     }
 
     /// A knowledge store with the map that the vehicle is shown on.
@@ -55,6 +79,16 @@ impl System {
             map: Some(KnowledgeStore::fine_demo_map()),
             ..KnowledgeStore::default()
         }
+    }
+
+    /// The multicast group, if another demo has the standard one.
+    pub(super) fn own_group(&self) -> Option<Group> {
+        self.network.is_further().then(|| self.network.group())
+    }
+
+    /// The flag by which `jaus watch` finds the debug view.
+    pub(super) fn watch_flags(&self) -> String {
+        self.network.watch_flags()
     }
 
     /// Where the debug view is served, unless another program uses the port.
@@ -69,10 +103,18 @@ impl System {
 
     /// Adds a node on loopback.
     pub(super) fn node(&mut self, subsystem: u16, number: u8) -> Result<Node, Failure> {
-        let config = Config::loopback(subsystem, number).group(self.network.group());
-        let node = Node::start(config).map_err(Failure::of)?;
+        let node = self.start_node(subsystem, number)?;
         self.nodes.push(node.clone());
         Ok(node)
+    }
+
+    fn start_node(&mut self, subsystem: u16, number: u8) -> Result<Node, Failure> {
+        #[cfg(feature = "secure")]
+        if let Some(links) = &mut self.secure {
+            return links.start(subsystem, number);
+        }
+        let config = Config::loopback(subsystem, number).group(self.network.group());
+        Node::start(config).map_err(Failure::of)
     }
 
     /// Adds a part under a component number of a node.

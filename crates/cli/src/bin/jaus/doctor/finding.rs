@@ -74,6 +74,11 @@ impl Finding {
         }
     }
 
+    #[cfg(feature = "secure")]
+    pub(super) fn is_problem(&self) -> bool {
+        self.mark == Mark::Problem
+    }
+
     /// Adds a remedy.
     pub(super) fn advice(mut self, advice: impl Display) -> Self {
         self.advice = Some(advice.to_string());

@@ -10,6 +10,8 @@ mod neighbours;
 mod network;
 mod port;
 mod ra;
+#[cfg(feature = "secure")]
+mod secure;
 
 use std::time::Duration;
 
@@ -27,7 +29,8 @@ use jaus_cli::runtime;
 ///
 /// Checks this host's interfaces, port, buffers and clock, then listens on the network: does
 /// multicast loop back, which nodes are there, do their multicasts arrive, do two of them share an
-/// id? Needs no privileges. Give it the flags or the settings file of the node that does not work.
+/// id? With a secure link it checks keys and trusted keys, and connects to the peers. Needs no
+/// privileges. Give it the flags or the settings file of the node that does not work.
 /// Exit status 1 means that there are warnings or failures, for instance that no other node was
 /// heard. `jaus examine` examines one peer.
 #[derive(Args)]
@@ -36,6 +39,7 @@ use jaus_cli::runtime;
     jaus doctor --config node.toml        with the settings of a node\n  \
     jaus doctor --id 101.1.1              and whether that id is taken\n  \
     jaus doctor --interface eth0 --for 10s\n  \
+    jaus doctor --secure-peer 192.168.7.2 and whether a secure link stands\n  \
     jaus doctor --json | jq '.findings[] | select(.verdict != \"ok\")'")]
 pub(crate) struct Doctor {
     /// How long to listen to the network; up to 30s if a node is there whose multicasts do not arrive
@@ -67,6 +71,18 @@ impl Doctor {
         if self.network.has_file() {
             report.add(Finding::ok("settings", "the settings file can be read"))?;
         }
+        #[cfg(feature = "secure")]
+        let config = match self.network.secure()? {
+            Some(link) => {
+                report.add_all(secure::check(&link, self.duration).await)?;
+                match secure::plain(config) {
+                    Ok(Some(config)) => config,
+                    Ok(None) => return Ok(()),
+                    Err(contradiction) => return report.add(contradiction),
+                }
+            }
+            None => config,
+        };
         report.add_all(ways(&config))?;
         report.add_all(port::check_tcp(&config))?;
         let listen = self.duration;

@@ -79,6 +79,7 @@ pub(crate) struct Examine {
 
 impl Examine {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        self.network.require_plain()?;
         let (wanted, config) = self.network.for_examination()?;
         runtime::run(self.examine(wanted, config))
     }

@@ -1,0 +1,92 @@
+//! The secure link: are key and trusted keys usable, and does a link to each peer stand?
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use jaus::link::Interfaces;
+use jaus::node::Config;
+use jaus_cli::output::counted;
+use jaus_cli::secure::Secure;
+use jaus_secure::Reached;
+
+use super::finding::Finding;
+
+const CHECK: &str = "secure";
+
+/// Checks the link, and connects to its peers.
+pub(super) async fn check(secure: &Secure, time: Duration) -> Vec<Finding> {
+    let mut findings = vec![key(secure), trust(secure)];
+    if findings.iter().any(Finding::is_problem) {
+        return findings;
+    }
+    let mut link = match secure.open() {
+        Ok(link) => link,
+        Err(error) => {
+            findings.push(Finding::problem(CHECK, error).advice(
+                "stop the node that has the port, or choose another with --secure-listen=ADDRESS:PORT",
+            ));
+            return findings;
+        }
+    };
+    let peers = secure.peers();
+    let reached = link.probe(&peers, time).await;
+    findings.extend(
+        peers
+            .into_iter()
+            .zip(reached)
+            .map(|(peer, reached)| of_peer(peer, reached)),
+    );
+    findings
+}
+
+/// The node's settings for plain JUDP beside the link; `None` if it uses none.
+pub(super) fn plain(config: Config) -> Result<Option<Config>, Finding> {
+    let config = Secure::restrict(config).map_err(|error| Finding::problem(CHECK, error))?;
+    let is_used = config.interfaces != Interfaces::Only(Vec::new());
+    Ok(is_used.then_some(config))
+}
+
+fn key(secure: &Secure) -> Finding {
+    match secure.key() {
+        Ok(key) => Finding::ok(
+            CHECK,
+            format_args!("the key of this node is {}", key.public()),
+        ),
+        Err(error) => Finding::problem(CHECK, error),
+    }
+}
+
+fn trust(secure: &Secure) -> Finding {
+    match secure.trust() {
+        Ok(trust) if trust.is_empty() => {
+            Finding::problem(CHECK, "no key is trusted, so no link can stand").advice(
+                "`jaus keys trust NAME KEY IDS`, with the key that `jaus keys show` prints there",
+            )
+        }
+        Ok(trust) => Finding::ok(
+            CHECK,
+            format_args!("this node trusts {}", counted(trust.len(), "key")),
+        ),
+        Err(error) => Finding::problem(CHECK, error),
+    }
+}
+
+fn of_peer(peer: SocketAddr, reached: Reached) -> Finding {
+    match reached {
+        Ok(session) => {
+            let time = session.round_trip.as_secs_f64() * 1000.0;
+            let name = &session.peer.name;
+            Finding::ok(
+                CHECK,
+                format_args!("{peer} is `{name}`; round trip {time:.1} ms"),
+            )
+        }
+        Err(fault) => {
+            let finding = Finding::problem(CHECK, format_args!("{peer}: {fault}"));
+            match fault.remedy() {
+                Some(remedy) => finding.advice(remedy),
+                None => finding,
+            }
+        }
+    }
+}
