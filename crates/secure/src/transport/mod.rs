@@ -29,11 +29,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
-use jaus::endpoint::SessionId;
+use jaus::endpoint::{Buckets, Rate, SessionId};
 use jaus::link::custom::Arrival;
 use quinn_proto::{
     ClientConfig, ConnectionError, ConnectionHandle, DatagramEvent, Endpoint, EndpointConfig,
-    Event, IdleTimeout, Incoming, ServerConfig, StreamEvent, TransportConfig, VarInt,
+    Event, HashedConnectionIdGenerator, IdleTimeout, Incoming, ServerConfig, StreamEvent,
+    TransportConfig, VarInt,
 };
 use ring::hmac;
 use rustls::pki_types::CertificateDer;
@@ -59,6 +60,10 @@ const MOST_HANDSHAKES_PER_ADDRESS: usize = 8;
 /// From this number of unfinished handshakes on, a peer must first show that it receives at its
 /// address.
 const RETRY_FROM: usize = 4;
+/// First packets of handshakes from one network address: each costs a key derivation and an answer.
+const FIRST_PACKETS: Rate = Rate::new(50, 100);
+/// Limit of addresses whose first packets are counted. Further ones share one count.
+const MOST_ADDRESSES: usize = 4096;
 /// Octets of QUIC datagrams that may wait in a connection. What exceeds them waits in the backlog of
 /// the session, where an urgent message can overtake it.
 const DATAGRAM_BUFFER: usize = 16 << 10;
@@ -83,6 +88,7 @@ pub struct Transport {
     warned: Option<Instant>,
     endpoint: Endpoint,
     client: ClientConfig,
+    first_packets: Buckets<IpAddr>,
     dials: Vec<Dial>,
     sessions: BTreeMap<SessionId, Session>,
     handles: HashMap<ConnectionHandle, SessionId>,
@@ -106,10 +112,7 @@ impl Transport {
         server.transport_config(transport.clone());
         let mut client = ClientConfig::new(client);
         client.transport_config(transport);
-        // With the same secret after a restart, peers notice at once that their session is gone.
-        let resets = key.secret_for(b"jaus/1 stateless reset");
-        let resets = hmac::Key::new(hmac::HMAC_SHA256, resets.as_ref());
-        let config = Arc::new(EndpointConfig::new(Arc::new(resets)));
+        let config = Arc::new(endpoint_config(key));
         Self {
             own: key.public(),
             edition: trust.edition(),
@@ -118,6 +121,7 @@ impl Transport {
             warned: None,
             endpoint: Endpoint::new(config, Some(Arc::new(server)), true, None),
             client,
+            first_packets: Buckets::new(FIRST_PACKETS, MOST_ADDRESSES),
             dials: dials.into_iter().map(Dial::new).collect(),
             sessions: BTreeMap::new(),
             handles: HashMap::new(),
@@ -155,6 +159,10 @@ impl Transport {
 
     /// Processes a UDP datagram from this address.
     pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, datagram: &[u8]) {
+        if is_first_packet(datagram) && !self.first_packets.take(now, from.ip()) {
+            self.counters.handshakes_dropped += 1;
+            return;
+        }
         self.buffer.clear();
         let data = BytesMut::from(datagram);
         let event = self
@@ -494,6 +502,24 @@ impl Transport {
             }
         }
     }
+}
+
+/// Whether a datagram begins with an Initial packet of QUIC 1 (RFC 9000, section 17.2.2).
+fn is_first_packet(datagram: &[u8]) -> bool {
+    datagram.first().is_some_and(|first| first & 0xF0 == 0xC0)
+}
+
+/// Parameters of the endpoint. With the same secrets after a restart it resets the connections of
+/// its previous life, so that the peers dial again before these time out.
+fn endpoint_config(key: &Key) -> EndpointConfig {
+    let secret = key.secret_for(b"jaus/1 stateless reset");
+    let mut config =
+        EndpointConfig::new(Arc::new(hmac::Key::new(hmac::HMAC_SHA256, secret.as_ref())));
+    let mut ids = [0; 8];
+    ids.copy_from_slice(&key.secret_for(b"jaus/1 connection ids").as_ref()[..8]);
+    let ids = u64::from_le_bytes(ids);
+    config.cid_generator(move || Box::new(HashedConnectionIdGenerator::from_key(ids)));
+    config
 }
 
 /// Parameters of every connection.

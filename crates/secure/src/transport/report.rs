@@ -15,7 +15,8 @@ pub struct Counters {
     pub established: u64,
     /// Handshakes that failed, most often because a side does not trust the key of the other.
     pub handshakes_failed: u64,
-    /// Connections ignored because too many handshakes were unfinished.
+    /// First packets ignored because too many came from one address, or too many handshakes were
+    /// unfinished.
     pub handshakes_dropped: u64,
     /// Messages refused because they came from an id for which the key of their sender may not
     /// speak.

@@ -398,6 +398,39 @@ fn a_flood_of_handshakes_from_one_address_is_bounded_and_keeps_no_other_out() {
 }
 
 #[test]
+fn ten_thousand_first_packets_a_second_are_answered_a_hundred_times() {
+    let (mut network, ..) = vehicle_and_operator();
+    let mut stranger = Transport::new(&key(), TrustFile::default(), [address(1)]);
+    stranger.handle_timeout(network.now);
+    let (to, first) = stranger.poll_transmit(network.now).unwrap();
+    for number in 0..10_000u32 {
+        // Another destination id makes it another handshake; that it does not decrypt is found last.
+        let mut packet = first.to_vec();
+        packet[6..10].copy_from_slice(&number.to_le_bytes());
+        network.deliver(to, address(66), &packet);
+    }
+    let vehicle = &mut network.hosts[0].transport;
+    assert!(vehicle.counters().handshakes_dropped >= 9_900);
+    assert!(vehicle.responses.len() <= 100);
+    // The operator notices nothing.
+    let command = judp("60.1.1", 20);
+    network.send(1, Priority::Standard, &command);
+    network.run(2 * DELAY);
+    assert_eq!(network.hosts[0].received, [command]);
+}
+
+#[test]
+fn a_restarted_node_is_noticed_before_its_session_times_out() {
+    let (mut network, trust, keys) = vehicle_and_operator();
+    // No goodbye: its state is gone.
+    network.hosts[0].transport = Transport::new(&keys[0], trust[0].clone(), []);
+    network.run(2 * SECOND);
+    assert_eq!(network.hosts[1].closed.len(), 1);
+    assert!(network.session(0).is_some() && network.session(1).is_some());
+    const { assert!(IDLE.as_secs() > 2) };
+}
+
+#[test]
 fn a_node_that_stops_tells_its_peers() {
     let (mut network, ..) = vehicle_and_operator();
     network.hosts[0].transport.close(network.now);
