@@ -7,6 +7,8 @@ use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::wire::{Frame, judp};
 
+use jaus_test_kit::hosts::SETTINGS;
+
 use super::clients::{ECHO, VEHICLE};
 use crate::testbed::TO_STRANGERS;
 
@@ -16,14 +18,26 @@ pub(crate) struct Attacker {
     /// Sends a copy of everything to the echo socket, if set.
     echo: Option<UdpSocket>,
     sequence: u16,
+    /// Divides the time of an attack.
+    hurry: u32,
     pub(crate) packets: u64,
     octets: u64,
 }
 
 impl Attacker {
+    /// Aims at the port of JUDP for as long as the attack says; with the setting `brief:PORT`, at
+    /// that port for a quarter of the time.
     pub(crate) fn new() -> Self {
         let address = |text: &str| SocketAddr::new(text.parse().unwrap(), judp::PORT);
-        Self::between(address("10.217.0.9"), address(TO_STRANGERS))
+        let mut victim = address(TO_STRANGERS);
+        let port = std::env::var(SETTINGS).ok();
+        let port = port.and_then(|it| it.strip_prefix("brief:")?.parse().ok());
+        victim.set_port(port.unwrap_or(judp::PORT));
+        let hurry = if port.is_some() { 4 } else { 1 };
+        Self {
+            hurry,
+            ..Self::between(address("10.217.0.9"), victim)
+        }
     }
 
     pub(crate) fn between(own: SocketAddr, victim: SocketAddr) -> Self {
@@ -34,6 +48,7 @@ impl Attacker {
             socket,
             echo: None,
             sequence: 0,
+            hurry: 1,
             packets: 0,
             octets: 0,
         }
@@ -84,6 +99,7 @@ impl Attacker {
         rate: u32,
         mut act: impl FnMut(&mut Self, u32),
     ) {
+        let time = time / self.hurry;
         let (begun, mut number) = (Instant::now(), 0);
         println!("\nbegun");
         while begun.elapsed() < time {

@@ -29,6 +29,9 @@ use jaus_test_kit::rover;
 /// Enough for the client's two reports and for a newcomer to be found.
 const LONG: Duration = Duration::from_secs(20);
 
+/// The flood of handshakes. Handshakes from one address are cheap to refuse.
+const HANDSHAKES: u32 = 10_000;
+
 const TIME: Duration = Duration::from_secs(6);
 /// Datagrams per second of a flood: fewer for an unoptimised vehicle, which shares its processor
 /// with other tests.
@@ -72,6 +75,15 @@ pub(crate) async fn run(attack: &str) {
         "to-nobody" => attacker.repeat(TIME, 400, to_nobody),
         "configuration" => configuration(&mut attacker),
         "many-ids" => attacker.repeat(LONG, 550, |it, number| it.send(cycling(number), &pose())),
+        #[cfg(feature = "secure")]
+        "handshakes" => {
+            attacker = super::secure::stranger();
+            let mut first = super::secure::first_packet();
+            attacker.repeat(LONG / 2, HANDSHAKES, move |it, number| {
+                first[6..10].copy_from_slice(&number.to_le_bytes());
+                it.send_octets(&first);
+            });
+        }
         "ra-flood" => attacker.repeat(LONG, 3000, ra_flood),
         "ra-forged" => attacker.repeat(LONG / 4, 20, ra_forged),
         other => panic!("no attack is called {other}"),

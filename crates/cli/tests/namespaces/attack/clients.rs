@@ -46,10 +46,19 @@ fn config(subsystem: u16) -> Config {
     }
 }
 
+/// Starts a node with the settings of the role; `secure:FOLDER` are keys for a secure link.
+fn start(subsystem: u16) -> Node {
+    #[cfg(feature = "secure")]
+    if let Some(folder) = super::secure::folder_of_keys() {
+        return super::secure::start(subsystem, &folder);
+    }
+    Node::start(config(subsystem)).unwrap()
+}
+
 /// Queries the vehicle and the echo socket 20 times per second, and subscribes to 25 poses per
 /// second.
 pub(crate) async fn client() {
-    let node = Node::start(config(CLIENT.subsystem())).unwrap();
+    let node = start(CLIENT.subsystem());
     let builder = Component::builder(Kind::OperatorControlUnit, "Client");
     let client = builder.attach(&node, CLIENT.component()).unwrap();
     let found = client.find_within(local_pose_sensor::URN, LIMIT).await;
@@ -72,6 +81,7 @@ pub(crate) async fn client() {
         // Answers since the last event, and the most between two events.
         let (mut answers, mut answers_between) = (0, 0);
         let (mut last, mut gap) = (Instant::now(), Duration::ZERO);
+        let mut round_trips = Vec::new();
         let end = Instant::now() + SPAN;
         let mut beats = interval(Duration::from_millis(50));
         while Instant::now() < end {
@@ -93,7 +103,13 @@ pub(crate) async fn client() {
                         let answer = timeout(LOST, echo.recv(&mut octets)).await;
                         matches!(answer, Ok(Ok(_)))
                     };
-                    let (answer, echoed) = tokio::join!(timeout(LOST, place()), echoed);
+                    let sent = Instant::now();
+                    let timed = async {
+                        let answer = timeout(LOST, place()).await;
+                        (answer, sent.elapsed())
+                    };
+                    let ((answer, time), echoed) = tokio::join!(timed, echoed);
+                    round_trips.push(time);
                     let is_answered = matches!(answer, Ok(Some(_)));
                     lost += u64::from(!is_answered);
                     answers += u64::from(is_answered);
@@ -103,14 +119,17 @@ pub(crate) async fn client() {
             }
         }
         gap = gap.max(last.elapsed());
+        round_trips.sort_unstable();
+        let median = round_trips[round_trips.len() / 2];
         let control = client.query(VEHICLE, &QueryControl {}).await;
         let controller = control.map_or(0, |it| it.subsystem_id);
         let now = place().await.unwrap_or(start);
         let moved = (now.0 - start.0).hypot(now.1 - start.1) * 1000.0;
         println!(
             "client pings={pings} lost={lost} echoes_lost={echoes_lost} gap_ms={} \
-             answers_between={answers_between} controller={controller} moved_mm={}",
+             median_us={} answers_between={answers_between} controller={controller} moved_mm={}",
             gap.as_millis(),
+            median.as_micros(),
             moved.round()
         );
     }

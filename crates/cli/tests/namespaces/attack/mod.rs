@@ -17,6 +17,8 @@ mod gateway;
 mod ip6;
 mod routers;
 mod scene;
+#[cfg(feature = "secure")]
+mod secure;
 mod soak;
 mod streams;
 mod talkers;

@@ -50,7 +50,12 @@ impl<'a> Scene<'a> {
 
     /// Runs an attack to its end. Returns the attacker's figures.
     pub(crate) fn attack(&self, name: &str) -> Figures {
-        let attacker = self.bed.start(Host::Strangers, name, "");
+        self.attack_with(name, "")
+    }
+
+    /// Runs an attack with these settings to its end. Returns the attacker's figures.
+    pub(crate) fn attack_with(&self, name: &str, settings: &str) -> Figures {
+        let attacker = self.bed.start(Host::Strangers, name, settings);
         figures(&attacker.says("attack"))
     }
 

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use jaus_test_kit::waiting::block_until;
 use tempfile::TempDir;
 
 use super::judge::peer::free_port;
@@ -57,7 +58,9 @@ fn vehicle_and_operator(id: &str) -> (Running, Host, Host, String) {
     let listen = format!("--secure-listen={address}");
     let flags = at_vehicle.flags();
     let flags = flags.each_ref().map(String::as_str);
-    let mut vehicle = Running::command("vehicle", &[&["--id", id, &listen][..], &flags].concat());
+    let audit = format!("--audit={}", at_vehicle.file("audit.jsonl"));
+    let own = ["--id", id, &listen, &audit];
+    let mut vehicle = Running::command("vehicle", &[&own[..], &flags].concat());
     vehicle.read_until("Ctrl-C");
     (vehicle, at_vehicle, at_operator, address)
 }
@@ -186,13 +189,140 @@ fn a_node_without_a_key_says_how_to_make_one() {
 
 #[test]
 fn commands_that_use_plain_links_refuse_a_secure_one() {
-    for command in [
-        &["judge", "115.1.5"][..],
-        &["examine", "115.1.5"],
-        &["doctor"],
-    ] {
+    for command in [&["judge", "115.1.5"][..], &["examine", "115.1.5"]] {
         let refused = run(&[command, &["--secure-peer", "127.0.0.1"]].concat(), b"");
         assert_eq!(refused.status, 2, "{refused:?}");
         assert!(refused.stderr.contains("plain links only"), "{refused:?}");
     }
+}
+
+/// The operator's host, with another key that the vehicle does not trust.
+fn stranger(vehicle: &Host) -> Host {
+    let stranger = Host::new();
+    stranger.new_key();
+    let shown = vehicle.keys(&["show"]);
+    stranger.trust("rover", shown.stdout.trim(), "115.255.255");
+    stranger
+}
+
+#[test]
+fn a_key_without_rules_observes_and_both_sides_say_why_it_commands_nothing() {
+    let (vehicle, at_vehicle, operator, address) = vehicle_and_operator("115.1.4");
+    let query = [
+        "query",
+        "115.1.4",
+        "QueryIdentification",
+        WHICH,
+        "--id",
+        "60.1.1",
+    ];
+    assert_eq!(as_operator(&operator, &address, &query).status, 0);
+    let drive = [
+        "send",
+        "115.1.4",
+        "SetWrenchEffort",
+        r#"{"PropulsiveLinearEffortX":30}"#,
+        "--control",
+        "127",
+        "--id",
+        "60.1.1",
+    ];
+    let refused = as_operator(&operator, &address, &drive);
+    assert_eq!(refused.status, 1, "{refused:?}");
+    let words = "RequestControl from 60.1.1 to 115.1.4: its key may not take control";
+    assert!(refused.stderr.contains(words), "{refused:?}");
+
+    let allowed = at_vehicle.keys(&["allow", "operator", "control=100"]);
+    assert_eq!(allowed.status, 0, "{allowed:?}");
+    let listed = at_vehicle.keys(&["list"]);
+    assert!(
+        listed.stdout.contains("60.255.255  control=100"),
+        "{listed:?}"
+    );
+    // The vehicle reads the file within a second.
+    block_until(|| {
+        let refused = as_operator(&operator, &address, &drive);
+        refused
+            .stderr
+            .contains("authority 127, but its key may take control with at most 100")
+    });
+    let within = drive.map(|it| if it == "127" { "100" } else { it });
+    let sent = as_operator(&operator, &address, &within);
+    assert_eq!(sent.status, 0, "{sent:?}");
+
+    drop(vehicle);
+    let audit = std::fs::read_to_string(at_vehicle.file("audit.jsonl")).unwrap();
+    for part in [
+        r#""who":"operator","what":"connect","result":"allowed""#,
+        r#""who":"operator","what":"RequestControl","to":"115.1.4","result":"refused","why":"its key may not take control"#,
+        r#""who":"operator","what":"control","to":"115.1.4","result":"allowed""#,
+        r#""id":"60.1.1""#,
+    ] {
+        assert!(audit.contains(part), "{part} in {audit}");
+    }
+}
+
+#[test]
+fn doctor_finds_what_keeps_a_secure_link_from_standing() {
+    let (_vehicle, at_vehicle, operator, address) = vehicle_and_operator("115.1.5");
+    let doctor = |host: &Host, arguments: &[&str]| {
+        let arguments = [&["doctor", "--for", "2s", "--secure-peer"], arguments].concat();
+        let flags = host.flags();
+        run(
+            &[&arguments[..], &flags.each_ref().map(String::as_str)].concat(),
+            b"",
+        )
+    };
+    let words = |run: &Run| run.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+
+    let sound = doctor(&operator, &[&address]);
+    assert_eq!(sound.status, 0, "{sound:?}");
+    assert!(
+        words(&sound).contains("is `rover`; round trip"),
+        "{sound:?}"
+    );
+
+    // The vehicle does not trust this key.
+    let refused = doctor(&stranger(&at_vehicle), &[&address]);
+    assert_eq!(refused.status, 1);
+    let remedy = "on the peer's host, `jaus keys trust` the key that `jaus keys show` prints here";
+    assert!(words(&refused).contains(remedy), "{refused:?}");
+
+    // Nor is the vehicle's key trusted here.
+    operator.keys(&["revoke", "rover"]);
+    let other = Host::new().new_key();
+    operator.trust("other", &other, "116.255.255");
+    let untrusted = doctor(&operator, &[&address]);
+    assert!(
+        words(&untrusted).contains("is not trusted here"),
+        "{untrusted:?}"
+    );
+    operator.keys(&["revoke", "other"]);
+    let nobody = doctor(&operator, &[&address]);
+    assert!(words(&nobody).contains("no key is trusted"), "{nobody:?}");
+
+    // Nothing listens there.
+    let silent = doctor(
+        &stranger(&at_vehicle),
+        &[&format!("127.0.0.1:{}", free_port())],
+    );
+    assert!(
+        words(&silent).contains("is the peer running with --secure-listen"),
+        "{silent:?}"
+    );
+
+    let settings = operator.file("node.toml");
+    std::fs::write(&settings, "[tcp]\nlisten = \"127.0.0.1:0\"\n").unwrap();
+    operator.trust("rover", &other, "115.255.255");
+    let contradiction = doctor(&operator, &[&address, "--config", &settings]);
+    assert!(
+        words(&contradiction).contains("contradict each other"),
+        "{contradiction:?}"
+    );
+
+    use std::os::unix::fs::PermissionsExt as _;
+    let readable = std::fs::Permissions::from_mode(0o644);
+    std::fs::set_permissions(operator.file("node.key"), readable).unwrap();
+    let exposed = doctor(&operator, &[&address]);
+    assert!(words(&exposed).contains("chmod 600"), "{exposed:?}");
 }
