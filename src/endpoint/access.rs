@@ -1,7 +1,9 @@
-//! Access control for a node: allow and deny lists by subsystem and by network.
+//! Access control for a node: allow and deny lists by subsystem and by network, and ids bound to
+//! networks.
 //!
 //! JAUS does not authenticate senders. The lists keep out unrelated traffic, such as another team's
-//! vehicles on a shared network. They do not protect against a sender that forges an id or address.
+//! vehicles on a shared network. Binding refuses a forged id from another address. Neither protects
+//! against a sender that forges the address as well.
 
 use std::fmt;
 use std::net::IpAddr;
@@ -10,8 +12,8 @@ use std::str::FromStr;
 
 use ipnet::IpNet;
 
-use super::Counter;
-use crate::address::JausId;
+use super::{Counter, Remote};
+use crate::address::{JausId, ParseIdError};
 use crate::as_text::serde_as_text;
 
 /// Allow and deny lists. Deny wins over allow. If an allow list is not empty, everything that is
@@ -21,21 +23,27 @@ use crate::as_text::serde_as_text;
 /// [access]
 /// allow_subsystems = ["101", "200-299"]
 /// deny_networks = ["10.0.9.0/24", "fd00:9::/32"]
+/// bind = ["60.255.255@192.168.7.2"]
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct Access {
     /// The only subsystems to receive from and to forward for, unless empty. The node's own
-    /// subsystem is no exception: its other nodes are heard only if it is listed.
+    /// subsystem is no exception: its other nodes are heard only if it is listed. Flag: `--allow`.
     pub allow_subsystems: Vec<Subsystems>,
-    /// Subsystems to ignore, both as senders and for forwarding.
+    /// Subsystems to ignore, both as senders and for forwarding. Flag: `--deny`.
     pub deny_subsystems: Vec<Subsystems>,
-    /// The only networks to receive from, unless empty. Serial lines have no address and are always
-    /// allowed.
+    /// The only networks to receive from, unless empty. Serial lines and secure links have no
+    /// address and are always allowed. Flag: `--allow`.
     pub allow_networks: Vec<Network>,
-    /// Networks to ignore.
+    /// Networks to ignore. Flag: `--deny`.
     pub deny_networks: Vec<Network>,
+    /// Ids and the only networks to receive them from. An id with several entries may come from each
+    /// of their networks; an id without an entry may come from anywhere. A bound id is refused from
+    /// a serial line. Secure links are exempt, because they check the ids of each key. Flag:
+    /// `--bind`.
+    pub bind: Vec<Binding>,
 }
 
 impl Access {
@@ -53,9 +61,39 @@ impl Access {
         admits(&self.allow_networks, &self.deny_networks, contains)
     }
 
-    /// Checks the sender of a message.
-    pub(super) fn check_source(&self, source: JausId) -> Result<(), Counter> {
-        let is_allowed = self.allows_subsystem(source.subsystem());
+    /// Whether messages with this id may come from this remote end.
+    #[must_use]
+    pub fn allows_id_from(&self, id: JausId, from: Remote) -> bool {
+        let mut bindings = self.bind.iter().filter(|it| it.ids.matches(id)).peekable();
+        if bindings.peek().is_none() {
+            return true;
+        }
+        match from {
+            Remote::Socket(address) => bindings.any(|it| it.network.contains(address.ip())),
+            Remote::Line => false,
+            Remote::Session(_) => true,
+        }
+    }
+
+    /// Adds an entry to the allow list of its kind.
+    pub fn allow(&mut self, entry: AccessEntry) {
+        match entry {
+            AccessEntry::Subsystems(subsystems) => self.allow_subsystems.push(subsystems),
+            AccessEntry::Network(network) => self.allow_networks.push(network),
+        }
+    }
+
+    /// Adds an entry to the deny list of its kind.
+    pub fn deny(&mut self, entry: AccessEntry) {
+        match entry {
+            AccessEntry::Subsystems(subsystems) => self.deny_subsystems.push(subsystems),
+            AccessEntry::Network(network) => self.deny_networks.push(network),
+        }
+    }
+
+    /// Checks the subsystem of a message's source or destination.
+    pub(super) fn check_subsystem(&self, id: JausId) -> Result<(), Counter> {
+        let is_allowed = self.allows_subsystem(id.subsystem());
         is_allowed.then_some(()).ok_or(Counter::SubsystemDenied)
     }
 }
@@ -74,6 +112,23 @@ impl Subsystems {
     pub fn contains(&self, subsystem: u16) -> bool {
         self.0.contains(&subsystem)
     }
+}
+
+/// Ids bound to a network, as text `60.1.255@192.168.7.2` or `60.255.255@192.168.7.0/24`. The ids
+/// may have the wildcards 65535 and 255.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Binding {
+    ids: JausId,
+    network: Network,
+}
+
+/// An entry of an allow or deny list: a [`Network`], or [`Subsystems`].
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum AccessEntry {
+    /// A subsystem or a range of subsystems.
+    Subsystems(Subsystems),
+    /// A network or an address.
+    Network(Network),
 }
 
 /// Why a text is not a valid list entry.
@@ -100,6 +155,15 @@ pub enum AccessError {
         /// The network that contains the address.
         meant: Network,
     },
+    /// Not ids and a network.
+    #[error(
+        "`{0}` binds no id to a network: write ids and a network, such as \
+         \"60.1.255@192.168.7.2\" or \"60.255.255@192.168.7.0/24\""
+    )]
+    Binding(String),
+    /// The ids of a binding are invalid.
+    #[error("the ids of a binding: {0}")]
+    BoundId(ParseIdError),
 }
 
 impl FromStr for Subsystems {
@@ -169,11 +233,45 @@ impl fmt::Display for Network {
     }
 }
 
-serde_as_text!(Subsystems, Network);
+impl FromStr for Binding {
+    type Err = AccessError;
+
+    fn from_str(text: &str) -> Result<Self, AccessError> {
+        let (ids, network) = text
+            .split_once('@')
+            .ok_or_else(|| AccessError::Binding(text.to_owned()))?;
+        Ok(Self {
+            ids: ids.parse().map_err(AccessError::BoundId)?,
+            network: network.parse()?,
+        })
+    }
+}
+
+impl fmt::Display for Binding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}@{}", self.ids, self.network)
+    }
+}
+
+impl FromStr for AccessEntry {
+    type Err = AccessError;
+
+    /// An address has a dot or a colon, and a range of subsystems has neither.
+    fn from_str(text: &str) -> Result<Self, AccessError> {
+        if text.contains(['.', ':']) {
+            text.parse().map(Self::Network)
+        } else {
+            text.parse().map(Self::Subsystems)
+        }
+    }
+}
+
+serde_as_text!(Subsystems, Network, Binding);
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::endpoint::SessionId;
 
     fn network(text: &str) -> Network {
         text.parse().unwrap()
@@ -212,6 +310,55 @@ mod tests {
     }
 
     #[test]
+    fn a_bound_id_comes_from_its_networks_alone() {
+        let binding = |text: &str| text.parse().unwrap();
+        let access = Access {
+            bind: ["60.1.255@192.168.7.2", "60.1.255@10.0.9.0/24"]
+                .map(binding)
+                .into(),
+            ..Access::default()
+        };
+        let socket = |text: &str| Remote::Socket(text.parse().unwrap());
+        let bound = JausId::new(60, 1, 9);
+        assert!(access.allows_id_from(bound, socket("192.168.7.2:3794")));
+        assert!(access.allows_id_from(bound, socket("10.0.9.7:9")));
+        assert!(!access.allows_id_from(bound, socket("192.168.7.3:3794")));
+        assert!(
+            !access.allows_id_from(bound, Remote::Line),
+            "a line has no address"
+        );
+        assert!(
+            access.allows_id_from(bound, Remote::Session(SessionId(1))),
+            "its key has ids"
+        );
+        for free in [JausId::new(60, 2, 9), JausId::new(61, 1, 9)] {
+            assert!(
+                access.allows_id_from(free, socket("192.168.7.3:3794")),
+                "{free}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_entry_of_a_flag_is_added_to_the_list_of_its_kind() {
+        let mut access = Access::default();
+        for text in ["101", "200-299", "10.0.0.0/8", "fd00::/8"] {
+            access.allow(text.parse().unwrap());
+            access.deny(text.parse().unwrap());
+        }
+        assert_eq!(access.allow_subsystems, subsystems(&["101", "200-299"]));
+        assert_eq!(access.deny_subsystems, access.allow_subsystems);
+        let networks = vec![network("10.0.0.0/8"), network("fd00::/8")];
+        assert_eq!(
+            (&access.allow_networks, &access.deny_networks),
+            (&networks, &networks)
+        );
+        let error = |text: &str| text.parse::<AccessEntry>().unwrap_err();
+        assert!(matches!(error("rover"), AccessError::Subsystems(_)));
+        assert!(matches!(error("10.0.0"), AccessError::Network(_)));
+    }
+
+    #[test]
     fn entries_are_written_as_they_are_read() {
         for text in ["101", "200-299"] {
             assert_eq!(text.parse::<Subsystems>().unwrap().to_string(), text);
@@ -219,6 +366,8 @@ mod tests {
         for text in ["10.0.9.0/24", "fd00::/8"] {
             assert_eq!(network(text).to_string(), text);
         }
+        let text = "60.255.255@10.0.9.0/24";
+        assert_eq!(text.parse::<Binding>().unwrap().to_string(), text);
     }
 
     #[test]
@@ -241,5 +390,13 @@ mod tests {
         }
         let error = "10.0.9.7/24".parse::<Network>().unwrap_err().to_string();
         assert!(error.contains("write \"10.0.9.0/24\""), "{error}");
+        for (wrong, remedy) in [
+            ("60.1.255", "\"60.1.255@192.168.7.2\""),
+            ("60.1@10.0.9.7", "\"60.1\""),
+            ("60.1.1@eth0", "\"10.0.9.7\""),
+        ] {
+            let error = wrong.parse::<Binding>().unwrap_err().to_string();
+            assert!(error.contains(remedy), "{error}");
+        }
     }
 }

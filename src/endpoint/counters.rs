@@ -41,6 +41,8 @@ counters! {
     OutOfScope = "dropped: local broadcast from another subsystem",
     AcknowledgementWithPayload = "dropped: acknowledgement with payload",
     Duplicate = "dropped: duplicate",
+    /// Dropped: a message from an id that `access.bind` binds to other networks.
+    BoundElsewhere = "dropped: id bound to another network",
     NetworkDenied = "dropped: network not allowed",
     SubsystemDenied = "dropped: subsystem not allowed",
     MessageRate = "dropped: too many messages from one source",

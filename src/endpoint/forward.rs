@@ -88,7 +88,7 @@ impl Endpoint {
         let (frame, now, from) = (arrival.frame, arrival.now, arrival.path);
         let destination = frame.destination;
         if destination.is_unicast() {
-            self.config.access.check_source(destination)?;
+            self.config.access.check_subsystem(destination)?;
             if let Some((path, version)) = self.route(destination) {
                 // Multicast has already reached every node on that network.
                 let shared = from.link == path.link

@@ -61,7 +61,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 pub use crate::peer::Pacing;
-pub use access::{Access, AccessError, Network, Subsystems};
+pub use access::{Access, AccessEntry, AccessError, Binding, Network, Subsystems};
 pub use config::{Config, PAYLOAD_LIMITS, StaticPeer, first_sequence_at};
 pub use counters::{Counter, Counters};
 pub use delivery::FlowStatus;

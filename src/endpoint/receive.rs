@@ -235,10 +235,16 @@ impl Endpoint {
         Err(Counter::UnawaitedAcknowledgement)
     }
 
-    /// Refuses senders that are denied by id or configured to be at another address.
+    /// Refuses senders that are denied by id, or bound or configured to be at another address.
     fn refuse_misplaced(&mut self, arrival: Arrival<'_>) -> Result<(), Counter> {
         let (id, path) = (arrival.frame.source, arrival.path);
-        self.config.access.check_source(id)?;
+        self.config.access.check_subsystem(id)?;
+        if !self.config.access.allows_id_from(id, path.peer) {
+            if self.warnings.is_due(arrival.now, Warning::BoundElsewhere) {
+                warn!(%id, from = %path.peer, "refused: `access.bind` binds this id to other networks");
+            }
+            return Err(Counter::BoundElsewhere);
+        }
         if !self.peers.is_pinned_elsewhere(id, path) {
             return Ok(());
         }

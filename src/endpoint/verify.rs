@@ -23,8 +23,8 @@ use crate::wire::Frame;
 /// ago. No message awaits such a number, and a peer's duplicate detection does not confuse it with
 /// those of coming messages.
 const NUMBERS_AGO: u16 = 1 << 14;
-/// The shortest interval between two warnings of a kind.
-const WARNING_INTERVAL: Duration = Duration::from_secs(10);
+/// The shortest interval between two warnings of a kind. The counters show how often it happens.
+const WARNING_INTERVAL: Duration = Duration::from_secs(60);
 
 /// Rate-limited warnings to the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,12 +34,13 @@ pub(super) enum Warning {
     IdConflict,
     TableFull,
     PinnedElsewhere,
+    BoundElsewhere,
     Unverified,
 }
 
 /// When each warning was last logged.
 #[derive(Debug, Default)]
-pub(super) struct Warnings([Option<Instant>; 6]);
+pub(super) struct Warnings([Option<Instant>; 7]);
 
 impl Warnings {
     /// Whether a warning may be logged again.
@@ -265,9 +266,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_warning_of_a_kind_is_due_every_ten_seconds() {
+    fn a_warning_of_a_kind_is_due_once_a_minute() {
         let (mut warnings, begin) = (Warnings::default(), Instant::now());
-        for (after, expected) in [(0, true), (9_999, false), (10_000, true), (19_999, false)] {
+        for (after, expected) in [(0, true), (59_999, false), (60_000, true), (119_999, false)] {
             let now = begin + Duration::from_millis(after);
             assert_eq!(warnings.is_due(now, Warning::PeerMoved), expected);
         }

@@ -228,3 +228,18 @@ async fn a_pinned_id_is_refused_from_a_line() {
     let refused = scene.vehicle.counters().get(Counter::PinnedElsewhere);
     assert_eq!(refused, 2000);
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_bound_id_is_refused_from_a_line() {
+    let mut scene = Scene::new(|mut config, client| {
+        let address = client.socket().unwrap().ip();
+        let bound = format!("{CLIENT}@{address}").parse();
+        config.access.bind.push(bound.unwrap());
+        config
+    });
+    let forged = (1..=2000).flat_map(|number| on_line(CLIENT, number, Acknowledgement::None));
+    let (lost, from_line) = scene.ask_during(forged.collect()).await;
+    assert_eq!((lost, from_line), (0, Vec::new()));
+    let refused = scene.vehicle.counters().get(Counter::BoundElsewhere);
+    assert_eq!(refused, 2000);
+}

@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use jaus::address::JausId;
 use jaus::component::{Component, Kind};
+use jaus::endpoint::{AccessEntry, Binding};
 #[cfg(unix)]
 use jaus::link::junior::DEFAULT_FOLDER;
 use jaus::link::local::record::Reason;
@@ -60,6 +61,22 @@ pub struct Network {
     #[arg(long, value_name = "PEER")]
     peer: Vec<PeerAddress>,
 
+    /// Accept messages only from these senders: a subsystem, a range of them, or a network, for
+    /// example 60, 200-299 or 192.168.7.0/24 (repeatable)
+    ///
+    /// Subsystems and networks are two lists: with both, a sender must be on both.
+    #[arg(long, value_name = "SENDERS")]
+    allow: Vec<AccessEntry>,
+
+    /// Refuse messages from these senders, also if --allow names them (repeatable)
+    #[arg(long, value_name = "SENDERS")]
+    deny: Vec<AccessEntry>,
+
+    /// Accept messages with these ids only from this network, for example 60.255.255@192.168.7.2;
+    /// 255 and 65535 are wildcards (repeatable)
+    #[arg(long, value_name = "IDS@NETWORK")]
+    bind: Vec<Binding>,
+
     /// Attach to this host's node (`jaus node --local`) instead of running our own; ADDRESS is its
     /// local link's [default: the usual place]
     #[arg(
@@ -68,7 +85,9 @@ pub struct Network {
         num_args = 0..=1,
         require_equals = true,
         default_missing_value = "default",
-        conflicts_with_all = ["interface", "loopback", "port", "group", "ttl", "peer"],
+        conflicts_with_all = [
+            "interface", "loopback", "port", "group", "ttl", "peer", "allow", "deny", "bind",
+        ],
     )]
     attach: Option<Address>,
 
@@ -315,6 +334,13 @@ impl Network {
         node.group = self.group.unwrap_or(node.group);
         node.ttl = self.ttl.unwrap_or(node.ttl);
         node.peers.extend(&self.peer);
+        for entry in &self.allow {
+            node.access.allow(entry.clone());
+        }
+        for entry in &self.deny {
+            node.access.deny(entry.clone());
+        }
+        node.access.bind.extend(&self.bind);
         #[cfg(unix)]
         if self.junior.is_some() {
             node.junior.clone_from(&self.junior);

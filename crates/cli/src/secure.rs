@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
+use jaus::address::JausId;
 use jaus::link::Interfaces;
 use jaus::node::Config;
 use jaus_audit::{AuditLog, Limits};
-use jaus_secure::{Key, SecureLink, TrustFile};
+use jaus_secure::{Key, Peer, SecureLink, TrustFile, edit};
 use serde::Deserialize;
 
 use super::failure::Failure;
@@ -69,6 +70,14 @@ pub struct SecureFlags {
     /// Write an audit log to this file: sessions, refused messages, control, emergencies
     #[arg(long, value_name = "FILE")]
     audit: Option<PathBuf>,
+
+    /// At the first start, trust this key for these ids: NAME, KEY and IDS, separated by blanks
+    /// (repeatable)
+    ///
+    /// It writes the file of trusted keys if there is none. A key that is missing from an existing
+    /// file may have been revoked: then the start fails, and `jaus keys trust` adds the key.
+    #[arg(long, value_name = "PEER")]
+    trust: Vec<Peer>,
 
     #[command(flatten)]
     files: KeyFiles,
@@ -137,6 +146,8 @@ pub struct Secure {
     listen: Option<Address>,
     peers: Vec<Address>,
     audit: Option<PathBuf>,
+    /// To be trusted at the first start.
+    trust: Vec<Peer>,
     files: KeyFiles,
 }
 
@@ -144,19 +155,25 @@ impl SecureFlags {
     /// The settings from flags and the settings file; `None` if neither asks for a secure link.
     ///
     /// # Errors
-    /// An unreadable file, or an invalid table.
+    /// An unreadable file, an invalid table, or a key to trust without a secure link.
     pub fn settings(&self, file: Option<&Path>) -> Result<Option<Secure>, Failure> {
         let table: Table = file.map(settings::secure).transpose()?.unwrap_or_default();
         let secure = Secure {
             listen: self.secure_listen.or(table.listen),
             peers: [&table.peers[..], &self.secure_peer].concat(),
             audit: self.audit.clone().or(table.audit),
+            trust: self.trust.clone(),
             files: KeyFiles {
                 key: self.files.key.clone().or(table.key),
                 trusted_keys: self.files.trusted_keys.clone().or(table.trusted_keys),
             },
         };
         let is_wanted = secure.listen.is_some() || !secure.peers.is_empty();
+        if !is_wanted && !secure.trust.is_empty() {
+            return Err(Failure::new(
+                "--trust is for a secure link: add --secure-listen, or --secure-peer ADDRESS",
+            ));
+        }
         Ok(is_wanted.then_some(secure))
     }
 }
@@ -205,7 +222,9 @@ impl Secure {
     /// # Errors
     /// A key or trust file that cannot be used, or an address that cannot be listened on.
     pub fn open(&self) -> Result<SecureLink, Failure> {
-        let (key, trust) = (self.key()?, self.trust()?);
+        let key = self.key()?;
+        trust_at_first_start(&self.files.trusted_keys()?, &self.trust)?;
+        let trust = self.trust()?;
         let any = || match self.peers.first() {
             Some(Address(SocketAddr::V6(_))) => SocketAddr::from(([0; 16], 0)),
             _ => SocketAddr::from(([0; 4], 0)),
@@ -222,6 +241,32 @@ impl Secure {
         }
         Ok(link)
     }
+}
+
+/// Writes a trust file with these peers if there is none. An existing file must trust them: it is
+/// not changed, or a restart with the same flags would undo a revocation.
+fn trust_at_first_start(file: &Path, peers: &[Peer]) -> Result<(), Failure> {
+    if !file.exists() {
+        let mut each = peers.iter();
+        return each.try_for_each(|peer| edit::trust(file, peer).map_err(Failure::of));
+    }
+    if peers.is_empty() {
+        return Ok(());
+    }
+    let trust = TrustFile::load(file).map_err(Failure::of)?;
+    let is_missing = |peer: &&Peer| trust.find(peer.key).is_none_or(|it| it.ids != peer.ids);
+    let Some(peer) = peers.iter().find(is_missing) else {
+        return Ok(());
+    };
+    let (name, key) = (&peer.name, peer.key);
+    let ids: Vec<_> = peer.ids.iter().map(JausId::to_string).collect();
+    Err(Failure::new(format!(
+        "{} does not trust the key of `{name}` for {}, which --trust names: was it revoked? Omit \
+         --trust, or run `jaus keys trust {name} {key} {}`",
+        file.display(),
+        ids.join(","),
+        ids.join(","),
+    )))
 }
 
 /// A key that is missing is made by a command.
@@ -247,6 +292,28 @@ mod tests {
         assert_eq!(address("10.0.0.2:99").unwrap(), "10.0.0.2:99");
         assert_eq!(address("::1").unwrap(), "[::1]:3795");
         assert!(address("rover").unwrap_err().contains("192.168.7.2"));
+    }
+
+    #[test]
+    fn a_restart_with_the_same_flags_does_not_undo_a_revocation() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("trusted_keys");
+        let key = format!("{}=", "A".repeat(43));
+        let operator: Peer = format!("operator {key} 60.255.255").parse().unwrap();
+        let peers = std::slice::from_ref(&operator);
+        trust_at_first_start(&file, &[]).unwrap();
+        assert!(!file.exists(), "no peer, no file");
+        for _ in 0..2 {
+            trust_at_first_start(&file, peers).unwrap();
+        }
+        let trust = TrustFile::load(&file).unwrap();
+        assert_eq!(trust.find(operator.key), Some(operator.clone()));
+
+        edit::revoke(&file, "operator").unwrap();
+        let refused = trust_at_first_start(&file, peers).unwrap_err().to_string();
+        let remedy = format!("jaus keys trust operator {key} 60.255.255");
+        assert!(refused.contains(&remedy), "{refused}");
+        assert_eq!(TrustFile::load(&file).unwrap().find(operator.key), None);
     }
 
     #[test]

@@ -13,6 +13,7 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::sync::{Arc, PoisonError, RwLock, Weak};
 use std::time::{Duration, SystemTime};
 
@@ -101,6 +102,15 @@ impl Peer {
     #[must_use]
     pub fn speaks_for(&self, source: JausId) -> bool {
         source.is_unicast() && self.ids.iter().any(|ids| ids.matches(source))
+    }
+}
+
+/// Reads one line of a trust file.
+impl FromStr for Peer {
+    type Err = TrustError;
+
+    fn from_str(text: &str) -> Result<Self, TrustError> {
+        parse_line(1, text)
     }
 }
 

@@ -169,6 +169,33 @@ fn who_is_denied_is_not_heard() {
 }
 
 #[test]
+fn a_bound_id_is_refused_from_other_networks_and_counted() {
+    let access = Access {
+        bind: vec!["42.255.255@10.0.0.2".parse().unwrap()],
+        ..Access::default()
+    };
+    let mut rig = Rig::with(Config {
+        access,
+        ..Config::default()
+    });
+    rig.hear_from(3, &from_peer(QUERY_HEARTBEAT));
+    assert!(rig.is_silent());
+    assert_eq!(rig.count(Counter::BoundElsewhere), 1);
+    assert_eq!(rig.endpoint.route(PEER), None, "nothing is learned");
+    rig.hear_from(2, &from_peer(QUERY_HEARTBEAT));
+    let source = id("43.1.1");
+    rig.hear_from(
+        3,
+        &Frame {
+            source,
+            ..from_peer(QUERY_HEARTBEAT)
+        },
+    );
+    assert_eq!(rig.received().len(), 2);
+    assert_eq!(rig.count(Counter::BoundElsewhere), 1);
+}
+
+#[test]
 fn a_table_full_of_peers_that_answer_takes_in_nobody_until_one_falls_silent() {
     let mut rig = Rig::with(Config {
         limits: Limits {

@@ -246,6 +246,23 @@ fn what_the_lists_do_not_allow_is_not_passed_on() {
 }
 
 #[test]
+fn a_bound_id_is_not_passed_on_from_other_networks() {
+    let mut between = Between::new(Config {
+        access: Access {
+            bind: vec!["1.255.255@10.0.0.7".parse().unwrap()],
+            ..Access::default()
+        },
+        ..router_config()
+    });
+    between.hear(0, 9, &message(A, C, 2));
+    between.hear(1, 8, &message(A, B, 3));
+    assert_eq!(between.sent(), []);
+    assert_eq!(between.count(Counter::BoundElsewhere), 2);
+    between.hear(0, 7, &message(A, C, 4));
+    assert_eq!(between.sent().len(), 1);
+}
+
+#[test]
 fn a_message_on_another_path_is_a_copy_as_long_as_it_may_be_repeated() {
     let window = Config::default().retransmission_window;
     for (pause, passed) in [(window - Duration::from_millis(1), 0), (window, 1)] {

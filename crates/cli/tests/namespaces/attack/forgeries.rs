@@ -1,7 +1,12 @@
 //! Forged source ids of other peers, and unassigned ids.
 
+use std::io::Write as _;
+use std::process::Stdio;
+
+use jaus_test_kit::tools::workspace;
+
 use super::bed::settings;
-use super::scene::{ANSWERS, figures, on_scene};
+use super::scene::{ANSWERS, Scene, figures, on_scene, on_testbed};
 use crate::testbed::Host;
 
 #[test]
@@ -33,6 +38,29 @@ fn commands_in_a_pinned_id_are_obeyed_from_its_address_alone() {
         println!("| control in a pinned id | {seen:?}, {attack:?} |");
         assert_eq!((seen["controller"], seen["moved_mm"]), (0, 0), "{seen:?}");
         assert!(seen["lost"] <= 2, "{seen:?}");
+    });
+}
+
+#[test]
+fn commands_in_a_bound_id_are_obeyed_from_its_network_alone() {
+    on_scene(&["--bind", "102.255.255@10.216.1.0/24"], |scene| {
+        let attack = scene.attack("forged-control");
+        let seen = scene.client();
+        println!("| control in a bound id | {seen:?}, {attack:?} |");
+        assert_eq!((seen["controller"], seen["moved_mm"]), (0, 0), "{seen:?}");
+        assert!(seen["lost"] <= 2 && attack["octets"] == 0, "{seen:?}");
+        scene.warns("binds this id to other networks");
+    });
+}
+
+#[test]
+fn without_a_binding_a_forged_id_drives_the_vehicle_and_the_log_says_so() {
+    on_scene(&[], |scene| {
+        let attack = scene.attack("forged-control");
+        let seen = scene.client();
+        println!("| control in an id that is not bound | {seen:?}, {attack:?} |");
+        assert!(seen["moved_mm"] > 100, "{seen:?}");
+        scene.warns("an id is used at two addresses");
     });
 }
 
@@ -86,6 +114,38 @@ fn commands_from_a_network_that_is_not_allowed_are_not_obeyed() {
         let attack = scene.attack("forged-control");
         let seen = scene.client();
         println!("| control from a network that is not allowed | {seen:?}, {attack:?} |");
+        assert_eq!((seen["controller"], seen["moved_mm"]), (0, 0), "{seen:?}");
+        assert!(seen["lost"] <= 2 && attack["octets"] == 0, "{seen:?}");
+    });
+}
+
+/// The file of nftables in docs/hardening.md, for the cables and the client of the test bed.
+fn firewall() -> String {
+    let page = std::fs::read_to_string(workspace("docs/hardening.md")).unwrap();
+    let (_, block) = page.split_once("```nft\n").unwrap();
+    let (rules, _) = block.split_once("```").unwrap();
+    let cables = [Host::Controller, Host::Strangers].map(Host::cable);
+    rules
+        .replace(
+            "!= \"eth0\"",
+            &format!("!= {{ \"{}\", \"{}\" }}", cables[0], cables[1]),
+        )
+        .replace("192.168.7.2", "10.216.1.2")
+}
+
+#[test]
+fn commands_do_not_pass_the_firewall_of_the_hardening_page() {
+    on_testbed(|bed| {
+        let mut nft = bed.program(Host::Vehicle, "nft", &["-f", "-"]);
+        let mut nft = nft.stdin(Stdio::piped()).spawn().unwrap();
+        let mut rules = nft.stdin.take().unwrap();
+        rules.write_all(firewall().as_bytes()).unwrap();
+        drop(rules);
+        assert!(nft.wait().unwrap().success());
+        let scene = Scene::start(bed, &[], "");
+        let attack = scene.attack("forged-control");
+        let seen = scene.client();
+        println!("| control against a firewall | {seen:?}, {attack:?} |");
         assert_eq!((seen["controller"], seen["moved_mm"]), (0, 0), "{seen:?}");
         assert!(seen["lost"] <= 2 && attack["octets"] == 0, "{seen:?}");
     });

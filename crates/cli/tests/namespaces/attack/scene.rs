@@ -6,6 +6,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use crate::testbed::{Host, Testbed};
 use jaus_test_kit::hosts::{Process, on_hosts};
 use jaus_test_kit::vehicle_process::VehicleProcess;
+use jaus_test_kit::waiting::block_until;
+use tempfile::NamedTempFile;
 
 /// `MemoryMax` of the packaged services, in KiB.
 pub(crate) const MEMORY: u64 = 64 * 1024;
@@ -22,6 +24,8 @@ pub(crate) struct Scene<'a> {
     pub(crate) bed: &'a Testbed,
     pub(crate) vehicle: VehicleProcess,
     pub(crate) client: Process,
+    /// The log of the vehicle.
+    log: NamedTempFile,
 }
 
 /// Numbers that a process has printed, by name.
@@ -38,14 +42,26 @@ impl<'a> Scene<'a> {
     /// Starts the vehicle with flags, and the client with settings.
     pub(crate) fn start(bed: &'a Testbed, flags: &[&str], settings: &str) -> Self {
         let arguments = [&["vehicle", "--id", "101.1.1"], flags].concat();
-        let vehicle = VehicleProcess::start(&mut bed.jaus(Host::Vehicle, &arguments));
+        let log = NamedTempFile::new().unwrap();
+        let mut vehicle = bed.jaus(Host::Vehicle, &arguments);
+        let vehicle = VehicleProcess::start(vehicle.stderr(log.reopen().unwrap()));
         let client = bed.start(Host::Controller, "client", settings);
         client.says("client");
         Self {
             bed,
             vehicle,
             client,
+            log,
         }
+    }
+
+    /// Waits until the vehicle has logged a warning that contains this text.
+    pub(crate) fn warns(&self, text: &str) {
+        block_until(|| {
+            let log = std::fs::read_to_string(&self.log).unwrap();
+            let mut lines = log.lines();
+            lines.any(|line| line.contains("WARN") && line.contains(text))
+        });
     }
 
     /// Runs an attack to its end. Returns the attacker's figures.

@@ -105,6 +105,43 @@ fn a_vehicle_is_found_and_queried_by_a_secure_link_alone() {
 }
 
 #[test]
+fn two_commands_on_each_host_give_a_vehicle_and_an_operator() {
+    let (vehicle, operator) = (Host::new(), Host::new());
+    let (vehicle_key, operator_key) = (vehicle.new_key(), operator.new_key());
+    let address = format!("127.0.0.1:{}", free_port());
+    let listen = format!("--secure-listen={address}");
+    let trust = format!("operator {operator_key} 60.255.255");
+    let flags = vehicle.flags();
+    let flags = flags.each_ref().map(String::as_str);
+    let trusting = ["--id", "115.1.6", &listen, "--trust", &trust];
+    let mut running = Running::command("vehicle", &[&trusting[..], &flags].concat());
+    running.read_until("Ctrl-C");
+
+    let trust = format!("rover {vehicle_key} 115.255.255");
+    let query = [
+        "query",
+        "115.1.6",
+        "QueryIdentification",
+        WHICH,
+        "--id",
+        "60.1.1",
+    ];
+    for _ in 0..2 {
+        let trusting = [&query[..], &["--trust", &trust]].concat();
+        let answered = as_operator(&operator, &address, &trusting);
+        assert_eq!(answered.status, 0, "{answered:?}");
+    }
+    assert_eq!(operator.keys(&["revoke", "rover"]).status, 0);
+    let again = as_operator(
+        &operator,
+        &address,
+        &[&query[..], &["--trust", &trust]].concat(),
+    );
+    assert_eq!(again.status, 2, "{again:?}");
+    assert!(again.stderr.contains("was it revoked?"), "{again:?}");
+}
+
+#[test]
 fn an_id_for_which_a_key_may_not_speak_gets_no_answer() {
     let (_vehicle, _, operator, address) = vehicle_and_operator("115.1.2");
     let query = [

@@ -22,6 +22,7 @@ mod monitor;
 mod network;
 mod ping;
 mod record;
+mod secrets;
 mod send;
 mod subscribe;
 mod texts;

@@ -104,9 +104,19 @@ fn filled_in(word: &str) -> Option<String> {
         "ID" => Some("101.1.1".to_owned()),
         "POLICY" => Some("stop".to_owned()),
         "IDS" => Some("101.255.255".to_owned()),
-        "KEY" | "OPERATORS_KEY" | "VEHICLES_KEY" => Some(format!("{}=", "A".repeat(43))),
-        word => Some(word.replace('…', "")),
+        "KEY" => Some(key()),
+        // Also within a quoted line of a trust file.
+        word => Some(
+            word.replace('…', "")
+                .replace("OPERATORS_KEY", &key())
+                .replace("VEHICLES_KEY", &key()),
+        ),
     }
+}
+
+/// A public key.
+fn key() -> String {
+    format!("{}=", "A".repeat(43))
 }
 
 /// Whether the flags of a command can be checked: `jaus help` has none, and some need features.

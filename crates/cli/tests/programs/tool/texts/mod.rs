@@ -4,6 +4,7 @@
 mod code;
 mod commands;
 mod cookbook;
+mod evidence;
 mod links;
 mod sessions;
 
