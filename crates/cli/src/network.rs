@@ -261,8 +261,8 @@ impl Network {
         #[cfg(feature = "secure")]
         if self.secure.settings(self.file())?.is_some() {
             return Err(Failure::new(
-                "this command uses plain links only: omit --secure-listen and --secure-peer, or \
-                 choose a settings file without [secure]",
+                "this command uses plain links only: omit --secure-listen, --secure-peer and \
+                 --secure-announce, or choose a settings file without [secure]",
             ));
         }
         Ok(())

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
+use jaus::address::JausId;
 use jaus::link::Interfaces;
 use jaus::node::Config;
-use jaus_secure::{Key, SecureLink, TrustFile};
+use jaus_secure::{Announce, Key, SecureLink, TrustFile};
 use serde::Deserialize;
 
 use super::failure::Failure;
@@ -16,6 +17,9 @@ use super::settings;
 
 /// The UDP port of secure links.
 pub const PORT: u16 = 3795;
+
+/// The value of `--secure-announce` without an interface.
+const EVERYWHERE: &str = "all";
 
 /// An address with a port, [`PORT`] by default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -64,6 +68,17 @@ pub struct SecureFlags {
     /// interface for it is named (repeatable)
     #[arg(long, value_name = "ADDRESS")]
     secure_peer: Vec<Address>,
+
+    /// Find peers that trust this node's key on this network, and be found by them, by signed
+    /// beacons; an interface limits them to its network [default: all interfaces] (repeatable)
+    #[arg(
+        long,
+        value_name = "INTERFACE",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = EVERYWHERE,
+    )]
+    secure_announce: Vec<String>,
 
     #[command(flatten)]
     files: KeyFiles,
@@ -118,10 +133,44 @@ struct Table {
     listen: Option<Address>,
     /// Connect to these peers. Flag: `--secure-peer`.
     peers: Vec<Address>,
+    /// Find peers by signed beacons, and be found by them: `true` for all interfaces, or names such
+    /// as `["eth0"]`. Flag: `--secure-announce`.
+    announce: Beacons,
     /// The file of this node's key. Flag: `--key`.
     key: Option<PathBuf>,
     /// The file of the keys that this node trusts. Flag: `--trusted-keys`.
     trusted_keys: Option<PathBuf>,
+}
+
+/// The interfaces to send beacons on.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "true, false, or a list of interfaces such as [\"eth0\"]"
+)]
+enum Beacons {
+    OnAll(bool),
+    On(Vec<String>),
+}
+
+impl Default for Beacons {
+    fn default() -> Self {
+        Self::OnAll(false)
+    }
+}
+
+impl Beacons {
+    /// Those of the flags, or else of the settings file; `None` for no beacons.
+    fn interfaces(self, flags: &[String]) -> Option<Interfaces> {
+        match (flags, self) {
+            ([], Self::OnAll(false)) => None,
+            ([], Self::On(names)) if names.is_empty() => None,
+            ([], Self::On(names)) => Some(Interfaces::Only(names)),
+            ([], Self::OnAll(true)) => Some(Interfaces::All),
+            (flags, _) if flags.iter().any(|it| it == EVERYWHERE) => Some(Interfaces::All),
+            (flags, _) => Some(Interfaces::Only(flags.to_vec())),
+        }
+    }
 }
 
 /// The settings of a secure link.
@@ -129,6 +178,7 @@ struct Table {
 pub struct Secure {
     listen: Option<Address>,
     peers: Vec<Address>,
+    announce: Option<Interfaces>,
     files: KeyFiles,
 }
 
@@ -142,12 +192,14 @@ impl SecureFlags {
         let secure = Secure {
             listen: self.secure_listen.or(table.listen),
             peers: [&table.peers[..], &self.secure_peer].concat(),
+            announce: table.announce.interfaces(&self.secure_announce),
             files: KeyFiles {
                 key: self.files.key.clone().or(table.key),
                 trusted_keys: self.files.trusted_keys.clone().or(table.trusted_keys),
             },
         };
-        let is_wanted = secure.listen.is_some() || !secure.peers.is_empty();
+        let is_wanted =
+            secure.listen.is_some() || !secure.peers.is_empty() || secure.announce.is_some();
         Ok(is_wanted.then_some(secure))
     }
 }
@@ -181,6 +233,10 @@ impl Secure {
         for Address(peer) in &self.peers {
             settings = settings.connect(*peer);
         }
+        if let Some(interfaces) = self.announce {
+            let node = JausId::new(config.subsystem, config.node, 0);
+            settings = settings.announce(Announce { interfaces, node });
+        }
         let link = SecureLink::open(&key, trust, settings).map_err(Failure::of)?;
         Ok((config, link))
     }
@@ -212,6 +268,25 @@ mod tests {
     }
 
     #[test]
+    fn beacons_are_sent_on_all_interfaces_or_on_the_named_ones() {
+        let only = |name: &str| Some(Interfaces::Only(vec![name.to_owned()]));
+        let from = |table: &str, flags: &[&str]| {
+            let table: Table = toml::from_str(table).unwrap();
+            let flags: Vec<_> = flags.iter().map(|&it| it.to_owned()).collect();
+            table.announce.interfaces(&flags)
+        };
+        assert_eq!(from("", &[]), None);
+        assert_eq!(from("announce = false", &[]), None);
+        assert_eq!(from("announce = []", &[]), None);
+        assert_eq!(from("announce = true", &[]), Some(Interfaces::All));
+        assert_eq!(from("announce = ['eth0']", &[]), only("eth0"));
+        assert_eq!(from("announce = ['eth0']", &["eth1"]), only("eth1"));
+        assert_eq!(from("", &[EVERYWHERE]), Some(Interfaces::All));
+        let error = toml::from_str::<Table>("announce = 3").unwrap_err();
+        assert!(error.to_string().contains("[\"eth0\"]"), "{error}");
+    }
+
+    #[test]
     fn plain_udp_remains_only_on_named_interfaces() {
         let folder = tempfile::tempdir().unwrap();
         let [key, trusted] = ["node.key", "trusted_keys"].map(|name| folder.path().join(name));
@@ -221,6 +296,7 @@ mod tests {
             let secure = Secure {
                 listen: Some("127.0.0.1:0".parse().unwrap()),
                 peers: Vec::new(),
+                announce: None,
                 files: KeyFiles {
                     key: Some(key.clone()),
                     trusted_keys: Some(trusted.clone()),

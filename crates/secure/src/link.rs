@@ -1,6 +1,8 @@
 //! The secure link of a node: a UDP socket around the [`Transport`].
 #![expect(clippy::disallowed_types, reason = "this module owns the socket")]
 
+mod beacons;
+
 use std::io;
 use std::net::SocketAddr;
 use std::task::{Context, Poll};
@@ -8,14 +10,20 @@ use std::time::Instant;
 
 use bytes::Bytes;
 use jaus::endpoint::{Remote, To, Transmit};
+use jaus::link;
 use jaus::link::custom::{Arrival, CustomLink};
 use jaus::node;
 use tokio::io::ReadBuf;
 use tokio::net::UdpSocket;
 
+use beacons::Beacons;
+
+use crate::beacon;
 use crate::key::Key;
 use crate::transport::Transport;
 use crate::trust::TrustFile;
+
+pub use beacons::Announce;
 
 /// UDP datagrams to read before the node's other links have their turn.
 const BATCH: usize = 64;
@@ -31,6 +39,8 @@ pub struct Settings {
     pub listen: SocketAddr,
     /// The peers to dial.
     pub connect: Vec<SocketAddr>,
+    /// Whether to find peers by [beacons](crate::beacon) and be found by them.
+    pub announce: Option<Announce>,
 }
 
 impl Settings {
@@ -40,6 +50,7 @@ impl Settings {
         Self {
             listen,
             connect: Vec::new(),
+            announce: None,
         }
     }
 
@@ -49,16 +60,30 @@ impl Settings {
         self.connect.push(peer);
         self
     }
+
+    /// Finds peers by beacons, and is found by them.
+    #[must_use]
+    pub fn announce(mut self, announce: Announce) -> Self {
+        self.announce = Some(announce);
+        self
+    }
 }
 
 /// Why a secure link was not opened.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot listen for secure links on UDP {address}: {source}")]
-pub struct OpenError {
-    /// The address.
-    address: SocketAddr,
-    /// The reason.
-    source: io::Error,
+#[non_exhaustive]
+pub enum OpenError {
+    /// The address is not one of this host, or its port is taken.
+    #[error("cannot listen for secure links on UDP {address}: {source}")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// The reason.
+        source: io::Error,
+    },
+    /// The interfaces for beacons are not there.
+    #[error("cannot announce the secure link: {0}")]
+    Announce(#[from] link::Error),
 }
 
 /// The secure link of a node. Must be opened within a tokio runtime.
@@ -66,6 +91,7 @@ pub struct OpenError {
 pub struct SecureLink {
     socket: UdpSocket,
     transport: Transport,
+    beacons: Option<Beacons>,
     /// The datagram that the kernel had no room for.
     leaving: Option<(SocketAddr, Bytes)>,
     buffer: Box<[u8]>,
@@ -76,15 +102,21 @@ impl SecureLink {
     /// Opens the link. Its first turn dials the peers.
     ///
     /// # Errors
-    /// If the address is not one of this host, or its port is taken.
+    /// If the address is not one of this host, or its port is taken; or if an interface for beacons
+    /// does not exist.
     pub fn open(key: &Key, trust: TrustFile, settings: Settings) -> Result<Self, OpenError> {
         let address = settings.listen;
-        let socket = bind(address).map_err(|source| OpenError { address, source })?;
-        tracing::info!(listening = ?socket.local_addr().ok(), key = %key.public(), "secure link opened");
+        let socket = bind(address).map_err(|source| OpenError::Listen { address, source })?;
+        let local = socket.local_addr();
+        let local = local.map_err(|source| OpenError::Listen { address, source })?;
+        let announce = settings.announce;
+        let beacons = announce.map(|it| Beacons::open(key, trust.clone(), local, it));
+        tracing::info!(listening = %local, key = %key.public(), "secure link opened");
         trust.follow();
         Ok(Self {
             socket,
             transport: Transport::new(key, trust, settings.connect),
+            beacons: beacons.transpose()?,
             leaving: None,
             buffer: vec![0; LONGEST].into(),
             timeout: Some(node::now()),
@@ -103,6 +135,34 @@ impl SecureLink {
     #[must_use]
     pub const fn transport(&self) -> &Transport {
         &self.transport
+    }
+
+    /// The counters of received beacons; `None` if it has no beacons.
+    #[must_use]
+    pub fn beacons(&self) -> Option<&beacon::Counters> {
+        self.beacons.as_ref().map(Beacons::counters)
+    }
+
+    /// Reads the beacons that have arrived, and dials the nodes that they show; returns whether there
+    /// may be more.
+    fn read_beacons(&mut self, cx: &mut Context<'_>, now: Instant) -> bool {
+        let Some(beacons) = &mut self.beacons else {
+            return false;
+        };
+        let (sightings, may_be_more) = beacons.read(cx, now);
+        for sighting in sightings {
+            self.transport.handle_sighting(now, sighting);
+        }
+        may_be_more
+    }
+
+    fn next_timeout(&mut self, now: Instant) -> Option<Instant> {
+        let beacons = self.beacons.as_ref().map(|it| it.due(now));
+        self.transport
+            .poll_timeout()
+            .into_iter()
+            .chain(beacons)
+            .min()
     }
 
     /// Reads what the kernel has received; returns whether there may be more.
@@ -146,6 +206,9 @@ impl CustomLink for SecureLink {
     }
 
     fn poll_flush(&mut self, cx: &mut Context<'_>, now: Instant) -> Poll<()> {
+        if let Some(beacons) = &mut self.beacons {
+            beacons.send(now, node::time_of_day());
+        }
         loop {
             let next = self.leaving.take();
             let Some((to, datagram)) = next.or_else(|| self.transport.poll_transmit(now)) else {
@@ -161,7 +224,7 @@ impl CustomLink for SecureLink {
                 }
             }
         }
-        self.timeout = self.transport.poll_timeout();
+        self.timeout = self.next_timeout(now);
         Poll::Ready(())
     }
 
@@ -170,10 +233,11 @@ impl CustomLink for SecureLink {
             return Poll::Ready(arrival);
         }
         self.transport.handle_timeout(now);
-        if self.read(cx, now) {
+        let beacons_wait = self.read_beacons(cx, now);
+        if self.read(cx, now) || beacons_wait {
             cx.waker().wake_by_ref();
         }
-        self.timeout = self.transport.poll_timeout();
+        self.timeout = self.next_timeout(now);
         self.transport
             .poll_arrival()
             .map_or(Poll::Pending, Poll::Ready)
@@ -184,6 +248,7 @@ impl CustomLink for SecureLink {
     }
 
     fn hang_up(&mut self) -> Poll<()> {
+        self.beacons = None;
         self.transport.close(node::now());
         if self.transport.is_closing() {
             Poll::Pending

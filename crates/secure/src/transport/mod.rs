@@ -274,25 +274,6 @@ impl Transport {
         }
     }
 
-    fn dial(&mut self, now: Instant) {
-        for index in 0..self.dials.len() {
-            let Some(address) = self.dials[index].start(now) else {
-                continue;
-            };
-            let client = self.client.clone();
-            match self.endpoint.connect(now, client, address, "jaus") {
-                Ok((handle, connection)) => {
-                    let id = self.insert(Session::new(handle, connection, Some(index)));
-                    self.dials[index].session = Some(id);
-                }
-                Err(error) => {
-                    tracing::warn!(%address, %error, "cannot dial the secure peer");
-                    self.dials[index].lost(now, false);
-                }
-            }
-        }
-    }
-
     /// Decides on a new connection from a peer.
     fn admit(&mut self, now: Instant, incoming: Incoming) {
         let from = incoming.remote_address().ip();

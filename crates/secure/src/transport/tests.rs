@@ -4,6 +4,8 @@
     reason = "virtual time starts at any instant"
 )]
 
+mod beacons;
+
 use std::collections::BTreeMap;
 
 use jaus::address::JausId;
