@@ -8,7 +8,7 @@ use std::net::SocketAddr;
 use std::time::Instant;
 
 use super::*;
-use crate::trust::{Peer, Trust, TrustFile};
+use crate::trust::{Trust, TrustFile};
 
 const SECOND: Duration = Duration::from_secs(1);
 /// A time of day, since 1970.
@@ -20,11 +20,8 @@ fn key() -> Key {
 }
 
 fn trusting(key: &Key, ids: &str) -> TrustFile {
-    TrustFile::of(Trust::new(vec![Peer {
-        name: "rover".to_owned(),
-        key: key.public(),
-        ids: vec![ids.parse().unwrap()],
-    }]))
+    let line = format!("rover {} {ids}", key.public());
+    TrustFile::of(Trust::parse(&line).unwrap())
 }
 
 fn from(host: u8) -> SocketAddr {
