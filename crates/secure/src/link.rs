@@ -2,33 +2,31 @@
 #![expect(clippy::disallowed_types, reason = "this module owns the socket")]
 
 mod beacons;
+mod socket;
 
 use std::io;
 use std::net::SocketAddr;
+use std::num::NonZeroU32;
 use std::task::{Context, Poll};
 use std::time::Instant;
 
-use bytes::Bytes;
 use jaus::endpoint::{Remote, To, Transmit};
 use jaus::link;
 use jaus::link::custom::{Arrival, CustomLink};
 use jaus::node;
-use tokio::io::ReadBuf;
-use tokio::net::UdpSocket;
 
 use beacons::Beacons;
+use socket::Socket;
 
 use crate::beacon;
 use crate::key::Key;
-use crate::transport::Transport;
+use crate::transport::{Datagrams, Transport};
 use crate::trust::TrustFile;
 
 pub use beacons::Announce;
 
-/// UDP datagrams to read before the node's other links have their turn.
-const BATCH: usize = 64;
-/// The longest UDP datagram.
-const LONGEST: usize = 65_535;
+/// System calls to receive before the node's other links have their turn.
+const BATCH: usize = 8;
 
 /// The settings of a secure link.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,6 +39,8 @@ pub struct Settings {
     pub connect: Vec<SocketAddr>,
     /// Whether to find peers by [beacons](crate::beacon) and be found by them.
     pub announce: Option<Announce>,
+    /// The most UDP octets to send per second, on all sessions together; `None` for no limit.
+    pub budget: Option<NonZeroU32>,
 }
 
 impl Settings {
@@ -51,6 +51,7 @@ impl Settings {
             listen,
             connect: Vec::new(),
             announce: None,
+            budget: None,
         }
     }
 
@@ -65,6 +66,13 @@ impl Settings {
     #[must_use]
     pub fn announce(mut self, announce: Announce) -> Self {
         self.announce = Some(announce);
+        self
+    }
+
+    /// Limits the UDP octets that are sent per second, on all sessions together.
+    #[must_use]
+    pub const fn budget(mut self, octets_per_second: NonZeroU32) -> Self {
+        self.budget = Some(octets_per_second);
         self
     }
 }
@@ -89,12 +97,11 @@ pub enum OpenError {
 /// The secure link of a node. Must be opened within a tokio runtime.
 #[derive(Debug)]
 pub struct SecureLink {
-    socket: UdpSocket,
+    socket: Socket,
     transport: Transport,
     beacons: Option<Beacons>,
-    /// The datagram that the kernel had no room for.
-    leaving: Option<(SocketAddr, Bytes)>,
-    buffer: Box<[u8]>,
+    /// The datagrams that the kernel had no room for.
+    leaving: Option<Datagrams>,
     timeout: Option<Instant>,
 }
 
@@ -106,19 +113,23 @@ impl SecureLink {
     /// does not exist.
     pub fn open(key: &Key, trust: TrustFile, settings: Settings) -> Result<Self, OpenError> {
         let address = settings.listen;
-        let socket = bind(address).map_err(|source| OpenError::Listen { address, source })?;
+        let socket =
+            Socket::bind(address).map_err(|source| OpenError::Listen { address, source })?;
         let local = socket.local_addr();
         let local = local.map_err(|source| OpenError::Listen { address, source })?;
         let announce = settings.announce;
         let beacons = announce.map(|it| Beacons::open(key, trust.clone(), local, it));
         tracing::info!(listening = %local, key = %key.public(), "secure link opened");
         trust.follow();
+        let mut transport = Transport::new(key, trust, settings.connect);
+        if let Some(budget) = settings.budget {
+            transport = transport.with_budget(budget);
+        }
         Ok(Self {
             socket,
-            transport: Transport::new(key, trust, settings.connect),
+            transport,
             beacons: beacons.transpose()?,
             leaving: None,
-            buffer: vec![0; LONGEST].into(),
             timeout: Some(node::now()),
         })
     }
@@ -168,11 +179,12 @@ impl SecureLink {
     /// Reads what the kernel has received; returns whether there may be more.
     fn read(&mut self, cx: &mut Context<'_>, now: Instant) -> bool {
         for _ in 0..BATCH {
-            let mut buffer = ReadBuf::new(&mut self.buffer);
-            match self.socket.poll_recv_from(cx, &mut buffer) {
-                Poll::Ready(Ok(from)) => {
-                    self.transport.handle_datagram(now, from, buffer.filled());
-                }
+            let transport = &mut self.transport;
+            let received = self.socket.poll_receive(cx, |from, datagram| {
+                transport.handle_datagram(now, from, datagram);
+            });
+            match received {
+                Poll::Ready(Ok(())) => {}
                 // On Linux the refusal of an earlier datagram, which says nothing of the others.
                 Poll::Ready(Err(error)) => tracing::debug!(%error, "secure link: receiving"),
                 Poll::Pending => return false,
@@ -180,12 +192,6 @@ impl SecureLink {
         }
         true
     }
-}
-
-fn bind(address: SocketAddr) -> io::Result<UdpSocket> {
-    let socket = std::net::UdpSocket::bind(address)?;
-    socket.set_nonblocking(true)?;
-    UdpSocket::from_std(socket)
 }
 
 impl CustomLink for SecureLink {
@@ -210,16 +216,20 @@ impl CustomLink for SecureLink {
             beacons.send(now, node::time_of_day());
         }
         loop {
+            let most = self.socket.max_datagrams();
             let next = self.leaving.take();
-            let Some((to, datagram)) = next.or_else(|| self.transport.poll_transmit(now)) else {
+            let next = next.or_else(|| self.transport.poll_transmit(now, most));
+            let Some(datagrams) = next else {
                 break;
             };
-            match self.socket.poll_send_to(cx, &datagram, to) {
-                Poll::Ready(Ok(_)) => {}
+            match self.socket.poll_send(cx, &datagrams) {
+                Poll::Ready(Ok(())) => {}
                 // QUIC repeats what matters.
-                Poll::Ready(Err(error)) => tracing::debug!(%to, %error, "secure link: sending"),
+                Poll::Ready(Err(error)) => {
+                    tracing::debug!(to = %datagrams.to, %error, "secure link: sending");
+                }
                 Poll::Pending => {
-                    self.leaving = Some((to, datagram));
+                    self.leaving = Some(datagrams);
                     return Poll::Pending;
                 }
             }

@@ -5,6 +5,7 @@
 )]
 
 mod beacons;
+mod budget;
 
 use std::collections::BTreeMap;
 
@@ -85,7 +86,8 @@ impl Network {
     fn collect(&mut self) {
         for host in &mut self.hosts {
             host.transport.handle_timeout(self.now);
-            while let Some((to, octets)) = host.transport.poll_transmit(self.now) {
+            while let Some(Datagrams { to, octets, .. }) = host.transport.poll_transmit(self.now, 1)
+            {
                 self.number += 1;
                 self.record.push((to, host.address, octets.clone()));
                 if self.loss == 0 || !self.number.is_multiple_of(self.loss) {
@@ -386,7 +388,7 @@ fn a_flood_of_handshakes_from_one_address_is_bounded_and_keeps_no_other_out() {
     for _ in 0..500 {
         let mut stranger = Transport::new(&keys[2], rover.clone(), [address(1)]);
         stranger.handle_timeout(network.now);
-        while let Some((to, octets)) = stranger.poll_transmit(network.now) {
+        while let Some(Datagrams { to, octets, .. }) = stranger.poll_transmit(network.now, 1) {
             network.deliver(to, address(66), &octets);
         }
     }
