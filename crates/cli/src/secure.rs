@@ -2,13 +2,14 @@
 
 use std::env;
 use std::net::{IpAddr, SocketAddr};
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
 use jaus::address::JausId;
 use jaus::link::Interfaces;
-use jaus::node::Config;
+use jaus::node::{Config, units};
 use jaus_secure::{Announce, Key, SecureLink, TrustFile};
 use serde::Deserialize;
 
@@ -39,6 +40,37 @@ impl FromStr for Address {
 }
 
 impl TryFrom<String> for Address {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+/// Octets per second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+struct Budget(NonZeroU32);
+
+/// With less, handshakes and keep-alives alone would use up the budget.
+const LEAST_BUDGET: u32 = 5000;
+
+impl FromStr for Budget {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let size = text.strip_suffix("/s").and_then(|it| units::size(it).ok());
+        let octets = size.and_then(|octets| u32::try_from(octets).ok());
+        let octets = octets.filter(|&octets| octets >= LEAST_BUDGET);
+        octets.and_then(NonZeroU32::new).map(Self).ok_or_else(|| {
+            format!(
+                "`{text}` is not a rate from 5 kB/s to 4 GB/s: write \"200 kB/s\" or \"1.5 MB/s\""
+            )
+        })
+    }
+}
+
+impl TryFrom<String> for Budget {
     type Error = String;
 
     fn try_from(text: String) -> Result<Self, String> {
@@ -79,6 +111,10 @@ pub struct SecureFlags {
         default_missing_value = EVERYWHERE,
     )]
     secure_announce: Vec<String>,
+
+    /// Send at most this much per second by the secure link, such as "200 kB/s"
+    #[arg(long, value_name = "RATE")]
+    secure_budget: Option<Budget>,
 
     #[command(flatten)]
     files: KeyFiles,
@@ -136,6 +172,9 @@ struct Table {
     /// Find peers by signed beacons, and be found by them: `true` for all interfaces, or names such
     /// as `["eth0"]`. Flag: `--secure-announce`.
     announce: Beacons,
+    /// The most octets to send per second on all sessions together, such as `"200 kB/s"`. The most
+    /// urgent messages come first. Flag: `--secure-budget`.
+    budget: Option<Budget>,
     /// The file of this node's key. Flag: `--key`.
     key: Option<PathBuf>,
     /// The file of the keys that this node trusts. Flag: `--trusted-keys`.
@@ -179,6 +218,7 @@ pub struct Secure {
     listen: Option<Address>,
     peers: Vec<Address>,
     announce: Option<Interfaces>,
+    budget: Option<Budget>,
     files: KeyFiles,
 }
 
@@ -193,6 +233,7 @@ impl SecureFlags {
             listen: self.secure_listen.or(table.listen),
             peers: [&table.peers[..], &self.secure_peer].concat(),
             announce: table.announce.interfaces(&self.secure_announce),
+            budget: self.secure_budget.or(table.budget),
             files: KeyFiles {
                 key: self.files.key.clone().or(table.key),
                 trusted_keys: self.files.trusted_keys.clone().or(table.trusted_keys),
@@ -236,6 +277,9 @@ impl Secure {
         if let Some(interfaces) = self.announce {
             let node = JausId::new(config.subsystem, config.node, 0);
             settings = settings.announce(Announce { interfaces, node });
+        }
+        if let Some(Budget(octets)) = self.budget {
+            settings = settings.budget(octets);
         }
         let link = SecureLink::open(&key, trust, settings).map_err(Failure::of)?;
         Ok((config, link))
@@ -287,6 +331,19 @@ mod tests {
     }
 
     #[test]
+    fn a_budget_is_a_size_for_each_second() {
+        let budget = |text: &str| text.parse::<Budget>().map(|Budget(octets)| octets.get());
+        assert_eq!(budget("200 kB/s"), Ok(200_000));
+        assert_eq!(budget("1.5MiB/s"), Ok(3 << 19));
+        for text in [
+            "", "200 kB", "200", "0/s", "1 kB/s", "5 GB/s", "kB/s", "-1 kB/s",
+        ] {
+            let error = budget(text).unwrap_err();
+            assert!(error.contains("200 kB/s"), "{error}");
+        }
+    }
+
+    #[test]
     fn plain_udp_remains_only_on_named_interfaces() {
         let folder = tempfile::tempdir().unwrap();
         let [key, trusted] = ["node.key", "trusted_keys"].map(|name| folder.path().join(name));
@@ -297,6 +354,7 @@ mod tests {
                 listen: Some("127.0.0.1:0".parse().unwrap()),
                 peers: Vec::new(),
                 announce: None,
+                budget: None,
                 files: KeyFiles {
                     key: Some(key.clone()),
                     trusted_keys: Some(trusted.clone()),
