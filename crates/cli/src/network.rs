@@ -288,8 +288,8 @@ impl Network {
         #[cfg(feature = "secure")]
         if self.secure()?.is_some() {
             return Err(Failure::new(
-                "this command uses plain links only: omit --secure-listen and --secure-peer, or \
-                 choose a settings file without [secure]",
+                "this command uses plain links only: omit --secure-listen, --secure-peer and \
+                 --secure-announce, or choose a settings file without [secure]",
             ));
         }
         Ok(())
@@ -304,7 +304,8 @@ impl Network {
         #[cfg(feature = "secure")]
         if let Some(secure) = self.secure()? {
             let config = Secure::restrict(config)?;
-            return Node::start_with(config, vec![Box::new(secure.open()?)]).map_err(Failure::of);
+            let link = secure.open(JausId::new(config.subsystem, config.node, 0))?;
+            return Node::start_with(config, vec![Box::new(link)]).map_err(Failure::of);
         }
         Node::start(config).map_err(Failure::of)
     }

@@ -10,7 +10,7 @@
 //!   for. A node without an entry cannot complete the handshake. A message from an id that its
 //!   sender's key may not speak for is refused and counted.
 //! * [`SecureLink`] is the link. It listens on a UDP port of its own and dials the configured peers;
-//!   one side has to be reachable. The peers are two nodes of this crate: other JAUS
+//!   one side has to be reachable. With [beacons](beacon), nodes of one network find each other. The peers are two nodes of this crate: other JAUS
 //!   implementations have no counterpart.
 //!
 //! ```no_run
@@ -34,6 +34,7 @@
 //! The protocol logic ([`transport`]) does no I/O and reads no clock; [`SecureLink`] adds the socket.
 #![forbid(unsafe_code)]
 
+pub mod beacon;
 pub mod edit;
 mod key;
 mod link;
@@ -42,6 +43,6 @@ mod tls;
 pub mod transport;
 mod trust;
 
-pub use key::{Key, KeyError, PublicKey};
-pub use link::{OpenError, Reached, SecureLink, Settings};
+pub use key::{Fingerprint, Key, KeyError, PublicKey};
+pub use link::{Announce, OpenError, Reached, SecureLink, Settings};
 pub use trust::{Peer, Trust, TrustError, TrustFile};

@@ -278,6 +278,12 @@ impl TrustFile {
         self.len() == 0
     }
 
+    /// All trusted keys.
+    pub(crate) fn keys(&self) -> Vec<PublicKey> {
+        let inner = self.trust.read().unwrap_or_else(PoisonError::into_inner);
+        inner.1.peers().iter().map(|peer| peer.key).collect()
+    }
+
     /// How often the trust was replaced.
     pub(crate) fn edition(&self) -> u64 {
         let inner = self.trust.read().unwrap_or_else(PoisonError::into_inner);
