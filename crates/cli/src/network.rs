@@ -356,6 +356,17 @@ pub const REMEDY: &str = "List components with `jaus discover`, choose the netwo
     --interface, or name a host that multicast does not reach with --peer; `jaus doctor` finds out \
     what is wrong";
 
+/// What a node says once at its start if it has plain links to other hosts.
+pub const EXPOSED: &str = "plain JUDP: every host on these networks can read and send messages in \
+    any id; secure links prevent that (docs/security.md)";
+
+/// Whether a node has plain links to other hosts.
+#[must_use]
+pub fn is_exposed(node: &Node) -> bool {
+    let links = node.links();
+    links.iter().any(|link| !link.local.ip().is_loopback())
+}
+
 /// Parses the id of a single component.
 pub fn one_component(text: &str) -> Result<JausId, String> {
     let id: JausId = text.parse().map_err(|error| format!("{error}"))?;
