@@ -280,13 +280,13 @@ impl CustomLink for SecureLink {
     }
 
     fn hang_up(&mut self) -> Poll<()> {
-        self.beacons = None;
-        self.transport.close(node::now());
-        if self.transport.is_closing() {
-            Poll::Pending
-        } else {
-            Poll::Ready(())
+        let now = node::now();
+        if self.transport.close(now) {
+            // The next turn sends the farewells, and comes back here.
+            self.timeout = Some(now);
+            return Poll::Pending;
         }
+        Poll::Ready(())
     }
 }
 

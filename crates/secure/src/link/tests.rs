@@ -15,6 +15,7 @@ use jaus::node::{Config, Node};
 
 use super::*;
 use crate::rules::Rules;
+use crate::transport::Act;
 use crate::trust::{Peer, Trust};
 
 /// Longer than any step takes.
@@ -137,4 +138,30 @@ async fn a_relay_joins_nodes_that_have_no_link_with_each_other() {
     for node in nodes {
         node.shutdown().await;
     }
+}
+
+#[tokio::test]
+async fn a_node_that_is_shut_down_tells_its_peers() {
+    let folder = tempfile::tempdir().unwrap();
+    let (rover_key, client_key) = (key(&folder, "rover"), key(&folder, "client"));
+    let any = "127.0.0.1:0".parse().unwrap();
+    let trust = trusting("client", &client_key, "60.255.255");
+    let at_rover = SecureLink::open(&rover_key, trust, Settings::new(any)).unwrap();
+    let peers = [at_rover.local().unwrap()];
+    let trust = trusting("rover", &rover_key, "101.255.255");
+    let settings = Settings::new(any).connect(peers[0]);
+    let mut at_client = SecureLink::open(&client_key, trust, settings).unwrap();
+    let rover = node(101, at_rover);
+    assert!(at_client.probe(&peers, LIMIT).await[0].is_ok());
+    rover.shutdown().await;
+    let closed = std::future::poll_fn(|cx| at_client.poll_receive(cx, node::now()));
+    let closed = tokio::time::timeout(LIMIT, closed).await.unwrap();
+    assert!(matches!(closed, Arrival::Closed(_)), "{closed:?}");
+    let reason = std::iter::from_fn(|| at_client.transport.poll_record()).find_map(|record| {
+        match record.act {
+            Act::Disconnected { reason } => Some(reason),
+            _ => None,
+        }
+    });
+    assert!(reason.unwrap().contains("the node stops"));
 }

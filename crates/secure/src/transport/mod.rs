@@ -229,19 +229,16 @@ impl Transport {
         sessions.chain(dials).chain(budget).min()
     }
 
-    /// Closes all sessions and dials no more.
-    pub fn close(&mut self, now: Instant) {
+    /// Closes all sessions and dials no more; returns whether there is a peer to tell.
+    pub fn close(&mut self, now: Instant) -> bool {
         self.dials.clear();
         self.endpoint.set_server_config(None);
-        for id in self.sessions.keys().copied().collect::<Vec<_>>() {
+        let running = self.sessions.iter().filter(|(_, it)| !it.ended);
+        let running: Vec<_> = running.map(|(&id, _)| id).collect();
+        for &id in &running {
             self.end(now, id, code::SHUTDOWN, "the node stops");
         }
-    }
-
-    /// Whether a peer does not know yet that its session has ended.
-    #[must_use]
-    pub fn is_closing(&self) -> bool {
-        self.sessions.values().any(|it| !it.ended)
+        !running.is_empty()
     }
 
     /// Closes the sessions of keys that the trust file no longer lists, and applies changes of ids.

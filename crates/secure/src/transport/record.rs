@@ -98,7 +98,7 @@ impl Fault {
     pub const fn remedy(&self) -> Option<&'static str> {
         match self {
             Self::UntrustedKey(_) => Some(
-                "compare the key with what `jaus keys show` prints on the peer's host, then                  `jaus keys trust` it",
+                "compare the key with what `jaus keys show` prints on the peer's host, then `jaus keys trust` it",
             ),
             Self::RefusedByPeer(_) => Some(
                 "on the peer's host, `jaus keys trust` the key that `jaus keys show` prints here; \

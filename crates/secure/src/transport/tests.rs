@@ -437,8 +437,8 @@ fn a_restarted_node_is_noticed_before_its_session_times_out() {
 #[test]
 fn a_node_that_stops_tells_its_peers() {
     let (mut network, ..) = vehicle_and_operator();
-    network.hosts[0].transport.close(network.now);
-    assert!(!network.hosts[0].transport.is_closing());
+    assert!(network.hosts[0].transport.close(network.now));
+    assert!(!network.hosts[0].transport.close(network.now), "only once");
     network.run(4 * DELAY);
     assert!(network.session(1).is_none());
 }
