@@ -23,14 +23,17 @@ const VEHICLE: &str = "10.216.1.1:3795";
 /// The setting of a client with a secure link.
 const FOLDER: &str = "secure:";
 /// Attacks on plain JUDP that have an effect, or would without its defences.
-const ATTACKS: [&str; 8] = [
+const ATTACKS: [&str; 11] = [
     "forged-id",
+    "many-ids",
     "forged-control",
     "queries",
     "events",
     "configuration",
     "answers",
     "unending",
+    "gapped",
+    "overlapping",
     "flood",
 ];
 

@@ -65,8 +65,8 @@ impl System {
 
     /// The secure links.
     #[cfg(all(test, feature = "secure"))]
-    pub(super) fn links(&mut self) -> &mut SecureLinks {
-        self.secure.as_mut().unwrap()
+    pub(super) fn links(&mut self) -> Option<&mut SecureLinks> {
+        self.secure.as_mut()
     }
 
     /// The flags by which other commands join the system.

@@ -91,7 +91,7 @@ fn a_mission_arrives_although_the_relay_restarts_and_the_operators_address_chang
             sleep(Duration::from_secs(4)).await;
             nat.renew.send(()).unwrap();
             sleep(Duration::from_secs(3)).await;
-            system.links().restart_relay().await;
+            system.links().unwrap().restart_relay().await;
             std::future::pending::<()>().await;
         };
         let mission = async {
