@@ -10,6 +10,7 @@
 
 pub mod failure;
 mod fence;
+pub mod folders;
 mod identity;
 mod launch;
 pub mod logging;
