@@ -25,5 +25,6 @@ mod record;
 mod send;
 mod subscribe;
 mod texts;
+mod users;
 mod vehicle;
 mod watch;
