@@ -10,6 +10,9 @@
 
 pub mod failure;
 mod fence;
+pub mod folders;
+#[cfg(feature = "https")]
+pub mod https;
 mod identity;
 mod launch;
 pub mod logging;

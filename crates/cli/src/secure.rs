@@ -1,6 +1,5 @@
 //! Flags and settings of the secure link: this node's key, the keys that it trusts, and the peers.
 
-use std::env;
 use std::net::{IpAddr, SocketAddr};
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
@@ -15,6 +14,7 @@ use jaus_secure::{Announce, Key, Peer, SecureLink, TrustFile, edit};
 use serde::Deserialize;
 
 use super::failure::Failure;
+use super::folders::config_folder;
 use super::settings;
 
 /// The UDP port of secure links.
@@ -154,12 +154,10 @@ impl KeyFiles {
         if let Some(path) = &self.key {
             return Ok(path.clone());
         }
-        let home = || env::var_os("HOME").map(|home| Path::new(&home).join(".config"));
-        let config = env::var_os("XDG_CONFIG_HOME").map(PathBuf::from);
-        let folder = config.or_else(home).ok_or_else(|| {
+        let folder = config_folder().ok_or_else(|| {
             Failure::new("there is no home directory: name the file of the key with --key")
         })?;
-        Ok(folder.join("jaus").join("node.key"))
+        Ok(folder.join("node.key"))
     }
 
     /// The file of trusted keys.

@@ -29,9 +29,14 @@ mod session;
 pub mod state;
 mod station;
 pub mod stick;
+mod tls;
 mod token;
 mod tree;
+pub mod users;
 
 pub use base_map::{BaseMap, BaseMapError};
 pub use station::{Listen, OpenStation, Station};
+pub use tls::Tls;
+#[cfg(feature = "https")]
+pub use tls::TlsError;
 pub use token::{Token, TokenError};

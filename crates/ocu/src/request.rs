@@ -27,6 +27,8 @@ pub enum Said {
         /// The token, as printed or stored in a file.
         token: String,
     },
+    /// The user is active, which keeps the session from becoming idle.
+    Active,
     /// Enables or disables the message view.
     Messages {
         /// Whether to send messages.
@@ -118,6 +120,50 @@ pub enum OperatorRequest {
     },
     /// Stop the mission.
     Stop,
+}
+
+impl OperatorRequest {
+    /// Its name in the audit log.
+    pub(crate) const fn name(&self) -> &'static str {
+        match self {
+            Self::Select { .. } => "select vehicle",
+            Self::Control { on: true } => "take control",
+            Self::Control { on: false } => "release control",
+            Self::Handover { grant: true, .. } => "hand over control",
+            Self::Handover { grant: false, .. } => "refuse handover",
+            Self::Resume => "resume",
+            Self::Standby => "standby",
+            Self::Emergency { on: true } => "set emergency",
+            Self::Emergency { on: false } => "clear emergency",
+            Self::EmergencyAll { on: true } => "set emergency of all",
+            Self::EmergencyAll { on: false } => "clear emergency of all",
+            Self::Drive { .. } => "drive",
+            Self::DriveEnd => "end drive",
+            Self::Destination { .. } => "plan mission",
+            Self::Approve { .. } => "approve mission",
+            Self::Stop => "stop mission",
+        }
+    }
+
+    /// The subsystem number of its vehicle, if the page shows the vehicle `shown`.
+    pub(crate) const fn vehicle(&self, shown: Option<u16>) -> Option<u16> {
+        match self {
+            Self::Select { subsystem } => Some(*subsystem),
+            Self::Handover { part, .. } => Some(part.subsystem()),
+            Self::EmergencyAll { .. } => None,
+            _ => shown,
+        }
+    }
+
+    /// Details for the audit log.
+    pub(crate) fn details(&self) -> Option<String> {
+        match self {
+            Self::Destination { x, y, .. } => Some(format!("to x {x} m, y {y} m")),
+            Self::Approve { mission } => Some(format!("mission {mission}")),
+            Self::Handover { operator, .. } => Some(format!("requested by {operator}")),
+            _ => None,
+        }
+    }
 }
 
 #[cfg(test)]

@@ -255,6 +255,9 @@ pub struct Control {
     pub held: bool,
     /// Whether control is wanted.
     pub wanted: bool,
+    /// Name of the user who drives: who last took control, drove or approved a mission. `null`
+    /// unless this station has or wants control.
+    pub user: Option<String>,
     /// Why control is not complete.
     pub reason: String,
     /// JAUS id of the operator whose control this station has requested.

@@ -6,10 +6,13 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use tokio::net::TcpListener;
 
 use super::base_map::BaseMap;
-use super::server::{Admission, Server};
+use super::server::{Admission, Gate, Server, Trail, UserGate};
 use super::session::Session;
+use super::tls::Tls;
 use super::token::Token;
+use super::users::UsersFile;
 use jaus::link::interface;
+use jaus_audit::AuditLog;
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
 /// An operator station with its page.
@@ -42,6 +45,12 @@ pub struct Station {
     pub token: Option<Token>,
     /// Whether reading also requires the token.
     pub token_to_read: bool,
+    /// The users of the page, who must log in to see anything. They replace the token.
+    pub users: Option<UsersFile>,
+    /// The certificate of the page. Without one it is served unencrypted.
+    pub tls: Option<Tls>,
+    /// The log of logins, and of requests that change vehicles.
+    pub audit: Option<AuditLog>,
     /// Host names of the page, in addition to `localhost` and the addresses of this machine.
     pub hosts: Vec<String>,
     /// The geographic map behind a vehicle that reports its global pose.
@@ -62,6 +71,16 @@ impl Listen {
     const PORT: u16 = 8080;
     /// Number of further ports to try.
     const PORTS: u16 = 20;
+
+    /// The addresses at which browsers reach the page.
+    #[must_use]
+    pub fn addresses(self) -> Vec<IpAddr> {
+        match self {
+            Self::Loopback => vec![Ipv4Addr::LOCALHOST.into()],
+            Self::At(address) if address.ip().is_unspecified() => own_addresses(),
+            Self::At(address) => vec![address.ip()],
+        }
+    }
 }
 
 impl Default for Station {
@@ -73,6 +92,9 @@ impl Default for Station {
             listen: Listen::Loopback,
             token: None,
             token_to_read: false,
+            users: None,
+            tls: None,
+            audit: None,
             hosts: Vec::new(),
             base_map: None,
         }
@@ -89,7 +111,8 @@ impl Station {
         let address = listener
             .local_addr()
             .map_err(|error| PartError::Broken(error.to_string()))?;
-        let generates_token = self.token.is_none() && !address.ip().is_loopback();
+        let generates_token =
+            self.token.is_none() && self.users.is_none() && !address.ip().is_loopback();
         if generates_token {
             let generated = Token::generate();
             self.token = Some(generated.map_err(|error| PartError::Broken(error.to_string()))?);
@@ -140,12 +163,25 @@ impl OpenStation {
 
     fn urls_with(&self, token: &str) -> Vec<String> {
         let port = self.address.port();
-        let url = |ip: IpAddr| format!("http://{}/{token}", SocketAddr::new(ip, port));
-        if self.address.ip().is_unspecified() {
-            own_addresses().into_iter().map(url).collect()
+        let scheme = if self.station.tls.is_some() {
+            "https"
         } else {
-            vec![url(self.address.ip())]
-        }
+            "http"
+        };
+        let addresses = Listen::At(self.address).addresses();
+        let urls = addresses.into_iter().map(|ip| {
+            let address = SocketAddr::new(ip, port);
+            format!("{scheme}://{address}/{token}")
+        });
+        urls.collect()
+    }
+
+    /// The fingerprint of a certificate that the station has made itself, for the operator to
+    /// compare.
+    #[must_use]
+    pub fn fingerprint(&self) -> Option<&str> {
+        let tls = self.station.tls.as_ref();
+        tls.filter(|it| it.is_self_signed()).map(Tls::fingerprint)
     }
 }
 
@@ -161,15 +197,41 @@ impl Part for OpenStation {
             tracing::info!("the operator's page is at {url}");
         }
         let Self {
-            station, listener, ..
+            station,
+            listener,
+            address,
+            ..
         } = self;
+        if station.tls.is_none() && !address.ip().is_loopback() {
+            tracing::warn!(
+                "the page is not encrypted: passwords and tokens can be read on its network; \
+                 --https encrypts it"
+            );
+        }
         let node = slot.node.clone();
         let component = slot.component("Operator").live_on(slot.port)?;
+        let trail = Trail::new(station.audit, component.id());
+        let gate = match (station.users, station.token) {
+            (Some(users), _) => {
+                let is_secure = station.tls.is_some();
+                Gate::Users(UserGate::new(
+                    users,
+                    address.port(),
+                    is_secure,
+                    trail.clone(),
+                ))
+            }
+            (None, Some(token)) => Gate::Token {
+                token,
+                to_read: station.token_to_read,
+            },
+            (None, None) => Gate::Open,
+        };
         let admission = Admission {
             operator: component.id(),
             authority: station.authority,
-            token: station.token,
-            token_to_read: station.token_to_read,
+            gate,
+            trail,
             hosts: station.hosts,
             base_map: station.base_map,
             node,
@@ -178,8 +240,8 @@ impl Part for OpenStation {
         let server = Server::new(admission, access);
         tokio::select! {
             error = session.run() => Err(error),
-            error = server.run(listener) => {
-                Err(PartError::Broken(format!("the page's server failed: {error}")))
+            () = server.run(listener, station.tls) => {
+                Err(PartError::Broken("the page's server has ended".to_owned()))
             }
         }
     }

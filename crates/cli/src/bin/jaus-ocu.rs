@@ -9,8 +9,12 @@ use std::process::ExitCode;
 use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
+use jaus_audit::{AuditLog, Limits};
+#[cfg(feature = "https")]
+use jaus_cli::https::HttpsFlags;
 use jaus_cli::output::Output;
 use jaus_cli::{Failure, Ready, launch};
+use jaus_ocu::users::UsersFile;
 use jaus_ocu::{BaseMap, Listen, Station, Token};
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
@@ -39,6 +43,18 @@ struct Flags {
     #[arg(long)]
     token_to_read: bool,
 
+    /// Require users to log in, each with a role: the file of users that `jaus users` writes
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["token_file", "token_to_read"])]
+    users: Option<PathBuf>,
+
+    #[cfg(feature = "https")]
+    #[command(flatten)]
+    https: HttpsFlags,
+
+    /// Log logins, and the requests that change vehicles, as JSON lines in this file
+    #[arg(long, value_name = "FILE")]
+    audit: Option<PathBuf>,
+
     /// A host name by which browsers reach this machine, besides its addresses (repeatable)
     #[arg(long, value_name = "NAME")]
     host: Vec<String>,
@@ -57,6 +73,7 @@ impl Ready for Flags {
         jaus-ocu --loopback                        for a vehicle on this computer\n  \
         jaus-ocu --listen 0.0.0.0:8080             for tablets; prints the address with a token\n  \
         jaus-ocu --listen 0.0.0.0:8080 --token-file /etc/jaus/token --host ocu.local\n  \
+        jaus-ocu --listen 0.0.0.0:8443 --https --users ~/.config/jaus/users\n  \
         jaus-ocu --vehicle 101 --vehicle 102 --interface eth0\n  \
         jaus-ocu --map /srv/maps/berlin.pmtiles    behind vehicles with a global pose";
     const ID: JausId = JausId::new(42, 1, 1);
@@ -75,25 +92,40 @@ impl Ready for Flags {
             ));
         }
         let base_map = self.map.as_deref().map(open_map).transpose()?;
+        let users = self.users.as_deref().map(open_users).transpose()?;
+        let audit = self.audit.as_deref().map(open_audit).transpose()?;
+        #[cfg(feature = "https")]
+        let tls = self.https.open(&names(listen, &self.host))?;
+        #[cfg(not(feature = "https"))]
+        let tls = None;
         Ok(Announced(Station {
             vehicles: self.vehicle,
             authority: self.authority,
             listen,
             token,
             token_to_read: self.token_to_read,
+            users,
+            tls,
+            audit,
             hosts: self.host,
             base_map,
         }))
     }
 }
 
-/// A station that prints a generated token.
+/// A station that prints a generated token, and the fingerprint of its own certificate.
 struct Announced(Station);
 
 impl Part for Announced {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let station = self.0.open().await?;
         announce(&station.secret_urls());
+        if let Some(fingerprint) = station.fingerprint() {
+            tracing::info!(
+                "compare the SHA-256 fingerprint of the certificate before you trust it: \
+                 {fingerprint}"
+            );
+        }
         station.run(slot).await
     }
 }
@@ -117,6 +149,28 @@ fn announce(secret_urls: &[String]) {
         // A closed standard output does not stop the station.
         let _ = output.line(format_args!("to control vehicles, open {url}"));
     }
+}
+
+fn open_users(path: &Path) -> Result<UsersFile, Failure> {
+    let file = UsersFile::load(path).map_err(|error| Failure::new(format!("--users: {error}")))?;
+    if file.users().iter().len() == 0 {
+        return Err(Failure::new(format!(
+            "--users: {} has no users; `jaus users add NAME --role administer --users FILE` adds one",
+            path.display()
+        )));
+    }
+    Ok(file)
+}
+
+fn open_audit(path: &Path) -> Result<AuditLog, Failure> {
+    AuditLog::open(path, Limits::default()).map_err(Failure::of)
+}
+
+/// Names and addresses of the page, for a new certificate.
+#[cfg(feature = "https")]
+fn names(listen: Listen, hosts: &[String]) -> Vec<String> {
+    let addresses = listen.addresses().into_iter().map(|it| it.to_string());
+    addresses.chain(hosts.iter().cloned()).collect()
 }
 
 fn open_map(path: &Path) -> Result<BaseMap, Failure> {

@@ -16,11 +16,11 @@ export class Emergency {
   /** The same for all vehicles. */
   #wantedAll = false;
   #vehicles = [];
-  /** Whether the station takes no requests from this page before it has the token. */
-  #barred = false;
+  /** Why the station takes no requests from this page; empty if it does. */
+  #barred = "";
   #unbar;
 
-  /** Calls `unbar` when the operator stops a vehicle and the station requires a token first. */
+  /** Calls `unbar` when the operator stops a vehicle and the station takes no requests. */
   constructor(link, unbar) {
     this.#link = link;
     this.#unbar = unbar;
@@ -71,7 +71,7 @@ export class Emergency {
     return true;
   }
 
-  /** Takes a state, the list of vehicles, and whether the token is missing. */
+  /** Takes a state, the list of vehicles, and why the station takes no requests. */
   update(state, vehicles, barred) {
     this.#vehicles = vehicles;
     this.#barred = barred;
@@ -99,7 +99,7 @@ export class Emergency {
     document.body.dataset.emergency = how;
     const [word, detail] = {
       ready: ["Emergency stop", touch.matches ? "stops the vehicle at once" : "Esc or Space"],
-      barred: ["Emergency stop", "enter the token to use it"],
+      barred: ["Emergency stop", this.#barred],
       wanted: ["Stopping", this.#link.open ? this.#refusal || "not confirmed yet" : "NOT SENT: no connection"],
       stopped: ["Emergency", "the vehicle is stopped"],
     }[how];

@@ -26,11 +26,23 @@ export class Link extends EventTarget {
   #token = takeToken();
   /** The vehicle that the page shows: what is asked is meant for it. */
   #vehicle = null;
+  /** Resolves to whether the page may connect. */
+  #admit;
+  /** Number of tries to connect: an earlier one that is still waiting gives up. */
+  #tries = 0;
+  /** Whether the page may not connect before the user has logged in. */
+  #barred = false;
   /** Whether the server's first frame has arrived and, if it requires a token, it has checked ours. */
   settled = false;
 
-  /** `connecting`, `live`, `stale` or `lost`. */
+  constructor(admit) {
+    super();
+    this.#admit = admit;
+  }
+
+  /** `barred`, `connecting`, `live`, `stale` or `lost`. */
   get condition() {
+    if (this.#barred) return "barred";
     if (this.open && this.#stateAt > this.#opened) return this.age > STALE ? "stale" : "live";
     return this.#retryAt || this.#stateAt ? "lost" : "connecting";
   }
@@ -58,6 +70,15 @@ export class Link extends EventTarget {
     addEventListener("online", () => this.#hurry());
     document.addEventListener("visibilitychange", () => document.hidden || this.#hurry());
     this.#connect();
+  }
+
+  /** Connects anew, as another user. */
+  restart() {
+    const socket = this.#socket;
+    this.#socket = null;
+    socket?.close();
+    this.#emit("close", null);
+    this.#hurry();
   }
 
   /** Sends a request; resolves to null when it is done, or to the reason why not. */
@@ -100,8 +121,18 @@ export class Link extends EventTarget {
     return true;
   }
 
-  #connect() {
+  async #connect() {
     clearTimeout(this.#retryTimer);
+    const number = ++this.#tries;
+    try {
+      this.#barred = !(await this.#admit());
+    } catch {
+      if (number !== this.#tries) return;
+      this.#barred = false;
+      return this.#lose();
+    }
+    if (number !== this.#tries) return;
+    if (this.#barred) return this.#emit("barred", null);
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
     const socket = new WebSocket(`${scheme}//${location.host}/ws`);
     this.#socket = socket;

@@ -1,6 +1,7 @@
 // Puts the page together: frames of the server go to the panels, requests of the operator to the
 // server.
 
+import { Account } from "./account.js";
 import { get, mark, plain, say, show, toast, typing } from "./dom.js";
 import { Drive } from "./drive.js";
 import { Emergency } from "./emergency.js";
@@ -16,10 +17,11 @@ import { part, showControl, showLink, showMissing, showStatus } from "./status.j
 import { followTheme } from "./theme.js";
 import { showSystem, showTree } from "./tree.js";
 
-const link = new Link();
+const account = new Account(() => link.restart(), () => link.send({ type: "active" }));
+const link = new Link(() => account.check());
 const map = new MapView((place) => choose(place));
 const mission = new Mission(ask, map);
-const emergency = new Emergency(link, () => openTokenSheet());
+const emergency = new Emergency(link, () => unbar());
 const drive = new Drive(link, () => emergency.stop());
 const fleet = new Fleet((subsystem) => selectVehicle(subsystem));
 const engage = new Engage(ask, () => readyToDrive());
@@ -28,7 +30,8 @@ new Messages(link);
 followTheme(() => map.recolour());
 
 let state = null;
-/** Whether the server accepts requests from this page: it requires no token, or has accepted ours. */
+/** Whether the server accepts requests from this page: it requires no token, or has accepted ours, or
+ * the user's role allows them. */
 let trusted = false;
 /** The authority that the operator's node asks for control with. */
 let authority = null;
@@ -36,11 +39,11 @@ let authority = null;
 // Frames of the server.
 
 link.addEventListener("hello", async ({ detail }) => {
-  trusted = !detail.token_needed;
+  trusted = account.users ? account.operates : !detail.token_needed;
   map.offerBaseMap(detail.base_map);
   authority = detail.authority;
-  if (!trusted && link.token) await offer(link.token);
-  else show(get("token-sheet"), !trusted && !watching());
+  if (detail.token_needed && !trusted && link.token) await offer(link.token);
+  else show(get("token-sheet"), detail.token_needed && !trusted && !watching());
   link.settled = true;
   render();
 });
@@ -57,6 +60,10 @@ link.addEventListener("close", () => {
   trusted = false;
   render();
 });
+link.addEventListener("barred", () => {
+  render();
+  account.focus();
+});
 link.addEventListener("refused", ({ detail }) => toast("bad", detail));
 
 /** Shows the state; also without news, because ages grow. */
@@ -64,7 +71,9 @@ function render() {
   showLink(link, state);
   const live = link.condition === "live";
   const operable = live && trusted && Boolean(state?.vehicle);
-  emergency.update(state, fleet.vehicles, link.open && link.settled && !trusted);
+  const barred = account.missing || (link.open && link.settled && !trusted);
+  const hint = account.users ? account.hindrance : "enter the token to use it";
+  emergency.update(state, fleet.vehicles, barred ? hint : "");
   fleet.update(state, live && trusted);
   const hindrance = hindered(live);
   drive.update(state, hindrance || uncontrolled());
@@ -76,7 +85,7 @@ function render() {
 }
 
 function renderState(live, operable, hindrance) {
-  showControl(state, authority, operable);
+  showControl(state, authority, operable, account);
   engage.update(state, operable, hindrance);
   handover.update(state, operable);
   showStatus(state, Number.isFinite(link.age) ? link.age : 0);
@@ -89,7 +98,7 @@ function renderState(live, operable, hindrance) {
 /** Why this page cannot drive now, even with control of a ready vehicle; empty if one can. */
 function hindered(live) {
   if (!live) return "Not connected";
-  if (!trusted) return "Watching only: enter the token to drive";
+  if (!trusted) return `Watching only: ${account.users ? account.hindrance : "enter the token to drive"}`;
   if (!state.vehicle) return "No vehicle";
   if (state.vehicle.emergency) return "Emergency: clear it before driving";
   return state.vehicle.stale ? sentence(state.vehicle.stale) : "";
@@ -165,6 +174,13 @@ async function offer(token) {
   render();
 }
 
+/** Shows what a page that may not operate needs for it. */
+function unbar() {
+  if (account.missing) account.focus();
+  else if (account.users) toast("warn", "Your role only observes: you cannot stop or drive vehicles.");
+  else openTokenSheet();
+}
+
 function openTokenSheet() {
   show(get("token-sheet"), true);
   get("token").focus();
@@ -181,7 +197,7 @@ get("token-no").addEventListener("click", () => {
   show(get("token-sheet"), false);
 });
 get("control-text").addEventListener("click", () => {
-  if (!trusted && link.open) openTokenSheet();
+  if (!trusted && link.open && !account.users) openTokenSheet();
 });
 
 // Views of small screens, and keys.

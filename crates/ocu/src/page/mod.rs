@@ -39,6 +39,7 @@ pub(crate) const FILES: &[File] = files! {
     "/sections.css" CSS "sections.css",
     "/icon.svg" IMAGE "icon.svg",
     "/main.js" SCRIPT "main.js",
+    "/account.js" SCRIPT "account.js",
     "/dom.js" SCRIPT "dom.js",
     "/link.js" SCRIPT "link.js",
     "/fleet.js" SCRIPT "fleet.js",

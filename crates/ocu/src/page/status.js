@@ -14,6 +14,7 @@ export function showLink(link, state) {
   document.body.dataset.link = condition;
   const age = Number.isFinite(link.age) ? duration(link.age) : "";
   const [word, detail] = {
+    barred: ["Not logged in", ""],
     connecting: ["Connecting", ""],
     live: ["Live", ""],
     stale: ["Stale", age],
@@ -59,12 +60,17 @@ export function showMissing(state, live) {
   say(notice, texts.slice(0, 2).join(" · ") + more);
 }
 
+/** The user who has this station's control, in words. */
+let holderHere = "you";
+
 /** Shows who controls, and offers to take, request or release control. */
-export function showControl(state, authority, operable) {
-  const { held, wanted, asking, reason } = state.control ?? {};
+export function showControl(state, authority, operable, account) {
+  const { held, wanted, asking, reason, user } = state.control ?? {};
+  const isOther = account.users && Boolean(user) && user !== account.user;
+  holderHere = isOther ? plain(user, 32) : "you";
   const driver = part(state, "primitive_driver");
   const [word, detail] = held
-    ? ["You have control", number(authority) === null ? "" : `authority ${authority}`]
+    ? [isOther ? `${holderHere} has control` : "You have control", number(authority) === null ? "" : `authority ${authority}`]
     : asking
       ? ["Control requested", `from ${plain(asking, 16)}`]
       : wanted
@@ -116,7 +122,7 @@ export function showStatus(state, late) {
 export function authority({ ours, controller, authority: level }) {
   if (!ours && !controller) return "control: nobody";
   const by = number(level) !== null ? ` (${level})` : "";
-  return `control: ${ours ? "you" : plain(controller, 16)}${by}`;
+  return `control: ${ours ? holderHere : plain(controller, 16)}${by}`;
 }
 
 function fill(id, value, decimals, source, late) {

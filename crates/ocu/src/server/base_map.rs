@@ -1,25 +1,27 @@
 //! The map file for pages: its description, and its tiles.
 
+use std::net::SocketAddr;
 use std::sync::Arc;
 
 use axum::Json;
-use axum::extract::{Path, State};
+use axum::extract::{ConnectInfo, Path, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use tokio::task::spawn_blocking;
 
-use super::Shared;
+use super::{Refusal, Shared};
 use crate::base_map::{BaseMap, BaseMapError, Tile};
 
 /// Number of tiles read at once.
 pub(super) const READERS: usize = 4;
 
-/// Status and text for a request that gets no map.
-type Refusal = (StatusCode, &'static str);
-
 /// The description of the map file.
-pub(super) async fn describe(State(shared): State<Arc<Shared>>, headers: HeaderMap) -> Response {
-    match admitted(&shared, &headers) {
+pub(super) async fn describe(
+    State(shared): State<Arc<Shared>>,
+    ConnectInfo(address): ConnectInfo<SocketAddr>,
+    headers: HeaderMap,
+) -> Response {
+    match admitted(&shared, &headers, address) {
         Ok(map) => Json(map.description()).into_response(),
         Err(refusal) => refusal.into_response(),
     }
@@ -28,10 +30,11 @@ pub(super) async fn describe(State(shared): State<Arc<Shared>>, headers: HeaderM
 /// One tile as stored. No content where the file has no tile.
 pub(super) async fn serve(
     State(shared): State<Arc<Shared>>,
+    ConnectInfo(address): ConnectInfo<SocketAddr>,
     Path((zoom, x, y)): Path<(u8, u32, u32)>,
     headers: HeaderMap,
 ) -> Response {
-    let map = match admitted(&shared, &headers) {
+    let map = match admitted(&shared, &headers, address) {
         Ok(map) => map.clone(),
         Err(refusal) => return refusal.into_response(),
     };
@@ -64,11 +67,12 @@ pub(super) async fn serve(
 }
 
 /// The map file, if there is one and the request may read it.
-fn admitted<'s>(shared: &'s Shared, headers: &HeaderMap) -> Result<&'s BaseMap, Refusal> {
-    if !shared.lets_read(headers) {
-        let words = "the map requires the token: send Authorization: Bearer TOKEN\n";
-        return Err((StatusCode::UNAUTHORIZED, words));
-    }
+fn admitted<'s>(
+    shared: &'s Shared,
+    headers: &HeaderMap,
+    address: SocketAddr,
+) -> Result<&'s BaseMap, Refusal> {
+    shared.check_reader(headers, address)?;
     let words = "this station has no map file; start jaus-ocu with --map\n";
     let map = shared.admission.base_map.as_ref();
     map.ok_or((StatusCode::NOT_FOUND, words))

@@ -1,86 +1,147 @@
-//! Limits on browser connections: their number and their idle time.
+//! Browser connections: their number in all and for each address, and the deadlines of handshakes,
+//! request headers and silence.
 
 use std::io;
 use std::net::SocketAddr;
 use std::pin::Pin;
-use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
-use axum::serve::Listener;
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use axum::Router;
+use axum::body::Body;
+use axum::extract::ConnectInfo;
+use axum::http::Request;
+use hyper::body::Incoming;
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tokio::time::{Instant, Sleep, sleep};
+use tokio::task::JoinSet;
+use tokio::time::{Instant, Sleep, sleep, timeout};
+use tower::ServiceExt;
 
-/// A listener with a limited number of connections.
-pub(super) struct Connections {
-    listener: TcpListener,
-    places: Arc<Semaphore>,
-}
+use super::places::{Place, Places, Source};
+use crate::tls::Tls;
 
-/// A connection with an idle timeout.
-pub(super) struct Connection {
-    stream: TcpStream,
-    silence: Pin<Box<Sleep>>,
-    _place: OwnedSemaphorePermit,
-}
+/// Connection limit: more than all pages need, and far below the usual limit of open files.
+const MOST: usize = 256;
+/// Connections of one address: eight pages with six requests each, and their sockets.
+const SHARE: usize = 64;
+/// Deadline of a TLS handshake.
+const HANDSHAKE: Duration = Duration::from_secs(10);
+/// Deadline of a request's header, also of the next one on the same connection.
+const HEADER: Duration = Duration::from_secs(10);
+/// Idle timeout. Pages answer pings more often than this.
+const SILENCE: Duration = Duration::from_secs(30);
+/// Delay before the next attempt after a failed accept.
+const PAUSE: Duration = Duration::from_millis(100);
+/// First octet of a TLS handshake.
+const TLS_HANDSHAKE: u8 = 22;
+/// Response when the connection limit is reached.
+const NO_PLACE: &[u8] =
+    b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
+/// Response to a request without TLS on a port with TLS.
+const NO_TLS: &[u8] = b"HTTP/1.1 400 Bad Request\r\nContent-Type: text/plain\r\n\
+    Content-Length: 43\r\nConnection: close\r\n\r\nthis page requires https:// in its address\n";
 
-impl Connections {
-    /// Connection limit: more than all pages need, and far below the usual limit of open files.
-    const MOST: usize = 256;
-    /// Idle timeout. Pages answer pings more often than this.
-    const SILENCE: Duration = Duration::from_secs(30);
-    /// Delay before the next attempt after a failed accept.
-    const PAUSE: Duration = Duration::from_millis(100);
-    /// Response when the connection limit is reached.
-    const NO_PLACE: &[u8] =
-        b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
-
-    pub(super) fn new(listener: TcpListener) -> Self {
-        Self {
-            listener,
-            places: Arc::new(Semaphore::new(Self::MOST)),
-        }
-    }
-}
-
-impl Listener for Connections {
-    type Io = Connection;
-    type Addr = SocketAddr;
-
-    async fn accept(&mut self) -> (Connection, SocketAddr) {
-        loop {
-            let (stream, address) = match self.listener.accept().await {
-                Ok(accepted) => accepted,
-                Err(error) => {
-                    tracing::warn!(%error, "cannot accept connections");
-                    sleep(Self::PAUSE).await;
-                    continue;
-                }
-            };
-            // Send small snapshots and commands without delay. A failure only adds latency.
-            let _ = stream.set_nodelay(true);
-            match self.places.clone().try_acquire_owned() {
-                Ok(place) => {
-                    let connection = Connection {
-                        stream,
-                        silence: Box::pin(sleep(Self::SILENCE)),
-                        _place: place,
-                    };
-                    return (connection, address);
-                }
-                Err(_) => {
-                    tracing::debug!(%address, "too many connections");
-                    // Best effort: never wait for the peer.
-                    let _ = stream.try_write(Self::NO_PLACE);
-                }
+/// Serves connections for as long as the listener works.
+pub(super) async fn serve(listener: TcpListener, tls: Option<Tls>, router: Router) {
+    let places = Places::new(MOST, SHARE);
+    let mut tasks = JoinSet::new();
+    loop {
+        let accepted = tokio::select! {
+            accepted = listener.accept() => accepted,
+            Some(_) = tasks.join_next() => continue,
+        };
+        let (stream, address) = match accepted {
+            Ok(accepted) => accepted,
+            Err(error) => {
+                tracing::warn!(%error, "cannot accept connections");
+                sleep(PAUSE).await;
+                continue;
+            }
+        };
+        match places.take(Source::of(address)) {
+            Ok(place) => {
+                let connection = Connection::new(stream, place);
+                tasks.spawn(serve_one(connection, address, tls.clone(), router.clone()));
+            }
+            Err(why) => {
+                tracing::debug!(%address, ?why, "too many connections");
+                // Best effort: never wait for the peer.
+                let _ = stream.try_write(NO_PLACE);
             }
         }
     }
+}
 
-    fn local_addr(&self) -> io::Result<SocketAddr> {
-        self.listener.local_addr()
+async fn serve_one(
+    mut connection: Connection,
+    address: SocketAddr,
+    tls: Option<Tls>,
+    router: Router,
+) {
+    let Some(tls) = tls else {
+        return serve_http(connection, address, router).await;
+    };
+    let handshake = async {
+        if !connection.begins_with_tls().await? {
+            connection.write_all(NO_TLS).await?;
+            return Err(io::Error::other("a request without TLS"));
+        }
+        tls.accept(connection).await
+    };
+    match timeout(HANDSHAKE, handshake).await {
+        Ok(Ok(stream)) => serve_http(stream, address, router).await,
+        Ok(Err(error)) => tracing::debug!(%address, %error, "no TLS handshake"),
+        Err(_) => tracing::debug!(%address, "the TLS handshake was not completed in time"),
+    }
+}
+
+/// Serves the requests of a connection, which know its address.
+async fn serve_http<S>(stream: S, address: SocketAddr, router: Router)
+where
+    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+{
+    let service = service_fn(move |request: Request<Incoming>| {
+        let mut request = request.map(Body::new);
+        request.extensions_mut().insert(ConnectInfo(address));
+        router.clone().oneshot(request)
+    });
+    let connection = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(HEADER)
+        .serve_connection(TokioIo::new(stream), service)
+        .with_upgrades();
+    if let Err(error) = connection.await {
+        tracing::debug!(%address, %error, "connection ended");
+    }
+}
+
+/// A connection with an idle timeout, which has a place until it ends.
+struct Connection {
+    stream: TcpStream,
+    silence: Pin<Box<Sleep>>,
+    _place: Place,
+}
+
+impl Connection {
+    fn new(stream: TcpStream, place: Place) -> Self {
+        // Send small snapshots and commands without delay. A failure only adds latency.
+        let _ = stream.set_nodelay(true);
+        Self {
+            stream,
+            silence: Box::pin(sleep(SILENCE)),
+            _place: place,
+        }
+    }
+
+    /// Whether the first octet is one of TLS. Waits for it.
+    async fn begins_with_tls(&self) -> io::Result<bool> {
+        let mut first = [0];
+        self.stream.peek(&mut first).await?;
+        Ok(first == [TLS_HANDSHAKE])
     }
 }
 
@@ -92,7 +153,7 @@ impl AsyncRead for Connection {
     ) -> Poll<io::Result<()>> {
         match Pin::new(&mut self.stream).poll_read(context, buffer) {
             Poll::Ready(read) => {
-                let until = Instant::now() + Connections::SILENCE;
+                let until = Instant::now() + SILENCE;
                 self.silence.as_mut().reset(until);
                 Poll::Ready(read)
             }
@@ -131,5 +192,47 @@ impl AsyncWrite for Connection {
 
     fn is_write_vectored(&self) -> bool {
         self.stream.is_write_vectored()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::routing::get;
+    use tokio::io::{AsyncReadExt, duplex};
+
+    use super::*;
+
+    fn router() -> Router {
+        Router::new().route("/", get(async || "hello"))
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_header_that_trickles_in_is_not_awaited_beyond_its_deadline() {
+        let (mut browser, server) = duplex(1024);
+        let start = Instant::now();
+        let serving = tokio::spawn(serve_http(server, ([10, 0, 0, 1], 9).into(), router()));
+        browser
+            .write_all(b"GET / HTTP/1.1\r\nHost: a\r\nX: ")
+            .await
+            .unwrap();
+        while browser.write_all(b"x").await.is_ok() {
+            sleep(Duration::from_secs(1)).await;
+        }
+        serving.await.unwrap();
+        assert!(start.elapsed() <= HEADER + Duration::from_secs(1));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_connection_without_a_further_request_is_closed() {
+        let (mut browser, server) = duplex(1024);
+        let serving = tokio::spawn(serve_http(server, ([10, 0, 0, 1], 9).into(), router()));
+        browser
+            .write_all(b"GET / HTTP/1.1\r\nHost: a\r\n\r\n")
+            .await
+            .unwrap();
+        let mut answer = Vec::new();
+        browser.read_to_end(&mut answer).await.unwrap();
+        assert!(answer.ends_with(b"hello"), "{answer:?}");
+        serving.await.unwrap();
     }
 }

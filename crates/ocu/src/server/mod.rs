@@ -1,32 +1,45 @@
 //! The web server: the page's files, the WebSocket to the session, and access protection. It holds
 //! no vehicle state: snapshots and requests just pass through.
 
+mod attempts;
 mod base_map;
 mod bounds;
 mod connections;
+mod gate;
 mod guard;
+mod login;
+mod logins;
+mod places;
 mod socket;
+mod trail;
 mod view;
 
-use std::sync::Arc;
+use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use axum::extract::ws::WebSocketUpgrade;
-use axum::extract::{Path, Request, State};
+use axum::extract::{ConnectInfo, Path, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
-use axum::routing::get;
+use axum::routing::{get, post};
 use axum::{Json, Router};
 use serde::Serialize;
 use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, oneshot};
+use tokio::time::interval;
 
-use self::connections::Connections;
+use self::attempts::Attempts;
+pub(super) use self::gate::{Gate, UserGate};
+use self::places::{NoPlace, Places, Source};
+pub(super) use self::trail::Trail;
 use super::base_map::BaseMap;
 use super::page::{self, File};
 use super::session::{Access, Order};
-use super::token::Token;
+use super::tls::Tls;
+use super::users::UserRole;
 use jaus::address::JausId;
 use jaus::node::Node;
 use jaus_view::Dictionary;
@@ -35,8 +48,8 @@ use jaus_view::Dictionary;
 pub(super) struct Admission {
     pub(super) operator: JausId,
     pub(super) authority: u8,
-    pub(super) token: Option<Token>,
-    pub(super) token_to_read: bool,
+    pub(super) gate: Gate,
+    pub(super) trail: Trail,
     pub(super) hosts: Vec<String>,
     /// The geographic map behind the vehicle.
     pub(super) base_map: Option<BaseMap>,
@@ -55,7 +68,9 @@ struct Shared {
     access: Access,
     dictionary: Dictionary,
     /// Limits the number of pages.
-    places: Arc<Semaphore>,
+    places: Places,
+    /// Limits failed logins.
+    attempts: Mutex<Attempts>,
     /// Limits the number of tiles of the map file that are read at once.
     readers: Arc<Semaphore>,
     pages: AtomicU64,
@@ -70,9 +85,14 @@ struct Counters {
     /// Cross-site requests, and requests with an unknown host name.
     strangers: AtomicU64,
     wrong_tokens: AtomicU64,
+    /// Logins with a wrong name or password, and those that came too soon after others.
+    failed_logins: AtomicU64,
     /// Pages that exceeded the frame size or rate.
     too_much: AtomicU64,
 }
+
+/// Status and text for a request that may not see what it asks for.
+type Refusal = (StatusCode, &'static str);
 
 /// Health report for monitoring.
 #[derive(Serialize)]
@@ -82,19 +102,25 @@ struct Health {
     no_place: u64,
     strangers: u64,
     wrong_tokens: u64,
+    failed_logins: u64,
     too_much: u64,
 }
 
 impl Server {
     /// Maximum number of pages served at once.
     const PAGES: usize = 32;
+    /// Maximum number of pages of one address.
+    const PAGES_OF_ADDRESS: usize = 8;
+    /// Interval of checking sessions and the users file.
+    const CHECK: Duration = Duration::from_secs(1);
 
     pub(super) fn new(admission: Admission, access: Access) -> Self {
         let shared = Shared {
             admission,
             access,
             dictionary: Dictionary::of(jaus_vehicle::messages::registry()),
-            places: Arc::new(Semaphore::new(Self::PAGES)),
+            places: Places::new(Self::PAGES, Self::PAGES_OF_ADDRESS),
+            attempts: Mutex::new(Attempts::new()),
             readers: Arc::new(Semaphore::new(base_map::READERS)),
             pages: AtomicU64::new(0),
             counters: Counters::default(),
@@ -104,22 +130,42 @@ impl Server {
         }
     }
 
-    /// Serves pages for as long as the listener accepts connections.
-    pub(super) async fn run(self, listener: TcpListener) -> std::io::Error {
+    /// Serves pages for as long as the listener accepts connections, which has no end.
+    pub(super) async fn run(self, listener: TcpListener, tls: Option<Tls>) {
+        let serving = connections::serve(listener, tls, self.router());
+        tokio::select! {
+            () = serving => {}
+            () = self.check_sessions() => {}
+        }
+    }
+
+    fn router(&self) -> Router {
         let files = page::FILES.iter().fold(Router::new(), |router, file| {
             router.route(file.path, get(move || serve_file(file)))
         });
-        let router = files
+        files
             .route("/ws", get(serve_page))
             .route("/map/{vehicle}/{map}", get(serve_map))
             .route("/base-map", get(base_map::describe))
             .route("/base-map/{zoom}/{x}/{y}", get(base_map::serve))
+            .route("/session", get(login::session))
+            .route("/login", post(login::log_in))
+            .route("/logout", post(login::log_out))
+            .route("/sessions", get(login::list))
+            .route("/sessions/{id}/end", post(login::end))
             .route("/health", get(health))
             .layer(middleware::from_fn_with_state(self.shared.clone(), admit))
-            .with_state(self.shared);
-        match axum::serve(Connections::new(listener), router).await {
-            Ok(()) => std::io::Error::other("the listener failed"),
-            Err(error) => error,
+            .with_state(self.shared.clone())
+    }
+
+    /// Ends the sessions of users that are over.
+    async fn check_sessions(&self) {
+        let mut checks = interval(Self::CHECK);
+        loop {
+            checks.tick().await;
+            if let Some(gate) = self.shared.admission.gate.users() {
+                gate.handle_time(Instant::now());
+            }
         }
     }
 }
@@ -134,7 +180,10 @@ async fn admit(State(shared): State<Arc<Shared>>, request: Request, next: Next) 
     let mut response = next.run(request).await;
     let headers = response.headers_mut();
     for (name, value) in HEADERS {
-        headers.insert(name, HeaderValue::from_static(value));
+        // A handler may forbid caching altogether.
+        headers
+            .entry(name)
+            .or_insert(HeaderValue::from_static(value));
     }
     response
 }
@@ -154,10 +203,11 @@ async fn health(State(shared): State<Arc<Shared>>) -> Json<Health> {
     let counters = &shared.counters;
     Json(Health {
         ok: true,
-        pages: Server::PAGES - shared.places.available_permits(),
+        pages: shared.places.taken(),
         no_place: counters.no_place.load(Relaxed),
         strangers: counters.strangers.load(Relaxed),
         wrong_tokens: counters.wrong_tokens.load(Relaxed),
+        failed_logins: counters.failed_logins.load(Relaxed),
         too_much: counters.too_much.load(Relaxed),
     })
 }
@@ -166,12 +216,12 @@ async fn health(State(shared): State<Arc<Shared>>) -> Json<Health> {
 /// URL only separates the entries in browser caches.
 async fn serve_map(
     State(shared): State<Arc<Shared>>,
+    ConnectInfo(address): ConnectInfo<SocketAddr>,
     Path((vehicle, map)): Path<(u16, u16)>,
     headers: HeaderMap,
 ) -> Response {
-    if !shared.lets_read(&headers) {
-        let words = "the map requires the token: send Authorization: Bearer TOKEN\n";
-        return (StatusCode::UNAUTHORIZED, words).into_response();
+    if let Err(refusal) = shared.check_reader(&headers, address) {
+        return refusal.into_response();
     }
     let (reply, cells) = oneshot::channel();
     let reply = Box::new(move |result| {
@@ -194,47 +244,89 @@ async fn serve_map(
     }
 }
 
-async fn serve_page(State(shared): State<Arc<Shared>>, upgrade: WebSocketUpgrade) -> Response {
-    let Ok(place) = shared.places.clone().try_acquire_owned() else {
-        shared.counters.no_place.fetch_add(1, Relaxed);
-        let words = format!(
-            "the limit of {} pages is reached; close one of them\n",
-            Server::PAGES
-        );
-        return (StatusCode::SERVICE_UNAVAILABLE, words).into_response();
+async fn serve_page(
+    State(shared): State<Arc<Shared>>,
+    ConnectInfo(address): ConnectInfo<SocketAddr>,
+    headers: HeaderMap,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    let Some(visitor) = shared.admission.gate.visitor(&headers, address) else {
+        return (StatusCode::UNAUTHORIZED, "log in first\n").into_response();
+    };
+    let place = match shared.places.take(Source::of(address)) {
+        Ok(place) => place,
+        Err(why) => {
+            shared.counters.no_place.fetch_add(1, Relaxed);
+            let words = match why {
+                NoPlace::Full => format!("the limit of {} pages is reached", Server::PAGES),
+                NoPlace::Share => format!(
+                    "the limit of {} pages of one address is reached",
+                    Server::PAGES_OF_ADDRESS
+                ),
+            };
+            let words = words + "; close one of them\n";
+            return (StatusCode::SERVICE_UNAVAILABLE, words).into_response();
+        }
     };
     upgrade
         .max_message_size(bounds::LARGEST_FRAME)
         .max_frame_size(bounds::LARGEST_FRAME)
         .on_upgrade(async move |socket| {
-            socket::serve(socket, shared).await;
+            socket::serve(socket, shared, visitor).await;
             drop(place);
         })
 }
 
 impl Shared {
-    /// Whether changing the vehicle requires a token.
-    fn needs_token(&self) -> bool {
-        self.admission.token.is_some()
+    fn attempts(&self) -> MutexGuard<'_, Attempts> {
+        self.attempts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether the shown token is right. Wrong tokens are counted.
-    fn admits(&self, shown: &str) -> bool {
-        let right = self
-            .admission
-            .token
-            .as_ref()
-            .is_none_or(|token| token.is(shown));
-        if !right {
-            self.counters.wrong_tokens.fetch_add(1, Relaxed);
+    /// Whether the shown token is right. Wrong tokens are counted, and slow down their address.
+    fn admits(&self, shown: &str, address: SocketAddr) -> Result<(), &'static str> {
+        let Some(token) = self.admission.gate.token() else {
+            return Ok(());
+        };
+        let source = Source::of(address);
+        let begun = self.attempts().begin(Instant::now(), source, None);
+        if begun.is_ok() && token.is(shown) {
+            self.attempts().succeeded(source, None);
+            return Ok(());
         }
-        right
+        self.counters.wrong_tokens.fetch_add(1, Relaxed);
+        Err(match begun {
+            Ok(()) => "wrong token",
+            Err(_) => "too many wrong tokens; try again in 10 s",
+        })
     }
 
-    /// Whether a request may read vehicle data.
-    fn lets_read(&self, headers: &HeaderMap) -> bool {
+    /// Counts and records a login that was refused. The name is recorded only if it is a user's: it
+    /// may be a password in the wrong field.
+    fn note_refused_login(&self, name: &str, address: SocketAddr, why: &str) {
+        self.counters.failed_logins.fetch_add(1, Relaxed);
+        let users = self.admission.gate.users().map(UserGate::users);
+        let is_known = users.is_some_and(|it| it.find(name).is_some());
+        let who = if is_known { name } else { "unknown user" };
+        tracing::warn!("login of {who} from {} refused: {why}", address.ip());
+        self.admission.trail.login(who, address, Some(why));
+    }
+
+    /// Checks that a request may read vehicle data.
+    fn check_reader(&self, headers: &HeaderMap, address: SocketAddr) -> Result<(), Refusal> {
+        let Some(visitor) = self.admission.gate.visitor(headers, address) else {
+            return Err((StatusCode::UNAUTHORIZED, "log in first\n"));
+        };
+        if visitor.may(UserRole::Observe) {
+            return Ok(());
+        }
         let shown = headers.get(header::AUTHORIZATION);
         let shown = shown.and_then(|it| it.to_str().ok()?.strip_prefix("Bearer "));
-        !self.admission.token_to_read || shown.is_some_and(|it| self.admits(it))
+        match shown.map(|it| self.admits(it, address)) {
+            Some(Ok(())) => Ok(()),
+            _ => {
+                let words = "the map requires the token: send Authorization: Bearer TOKEN\n";
+                Err((StatusCode::UNAUTHORIZED, words))
+            }
+        }
     }
 }

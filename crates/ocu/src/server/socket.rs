@@ -2,7 +2,7 @@
 //! writing are independent, so that a page that reads slowly can still stop the vehicle.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, Instant};
 
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
@@ -12,12 +12,14 @@ use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
 use super::Shared;
-use super::bounds::Rate;
+use super::bounds::{Bucket, FRAMES};
+use super::gate::Visitor;
 use super::view::{self, MessageView};
 use crate::answer::Said as Answer;
 use crate::request::{Frame, MessageFilter, OperatorRequest, Said};
 use crate::session::{Order, Reply};
 use crate::stick::PageId;
+use crate::users::UserRole;
 use jaus_view::Filter;
 
 /// Version of the protocol between page and station.
@@ -32,29 +34,36 @@ const PING: Duration = Duration::from_secs(5);
 const WRONG_TOKEN: Duration = Duration::from_secs(1);
 /// Number of wrong tokens after which the connection is closed.
 const WRONG_TOKENS: u32 = 5;
+/// A page that sees nothing without the token is disconnected after this time.
+const LOGIN: Duration = Duration::from_secs(60);
+/// Interval of checking whether a user's session has ended.
+const CHECK: Duration = Duration::from_secs(1);
+/// Code of the Close frame at the end of a user's session.
+const SESSION_ENDED: u16 = 4001;
 /// Minimum interval between refusals of requests without an id.
 const REFUSAL: Duration = Duration::from_secs(1);
 
 /// Serves a page until either side closes the connection.
-pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>) {
+pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, visitor: Visitor) {
     let page = PageId(shared.pages.fetch_add(1, Relaxed));
+    let visitor = Arc::new(visitor);
     let (mut sink, mut stream) = socket.split();
     let (answers, waiting) = mpsc::channel(ANSWERS);
     let (views, chosen) = mpsc::channel(ANSWERS);
-    let trusted = AtomicBool::new(!shared.needs_token());
     let reader = Reader {
         page,
         shared: &shared,
+        visitor: &visitor,
         answers,
         views,
-        trusted: &trusted,
-        rate: Rate::new(Instant::now()),
+        frames: Bucket::new(Instant::now()),
         wrong_tokens: 0,
         refused: None,
     };
     let parting = tokio::select! {
         parting = reader.run(&mut stream) => parting,
-        () = write(&mut sink, &shared, &trusted, waiting, chosen) => None,
+        () = write(&mut sink, &shared, &visitor, waiting, chosen) => None,
+        parting = supervise(&shared, &visitor) => Some(parting),
     };
     // Release the stick first, since the page that may hold it is gone.
     let _ = shared.access.orders.send(Order::Gone(page)).await;
@@ -78,14 +87,29 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>) {
 /// Code and reason of the Close frame.
 type Parting = (u16, &'static str);
 
+/// Waits until the visitor has to go: without the token in time, or at the end of the session.
+async fn supervise(shared: &Shared, visitor: &Visitor) -> Parting {
+    if let Some(gate) = shared.admission.gate.users() {
+        while gate.holds(visitor, false) {
+            sleep(CHECK).await;
+        }
+        return (SESSION_ENDED, "the session has ended");
+    }
+    sleep(LOGIN).await;
+    if visitor.may(UserRole::Observe) {
+        return std::future::pending().await;
+    }
+    (close_code::POLICY, "no token within 60 s")
+}
+
 struct Reader<'s> {
     page: PageId,
     shared: &'s Shared,
+    visitor: &'s Arc<Visitor>,
     answers: mpsc::Sender<Utf8Bytes>,
     /// The filter for the page's message view.
     views: mpsc::Sender<Option<Filter>>,
-    trusted: &'s AtomicBool,
-    rate: Rate,
+    frames: Bucket,
     wrong_tokens: u32,
     /// When a request without an id was last refused.
     refused: Option<Instant>,
@@ -104,7 +128,7 @@ impl Reader<'_> {
                     return Some((close_code::SIZE, "frames are limited to 4096 octets"));
                 }
             };
-            if !self.rate.allows(Instant::now()) {
+            if self.frames.take(Instant::now(), FRAMES).is_err() {
                 self.shared.counters.too_much.fetch_add(1, Relaxed);
                 return Some((
                     close_code::POLICY,
@@ -132,15 +156,15 @@ impl Reader<'_> {
                 return None;
             }
         };
+        if let Some(gate) = self.shared.admission.gate.users()
+            && !gate.holds(self.visitor, true)
+        {
+            return Some((SESSION_ENDED, "the session has ended"));
+        }
         match frame.said {
             Said::Token { token } => return self.show(frame.id, &token).await,
+            Said::Active => {}
             Said::Messages { on, filter } => self.choose(frame.id, on, &filter).await,
-            Said::OperatorRequest(_) if !self.trusted.load(Relaxed) => {
-                self.refuse(
-                    frame.id,
-                    "this requires the token that jaus-ocu printed or read from its file",
-                );
-            }
             Said::OperatorRequest(request) => {
                 self.request(frame.id, frame.vehicle, request).await;
             }
@@ -150,21 +174,28 @@ impl Reader<'_> {
 
     /// Handles a token from the page.
     async fn show(&mut self, id: Option<u64>, token: &str) -> Option<Parting> {
-        if self.shared.admits(token) {
-            self.trusted.store(true, Relaxed);
+        let address = self.visitor.address;
+        let Err(why) = self.shared.admits(token, address) else {
+            if self.shared.admission.gate.token().is_some() {
+                self.visitor.trust();
+                let user = &self.visitor.user;
+                self.shared.admission.trail.login(user, address, None);
+            }
             self.say(id.map(|id| Answer::Done { id }).as_ref());
             return None;
-        }
+        };
         self.wrong_tokens += 1;
-        tracing::warn!(page = self.page.0, "wrong token");
+        tracing::warn!(page = self.page.0, "{why}");
+        let user = &self.visitor.user;
+        self.shared.admission.trail.login(user, address, Some(why));
         sleep(WRONG_TOKEN).await;
-        self.refuse(id, "wrong token");
+        self.refuse(id, why);
         (self.wrong_tokens >= WRONG_TOKENS).then_some((close_code::POLICY, "too many wrong tokens"))
     }
 
     /// Starts or ends the message view.
     async fn choose(&mut self, id: Option<u64>, on: bool, filter: &MessageFilter) {
-        if !self.may_read() {
+        if !self.visitor.may(UserRole::Observe) {
             return self.refuse(id, "viewing requires the token too");
         }
         if on && self.shared.admission.node.is_none() {
@@ -179,20 +210,37 @@ impl Reader<'_> {
         self.say(id.map(|id| Answer::Done { id }).as_ref());
     }
 
-    fn may_read(&self) -> bool {
-        may_read(self.shared, self.trusted)
-    }
-
     async fn request(&mut self, id: Option<u64>, vehicle: Option<u16>, request: OperatorRequest) {
-        let (page, reply) = (self.page, self.reply(id));
+        let reply = self.reply(id);
+        let (visitor, trail) = (self.visitor.clone(), self.shared.admission.trail.clone());
+        let reply: Reply = Box::new(move |result| {
+            trail.request(&visitor, vehicle, &request, &result);
+            reply(result);
+        });
+        if !self.visitor.may(UserRole::Drive) {
+            return reply(Err(self.why_not()));
+        }
         let order = Order::OperatorRequest {
-            page,
+            page: self.page,
+            user: self.visitor.user.clone(),
             vehicle,
             request,
             reply,
         };
         // On error the session has ended, which the writer notices.
         let _ = self.shared.access.orders.send(order).await;
+    }
+
+    /// Why the visitor may not change anything.
+    fn why_not(&self) -> String {
+        if self.shared.admission.gate.users().is_none() {
+            return "this requires the token that jaus-ocu printed or read from its file"
+                .to_owned();
+        }
+        format!(
+            "this requires the role drive; {} may only observe",
+            self.visitor.user
+        )
     }
 
     /// The callback that reports the result of a request to the page. Without an id, only refusals
@@ -233,11 +281,6 @@ fn say(answers: &mpsc::Sender<Utf8Bytes>, answer: &Answer<'_>) {
     }
 }
 
-/// Whether a page may read vehicle data.
-fn may_read(shared: &Shared, trusted: &AtomicBool) -> bool {
-    !shared.admission.token_to_read || trusted.load(Relaxed)
-}
-
 /// The next message of the view, if there is one.
 async fn next_message(view: &mut Option<MessageView<'_>>) -> Option<Utf8Bytes> {
     match view {
@@ -250,7 +293,7 @@ async fn next_message(view: &mut Option<MessageView<'_>>) -> Option<Utf8Bytes> {
 async fn write(
     sink: &mut SplitSink<WebSocket, Message>,
     shared: &Shared,
-    trusted: &AtomicBool,
+    visitor: &Visitor,
     mut answers: mpsc::Receiver<Utf8Bytes>,
     mut chosen: mpsc::Receiver<Option<Filter>>,
 ) {
@@ -261,7 +304,7 @@ async fn write(
     pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let hello = Answer::Hello {
         version: VERSION,
-        token_needed: shared.needs_token(),
+        token_needed: shared.admission.gate.token().is_some(),
         operator: shared.admission.operator.to_string(),
         authority: shared.admission.authority,
         base_map: shared.admission.base_map.is_some(),
@@ -282,7 +325,7 @@ async fn write(
                 Some(json) => Some(Message::Text(json)),
                 None => return,
             },
-            snapshot = snapshots.next(), if may_read(shared, trusted) => match snapshot {
+            snapshot = snapshots.next(), if visitor.may(UserRole::Observe) => match snapshot {
                 Some(json) => Some(Message::Text(Utf8Bytes::from(&*json))),
                 None => return,
             },

@@ -43,6 +43,8 @@ pub(super) type Reply = Box<dyn FnOnce(Result<(), String>) + Send>;
 pub(super) enum Order {
     OperatorRequest {
         page: PageId,
+        /// The user of the page.
+        user: Arc<str>,
         /// The vehicle that the page means; `None` for the selected one.
         vehicle: Option<u16>,
         request: OperatorRequest,
@@ -141,6 +143,8 @@ pub(super) struct Session {
     leaving: BTreeSet<u16>,
     /// Whether all vehicles are to be in emergency, also those that appear later.
     all_stopped: bool,
+    /// The user who last took control, drove or approved a mission.
+    driver: Option<Arc<str>>,
     /// Why the station ended manual drive, until a page drives again.
     halted: Option<String>,
     orders: mpsc::Receiver<Order>,
@@ -177,6 +181,7 @@ impl Session {
             stick: Stick::default(),
             leaving: BTreeSet::new(),
             all_stopped: false,
+            driver: None,
             halted: None,
             orders: inbox,
             sightings,
@@ -332,6 +337,17 @@ impl Session {
         }
     }
 
+    /// Control of the selected vehicle, with the user who drives.
+    fn control(&self, vehicle: Option<&Vehicle>) -> Control {
+        let control = vehicle.map_or_else(Control::default, Vehicle::control_state);
+        let is_ours = control.held || control.wanted;
+        let driver = self.driver.as_ref().filter(|_| is_ours);
+        Control {
+            user: driver.map(ToString::to_string),
+            ..control
+        }
+    }
+
     fn state(&self, now: Instant) -> State {
         let driven = self.stick.driven();
         let push = driven.unwrap_or_default();
@@ -341,7 +357,7 @@ impl Session {
             time: Timestamp::since_1970(time_of_day(), DECIMALS).to_string(),
             operator: self.client.component().id().to_string(),
             vehicle: vehicle.and_then(|it| it.state(now)),
-            control: vehicle.map_or_else(Control::default, Vehicle::control_state),
+            control: self.control(vehicle),
             drive: Drive {
                 active: driven.is_some(),
                 forward: push.forward(),

@@ -27,10 +27,14 @@ impl Session {
         match order {
             Order::OperatorRequest {
                 page,
+                user,
                 vehicle,
                 request,
                 reply,
-            } => self.handle_request(now, page, vehicle, request, reply),
+            } => {
+                self.note_driver(page, user, &request);
+                self.handle_request(now, page, vehicle, request, reply);
+            }
             Order::Cells {
                 vehicle,
                 map,
@@ -43,6 +47,20 @@ impl Session {
                 None => reply(Err("unknown vehicle".to_owned())),
             },
             Order::Gone(page) => self.stick.handle_release(now, page),
+        }
+    }
+
+    /// Notes the user who drives from now on, if the request makes that change.
+    fn note_driver(&mut self, page: PageId, user: Arc<str>, request: &OperatorRequest) {
+        let is_wanted = self.fleet.selected().is_some_and(Vehicle::is_wanted);
+        let takes_over = match request {
+            OperatorRequest::Control { on } => *on && !is_wanted,
+            OperatorRequest::Drive { .. } => self.stick.driver().is_none_or(|it| it == page),
+            OperatorRequest::Approve { .. } => true,
+            _ => false,
+        };
+        if takes_over {
+            self.driver = Some(user);
         }
     }
 

@@ -18,3 +18,4 @@ mod handover;
 mod hostile;
 mod looking;
 mod missing;
+mod users;

@@ -7,6 +7,7 @@ use std::str::FromStr;
 use clap::{Args, Subcommand};
 use jaus::address::JausId;
 use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::folders::make_folder_of;
 use jaus_cli::output::{Output, say};
 use jaus_cli::secure::KeyFiles;
 use jaus_secure::rules::Rules;
@@ -147,7 +148,7 @@ impl Keys {
 impl Files {
     fn make(&self) -> Result<Outcome, Failure> {
         let path = self.files.key()?;
-        make_folder(&path)?;
+        make_folder_of(&path)?;
         let key = Key::create(&path).map_err(Failure::of)?;
         say(format_args!(
             "the key is in {}; on each peer run: jaus keys trust NAME {} IDS",
@@ -168,7 +169,7 @@ impl Files {
 impl TrustKey {
     fn add(&self) -> Result<Outcome, Failure> {
         let path = self.files.trusted_keys()?;
-        make_folder(&path)?;
+        make_folder_of(&path)?;
         let peer = Peer {
             name: self.name.clone(),
             key: self.public_key,
@@ -230,18 +231,4 @@ impl List {
         }
         Ok(Outcome::complete_if(!trust.peers().is_empty()))
     }
-}
-
-/// Makes the folder of a file, for its owner alone.
-fn make_folder(path: &Path) -> Result<(), Failure> {
-    let Some(folder) = path.parent().filter(|it| !it.as_os_str().is_empty()) else {
-        return Ok(());
-    };
-    let mut builder = fs::DirBuilder::new();
-    builder.recursive(true);
-    #[cfg(unix)]
-    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
-    builder
-        .create(folder)
-        .map_err(|error| Failure::file(folder, &error))
 }

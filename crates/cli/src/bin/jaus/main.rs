@@ -38,6 +38,7 @@ mod subscribe;
 mod test;
 #[cfg(target_os = "linux")]
 mod up;
+mod users;
 mod vehicle;
 mod watch;
 
@@ -78,6 +79,7 @@ enum Command {
     Warden(up::warden::Warden),
     #[cfg(feature = "secure")]
     Keys(keys::Keys),
+    Users(users::UsersCommand),
     Node(node::NodeCommand),
     Vehicle(vehicle::VehicleCommand),
     Monitor(monitor::Monitor),
@@ -121,6 +123,7 @@ impl Command {
             Self::Warden(warden) => warden.run(),
             #[cfg(feature = "secure")]
             Self::Keys(keys) => keys.run(),
+            Self::Users(users) => users.run(),
             Self::Node(node) => node.run(),
             Self::Vehicle(vehicle) => vehicle.run(),
             Self::Monitor(monitor) => monitor.run(),

@@ -110,6 +110,8 @@ impl Browser {
             "--disable-background-networking",
         ]);
         command.args(["--disable-dev-shm-usage", "--hide-scrollbars"]);
+        // Stations make certificates that no authority knows.
+        command.arg("--ignore-certificate-errors");
         command
             .arg(format!("--user-data-dir={}", profile.display()))
             .arg("about:blank");

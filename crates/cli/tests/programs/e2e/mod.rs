@@ -14,6 +14,8 @@ mod keyboard;
 mod pictures;
 mod steps;
 mod system;
+#[cfg(feature = "https")]
+mod users;
 mod watching;
 
 use std::time::Duration;
@@ -86,6 +88,12 @@ fn control_is_handed_over_between_the_pages_of_two_operators() {
 #[test]
 fn a_page_without_the_token_asks_for_it_where_it_would_stop_the_vehicle() {
     on_a_station(watching::run);
+}
+
+#[cfg(feature = "https")]
+#[test]
+fn users_log_in_over_https_and_do_what_their_roles_allow() {
+    on_a_station(users::run);
 }
 
 #[test]

@@ -26,5 +26,6 @@ mod secrets;
 mod send;
 mod subscribe;
 mod texts;
+mod users;
 mod vehicle;
 mod watch;

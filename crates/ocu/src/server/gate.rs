@@ -1,0 +1,251 @@
+//! Who may use the page: everyone on this host, holders of the token, or users who log in.
+
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use axum::http::{HeaderMap, header};
+use tokio::sync::Semaphore;
+use tokio::task::spawn_blocking;
+
+use super::logins::{Ending, Login, LoginId, Logins};
+use super::trail::Trail;
+use crate::token::Token;
+use crate::users::{PasswordHash, UserRole, Users, UsersFile};
+
+/// The user of a page that requires no login.
+const OPERATOR: &str = "operator";
+
+/// Who may use the page.
+pub(crate) enum Gate {
+    /// Everyone who reaches it.
+    Open,
+    /// Changes require the token, and viewing too if `to_read` is set.
+    Token { token: Token, to_read: bool },
+    /// Everything requires a login.
+    Users(UserGate),
+}
+
+/// Who uses a page or sends a request, and with which role.
+#[derive(Debug)]
+pub(super) struct Visitor {
+    pub(super) user: Arc<str>,
+    pub(super) address: SocketAddr,
+    /// The session of a user.
+    pub(super) login: Option<LoginId>,
+    /// `None` without permission to see anything. The right token raises it.
+    role: Mutex<Option<UserRole>>,
+}
+
+impl Visitor {
+    pub(super) fn may(&self, needed: UserRole) -> bool {
+        self.role().is_some_and(|role| role >= needed)
+    }
+
+    pub(super) fn role(&self) -> Option<UserRole> {
+        *self.role.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The visitor has shown the token.
+    pub(super) fn trust(&self) {
+        let mut role = self.role.lock().unwrap_or_else(PoisonError::into_inner);
+        *role = Some(UserRole::Drive);
+    }
+}
+
+impl Gate {
+    /// The sender of a request, with the role that the request shows; `None` for one who has to
+    /// log in first.
+    pub(super) fn visitor(&self, headers: &HeaderMap, address: SocketAddr) -> Option<Visitor> {
+        let visitor = |role| Visitor {
+            user: Arc::from(OPERATOR),
+            address,
+            login: None,
+            role: Mutex::new(role),
+        };
+        match self {
+            Self::Open => Some(visitor(Some(UserRole::Drive))),
+            Self::Token { to_read: false, .. } => Some(visitor(Some(UserRole::Observe))),
+            Self::Token { to_read: true, .. } => Some(visitor(None)),
+            Self::Users(gate) => gate.visitor(headers, address),
+        }
+    }
+
+    pub(super) const fn users(&self) -> Option<&UserGate> {
+        match self {
+            Self::Users(gate) => Some(gate),
+            _ => None,
+        }
+    }
+
+    pub(super) const fn token(&self) -> Option<&Token> {
+        match self {
+            Self::Token { token, .. } => Some(token),
+            _ => None,
+        }
+    }
+}
+
+/// Why nobody is logged in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub(super) enum LoginError {
+    #[error("wrong name or password")]
+    Wrong,
+    #[error("too many logins at this moment; try again")]
+    Busy,
+    #[error("the system has no random numbers")]
+    NoRandomness,
+}
+
+/// The users of the page and their sessions.
+pub(crate) struct UserGate {
+    file: UsersFile,
+    logins: Mutex<Logins>,
+    trail: Trail,
+    /// Name of the cookie with a session's secret. Browsers do not tell the ports of a host apart.
+    cookie: String,
+    /// Whether the page is served over TLS.
+    is_secure: bool,
+    /// Logins that are being verified, or wait for it.
+    waiting: Semaphore,
+    /// Verifies one password at a time, which takes 19 MiB.
+    verifier: Arc<Semaphore>,
+}
+
+impl UserGate {
+    /// The most logins that are being verified, or wait for it.
+    const MOST_WAITING: usize = 16;
+
+    pub(crate) fn new(file: UsersFile, port: u16, is_secure: bool, trail: Trail) -> Self {
+        let cookie = if is_secure {
+            format!("__Host-jaus-{port}")
+        } else {
+            format!("jaus-{port}")
+        };
+        Self {
+            file,
+            logins: Mutex::default(),
+            trail,
+            cookie,
+            is_secure,
+            waiting: Semaphore::new(Self::MOST_WAITING),
+            verifier: Arc::new(Semaphore::new(1)),
+        }
+    }
+
+    pub(super) fn users(&self) -> Arc<Users> {
+        self.file.users()
+    }
+
+    /// The sessions.
+    pub(super) fn logins(&self) -> MutexGuard<'_, Logins> {
+        self.logins.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn visitor(&self, headers: &HeaderMap, address: SocketAddr) -> Option<Visitor> {
+        let secret = self.secret(headers)?;
+        let logins = self.logins();
+        let login = logins.find(secret)?;
+        Some(Visitor {
+            user: Arc::from(&*login.user.name),
+            address,
+            login: Some(login.id),
+            role: Mutex::new(Some(login.role())),
+        })
+    }
+
+    /// The secret in the request's cookie.
+    fn secret<'h>(&self, headers: &'h HeaderMap) -> Option<&'h str> {
+        let cookies = headers.get_all(header::COOKIE).iter();
+        let mut pairs = cookies
+            .filter_map(|it| it.to_str().ok())
+            .flat_map(|it| it.split(';'))
+            .filter_map(|it| it.trim().split_once('='));
+        pairs.find_map(|(name, value)| (name == self.cookie).then_some(value))
+    }
+
+    /// Verifies a password, and begins a session. Returns its secret.
+    pub(super) async fn log_in(
+        &self,
+        name: &str,
+        password: String,
+        address: SocketAddr,
+    ) -> Result<Token, LoginError> {
+        let _place = self.waiting.try_acquire().map_err(|_| LoginError::Busy)?;
+        // The permit fails only if the semaphore is closed, which never happens.
+        let permit = self.verifier.clone().acquire_owned().await;
+        let user = self.users().find(name).cloned();
+        let verify = move || {
+            let _permit = permit;
+            match user {
+                Some(user) => user.password.verifies(&password).then_some(user),
+                None => {
+                    PasswordHash::verify_nothing(&password);
+                    None
+                }
+            }
+        };
+        let verified = spawn_blocking(verify).await.ok().flatten();
+        let user = Arc::new(verified.ok_or(LoginError::Wrong)?);
+        let secret = Token::generate().map_err(|_| LoginError::NoRandomness)?;
+        let displaced = self.logins().begin(Instant::now(), &secret, user, address);
+        if let Some(login) = displaced {
+            self.trail.ended(&login, &Ending::Displaced);
+        }
+        Ok(secret)
+    }
+
+    /// The header `Set-Cookie` for a secret.
+    pub(super) fn set_cookie(&self, secret: &Token) -> String {
+        let age = Logins::LONGEST.as_secs();
+        format!("{}; Max-Age={age}", self.cookie_with(secret.reveal()))
+    }
+
+    /// The header `Set-Cookie` that removes the cookie.
+    pub(super) fn clear_cookie(&self) -> String {
+        format!("{}; Max-Age=0", self.cookie_with(""))
+    }
+
+    fn cookie_with(&self, value: &str) -> String {
+        let secure = if self.is_secure { "; Secure" } else { "" };
+        format!(
+            "{}={value}; Path=/; HttpOnly; SameSite=Strict{secure}",
+            self.cookie
+        )
+    }
+
+    /// Ends a session.
+    pub(super) fn end(&self, id: LoginId, why: &Ending) -> Option<Login> {
+        let login = self.logins().end(id);
+        if let Some(login) = &login {
+            self.trail.ended(login, why);
+        }
+        login
+    }
+
+    /// Whether the session of a visitor has not ended. A session counts as used now if `is_active`
+    /// is set.
+    pub(super) fn holds(&self, visitor: &Visitor, is_active: bool) -> bool {
+        let Some(id) = visitor.login else {
+            return false;
+        };
+        let mut logins = self.logins();
+        if is_active {
+            logins.touch(Instant::now(), id);
+        }
+        logins.contains(id)
+    }
+
+    /// Reads the users file again if it has changed, and ends the sessions that are over.
+    pub(super) fn handle_time(&self, now: Instant) {
+        match self.file.refresh() {
+            Ok(true) => tracing::info!("the users file has been read again"),
+            Ok(false) => {}
+            Err(error) => tracing::error!(%error, "the previous users remain"),
+        }
+        let ended = self.logins().expire(now, &self.users());
+        for (login, why) in ended {
+            self.trail.ended(&login, &why);
+        }
+    }
+}

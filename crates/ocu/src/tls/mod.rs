@@ -1,0 +1,13 @@
+//! TLS of the page, if the feature `https` is enabled.
+
+#[cfg(feature = "https")]
+mod certificate;
+#[cfg(feature = "https")]
+mod https;
+#[cfg(not(feature = "https"))]
+mod without;
+
+#[cfg(feature = "https")]
+pub use self::https::{Tls, TlsError};
+#[cfg(not(feature = "https"))]
+pub use self::without::Tls;

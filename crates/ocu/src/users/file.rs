@@ -1,0 +1,230 @@
+//! The users file of a running station.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
+
+use super::{User, UserRole, Users};
+
+/// Why a users file cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum UsersError {
+    /// The file cannot be read or written.
+    #[error("the users file {}: {source}", .path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: io::Error,
+    },
+    /// Other users of the host can read the file.
+    #[error(
+        "the users file {} can be read by other users of this host (mode {mode:03o}): run `chmod \
+         600 {}`", .path.display(), .path.display()
+    )]
+    Readable {
+        /// The file.
+        path: PathBuf,
+        /// Its permission bits.
+        mode: u32,
+    },
+    /// The file is longer than 256 KiB.
+    #[error("the users file {} is longer than 256 KiB", .0.display())]
+    TooLong(PathBuf),
+    /// A line is malformed.
+    #[error("line {line}: {source}")]
+    Line {
+        /// Its number, from 1.
+        line: usize,
+        /// The reason.
+        source: Box<Self>,
+    },
+    /// A line has not three parts.
+    #[error("write a name, a role and a password hash; `jaus users add` writes such a line")]
+    Parts,
+    /// A text is not a user name.
+    #[error(
+        "`{0}` is not a user name: write 1 to {longest} letters, digits and -._@",
+        longest = User::LONGEST_NAME
+    )]
+    Name(String),
+    /// A text is not a role.
+    #[error(
+        "`{0}` is not a role: write {observe}, {drive} or {administer}",
+        observe = UserRole::Observe,
+        drive = UserRole::Drive,
+        administer = UserRole::Administer
+    )]
+    Role(String),
+    /// A text is not the hash of a password.
+    #[error("it has no usable password hash; `jaus users add` makes one")]
+    Password,
+    /// A name appears twice.
+    #[error("`{name}` is already in line {first}: remove one of them")]
+    Twice {
+        /// The name.
+        name: String,
+        /// The number of the first line.
+        first: usize,
+    },
+    /// There are too many users.
+    #[error("at most {} users are possible", Users::MOST)]
+    TooMany,
+    /// A user to be added exists.
+    #[error("`{0}` exists: remove the user first to change the password or role")]
+    Exists(String),
+}
+
+impl UsersError {
+    pub(super) fn in_line(self, line: usize) -> Self {
+        Self::Line {
+            line,
+            source: Box::new(self),
+        }
+    }
+
+    pub(super) fn in_file(path: &Path, source: io::Error) -> Self {
+        Self::File {
+            path: path.to_owned(),
+            source,
+        }
+    }
+}
+
+/// The longest users file, in octets.
+const LONGEST: u64 = 256 << 10;
+
+/// The users of a running station. Clones share them.
+#[derive(Clone, Debug)]
+pub struct UsersFile {
+    path: Arc<Path>,
+    content: Arc<Mutex<Content>>,
+}
+
+#[derive(Debug)]
+struct Content {
+    users: Arc<Users>,
+    edition: Edition,
+}
+
+/// Time of the last change and length of a file; `None` if it is not there.
+type Edition = Option<(SystemTime, u64)>;
+
+impl UsersFile {
+    /// Reads a users file.
+    ///
+    /// # Errors
+    /// If it cannot be read, can be read by other users of this host, or has a malformed line.
+    pub fn load(path: &Path) -> Result<Self, UsersError> {
+        let edition = edition(path);
+        let users = Arc::new(read(path)?);
+        Ok(Self {
+            path: path.into(),
+            content: Arc::new(Mutex::new(Content { users, edition })),
+        })
+    }
+
+    /// The users as last read.
+    #[must_use]
+    pub fn users(&self) -> Arc<Users> {
+        let content = self.content.lock().unwrap_or_else(PoisonError::into_inner);
+        content.users.clone()
+    }
+
+    /// Reads the file again if it has changed; returns whether it has. On an error the previous
+    /// users remain.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load), once for each change.
+    pub fn refresh(&self) -> Result<bool, UsersError> {
+        let edition = edition(&self.path);
+        let mut content = self.content.lock().unwrap_or_else(PoisonError::into_inner);
+        if content.edition == edition {
+            return Ok(false);
+        }
+        content.edition = edition;
+        content.users = Arc::new(read(&self.path)?);
+        Ok(true)
+    }
+}
+
+fn edition(path: &Path) -> Edition {
+    let metadata = fs::metadata(path).ok()?;
+    Some((metadata.modified().ok()?, metadata.len()))
+}
+
+fn read(path: &Path) -> Result<Users, UsersError> {
+    let metadata = fs::metadata(path).map_err(|source| UsersError::in_file(path, source))?;
+    if metadata.len() > LONGEST {
+        return Err(UsersError::TooLong(path.to_owned()));
+    }
+    check_mode(path, &metadata)?;
+    let text = fs::read_to_string(path).map_err(|source| UsersError::in_file(path, source))?;
+    Users::parse(&text)
+}
+
+/// Refuses a file that other users of the host can read: they could search for the passwords.
+#[cfg(unix)]
+fn check_mode(path: &Path, metadata: &fs::Metadata) -> Result<(), UsersError> {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    match metadata.permissions().mode() & 0o777 {
+        mode if mode & 0o077 != 0 => Err(UsersError::Readable {
+            path: path.to_owned(),
+            mode,
+        }),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(not(unix))]
+fn check_mode(_: &Path, _: &fs::Metadata) -> Result<(), UsersError> {
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::user;
+    use super::super::{add, remove};
+    use super::*;
+
+    #[test]
+    fn a_change_of_the_file_is_noticed_and_an_unusable_one_changes_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("users");
+        add(&path, &user("anna", UserRole::Drive)).unwrap();
+        let file = UsersFile::load(&path).unwrap();
+        assert!(!file.refresh().unwrap());
+        add(&path, &user("ben", UserRole::Observe)).unwrap();
+        assert!(file.refresh().unwrap());
+        assert_eq!(file.users().iter().len(), 2);
+        fs::write(&path, "ben\n").unwrap();
+        assert!(file.refresh().is_err());
+        assert!(!file.refresh().unwrap(), "an error is reported once");
+        assert_eq!(file.users().iter().len(), 2);
+        fs::remove_file(&path).unwrap();
+        assert!(file.refresh().is_err());
+        add(&path, &user("carl", UserRole::Drive)).unwrap();
+        assert!(file.refresh().unwrap());
+        remove(&path, "carl").unwrap();
+        assert!(file.refresh().unwrap());
+        assert_eq!(file.users().iter().len(), 0);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_that_others_can_read_is_refused_with_the_remedy() {
+        use std::os::unix::fs::PermissionsExt as _;
+
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("users");
+        add(&path, &user("anna", UserRole::Drive)).unwrap();
+        UsersFile::load(&path).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
+        let error = UsersFile::load(&path).unwrap_err().to_string();
+        assert!(error.contains("chmod 600"), "{error}");
+    }
+}

@@ -1,0 +1,317 @@
+//! Pages of users: login, roles, the end of sessions, and what the audit log has of it.
+
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+use futures_util::StreamExt;
+use jaus_audit::{AuditLog, Limits};
+use jaus_ocu::Station;
+use jaus_ocu::users::{self, PasswordHash, User, UserRole, UsersFile};
+use jaus_test_kit::waiting::{until, within_limit};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio_tungstenite::tungstenite::{Error, Message};
+
+use crate::scene::{Page, Scene, driver_of};
+
+/// The password of every user in these tests.
+const PASSWORD: &str = "correct horse battery";
+/// Its hash: hashing takes long.
+static HASH: LazyLock<PasswordHash> = LazyLock::new(|| PasswordHash::of(PASSWORD).unwrap());
+
+/// A station with the users anna (administer), ben (drive) and carl (observe).
+struct Guarded {
+    scene: Scene,
+    folder: TempDir,
+}
+
+impl Guarded {
+    async fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("users");
+        for (name, role) in [
+            ("anna", UserRole::Administer),
+            ("ben", UserRole::Drive),
+            ("carl", UserRole::Observe),
+        ] {
+            let user = User {
+                name: name.to_owned(),
+                role,
+                password: HASH.clone(),
+            };
+            users::add(&file, &user).unwrap();
+        }
+        let log = folder.path().join("audit.jsonl");
+        let station = Station {
+            users: Some(UsersFile::load(&file).unwrap()),
+            audit: Some(AuditLog::open(&log, Limits::default()).unwrap()),
+            ..Station::default()
+        };
+        let scene = Scene::with(station, 0).await;
+        Self { scene, folder }
+    }
+
+    fn users(&self) -> PathBuf {
+        self.folder.path().join("users")
+    }
+
+    fn audit(&self) -> String {
+        std::fs::read_to_string(self.folder.path().join("audit.jsonl")).unwrap()
+    }
+
+    /// Whether the audit log has an entry with these words.
+    fn has_recorded(&self, words: &[&str]) -> bool {
+        let log = self.audit();
+        log.lines()
+            .any(|line| words.iter().all(|it| line.contains(it)))
+    }
+
+    /// Sends a POST request. Returns the head of the response and its body.
+    async fn post(&self, path: &str, cookie: &str, body: &str) -> (String, String) {
+        let mut stream = TcpStream::connect(self.scene.address).await.unwrap();
+        let request = format!(
+            "POST {path} HTTP/1.1\r\nHost: localhost\r\nCookie: {cookie}\r\nContent-Length: {}\r\n\
+             Connection: close\r\n\r\n{body}",
+            body.len()
+        );
+        stream.write_all(request.as_bytes()).await.unwrap();
+        let mut answer = String::new();
+        within_limit(stream.read_to_string(&mut answer))
+            .await
+            .unwrap();
+        let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+        (head.to_owned(), body.to_owned())
+    }
+
+    async fn try_login(&self, name: &str, password: &str) -> (String, String) {
+        let body = json!({"name": name, "password": password}).to_string();
+        self.post("/login", "", &body).await
+    }
+
+    /// Logs in. Returns the cookie.
+    async fn login(&self, name: &str) -> String {
+        let (head, _) = self.try_login(name, PASSWORD).await;
+        assert!(head.starts_with("HTTP/1.1 204"), "{head}");
+        let mut lines = head.lines();
+        let cookie = lines
+            .find_map(|it| it.strip_prefix("set-cookie: "))
+            .unwrap();
+        for attribute in [
+            "; HttpOnly",
+            "; SameSite=Strict",
+            "; Path=/",
+            "; Max-Age=43200",
+        ] {
+            assert!(cookie.contains(attribute), "{cookie}");
+        }
+        cookie.split(';').next().unwrap().to_owned()
+    }
+
+    async fn get(&self, path: &str, cookie: &str) -> (String, Value) {
+        let headers = format!("Cookie: {cookie}\r\n");
+        let (head, body) = self.scene.get(path, &headers).await;
+        (head, serde_json::from_slice(&body).unwrap_or_default())
+    }
+
+    async fn page(&self, cookie: &str) -> Page {
+        let page = Page::try_open(self.scene.address, &[("cookie", cookie)]).await;
+        page.unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// Status of an attempt to open a page.
+    async fn page_status(&self, cookie: &str) -> u16 {
+        match Page::try_open(self.scene.address, &[("cookie", cookie)]).await {
+            Ok(_) => 101,
+            Err(error) => match *error {
+                Error::Http(answer) => answer.status().as_u16(),
+                other => panic!("{other}"),
+            },
+        }
+    }
+}
+
+/// Waits until the station closes the page at the end of its session.
+async fn session_ends(page: &mut Page) {
+    loop {
+        match within_limit(page.socket.next()).await {
+            Some(Ok(Message::Close(Some(frame)))) => {
+                return assert_eq!(u16::from(frame.code), 4001, "{frame}");
+            }
+            Some(Ok(_)) => {}
+            other => panic!("no close frame: {other:?}"),
+        }
+    }
+}
+
+#[tokio::test]
+async fn without_a_login_nothing_is_shown_but_the_form() {
+    let guarded = Guarded::new().await;
+    for cookie in ["", "jaus=x", "jaus-1=0123456789abcdef0123456789abcdef"] {
+        assert_eq!(guarded.page_status(cookie).await, 401);
+        let (head, _) = guarded.get("/map/101/1", cookie).await;
+        assert!(head.starts_with("http/1.1 401"), "{head}");
+        let (_, session) = guarded.get("/session", cookie).await;
+        assert_eq!(session, json!({"users": true, "user": null, "role": null}));
+    }
+    let (head, _) = guarded.get("/", "").await;
+    assert!(head.starts_with("http/1.1 200"), "{head}");
+}
+
+#[tokio::test]
+async fn a_wrong_password_and_an_unknown_user_get_the_same_answer() {
+    let guarded = Guarded::new().await;
+    let (head, wrong) = guarded.try_login("anna", "correct horse batterz").await;
+    assert!(head.starts_with("HTTP/1.1 401"), "{head}");
+    let (head, unknown) = guarded.try_login("dora", PASSWORD).await;
+    assert!(head.starts_with("HTTP/1.1 401"), "{head}");
+    assert_eq!(wrong, unknown);
+    let (_, health) = guarded.get("/health", "").await;
+    assert_eq!(health["failed_logins"], 2);
+}
+
+#[tokio::test]
+async fn after_five_failures_an_address_has_to_wait_even_with_the_right_password() {
+    let guarded = Guarded::new().await;
+    let mut slowed = false;
+    // A slow machine gets another attempt each 10 s.
+    for _ in 0..50 {
+        let (head, _) = guarded.try_login("anna", "wrong").await;
+        slowed = head.starts_with("HTTP/1.1 429");
+        if slowed {
+            assert!(head.to_lowercase().contains("retry-after: "), "{head}");
+            break;
+        }
+    }
+    assert!(slowed);
+    until(|| guarded.has_recorded(&["too many failed logins", "refused"])).await;
+}
+
+#[tokio::test]
+async fn one_who_observes_sees_the_vehicle_and_changes_nothing() {
+    let guarded = Guarded::new().await;
+    let cookie = guarded.login("carl").await;
+    let mut page = guarded.page(&cookie).await;
+    page.until(|state| driver_of(state)["state"] == "standby")
+        .await;
+    for request in [
+        json!({"type": "control", "on": true}),
+        json!({"type": "emergency", "on": true}),
+        json!({"type": "select", "subsystem": 101}),
+        json!({"type": "drive", "forward": 1, "turn": 0}),
+        json!({"type": "stop"}),
+    ] {
+        let refused = page.ask(request).await.unwrap_err();
+        assert!(refused.contains("requires the role drive"), "{refused}");
+    }
+    assert!(!guarded.scene.is_controlled());
+    let (head, _) = guarded.get("/sessions", &cookie).await;
+    assert!(head.starts_with("http/1.1 403"), "{head}");
+    until(|| guarded.has_recorded(&["carl", "take control", "refused", "role drive"])).await;
+}
+
+#[tokio::test]
+async fn all_pages_see_the_name_of_the_user_who_drives() {
+    let guarded = Guarded::new().await;
+    let mut watching = guarded.page(&guarded.login("carl").await).await;
+    let mut driving = guarded.page(&guarded.login("ben").await).await;
+    driving.select(101).await;
+    driving
+        .until(|state| !state["vehicle"]["pose"].is_null())
+        .await;
+    watching
+        .until(|state| state["control"]["user"].is_null())
+        .await;
+    let control = json!({"type": "control", "on": true});
+    driving.ask(control).await.unwrap();
+    watching
+        .until(|state| state["control"]["user"] == "ben")
+        .await;
+    driving
+        .ask(json!({"type": "control", "on": false}))
+        .await
+        .unwrap();
+    watching
+        .until(|state| state["control"]["user"].is_null())
+        .await;
+    until(|| guarded.has_recorded(&["ben", "release control", "allowed"])).await;
+    assert!(guarded.has_recorded(&["ben", "take control", "allowed"]));
+}
+
+#[tokio::test]
+async fn an_administrator_sees_who_is_logged_in_and_ends_a_session() {
+    let guarded = Guarded::new().await;
+    let ben = guarded.login("ben").await;
+    let anna = guarded.login("anna").await;
+    let mut page = guarded.page(&ben).await;
+    let (_, sessions) = guarded.get("/sessions", &anna).await;
+    let users: Vec<_> = sessions
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|it| &it["user"])
+        .collect();
+    assert_eq!(users, ["ben", "anna"]);
+    assert_eq!(sessions[1]["own"], true);
+    let end = format!("/sessions/{}/end", sessions[0]["id"]);
+    let (head, _) = guarded.post(&end, &ben, "").await;
+    assert!(head.starts_with("HTTP/1.1 403"), "{head}");
+    let (head, _) = guarded.post(&end, &anna, "").await;
+    assert!(head.starts_with("HTTP/1.1 204"), "{head}");
+    session_ends(&mut page).await;
+    assert_eq!(guarded.page_status(&ben).await, 401);
+    until(|| guarded.has_recorded(&["ben", "session ended", "ended by anna"])).await;
+}
+
+#[tokio::test]
+async fn a_logout_ends_the_session_and_its_pages() {
+    let guarded = Guarded::new().await;
+    let cookie = guarded.login("ben").await;
+    let mut page = guarded.page(&cookie).await;
+    let (head, _) = guarded.post("/logout", &cookie, "").await;
+    assert!(head.contains("Max-Age=0"), "{head}");
+    session_ends(&mut page).await;
+    assert_eq!(guarded.page_status(&cookie).await, 401);
+    until(|| guarded.has_recorded(&["ben", "logout"])).await;
+}
+
+#[tokio::test]
+async fn the_sessions_of_a_removed_user_end_and_those_of_others_go_on() {
+    let guarded = Guarded::new().await;
+    let mut removed = guarded.page(&guarded.login("ben").await).await;
+    let mut other = guarded.page(&guarded.login("carl").await).await;
+    assert!(users::remove(&guarded.users(), "ben").unwrap());
+    session_ends(&mut removed).await;
+    other.state().await;
+    until(|| guarded.has_recorded(&["ben", "the user was removed"])).await;
+}
+
+#[tokio::test]
+async fn the_audit_log_has_no_password_no_cookie_and_no_unknown_name() {
+    let guarded = Guarded::new().await;
+    let cookie = guarded.login("anna").await;
+    let (_, secret) = cookie.split_once('=').unwrap();
+    guarded.try_login("anna", "a-wrong-password").await;
+    guarded.try_login("a-password-as-name", "").await;
+    let mut page = guarded.page(&cookie).await;
+    page.ask(json!({"type": "control", "on": true})).await.ok();
+    guarded.post("/logout", &cookie, "").await;
+    until(|| guarded.has_recorded(&["anna", "logout"])).await;
+    assert!(guarded.has_recorded(&["anna", "login", "allowed", "127.0.0.1"]));
+    assert!(guarded.has_recorded(&["unknown user", "login", "refused"]));
+    let log = guarded.audit();
+    for word in [PASSWORD, "a-wrong-password", "a-password-as-name", secret] {
+        assert!(!log.contains(word), "{word} is in {log}");
+    }
+}
+
+#[tokio::test]
+async fn malformed_logins_are_refused() {
+    let guarded = Guarded::new().await;
+    let long = format!("{{\"name\":\"{}\"", "x".repeat(4000));
+    for body in ["", "{}", "[]", "\u{0}", "name=anna", &long] {
+        let (head, _) = guarded.post("/login", "", body).await;
+        assert!(head.starts_with("HTTP/1.1 400"), "{body}: {head}");
+    }
+}
