@@ -15,7 +15,7 @@ use hyper::body::Incoming;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
-use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt, ReadBuf};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::JoinSet;
 use tokio::time::{Instant, Sleep, sleep, timeout};
@@ -87,7 +87,7 @@ async fn serve_one(
     };
     let handshake = async {
         if !connection.begins_with_tls().await? {
-            connection.write_all(NO_TLS).await?;
+            connection.refuse(NO_TLS).await?;
             return Err(io::Error::other("a request without TLS"));
         }
         tls.accept(connection).await
@@ -142,6 +142,15 @@ impl Connection {
         let mut first = [0];
         self.stream.peek(&mut first).await?;
         Ok(first == [TLS_HANDSHAKE])
+    }
+
+    /// Answers a request that is not read further.
+    async fn refuse(&mut self, answer: &[u8]) -> io::Result<()> {
+        // Closing a socket with unread octets resets the connection, and the answer would be lost.
+        let mut request = [0; 4096];
+        let _ = self.read(&mut request).await?;
+        self.write_all(answer).await?;
+        self.shutdown().await
     }
 }
 
@@ -198,7 +207,7 @@ impl AsyncWrite for Connection {
 #[cfg(test)]
 mod tests {
     use axum::routing::get;
-    use tokio::io::{AsyncReadExt, duplex};
+    use tokio::io::duplex;
 
     use super::*;
 
@@ -234,5 +243,44 @@ mod tests {
         browser.read_to_end(&mut answer).await.unwrap();
         assert!(answer.ends_with(b"hello"), "{answer:?}");
         serving.await.unwrap();
+    }
+
+    /// What a browser receives from a server with TLS after these octets, and the time until the
+    /// server closes the connection.
+    #[cfg(feature = "https")]
+    async fn answer_with_tls(octets: &[u8]) -> (Vec<u8>, Duration) {
+        let folder = tempfile::tempdir().unwrap();
+        let now = std::time::SystemTime::UNIX_EPOCH + Duration::from_secs(1_800_000_000);
+        let tls = Tls::load_or_make(folder.path(), &[], now).unwrap();
+        let listener = TcpListener::bind(("127.0.0.1", 0)).await.unwrap();
+        let mut browser = TcpStream::connect(listener.local_addr().unwrap())
+            .await
+            .unwrap();
+        let serving = tokio::spawn(serve(listener, Some(tls), router()));
+        let start = Instant::now();
+        browser.write_all(octets).await.unwrap();
+        let mut answer = Vec::new();
+        browser.read_to_end(&mut answer).await.unwrap();
+        serving.abort();
+        (answer, start.elapsed())
+    }
+
+    #[cfg(feature = "https")]
+    #[tokio::test(start_paused = true)]
+    async fn a_handshake_that_is_not_completed_is_not_awaited_beyond_its_deadline() {
+        let begun = [TLS_HANDSHAKE, 3, 1, 2, 0];
+        for octets in [&[][..], &begun] {
+            let (_, time) = answer_with_tls(octets).await;
+            assert!(time >= HANDSHAKE && time < SILENCE, "{time:?}");
+        }
+    }
+
+    #[cfg(feature = "https")]
+    #[tokio::test]
+    async fn a_request_without_tls_is_told_to_use_https() {
+        let (answer, _) = answer_with_tls(b"GET / HTTP/1.1\r\n\r\n").await;
+        let answer = String::from_utf8(answer).unwrap();
+        assert!(answer.starts_with("HTTP/1.1 400 "), "{answer}");
+        assert!(answer.contains("https://"), "{answer}");
     }
 }

@@ -174,6 +174,7 @@ impl Login {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::users::PasswordHash;
     use crate::users::tests::{user, users};
 
     const MINUTE: Duration = Duration::from_secs(60);
@@ -227,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_session_ends_when_its_user_is_removed_or_loses_the_role() {
+    fn a_session_ends_when_its_user_is_removed_or_changed() {
         let (now, secret) = (Instant::now(), Token::generate().unwrap());
         let removed = users(&[("ben", UserRole::Drive)]);
         ends(&mut logins(now, &secret), now, &removed, Ending::Removed);
@@ -237,6 +238,15 @@ mod tests {
             now,
             &reduced,
             Ending::RoleReduced,
+        );
+        let mut other = user("anna", UserRole::Drive);
+        other.password = PasswordHash::of("another password").unwrap();
+        let changed = Users::of(vec![other]);
+        ends(
+            &mut logins(now, &secret),
+            now,
+            &changed,
+            Ending::PasswordChanged,
         );
         let raised = users(&[("anna", UserRole::Administer)]);
         let mut logins = logins(now, &secret);

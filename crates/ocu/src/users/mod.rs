@@ -101,6 +101,12 @@ impl Users {
     /// The most users of a file.
     pub const MOST: usize = 256;
 
+    /// Users that are not in a file.
+    #[must_use]
+    pub const fn of(users: Vec<User>) -> Self {
+        Self(users)
+    }
+
     /// Reads the text of a users file.
     ///
     /// # Errors
@@ -174,7 +180,7 @@ pub(crate) mod tests {
     }
 
     pub(crate) fn users(users: &[(&str, UserRole)]) -> Users {
-        Users(users.iter().map(|(name, role)| user(name, *role)).collect())
+        Users::of(users.iter().map(|(name, role)| user(name, *role)).collect())
     }
 
     #[test]

@@ -71,7 +71,7 @@ fn page_of(address: &str, name: &str) -> Browser {
     let mut page = Browser::start(None);
     page.look_on(SCREENS[0]);
     page.open(address);
-    page.wait("document.activeElement.id === 'login-name'");
+    page.wait("document.activeElement?.id === 'login-name'");
     is_accessible(&mut page, "Log in");
     page.type_keys(name);
     page.tab();
@@ -108,7 +108,7 @@ fn administrator_ends_the_session_of(address: &str, name: &str) {
 fn leaves(page: &mut Browser) {
     page.press("#account-button");
     page.press("#log-out");
-    page.wait("document.activeElement.id === 'login-name'");
+    page.wait("document.activeElement?.id === 'login-name'");
 }
 
 fn says_who_did_what(audit: &Path) {

@@ -1,11 +1,14 @@
 //! `jaus users`, and a station that requires users to log in.
 
 use std::fs;
+use std::io::{Read, Write};
+use std::net::TcpStream;
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use tempfile::TempDir;
 
-use crate::support::{Run, run};
+use crate::support::{Run, own_group, run};
 
 const PASSWORD: &str = "correct horse battery\n";
 
@@ -79,6 +82,57 @@ fn a_short_password_an_invalid_name_and_an_unknown_role_are_refused() {
     let role = host.add("anna", "fly");
     assert!(role.stderr.contains("administer"), "{role:?}");
     assert!(!fs::exists(host.file("users")).unwrap());
+}
+
+/// Sends a login to a station. Returns the response.
+fn log_in(address: &str, password: &str) -> String {
+    let body = format!("{{\"name\":\"anna\",\"password\":\"{}\"}}", password.trim());
+    let mut stream = TcpStream::connect(address).unwrap();
+    let head = "POST /login HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n";
+    write!(stream, "{head}Content-Length: {}\r\n\r\n{body}", body.len()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    answer
+}
+
+#[test]
+fn no_log_level_shows_a_password_or_a_cookie() {
+    const WRONG: &str = "a wrong password";
+    let host = Host::new();
+    host.add("anna", "drive");
+    // A file takes the output of this level at any speed.
+    let log = host.file("log");
+    let mut station = Command::new(env!("CARGO_BIN_EXE_jaus-ocu"))
+        .args(["--listen", "127.0.0.1:0", "--users", &host.file("users")])
+        .args(own_group())
+        .env("JAUS_LOG", "trace")
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(fs::File::create(&log).unwrap())
+        .spawn()
+        .unwrap();
+    let address = loop {
+        assert_eq!(station.try_wait().unwrap(), None, "it runs");
+        let text = fs::read_to_string(&log).unwrap();
+        if let Some((_, rest)) = text.split_once("page is at http://")
+            && let Some((address, _)) = rest.split_once('/')
+        {
+            break address.to_owned();
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    assert!(log_in(&address, WRONG).starts_with("HTTP/1.1 401"));
+    let answer = log_in(&address, PASSWORD);
+    let (_, cookie) = answer.split_once("set-cookie: ").unwrap();
+    let (_, secret) = cookie.split_once('=').unwrap();
+    let secret = secret.split(';').next().unwrap();
+    station.kill().unwrap();
+    station.wait().unwrap();
+    let text = fs::read_to_string(&log).unwrap();
+    assert!(text.contains("login of anna"), "{text}");
+    for word in [WRONG, PASSWORD.trim(), secret] {
+        assert!(!text.contains(word), "{word} is in {text}");
+    }
 }
 
 #[cfg(unix)]
