@@ -4,13 +4,14 @@ use std::env;
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::SystemTime;
 
 use clap::Args;
 use jaus::address::JausId;
 use jaus::link::Interfaces;
 use jaus::node::Config;
 use jaus_audit::{AuditLog, Limits};
-use jaus_secure::{Key, Peer, SecureLink, TrustFile, edit};
+use jaus_secure::{CertificateFiles, Credentials, Key, Peer, SecureLink, TrustFile, edit};
 use serde::Deserialize;
 
 use super::failure::Failure;
@@ -81,6 +82,47 @@ pub struct SecureFlags {
 
     #[command(flatten)]
     files: KeyFiles,
+
+    #[command(flatten)]
+    certificates: Certificates,
+}
+
+/// The files of a node that uses certificates instead of trusted keys.
+#[derive(Args, Clone, Debug, Default)]
+pub struct Certificates {
+    /// Use this certificate, and accept peers by theirs instead of by trusted keys
+    #[arg(long, value_name = "FILE")]
+    certificate: Option<PathBuf>,
+
+    /// The certificate of the authority that issued all of them [default: ca.crt beside the
+    /// certificate]
+    #[arg(long, value_name = "FILE")]
+    authority: Option<PathBuf>,
+
+    /// The authority's list of revoked certificates; without it, a certificate is accepted until it
+    /// expires
+    #[arg(long, value_name = "FILE")]
+    revoked: Option<PathBuf>,
+}
+
+impl Certificates {
+    fn files(&self) -> Result<Option<CertificateFiles>, Failure> {
+        let Some(certificate) = self.certificate.clone() else {
+            return match self.authority.as_ref().or(self.revoked.as_ref()) {
+                None => Ok(None),
+                Some(_) => Err(Failure::new(
+                    "an authority or a revocation list is for a node with a certificate: name it \
+                     with --certificate",
+                )),
+            };
+        };
+        let beside = || certificate.with_file_name("ca.crt");
+        Ok(Some(CertificateFiles {
+            authority: self.authority.clone().unwrap_or_else(beside),
+            revoked: self.revoked.clone(),
+            certificate,
+        }))
+    }
 }
 
 /// The files of keys.
@@ -104,12 +146,20 @@ impl KeyFiles {
         if let Some(path) = &self.key {
             return Ok(path.clone());
         }
+        Ok(Self::folder()?.join("node.key"))
+    }
+
+    /// The folder of keys if no flag names another.
+    ///
+    /// # Errors
+    /// Without a home directory.
+    pub fn folder() -> Result<PathBuf, Failure> {
         let home = || env::var_os("HOME").map(|home| Path::new(&home).join(".config"));
         let config = env::var_os("XDG_CONFIG_HOME").map(PathBuf::from);
         let folder = config.or_else(home).ok_or_else(|| {
             Failure::new("there is no home directory: name the file of the key with --key")
         })?;
-        Ok(folder.join("jaus").join("node.key"))
+        Ok(folder.join("jaus"))
     }
 
     /// The file of trusted keys.
@@ -136,6 +186,13 @@ struct Table {
     key: Option<PathBuf>,
     /// The file of the keys that this node trusts. Flag: `--trusted-keys`.
     trusted_keys: Option<PathBuf>,
+    /// The file of this node's certificate, with which it accepts peers by theirs instead of by
+    /// trusted keys. Flag: `--certificate`.
+    certificate: Option<PathBuf>,
+    /// The certificate of the authority; by default `ca.crt` beside the node's. Flag: `--authority`.
+    authority: Option<PathBuf>,
+    /// The authority's list of revoked certificates. Flag: `--revoked`.
+    revoked: Option<PathBuf>,
     /// The file of the audit log: sessions, refused messages, control, emergencies. Flag: `--audit`.
     audit: Option<PathBuf>,
 }
@@ -149,6 +206,7 @@ pub struct Secure {
     /// To be trusted at the first start.
     trust: Vec<Peer>,
     files: KeyFiles,
+    certificates: Certificates,
 }
 
 impl SecureFlags {
@@ -167,11 +225,24 @@ impl SecureFlags {
                 key: self.files.key.clone().or(table.key),
                 trusted_keys: self.files.trusted_keys.clone().or(table.trusted_keys),
             },
+            certificates: {
+                let flags = self.certificates.clone();
+                Certificates {
+                    certificate: flags.certificate.or(table.certificate),
+                    authority: flags.authority.or(table.authority),
+                    revoked: flags.revoked.or(table.revoked),
+                }
+            },
         };
         let is_wanted = secure.listen.is_some() || !secure.peers.is_empty();
         if !is_wanted && !secure.trust.is_empty() {
             return Err(Failure::new(
                 "--trust is for a secure link: add --secure-listen, or --secure-peer ADDRESS",
+            ));
+        }
+        if secure.uses_certificates() && !secure.trust.is_empty() {
+            return Err(Failure::new(
+                "--trust is for a node without a certificate: omit --trust or the certificate",
             ));
         }
         Ok(is_wanted.then_some(secure))
@@ -192,8 +263,36 @@ impl Secure {
     /// # Errors
     /// If their file cannot be used.
     pub fn trust(&self) -> Result<TrustFile, Failure> {
-        TrustFile::load(&self.files.trusted_keys()?)
+        let path = self.files.trusted_keys()?;
+        if self.uses_certificates() {
+            return TrustFile::load_optional(&path).map_err(Failure::of);
+        }
+        TrustFile::load(&path)
             .map_err(|error| Failure::new(format!("{error}; `jaus keys trust` writes that file")))
+    }
+
+    /// Whether this node uses certificates instead of trusted keys.
+    pub const fn uses_certificates(&self) -> bool {
+        self.certificates.certificate.is_some()
+    }
+
+    /// This node's key, and how it accepts those of its peers.
+    ///
+    /// # Errors
+    /// If a file cannot be used, or the node's own certificate is not valid.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "the node's certificate has to be valid when the node starts"
+    )]
+    pub fn credentials(&self) -> Result<Credentials, Failure> {
+        // A key that cannot be used is named with its remedy.
+        self.key()?;
+        let (key, trust) = (self.files.key()?, self.trust()?);
+        match self.certificates.files()? {
+            Some(files) => Credentials::load_certified(&key, &files, trust, SystemTime::now())
+                .map_err(Failure::of),
+            None => Credentials::load(&key, trust).map_err(Failure::of),
+        }
     }
 
     /// The addresses of the peers to connect to.
@@ -220,11 +319,10 @@ impl Secure {
     /// Opens the link.
     ///
     /// # Errors
-    /// A key or trust file that cannot be used, or an address that cannot be listened on.
+    /// A key, certificate or trust file that cannot be used, or an address that cannot be listened on.
     pub fn open(&self) -> Result<SecureLink, Failure> {
-        let key = self.key()?;
         trust_at_first_start(&self.files.trusted_keys()?, &self.trust)?;
-        let trust = self.trust()?;
+        let credentials = self.credentials()?;
         let any = || match self.peers.first() {
             Some(Address(SocketAddr::V6(_))) => SocketAddr::from(([0; 16], 0)),
             _ => SocketAddr::from(([0; 4], 0)),
@@ -234,7 +332,7 @@ impl Secure {
         for peer in self.peers() {
             settings = settings.connect(peer);
         }
-        let mut link = SecureLink::open(&key, trust, settings).map_err(Failure::of)?;
+        let mut link = SecureLink::open_with(credentials, settings).map_err(Failure::of)?;
         if let Some(path) = &self.audit {
             let log = AuditLog::open(path, Limits::default()).map_err(Failure::of)?;
             link = link.audited(log);
@@ -248,7 +346,7 @@ impl Secure {
 fn trust_at_first_start(file: &Path, peers: &[Peer]) -> Result<(), Failure> {
     if !file.exists() {
         let mut each = peers.iter();
-        return each.try_for_each(|peer| edit::trust(file, peer).map_err(Failure::of));
+        return each.try_for_each(|peer| edit::trust(file, peer, false).map_err(Failure::of));
     }
     if peers.is_empty() {
         return Ok(());
@@ -295,6 +393,28 @@ mod tests {
     }
 
     #[test]
+    fn an_authority_without_a_certificate_is_an_error() {
+        let path = || Some(PathBuf::from("ca.crt"));
+        for (authority, revoked) in [(path(), None), (None, path())] {
+            let certificate = None;
+            let certificates = Certificates {
+                certificate,
+                authority,
+                revoked,
+            };
+            let error = certificates.files().unwrap_err().to_string();
+            assert!(error.contains("--certificate"), "{error}");
+        }
+        let certificate = Some(PathBuf::from("/etc/jaus/rover.crt"));
+        let certificates = Certificates {
+            certificate,
+            ..Certificates::default()
+        };
+        let files = certificates.files().unwrap().unwrap();
+        assert_eq!(files.authority, PathBuf::from("/etc/jaus/ca.crt"));
+    }
+
+    #[test]
     fn a_restart_with_the_same_flags_does_not_undo_a_revocation() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("trusted_keys");
@@ -309,7 +429,7 @@ mod tests {
         let trust = TrustFile::load(&file).unwrap();
         assert_eq!(trust.find(operator.key), Some(operator.clone()));
 
-        edit::revoke(&file, "operator").unwrap();
+        edit::revoke(&file, "operator", None).unwrap();
         let refused = trust_at_first_start(&file, peers).unwrap_err().to_string();
         let remedy = format!("jaus keys trust operator {key} 60.255.255");
         assert!(refused.contains(&remedy), "{refused}");

@@ -7,7 +7,7 @@ mod probe;
 use std::io;
 use std::net::SocketAddr;
 use std::task::{Context, Poll};
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 
 use bytes::Bytes;
 use jaus::endpoint::{Remote, To, Transmit};
@@ -17,6 +17,7 @@ use jaus_audit::AuditLog;
 use tokio::io::ReadBuf;
 use tokio::net::UdpSocket;
 
+use crate::credentials::Credentials;
 use crate::key::Key;
 use crate::transport::Transport;
 use crate::trust::TrustFile;
@@ -72,6 +73,7 @@ pub struct OpenError {
 pub struct SecureLink {
     socket: UdpSocket,
     transport: Transport,
+    credentials: Credentials,
     /// The datagram that the kernel had no room for.
     leaving: Option<(SocketAddr, Bytes)>,
     buffer: Box<[u8]>,
@@ -85,13 +87,23 @@ impl SecureLink {
     /// # Errors
     /// If the address is not one of this host, or its port is taken.
     pub fn open(key: &Key, trust: TrustFile, settings: Settings) -> Result<Self, OpenError> {
+        Self::open_with(Credentials::pinned(key.clone(), trust), settings)
+    }
+
+    /// Opens the link with these credentials, and follows their files.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_with(credentials: Credentials, settings: Settings) -> Result<Self, OpenError> {
         let address = settings.listen;
         let socket = bind(address).map_err(|source| OpenError { address, source })?;
-        tracing::info!(listening = ?socket.local_addr().ok(), key = %key.public(), "secure link opened");
-        trust.follow();
+        let (listening, key) = (socket.local_addr().ok(), credentials.public());
+        tracing::info!(?listening, %key, "secure link opened");
+        credentials.follow();
         Ok(Self {
             socket,
-            transport: Transport::new(key, trust, settings.connect),
+            transport: Transport::with_credentials(credentials.clone(), settings.connect),
+            credentials,
             leaving: None,
             buffer: vec![0; LONGEST].into(),
             timeout: Some(node::now()),
@@ -145,6 +157,15 @@ impl SecureLink {
     }
 }
 
+/// The time at which certificates are checked.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "this module owns the link's clocks"
+)]
+fn wall_clock() -> SystemTime {
+    SystemTime::now()
+}
+
 fn bind(address: SocketAddr) -> io::Result<UdpSocket> {
     let socket = std::net::UdpSocket::bind(address)?;
     socket.set_nonblocking(true)?;
@@ -193,6 +214,7 @@ impl CustomLink for SecureLink {
         if let Some(arrival) = self.transport.poll_arrival() {
             return Poll::Ready(arrival);
         }
+        self.credentials.set_clock(wall_clock());
         self.transport.handle_timeout(now);
         if self.read(cx, now) {
             cx.waker().wake_by_ref();

@@ -47,6 +47,11 @@ impl Dial {
         Some(self.address)
     }
 
+    /// Makes the next attempt due at once.
+    pub(super) const fn hasten(&mut self) {
+        self.due = None;
+    }
+
     pub(super) const fn established(&mut self, session: SessionId) {
         self.session = Some(session);
         self.pause = FIRST_PAUSE;
