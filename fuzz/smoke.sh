@@ -6,7 +6,7 @@ cd "$(dirname "$0")"
 
 seconds=${1:-15}
 [ $# -eq 0 ] || shift
-[ $# -gt 0 ] || set -- judp fragments ra_node jtcp jserial local \
+[ $# -gt 0 ] || set -- judp fragments ra_node jtcp jserial local secure \
     service gateway capture generated dynamic jsidl_text
 
 cargo +nightly run --quiet --bin seeds

@@ -73,7 +73,7 @@ pub use forward::Routing;
 pub use link::{LinkId, LinkProfile, Path, Remote, SessionId, To, Transmit};
 pub use peers::{Peer, RouteState, Traffic};
 pub(crate) use rate::quota_address;
-pub use rate::{Buckets, Limits, Rate};
+pub use rate::{Bucket, Buckets, Limits, Rate};
 pub use send::SendError;
 pub use sink::{Ingress, Sink};
 
@@ -84,7 +84,7 @@ use delivery::Deliveries;
 use egress::{Egress, Level};
 use large::{Numbers, Reassembly};
 use peers::{CHALLENGE_FLAGS, Peers};
-use rate::{Bucket, Gate, Origin};
+use rate::{Gate, Origin};
 use recent::Recent;
 use verify::Warnings;
 

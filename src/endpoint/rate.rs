@@ -32,7 +32,8 @@ impl Rate {
     }
 
     /// How long it takes to gain this many tokens.
-    fn time_for(self, tokens: u32) -> Duration {
+    #[must_use]
+    pub fn time_for(self, tokens: u32) -> Duration {
         Duration::from_secs(tokens.into()) / self.per_second.max(1)
     }
 }
@@ -77,7 +78,7 @@ impl Default for Limits {
 
 /// A token bucket. It stores when it will be full again, which determines how many tokens it holds.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Bucket {
+pub struct Bucket {
     full: Option<Instant>,
 }
 
@@ -93,13 +94,14 @@ impl Bucket {
     }
 
     /// How long until the bucket is full.
-    pub(super) fn debt(self, now: Instant) -> Duration {
+    #[must_use]
+    pub fn debt(self, now: Instant) -> Duration {
         let debt = self.full.map(|full| full.saturating_duration_since(now));
         debt.unwrap_or_default()
     }
 
     /// Postpones the time at which the bucket is full.
-    pub(super) fn spend(&mut self, now: Instant, time: Duration) {
+    pub fn spend(&mut self, now: Instant, time: Duration) {
         self.full = Some(self.full.map_or(now, |full| full.max(now)) + time);
     }
 

@@ -10,7 +10,7 @@ use clap::{ArgMatches, Args, Command, CommandFactory, FromArgMatches, Parser};
 
 use super::failure::{Failure, Outcome};
 use super::logging::Logging;
-use super::network::Network;
+use super::network::{self, Network};
 use super::runtime::RunFor;
 use super::systemd::Systemd;
 use super::{output, reference, runtime, settings};
@@ -156,6 +156,9 @@ fn tell_place(id: JausId, node: Option<&Node>) {
     };
     for link in node.links() {
         tracing::info!("{id} on {}, UDP {}", link.interface.name, link.local);
+    }
+    if network::is_exposed(node) {
+        tracing::info!("{}", network::EXPOSED);
     }
 }
 

@@ -288,8 +288,8 @@ impl Network {
         #[cfg(feature = "secure")]
         if self.secure()?.is_some() {
             return Err(Failure::new(
-                "this command uses plain links only: omit --secure-listen and --secure-peer, or \
-                 choose a settings file without [secure]",
+                "this command uses plain links only: omit --secure-listen, --secure-peer and \
+                 --secure-announce, or choose a settings file without [secure]",
             ));
         }
         Ok(())
@@ -304,7 +304,8 @@ impl Network {
         #[cfg(feature = "secure")]
         if let Some(secure) = self.secure()? {
             let config = Secure::restrict(config)?;
-            return Node::start_with(config, vec![Box::new(secure.open()?)]).map_err(Failure::of);
+            let link = secure.open(JausId::new(config.subsystem, config.node, 0))?;
+            return Node::start_with(config, vec![Box::new(link)]).map_err(Failure::of);
         }
         Node::start(config).map_err(Failure::of)
     }
@@ -354,6 +355,17 @@ impl Network {
 pub const REMEDY: &str = "List components with `jaus discover`, choose the network with \
     --interface, or name a host that multicast does not reach with --peer; `jaus doctor` finds out \
     what is wrong";
+
+/// What a node says once at its start if it has plain links to other hosts.
+pub const EXPOSED: &str = "plain JUDP: every host on these networks can read and send messages in \
+    any id; secure links prevent that (docs/security.md)";
+
+/// Whether a node has plain links to other hosts.
+#[must_use]
+pub fn is_exposed(node: &Node) -> bool {
+    let links = node.links();
+    links.iter().any(|link| !link.local.ip().is_loopback())
+}
 
 /// Parses the id of a single component.
 pub fn one_component(text: &str) -> Result<JausId, String> {

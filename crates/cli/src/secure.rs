@@ -1,7 +1,9 @@
 //! Flags and settings of the secure link: this node's key, the keys that it trusts, and the peers.
 
-use std::env;
+mod files;
+
 use std::net::{IpAddr, SocketAddr};
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::SystemTime;
@@ -9,16 +11,22 @@ use std::time::SystemTime;
 use clap::Args;
 use jaus::address::JausId;
 use jaus::link::Interfaces;
-use jaus::node::Config;
+use jaus::node::{Config, units};
 use jaus_audit::{AuditLog, Limits};
-use jaus_secure::{CertificateFiles, Credentials, Key, Peer, SecureLink, TrustFile, edit};
+use jaus_secure::{Announce, Credentials, Key, Peer, SecureLink, TrustFile, edit};
 use serde::Deserialize;
+
+use files::Certificates;
+pub use files::KeyFiles;
 
 use super::failure::Failure;
 use super::settings;
 
 /// The UDP port of secure links.
 pub const PORT: u16 = 3795;
+
+/// The value of `--secure-announce` without an interface.
+const EVERYWHERE: &str = "all";
 
 /// An address with a port, [`PORT`] by default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -38,6 +46,37 @@ impl FromStr for Address {
 }
 
 impl TryFrom<String> for Address {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+/// Octets per second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+struct Budget(NonZeroU32);
+
+/// With less, handshakes and keep-alives alone would use up the budget.
+const LEAST_BUDGET: u32 = 5000;
+
+impl FromStr for Budget {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let size = text.strip_suffix("/s").and_then(|it| units::size(it).ok());
+        let octets = size.and_then(|octets| u32::try_from(octets).ok());
+        let octets = octets.filter(|&octets| octets >= LEAST_BUDGET);
+        octets.and_then(NonZeroU32::new).map(Self).ok_or_else(|| {
+            format!(
+                "`{text}` is not a rate from 5 kB/s to 4 GB/s: write \"200 kB/s\" or \"1.5 MB/s\""
+            )
+        })
+    }
+}
+
+impl TryFrom<String> for Budget {
     type Error = String;
 
     fn try_from(text: String) -> Result<Self, String> {
@@ -80,98 +119,26 @@ pub struct SecureFlags {
     #[arg(long, value_name = "PEER")]
     trust: Vec<Peer>,
 
+    /// Find peers that trust this node's key on this network, and be found by them, by signed
+    /// beacons; an interface limits them to its network [default: all interfaces] (repeatable)
+    #[arg(
+        long,
+        value_name = "INTERFACE",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = EVERYWHERE,
+    )]
+    secure_announce: Vec<String>,
+
+    /// Send at most this much per second by the secure link, such as "200 kB/s"
+    #[arg(long, value_name = "RATE")]
+    secure_budget: Option<Budget>,
+
     #[command(flatten)]
     files: KeyFiles,
 
     #[command(flatten)]
     certificates: Certificates,
-}
-
-/// The files of a node that uses certificates instead of trusted keys.
-#[derive(Args, Clone, Debug, Default)]
-pub struct Certificates {
-    /// Use this certificate, and accept peers by theirs instead of by trusted keys
-    #[arg(long, value_name = "FILE")]
-    certificate: Option<PathBuf>,
-
-    /// The certificate of the authority that issued all of them [default: ca.crt beside the
-    /// certificate]
-    #[arg(long, value_name = "FILE")]
-    authority: Option<PathBuf>,
-
-    /// The authority's list of revoked certificates; without it, a certificate is accepted until it
-    /// expires
-    #[arg(long, value_name = "FILE")]
-    revoked: Option<PathBuf>,
-}
-
-impl Certificates {
-    fn files(&self) -> Result<Option<CertificateFiles>, Failure> {
-        let Some(certificate) = self.certificate.clone() else {
-            return match self.authority.as_ref().or(self.revoked.as_ref()) {
-                None => Ok(None),
-                Some(_) => Err(Failure::new(
-                    "an authority or a revocation list is for a node with a certificate: name it \
-                     with --certificate",
-                )),
-            };
-        };
-        let beside = || certificate.with_file_name("ca.crt");
-        Ok(Some(CertificateFiles {
-            authority: self.authority.clone().unwrap_or_else(beside),
-            revoked: self.revoked.clone(),
-            certificate,
-        }))
-    }
-}
-
-/// The files of keys.
-#[derive(Args, Debug)]
-pub struct KeyFiles {
-    /// The file of this node's key [default: ~/.config/jaus/node.key]
-    #[arg(long, value_name = "FILE")]
-    key: Option<PathBuf>,
-
-    /// The file of the keys that this node trusts [default: trusted_keys beside the key]
-    #[arg(long, value_name = "FILE")]
-    trusted_keys: Option<PathBuf>,
-}
-
-impl KeyFiles {
-    /// The file of this node's key.
-    ///
-    /// # Errors
-    /// Without a flag and a home directory.
-    pub fn key(&self) -> Result<PathBuf, Failure> {
-        if let Some(path) = &self.key {
-            return Ok(path.clone());
-        }
-        Ok(Self::folder()?.join("node.key"))
-    }
-
-    /// The folder of keys if no flag names another.
-    ///
-    /// # Errors
-    /// Without a home directory.
-    pub fn folder() -> Result<PathBuf, Failure> {
-        let home = || env::var_os("HOME").map(|home| Path::new(&home).join(".config"));
-        let config = env::var_os("XDG_CONFIG_HOME").map(PathBuf::from);
-        let folder = config.or_else(home).ok_or_else(|| {
-            Failure::new("there is no home directory: name the file of the key with --key")
-        })?;
-        Ok(folder.join("jaus"))
-    }
-
-    /// The file of trusted keys.
-    ///
-    /// # Errors
-    /// As [`key`](Self::key).
-    pub fn trusted_keys(&self) -> Result<PathBuf, Failure> {
-        match &self.trusted_keys {
-            Some(path) => Ok(path.clone()),
-            None => Ok(self.key()?.with_file_name("trusted_keys")),
-        }
-    }
 }
 
 /// The table `[secure]` of a settings file.
@@ -182,6 +149,12 @@ struct Table {
     listen: Option<Address>,
     /// Connect to these peers. Flag: `--secure-peer`.
     peers: Vec<Address>,
+    /// Find peers by signed beacons, and be found by them: `true` for all interfaces, or names such
+    /// as `["eth0"]`. Flag: `--secure-announce`.
+    announce: Beacons,
+    /// The most octets to send per second on all sessions together, such as `"200 kB/s"`. The most
+    /// urgent messages come first. Flag: `--secure-budget`.
+    budget: Option<Budget>,
     /// The file of this node's key. Flag: `--key`.
     key: Option<PathBuf>,
     /// The file of the keys that this node trusts. Flag: `--trusted-keys`.
@@ -197,6 +170,37 @@ struct Table {
     audit: Option<PathBuf>,
 }
 
+/// The interfaces to send beacons on.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "true, false, or a list of interfaces such as [\"eth0\"]"
+)]
+enum Beacons {
+    OnAll(bool),
+    On(Vec<String>),
+}
+
+impl Default for Beacons {
+    fn default() -> Self {
+        Self::OnAll(false)
+    }
+}
+
+impl Beacons {
+    /// Those of the flags, or else of the settings file; `None` for no beacons.
+    fn interfaces(self, flags: &[String]) -> Option<Interfaces> {
+        match (flags, self) {
+            ([], Self::OnAll(false)) => None,
+            ([], Self::On(names)) if names.is_empty() => None,
+            ([], Self::On(names)) => Some(Interfaces::Only(names)),
+            ([], Self::OnAll(true)) => Some(Interfaces::All),
+            (flags, _) if flags.iter().any(|it| it == EVERYWHERE) => Some(Interfaces::All),
+            (flags, _) => Some(Interfaces::Only(flags.to_vec())),
+        }
+    }
+}
+
 /// The settings of a secure link.
 #[derive(Debug)]
 pub struct Secure {
@@ -205,6 +209,8 @@ pub struct Secure {
     audit: Option<PathBuf>,
     /// To be trusted at the first start.
     trust: Vec<Peer>,
+    announce: Option<Interfaces>,
+    budget: Option<Budget>,
     files: KeyFiles,
     certificates: Certificates,
 }
@@ -221,6 +227,8 @@ impl SecureFlags {
             peers: [&table.peers[..], &self.secure_peer].concat(),
             audit: self.audit.clone().or(table.audit),
             trust: self.trust.clone(),
+            announce: table.announce.interfaces(&self.secure_announce),
+            budget: self.secure_budget.or(table.budget),
             files: KeyFiles {
                 key: self.files.key.clone().or(table.key),
                 trusted_keys: self.files.trusted_keys.clone().or(table.trusted_keys),
@@ -234,15 +242,16 @@ impl SecureFlags {
                 }
             },
         };
-        let is_wanted = secure.listen.is_some() || !secure.peers.is_empty();
+        let is_wanted =
+            secure.listen.is_some() || !secure.peers.is_empty() || secure.announce.is_some();
         if !is_wanted && !secure.trust.is_empty() {
             return Err(Failure::new(
                 "--trust is for a secure link: add --secure-listen, or --secure-peer ADDRESS",
             ));
         }
-        if secure.uses_certificates() && !secure.trust.is_empty() {
+        if secure.uses_certificates() && (!secure.trust.is_empty() || secure.announce.is_some()) {
             return Err(Failure::new(
-                "--trust is for a node without a certificate: omit --trust or the certificate",
+                "--trust and announcing are for nodes that trust keys: omit them, or the certificate",
             ));
         }
         Ok(is_wanted.then_some(secure))
@@ -316,11 +325,11 @@ impl Secure {
         }
     }
 
-    /// Opens the link.
+    /// Opens the link of this node, an id without a component.
     ///
     /// # Errors
     /// A key, certificate or trust file that cannot be used, or an address that cannot be listened on.
-    pub fn open(&self) -> Result<SecureLink, Failure> {
+    pub fn open(&self, node: JausId) -> Result<SecureLink, Failure> {
         trust_at_first_start(&self.files.trusted_keys()?, &self.trust)?;
         let credentials = self.credentials()?;
         let any = || match self.peers.first() {
@@ -331,6 +340,12 @@ impl Secure {
         let mut settings = jaus_secure::Settings::new(listen);
         for peer in self.peers() {
             settings = settings.connect(peer);
+        }
+        if let Some(interfaces) = self.announce.clone() {
+            settings = settings.announce(Announce { interfaces, node });
+        }
+        if let Some(Budget(octets)) = self.budget {
+            settings = settings.budget(octets);
         }
         let mut link = SecureLink::open_with(credentials, settings).map_err(Failure::of)?;
         if let Some(path) = &self.audit {
@@ -393,28 +408,6 @@ mod tests {
     }
 
     #[test]
-    fn an_authority_without_a_certificate_is_an_error() {
-        let path = || Some(PathBuf::from("ca.crt"));
-        for (authority, revoked) in [(path(), None), (None, path())] {
-            let certificate = None;
-            let certificates = Certificates {
-                certificate,
-                authority,
-                revoked,
-            };
-            let error = certificates.files().unwrap_err().to_string();
-            assert!(error.contains("--certificate"), "{error}");
-        }
-        let certificate = Some(PathBuf::from("/etc/jaus/rover.crt"));
-        let certificates = Certificates {
-            certificate,
-            ..Certificates::default()
-        };
-        let files = certificates.files().unwrap().unwrap();
-        assert_eq!(files.authority, PathBuf::from("/etc/jaus/ca.crt"));
-    }
-
-    #[test]
     fn a_restart_with_the_same_flags_does_not_undo_a_revocation() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("trusted_keys");
@@ -434,6 +427,39 @@ mod tests {
         let remedy = format!("jaus keys trust operator {key} 60.255.255");
         assert!(refused.contains(&remedy), "{refused}");
         assert_eq!(TrustFile::load(&file).unwrap().find(operator.key), None);
+    }
+
+    #[test]
+    #[test]
+    fn beacons_are_sent_on_all_interfaces_or_on_the_named_ones() {
+        let only = |name: &str| Some(Interfaces::Only(vec![name.to_owned()]));
+        let from = |table: &str, flags: &[&str]| {
+            let table: Table = toml::from_str(table).unwrap();
+            let flags: Vec<_> = flags.iter().map(|&it| it.to_owned()).collect();
+            table.announce.interfaces(&flags)
+        };
+        assert_eq!(from("", &[]), None);
+        assert_eq!(from("announce = false", &[]), None);
+        assert_eq!(from("announce = []", &[]), None);
+        assert_eq!(from("announce = true", &[]), Some(Interfaces::All));
+        assert_eq!(from("announce = ['eth0']", &[]), only("eth0"));
+        assert_eq!(from("announce = ['eth0']", &["eth1"]), only("eth1"));
+        assert_eq!(from("", &[EVERYWHERE]), Some(Interfaces::All));
+        let error = toml::from_str::<Table>("announce = 3").unwrap_err();
+        assert!(error.to_string().contains("[\"eth0\"]"), "{error}");
+    }
+
+    #[test]
+    fn a_budget_is_a_size_for_each_second() {
+        let budget = |text: &str| text.parse::<Budget>().map(|Budget(octets)| octets.get());
+        assert_eq!(budget("200 kB/s"), Ok(200_000));
+        assert_eq!(budget("1.5MiB/s"), Ok(3 << 19));
+        for text in [
+            "", "200 kB", "200", "0/s", "1 kB/s", "5 GB/s", "kB/s", "-1 kB/s",
+        ] {
+            let error = budget(text).unwrap_err();
+            assert!(error.contains("200 kB/s"), "{error}");
+        }
     }
 
     #[test]

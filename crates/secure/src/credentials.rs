@@ -136,6 +136,10 @@ impl Credentials {
         self.own.get().key.public()
     }
 
+    pub(crate) fn trust(&self) -> TrustFile {
+        self.trust.clone()
+    }
+
     pub(crate) fn own_key(&self) -> Key {
         self.own.get().key.clone()
     }

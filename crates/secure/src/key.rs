@@ -9,9 +9,9 @@ use std::sync::Arc;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use ring::digest;
+use ring::digest::{Digest, SHA256, digest};
 use ring::rand::SystemRandom;
-use ring::signature::Ed25519KeyPair;
+use ring::signature::{ED25519, Ed25519KeyPair, UnparsedPublicKey};
 use rustls::SignatureScheme;
 use rustls::pki_types::{PrivatePkcs8KeyDer, SubjectPublicKeyInfoDer, pem::PemObject as _};
 use rustls::sign::SigningKey;
@@ -142,13 +142,15 @@ impl Key {
     }
 
     /// A secret for another purpose, the same whenever the node runs with this key.
-    pub(crate) fn secret_for(&self, purpose: &[u8]) -> digest::Digest {
-        let signer = self.signing.choose_scheme(&[SignatureScheme::ED25519]);
+    pub(crate) fn secret_for(&self, purpose: &[u8]) -> Digest {
         // Ed25519 signs everything, and the same text always in the same way.
-        let signature = signer
-            .and_then(|it| it.sign(purpose).ok())
-            .unwrap_or_default();
-        digest::digest(&digest::SHA256, &signature)
+        digest(&SHA256, &self.sign(purpose).unwrap_or_default())
+    }
+
+    /// Signs a message; `None` if the key refuses to.
+    pub(crate) fn sign(&self, message: &[u8]) -> Option<Vec<u8>> {
+        let signer = self.signing.choose_scheme(&[SignatureScheme::ED25519])?;
+        signer.sign(message).ok()
     }
 
     pub(crate) fn signing(&self) -> Arc<dyn SigningKey> {
@@ -173,6 +175,20 @@ impl PublicKey {
     #[must_use]
     pub const fn from_octets(octets: [u8; 32]) -> Self {
         Self(octets)
+    }
+
+    /// Its fingerprint.
+    #[must_use]
+    pub fn fingerprint(self) -> Fingerprint {
+        let mut octets = [0; 32];
+        octets.copy_from_slice(digest(&SHA256, &self.0).as_ref());
+        Fingerprint(octets)
+    }
+
+    /// Whether the private key has made this signature of this message.
+    pub(crate) fn has_signed(self, message: &[u8], signature: &[u8]) -> bool {
+        let key = UnparsedPublicKey::new(&ED25519, self.0);
+        key.verify(message, signature).is_ok()
     }
 
     pub(crate) fn from_spki(spki: &[u8]) -> Option<Self> {
@@ -211,6 +227,24 @@ impl FromStr for PublicKey {
         octets
             .map(Self)
             .ok_or_else(|| KeyError::Text(text.chars().take(60).collect()))
+    }
+}
+
+/// The SHA-256 of a public key, which names the key without showing it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Fingerprint([u8; 32]);
+
+impl Fingerprint {
+    /// From its octets.
+    #[must_use]
+    pub const fn from_octets(octets: [u8; 32]) -> Self {
+        Self(octets)
+    }
+
+    /// Its octets.
+    #[must_use]
+    pub const fn as_octets(&self) -> &[u8; 32] {
+        &self.0
     }
 }
 

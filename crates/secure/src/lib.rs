@@ -12,7 +12,7 @@
 //! * Instead, a node may have a [`Certificate`] of its team's [`Authority`], which names it and
 //!   holds its ids; see [`Credentials`].
 //! * [`SecureLink`] is the link. It listens on a UDP port of its own and dials the configured peers;
-//!   one side has to be reachable. The peers are two nodes of this crate: other JAUS
+//!   one side has to be reachable. With [beacons](beacon), nodes of one network find each other. The peers are two nodes of this crate: other JAUS
 //!   implementations have no counterpart.
 //!
 //! ```no_run
@@ -37,6 +37,7 @@
 #![forbid(unsafe_code)]
 
 mod authority;
+pub mod beacon;
 #[cfg(feature = "ca")]
 pub mod ca;
 mod certificate;
@@ -53,6 +54,6 @@ mod trust;
 pub use authority::{Authority, Rejection};
 pub use certificate::{Certificate, CertificateError, Defect};
 pub use credentials::{CertificateFiles, Credentials, CredentialsError};
-pub use key::{Key, KeyError, PublicKey};
-pub use link::{OpenError, Reached, SecureLink, Settings};
+pub use key::{Fingerprint, Key, KeyError, PublicKey};
+pub use link::{Announce, OpenError, Reached, SecureLink, Settings};
 pub use trust::{Grant, Peer, Trust, TrustError, TrustFile};

@@ -2,32 +2,36 @@
 #![expect(clippy::disallowed_types, reason = "this module owns the socket")]
 
 mod audit;
+mod beacons;
 mod probe;
+mod socket;
 
 use std::io;
 use std::net::SocketAddr;
+use std::num::NonZeroU32;
 use std::task::{Context, Poll};
 use std::time::{Instant, SystemTime};
 
-use bytes::Bytes;
 use jaus::endpoint::{Remote, To, Transmit};
+use jaus::link;
 use jaus::link::custom::{Arrival, CustomLink};
 use jaus::node;
 use jaus_audit::AuditLog;
-use tokio::io::ReadBuf;
-use tokio::net::UdpSocket;
 
+use beacons::Beacons;
+use socket::Socket;
+
+use crate::beacon;
 use crate::credentials::Credentials;
 use crate::key::Key;
-use crate::transport::Transport;
+use crate::transport::{Datagrams, Transport};
 use crate::trust::TrustFile;
 
+pub use beacons::Announce;
 pub use probe::Reached;
 
-/// UDP datagrams to read before the node's other links have their turn.
-const BATCH: usize = 64;
-/// The longest UDP datagram.
-const LONGEST: usize = 65_535;
+/// System calls to receive before the node's other links have their turn.
+const BATCH: usize = 8;
 
 /// The settings of a secure link.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,6 +42,10 @@ pub struct Settings {
     pub listen: SocketAddr,
     /// The peers to dial.
     pub connect: Vec<SocketAddr>,
+    /// Whether to find peers by [beacons](crate::beacon) and be found by them.
+    pub announce: Option<Announce>,
+    /// The most UDP octets to send per second, on all sessions together; `None` for no limit.
+    pub budget: Option<NonZeroU32>,
 }
 
 impl Settings {
@@ -47,6 +55,8 @@ impl Settings {
         Self {
             listen,
             connect: Vec::new(),
+            announce: None,
+            budget: None,
         }
     }
 
@@ -56,27 +66,48 @@ impl Settings {
         self.connect.push(peer);
         self
     }
+
+    /// Finds peers by beacons, and is found by them.
+    #[must_use]
+    pub fn announce(mut self, announce: Announce) -> Self {
+        self.announce = Some(announce);
+        self
+    }
+
+    /// Limits the UDP octets that are sent per second, on all sessions together.
+    #[must_use]
+    pub const fn budget(mut self, octets_per_second: NonZeroU32) -> Self {
+        self.budget = Some(octets_per_second);
+        self
+    }
 }
 
 /// Why a secure link was not opened.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot listen for secure links on UDP {address}: {source}")]
-pub struct OpenError {
-    /// The address.
-    address: SocketAddr,
-    /// The reason.
-    source: io::Error,
+#[non_exhaustive]
+pub enum OpenError {
+    /// The address is not one of this host, or its port is taken.
+    #[error("cannot listen for secure links on UDP {address}: {source}")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// The reason.
+        source: io::Error,
+    },
+    /// The interfaces for beacons are not there.
+    #[error("cannot announce the secure link: {0}")]
+    Announce(#[from] link::Error),
 }
 
 /// The secure link of a node. Must be opened within a tokio runtime.
 #[derive(Debug)]
 pub struct SecureLink {
-    socket: UdpSocket,
+    socket: Socket,
     transport: Transport,
     credentials: Credentials,
-    /// The datagram that the kernel had no room for.
-    leaving: Option<(SocketAddr, Bytes)>,
-    buffer: Box<[u8]>,
+    beacons: Option<Beacons>,
+    /// The datagrams that the kernel had no room for.
+    leaving: Option<Datagrams>,
     timeout: Option<Instant>,
     audit: Option<AuditLog>,
 }
@@ -85,7 +116,8 @@ impl SecureLink {
     /// Opens the link. Its first turn dials the peers.
     ///
     /// # Errors
-    /// If the address is not one of this host, or its port is taken.
+    /// If the address is not one of this host, or its port is taken; or if an interface for beacons
+    /// does not exist.
     pub fn open(key: &Key, trust: TrustFile, settings: Settings) -> Result<Self, OpenError> {
         Self::open_with(Credentials::pinned(key.clone(), trust), settings)
     }
@@ -96,16 +128,24 @@ impl SecureLink {
     /// As [`open`](Self::open).
     pub fn open_with(credentials: Credentials, settings: Settings) -> Result<Self, OpenError> {
         let address = settings.listen;
-        let socket = bind(address).map_err(|source| OpenError { address, source })?;
-        let (listening, key) = (socket.local_addr().ok(), credentials.public());
-        tracing::info!(?listening, %key, "secure link opened");
+        let socket =
+            Socket::bind(address).map_err(|source| OpenError::Listen { address, source })?;
+        let local = socket.local_addr();
+        let local = local.map_err(|source| OpenError::Listen { address, source })?;
+        let announce = settings.announce;
+        let beacons = announce.map(|it| Beacons::open(credentials.clone(), local, it));
+        tracing::info!(listening = %local, key = %credentials.public(), "secure link opened");
         credentials.follow();
+        let mut transport = Transport::with_credentials(credentials.clone(), settings.connect);
+        if let Some(budget) = settings.budget {
+            transport = transport.with_budget(budget);
+        }
         Ok(Self {
             socket,
-            transport: Transport::with_credentials(credentials.clone(), settings.connect),
+            transport,
             credentials,
+            beacons: beacons.transpose()?,
             leaving: None,
-            buffer: vec![0; LONGEST].into(),
             timeout: Some(node::now()),
             audit: None,
         })
@@ -140,14 +180,43 @@ impl SecureLink {
         }
     }
 
+    /// The counters of received beacons; `None` if it has no beacons.
+    #[must_use]
+    pub fn beacons(&self) -> Option<&beacon::Counters> {
+        self.beacons.as_ref().map(Beacons::counters)
+    }
+
+    /// Reads the beacons that have arrived, and dials the nodes that they show; returns whether there
+    /// may be more.
+    fn read_beacons(&mut self, cx: &mut Context<'_>, now: Instant) -> bool {
+        let Some(beacons) = &mut self.beacons else {
+            return false;
+        };
+        let (sightings, may_be_more) = beacons.read(cx, now);
+        for sighting in sightings {
+            self.transport.handle_sighting(now, sighting);
+        }
+        may_be_more
+    }
+
+    fn next_timeout(&mut self, now: Instant) -> Option<Instant> {
+        let beacons = self.beacons.as_ref().map(|it| it.due(now));
+        self.transport
+            .poll_timeout()
+            .into_iter()
+            .chain(beacons)
+            .min()
+    }
+
     /// Reads what the kernel has received; returns whether there may be more.
     fn read(&mut self, cx: &mut Context<'_>, now: Instant) -> bool {
         for _ in 0..BATCH {
-            let mut buffer = ReadBuf::new(&mut self.buffer);
-            match self.socket.poll_recv_from(cx, &mut buffer) {
-                Poll::Ready(Ok(from)) => {
-                    self.transport.handle_datagram(now, from, buffer.filled());
-                }
+            let transport = &mut self.transport;
+            let received = self.socket.poll_receive(cx, |from, datagram| {
+                transport.handle_datagram(now, from, datagram);
+            });
+            match received {
+                Poll::Ready(Ok(())) => {}
                 // On Linux the refusal of an earlier datagram, which says nothing of the others.
                 Poll::Ready(Err(error)) => tracing::debug!(%error, "secure link: receiving"),
                 Poll::Pending => return false,
@@ -155,21 +224,6 @@ impl SecureLink {
         }
         true
     }
-}
-
-/// The time at which certificates are checked.
-#[expect(
-    clippy::disallowed_methods,
-    reason = "this module owns the link's clocks"
-)]
-fn wall_clock() -> SystemTime {
-    SystemTime::now()
-}
-
-fn bind(address: SocketAddr) -> io::Result<UdpSocket> {
-    let socket = std::net::UdpSocket::bind(address)?;
-    socket.set_nonblocking(true)?;
-    UdpSocket::from_std(socket)
 }
 
 impl CustomLink for SecureLink {
@@ -190,22 +244,29 @@ impl CustomLink for SecureLink {
     }
 
     fn poll_flush(&mut self, cx: &mut Context<'_>, now: Instant) -> Poll<()> {
+        if let Some(beacons) = &mut self.beacons {
+            beacons.send(now, node::time_of_day());
+        }
         loop {
+            let most = self.socket.max_datagrams();
             let next = self.leaving.take();
-            let Some((to, datagram)) = next.or_else(|| self.transport.poll_transmit(now)) else {
+            let next = next.or_else(|| self.transport.poll_transmit(now, most));
+            let Some(datagrams) = next else {
                 break;
             };
-            match self.socket.poll_send_to(cx, &datagram, to) {
-                Poll::Ready(Ok(_)) => {}
+            match self.socket.poll_send(cx, &datagrams) {
+                Poll::Ready(Ok(())) => {}
                 // QUIC repeats what matters.
-                Poll::Ready(Err(error)) => tracing::debug!(%to, %error, "secure link: sending"),
+                Poll::Ready(Err(error)) => {
+                    tracing::debug!(to = %datagrams.to, %error, "secure link: sending");
+                }
                 Poll::Pending => {
-                    self.leaving = Some((to, datagram));
+                    self.leaving = Some(datagrams);
                     return Poll::Pending;
                 }
             }
         }
-        self.timeout = self.transport.poll_timeout();
+        self.timeout = self.next_timeout(now);
         self.write_records();
         Poll::Ready(())
     }
@@ -214,12 +275,14 @@ impl CustomLink for SecureLink {
         if let Some(arrival) = self.transport.poll_arrival() {
             return Poll::Ready(arrival);
         }
-        self.credentials.set_clock(wall_clock());
+        self.credentials
+            .set_clock(SystemTime::UNIX_EPOCH + node::time_of_day());
         self.transport.handle_timeout(now);
-        if self.read(cx, now) {
+        let beacons_wait = self.read_beacons(cx, now);
+        if self.read(cx, now) || beacons_wait {
             cx.waker().wake_by_ref();
         }
-        self.timeout = self.transport.poll_timeout();
+        self.timeout = self.next_timeout(now);
         self.transport
             .poll_arrival()
             .map_or(Poll::Pending, Poll::Ready)
@@ -230,6 +293,7 @@ impl CustomLink for SecureLink {
     }
 
     fn hang_up(&mut self) -> Poll<()> {
+        self.beacons = None;
         self.transport.close(node::now());
         if self.transport.is_closing() {
             Poll::Pending

@@ -398,6 +398,12 @@ impl TrustFile {
         self.len() == 0
     }
 
+    /// All trusted keys.
+    pub(crate) fn keys(&self) -> Vec<PublicKey> {
+        let trust = self.0.get();
+        trust.peers().iter().map(|peer| peer.key).collect()
+    }
+
     /// How often the trust was replaced.
     pub(crate) fn edition(&self) -> u64 {
         self.0.edition()

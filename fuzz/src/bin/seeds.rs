@@ -50,6 +50,12 @@ fn main() -> Result<()> {
     )?;
     write(&corpus.join("local"), "component", &[&[1], &component()])?;
     write(&corpus.join("local"), "node", &[&[30], &node()])?;
+    let [datagram, ..] = framed(&[0x01, 0xD7]);
+    let in_stream = jaus_secure::transport::framed(&datagram).expect("a short datagram");
+    write(&corpus.join("secure"), "beacon", &[&[5], &beacon()])?;
+    write(&corpus.join("secure"), "datagram", &[&[5], &datagram])?;
+    let streams = [&[5], &in_stream[..], &in_stream];
+    write(&corpus.join("secure"), "stream", &streams)?;
     for entry in jsidl::catalogue::entries() {
         let name = entry.path.replace('/', "-");
         write(
@@ -59,6 +65,24 @@ fn main() -> Result<()> {
         )?;
     }
     Ok(())
+}
+
+/// A beacon of the key that the target trusts, with a wrong signature.
+fn beacon() -> Vec<u8> {
+    use jaus_secure::PublicKey;
+    use jaus_secure::beacon::{Beacon, LENGTH, Stamp};
+
+    let beacon = Beacon {
+        fingerprint: PublicKey::from_octets([7; 32]).fingerprint(),
+        subsystem: 101,
+        node: 1,
+        address: [10, 0, 0, 1].into(),
+        port: 3795,
+        stamp: Stamp::default(),
+    };
+    let mut octets = beacon.encode();
+    octets.resize(LENGTH, 0);
+    octets
 }
 
 /// Octets that make a value with optional members and a few elements.
@@ -138,7 +162,13 @@ fn node() -> Vec<u8> {
         },
         outcome(1, Outcome::Acknowledged),
         outcome(2, unacknowledged),
-        Record::with_text(Head::Outcome { handle: 3, outcome: Outcome::Rejected }, "no"),
+        Record::with_text(
+            Head::Outcome {
+                handle: 3,
+                outcome: Outcome::Rejected,
+            },
+            "no",
+        ),
         Record::with_text(Head::Refused(Reason::Taken), "no"),
     ])
 }

@@ -19,4 +19,5 @@ mod gateway;
 mod judge;
 mod nodes;
 mod safety;
+mod secure;
 mod testbed;

@@ -6,7 +6,8 @@ use bytes::{Buf as _, BufMut as _, Bytes, BytesMut};
 const PREFIX: usize = 2;
 
 /// The datagram as it is written to a stream; `None` if it is too long for the prefix.
-pub(super) fn framed(datagram: &[u8]) -> Option<Bytes> {
+#[must_use]
+pub fn framed(datagram: &[u8]) -> Option<Bytes> {
     let length = u16::try_from(datagram.len()).ok()?;
     let mut framed = BytesMut::with_capacity(PREFIX + datagram.len());
     framed.put_u16_le(length);
@@ -17,16 +18,20 @@ pub(super) fn framed(datagram: &[u8]) -> Option<Bytes> {
 /// Collects the octets of one stream and finds the datagrams. Holds at most one incomplete
 /// datagram, 64 KiB.
 #[derive(Debug, Default)]
-pub(super) struct Inlet(BytesMut);
+pub struct Inlet(BytesMut);
 
 impl Inlet {
     /// Adds octets. Take the [complete datagrams](Self::next) before adding more.
-    pub(super) fn push(&mut self, octets: &[u8]) {
+    pub fn push(&mut self, octets: &[u8]) {
         self.0.extend_from_slice(octets);
     }
 
     /// The next complete datagram.
-    pub(super) fn next(&mut self) -> Option<Bytes> {
+    #[expect(
+        clippy::should_implement_trait,
+        reason = "more datagrams may follow after there was none"
+    )]
+    pub fn next(&mut self) -> Option<Bytes> {
         let prefix = self.0.first_chunk::<PREFIX>()?;
         let length = usize::from(u16::from_le_bytes(*prefix));
         if self.0.len() < PREFIX + length {

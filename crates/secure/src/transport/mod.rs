@@ -14,6 +14,7 @@
 //! public key dialled, or else the newer one.
 
 mod dial;
+mod egress;
 mod inlet;
 mod parameters;
 mod record;
@@ -38,6 +39,8 @@ use quinn_proto::{
     StreamEvent, VarInt,
 };
 
+pub use egress::Datagrams;
+pub use inlet::{Inlet, framed};
 pub use record::{Act, Fault, Record};
 pub use report::{Counters, SessionReport};
 
@@ -47,6 +50,7 @@ use crate::key::{Key, PublicKey};
 use crate::tls::Refusals;
 use crate::trust::TrustFile;
 use dial::Dial;
+use egress::Budget;
 use session::Session;
 
 /// Limit of unfinished handshakes.
@@ -94,6 +98,9 @@ pub struct Transport {
     responses: VecDeque<(SocketAddr, Bytes)>,
     records: VecDeque<Record>,
     counters: Counters,
+    budget: Option<Budget>,
+    /// How often a session was served within the budget.
+    turns: u64,
     buffer: Vec<u8>,
 }
 
@@ -135,6 +142,8 @@ impl Transport {
             responses: VecDeque::new(),
             records: VecDeque::new(),
             counters: Counters::default(),
+            budget: None,
+            turns: 0,
             buffer: Vec::new(),
         }
     }
@@ -218,28 +227,13 @@ impl Transport {
         self.arrivals.pop_front()
     }
 
-    /// The next UDP datagram to send, and its destination.
-    pub fn poll_transmit(&mut self, now: Instant) -> Option<(SocketAddr, Bytes)> {
-        if let Some(response) = self.responses.pop_front() {
-            return Some(response);
-        }
-        for session in self.sessions.values_mut() {
-            session.flush();
-            self.buffer.clear();
-            if let Some(transmit) = session.connection.poll_transmit(now, 1, &mut self.buffer) {
-                let datagram = Bytes::copy_from_slice(&self.buffer[..transmit.size]);
-                return Some((transmit.destination, datagram));
-            }
-        }
-        None
-    }
-
     /// When to call [`handle_timeout`](Self::handle_timeout) if nothing happens before.
     pub fn poll_timeout(&mut self) -> Option<Instant> {
         let sessions = self.sessions.values_mut();
         let sessions = sessions.filter_map(|it| it.connection.poll_timeout());
         let dials = self.dials.iter().filter_map(Dial::due);
-        sessions.chain(dials).min()
+        let budget = self.budget.as_ref().and_then(Budget::ready);
+        sessions.chain(dials).chain(budget).min()
     }
 
     /// Closes all sessions and dials no more.
@@ -255,25 +249,6 @@ impl Transport {
     #[must_use]
     pub fn is_closing(&self) -> bool {
         self.sessions.values().any(|it| !it.ended)
-    }
-
-    fn dial(&mut self, now: Instant) {
-        for index in 0..self.dials.len() {
-            let Some(address) = self.dials[index].start(now) else {
-                continue;
-            };
-            let client = self.client.clone();
-            match self.endpoint.connect(now, client, address, "jaus") {
-                Ok((handle, connection)) => {
-                    let id = self.insert(Session::new(handle, connection, Some(index)));
-                    self.dials[index].session = Some(id);
-                }
-                Err(error) => {
-                    tracing::warn!(%address, %error, "cannot dial the secure peer");
-                    self.dials[index].lost(now, false);
-                }
-            }
-        }
     }
 
     /// Decides on a new connection from a peer.

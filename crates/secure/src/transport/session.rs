@@ -48,6 +48,8 @@ pub(super) struct Session {
     inlets: BTreeMap<StreamId, Inlet>,
     pub(super) received: u64,
     pub(super) sent: u64,
+    /// When it was served last within the budget, as a number that grows.
+    pub(super) turn: u64,
 }
 
 /// The stream to the peer for one priority.
@@ -77,6 +79,7 @@ impl Session {
             inlets: BTreeMap::new(),
             received: 0,
             sent: 0,
+            turn: 0,
         }
     }
 
@@ -115,27 +118,37 @@ impl Session {
         self.write(usize::from(Priority::Standard.bits()), &[]);
     }
 
-    /// Passes waiting datagrams to the connection, as far as it takes them.
-    pub(super) fn flush(&mut self) {
+    /// The priority of the datagram that waits next.
+    pub(super) fn next_priority(&self) -> Option<Priority> {
+        self.backlog.first().map(|&(priority, _)| priority)
+    }
+
+    /// Passes the next waiting datagram to the connection; returns its octets, or `None` if there is
+    /// none or the connection takes no more.
+    pub(super) fn flush_one(&mut self) -> Option<usize> {
+        let (priority, datagram) = self.backlog.first().cloned()?;
+        let level = usize::from(priority.bits());
+        let is_taken = if travels_on_stream(&datagram) {
+            self.write(level, &datagram)
+        } else {
+            match self.connection.datagrams().send(datagram.clone(), false) {
+                Ok(()) => true,
+                Err(SendDatagramError::Blocked(_)) => false,
+                Err(_) => self.write(level, &datagram),
+            }
+        };
+        if !is_taken {
+            return None;
+        }
+        self.sent += 1;
+        drop(self.backlog.pop());
+        Some(datagram.len())
+    }
+
+    /// Goes on writing the datagrams that streams have taken in part.
+    pub(super) fn write_rests(&mut self) {
         for level in 0..self.outlets.len() {
             self.write_rest(level);
-        }
-        while let Some((priority, datagram)) = self.backlog.first().cloned() {
-            let level = usize::from(priority.bits());
-            let taken = if travels_on_stream(&datagram) {
-                self.write(level, &datagram)
-            } else {
-                match self.connection.datagrams().send(datagram.clone(), false) {
-                    Ok(()) => true,
-                    Err(SendDatagramError::Blocked(_)) => false,
-                    Err(_) => self.write(level, &datagram),
-                }
-            };
-            if !taken {
-                break;
-            }
-            self.sent += 1;
-            drop(self.backlog.pop());
         }
     }
 

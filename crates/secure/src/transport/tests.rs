@@ -4,6 +4,9 @@
     reason = "virtual time starts at any instant"
 )]
 
+mod beacons;
+mod budget;
+
 use std::collections::BTreeMap;
 
 use jaus::address::JausId;
@@ -92,7 +95,8 @@ impl Network {
     fn collect(&mut self) {
         for host in &mut self.hosts {
             host.transport.handle_timeout(self.now);
-            while let Some((to, octets)) = host.transport.poll_transmit(self.now) {
+            while let Some(Datagrams { to, octets, .. }) = host.transport.poll_transmit(self.now, 1)
+            {
                 self.number += 1;
                 self.record.push((to, host.address, octets.clone()));
                 if self.loss == 0 || !self.number.is_multiple_of(self.loss) {
@@ -393,7 +397,7 @@ fn a_flood_of_handshakes_from_one_address_is_bounded_and_keeps_no_other_out() {
     for _ in 0..500 {
         let mut stranger = Transport::new(&keys[2], rover.clone(), [address(1)]);
         stranger.handle_timeout(network.now);
-        while let Some((to, octets)) = stranger.poll_transmit(network.now) {
+        while let Some(Datagrams { to, octets, .. }) = stranger.poll_transmit(network.now, 1) {
             network.deliver(to, address(66), &octets);
         }
     }
@@ -409,12 +413,12 @@ fn ten_thousand_first_packets_a_second_are_answered_a_hundred_times() {
     let (mut network, ..) = vehicle_and_operator();
     let mut stranger = Transport::new(&key(), TrustFile::default(), [address(1)]);
     stranger.handle_timeout(network.now);
-    let (to, first) = stranger.poll_transmit(network.now).unwrap();
+    let first = stranger.poll_transmit(network.now, 1).unwrap();
     for number in 0..10_000u32 {
         // Another destination id makes it another handshake; that it does not decrypt is found last.
-        let mut packet = first.to_vec();
+        let mut packet = first.octets.to_vec();
         packet[6..10].copy_from_slice(&number.to_le_bytes());
-        network.deliver(to, address(66), &packet);
+        network.deliver(first.to, address(66), &packet);
     }
     let vehicle = &mut network.hosts[0].transport;
     assert!(vehicle.counters().handshakes_dropped >= 9_900);

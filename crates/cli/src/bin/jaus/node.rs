@@ -9,7 +9,7 @@ use jaus::component::{Change, Component, Kind};
 use jaus::endpoint::Event;
 use jaus::node::{ComponentEvents, Events, LinkReport, Local, Node, units};
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::network::{Network, SubsystemKind};
+use jaus_cli::network::{self, Network, SubsystemKind};
 use jaus_cli::runtime::{self, RunFor};
 use jaus_cli::statistics::{self, DropWatch};
 use jaus_cli::tree;
@@ -200,6 +200,9 @@ pub(crate) fn introduce(
             "on {}: UDP {}, {group}",
             link.interface.name, link.local
         ))?;
+    }
+    if network::is_exposed(node) {
+        output.line(network::EXPOSED)?;
     }
     if let Some(tcp) = node.tcp() {
         let listening = tcp.listening.map_or_else(

@@ -58,8 +58,8 @@ pub(crate) fn first_packet() -> Vec<u8> {
     let victim = VEHICLE.parse().unwrap();
     let mut transport = Transport::new(&key, TrustFile::default(), [victim]);
     transport.handle_timeout(Instant::now());
-    let (_, packet) = transport.poll_transmit(Instant::now()).unwrap();
-    packet.to_vec()
+    let packets = transport.poll_transmit(Instant::now(), 1).unwrap();
+    packets.octets.to_vec()
 }
 
 /// An attacker that aims at the port of secure links.

@@ -224,6 +224,8 @@ fn write_secure(page: &mut String) {
         let value = match (&field.kind, field.name.as_str()) {
             (Kind::List(_), _) => "list of addresses",
             (_, "listen") => "address",
+            (_, "budget") => "rate",
+            (_, "announce") => "boolean, or list of interfaces",
             _ => "path",
         };
         let about = field.about.replace('\n', " ");

@@ -125,7 +125,7 @@ impl Demo {
     fn way(&self) -> &'static str {
         #[cfg(feature = "secure")]
         if self.secure {
-            return "over secure links (QUIC) to the\nvehicle's first node, which relays between them";
+            return "over secure links (QUIC) through a relay";
         }
         "over UDP on the loopback interface"
     }

@@ -63,6 +63,12 @@ impl System {
         self
     }
 
+    /// The secure links.
+    #[cfg(all(test, feature = "secure"))]
+    pub(super) fn links(&mut self) -> &mut SecureLinks {
+        self.secure.as_mut().unwrap()
+    }
+
     /// The flags by which other commands join the system.
     pub(super) fn flags(&self) -> String {
         #[cfg(feature = "secure")]
@@ -110,7 +116,7 @@ impl System {
 
     fn start_node(&mut self, subsystem: u16, number: u8) -> Result<Node, Failure> {
         #[cfg(feature = "secure")]
-        if let Some(links) = &mut self.secure {
+        if let Some(links) = &self.secure {
             return links.start(subsystem, number);
         }
         let config = Config::loopback(subsystem, number).group(self.network.group());
@@ -153,6 +159,10 @@ impl System {
         self.parts.shutdown().await;
         for node in self.nodes {
             node.shutdown().await;
+        }
+        #[cfg(feature = "secure")]
+        if let Some(links) = self.secure {
+            links.stop().await;
         }
     }
 }

@@ -74,7 +74,8 @@ impl Doctor {
         #[cfg(feature = "secure")]
         let config = match self.network.secure()? {
             Some(link) => {
-                report.add_all(secure::check(&link, self.duration).await)?;
+                let node = jaus::address::JausId::new(config.subsystem, config.node, 0);
+                report.add_all(secure::check(&link, node, self.duration).await)?;
                 match secure::plain(config) {
                     Ok(Some(config)) => config,
                     Ok(None) => return Ok(()),

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use jaus::address::JausId;
 use jaus::link::Interfaces;
 use jaus::node::Config;
 use jaus_cli::output::counted;
@@ -14,7 +15,7 @@ use super::finding::Finding;
 const CHECK: &str = "secure";
 
 /// Checks the link, and connects to its peers.
-pub(super) async fn check(secure: &Secure, time: Duration) -> Vec<Finding> {
+pub(super) async fn check(secure: &Secure, node: JausId, time: Duration) -> Vec<Finding> {
     let accepts = if secure.uses_certificates() {
         certificate
     } else {
@@ -24,7 +25,7 @@ pub(super) async fn check(secure: &Secure, time: Duration) -> Vec<Finding> {
     if findings.iter().any(Finding::is_problem) {
         return findings;
     }
-    let mut link = match secure.open() {
+    let mut link = match secure.open(node) {
         Ok(link) => link,
         Err(error) => {
             findings.push(Finding::problem(CHECK, error).advice(
