@@ -430,7 +430,6 @@ mod tests {
     }
 
     #[test]
-    #[test]
     fn beacons_are_sent_on_all_interfaces_or_on_the_named_ones() {
         let only = |name: &str| Some(Interfaces::Only(vec![name.to_owned()]));
         let from = |table: &str, flags: &[&str]| {
