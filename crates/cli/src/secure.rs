@@ -1,20 +1,25 @@
 //! Flags and settings of the secure link: this node's key, the keys that it trusts, and the peers.
 
+mod files;
+
 use std::net::{IpAddr, SocketAddr};
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::SystemTime;
 
 use clap::Args;
 use jaus::address::JausId;
 use jaus::link::Interfaces;
 use jaus::node::{Config, units};
 use jaus_audit::{AuditLog, Limits};
-use jaus_secure::{Announce, Key, Peer, SecureLink, TrustFile, edit};
+use jaus_secure::{Announce, Credentials, Key, Peer, SecureLink, TrustFile, edit};
 use serde::Deserialize;
 
+use files::Certificates;
+pub use files::KeyFiles;
+
 use super::failure::Failure;
-use super::folders::config_folder;
 use super::settings;
 
 /// The UDP port of secure links.
@@ -131,45 +136,9 @@ pub struct SecureFlags {
 
     #[command(flatten)]
     files: KeyFiles,
-}
 
-/// The files of keys.
-#[derive(Args, Debug)]
-pub struct KeyFiles {
-    /// The file of this node's key [default: ~/.config/jaus/node.key]
-    #[arg(long, value_name = "FILE")]
-    key: Option<PathBuf>,
-
-    /// The file of the keys that this node trusts [default: trusted_keys beside the key]
-    #[arg(long, value_name = "FILE")]
-    trusted_keys: Option<PathBuf>,
-}
-
-impl KeyFiles {
-    /// The file of this node's key.
-    ///
-    /// # Errors
-    /// Without a flag and a home directory.
-    pub fn key(&self) -> Result<PathBuf, Failure> {
-        if let Some(path) = &self.key {
-            return Ok(path.clone());
-        }
-        let folder = config_folder().ok_or_else(|| {
-            Failure::new("there is no home directory: name the file of the key with --key")
-        })?;
-        Ok(folder.join("node.key"))
-    }
-
-    /// The file of trusted keys.
-    ///
-    /// # Errors
-    /// As [`key`](Self::key).
-    pub fn trusted_keys(&self) -> Result<PathBuf, Failure> {
-        match &self.trusted_keys {
-            Some(path) => Ok(path.clone()),
-            None => Ok(self.key()?.with_file_name("trusted_keys")),
-        }
-    }
+    #[command(flatten)]
+    certificates: Certificates,
 }
 
 /// The table `[secure]` of a settings file.
@@ -190,6 +159,13 @@ struct Table {
     key: Option<PathBuf>,
     /// The file of the keys that this node trusts. Flag: `--trusted-keys`.
     trusted_keys: Option<PathBuf>,
+    /// The file of this node's certificate, with which it accepts peers by theirs instead of by
+    /// trusted keys. Flag: `--certificate`.
+    certificate: Option<PathBuf>,
+    /// The certificate of the authority; by default `ca.crt` beside the node's. Flag: `--authority`.
+    authority: Option<PathBuf>,
+    /// The authority's list of revoked certificates. Flag: `--revoked`.
+    revoked: Option<PathBuf>,
     /// The file of the audit log: sessions, refused messages, control, emergencies. Flag: `--audit`.
     audit: Option<PathBuf>,
 }
@@ -236,6 +212,7 @@ pub struct Secure {
     announce: Option<Interfaces>,
     budget: Option<Budget>,
     files: KeyFiles,
+    certificates: Certificates,
 }
 
 impl SecureFlags {
@@ -256,12 +233,25 @@ impl SecureFlags {
                 key: self.files.key.clone().or(table.key),
                 trusted_keys: self.files.trusted_keys.clone().or(table.trusted_keys),
             },
+            certificates: {
+                let flags = self.certificates.clone();
+                Certificates {
+                    certificate: flags.certificate.or(table.certificate),
+                    authority: flags.authority.or(table.authority),
+                    revoked: flags.revoked.or(table.revoked),
+                }
+            },
         };
         let is_wanted =
             secure.listen.is_some() || !secure.peers.is_empty() || secure.announce.is_some();
         if !is_wanted && !secure.trust.is_empty() {
             return Err(Failure::new(
                 "--trust is for a secure link: add --secure-listen, or --secure-peer ADDRESS",
+            ));
+        }
+        if secure.uses_certificates() && (!secure.trust.is_empty() || secure.announce.is_some()) {
+            return Err(Failure::new(
+                "--trust and announcing are for nodes that trust keys: omit them, or the certificate",
             ));
         }
         Ok(is_wanted.then_some(secure))
@@ -282,8 +272,36 @@ impl Secure {
     /// # Errors
     /// If their file cannot be used.
     pub fn trust(&self) -> Result<TrustFile, Failure> {
-        TrustFile::load(&self.files.trusted_keys()?)
+        let path = self.files.trusted_keys()?;
+        if self.uses_certificates() {
+            return TrustFile::load_optional(&path).map_err(Failure::of);
+        }
+        TrustFile::load(&path)
             .map_err(|error| Failure::new(format!("{error}; `jaus keys trust` writes that file")))
+    }
+
+    /// Whether this node uses certificates instead of trusted keys.
+    pub const fn uses_certificates(&self) -> bool {
+        self.certificates.certificate.is_some()
+    }
+
+    /// This node's key, and how it accepts those of its peers.
+    ///
+    /// # Errors
+    /// If a file cannot be used, or the node's own certificate is not valid.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "the node's certificate has to be valid when the node starts"
+    )]
+    pub fn credentials(&self) -> Result<Credentials, Failure> {
+        // A key that cannot be used is named with its remedy.
+        self.key()?;
+        let (key, trust) = (self.files.key()?, self.trust()?);
+        match self.certificates.files()? {
+            Some(files) => Credentials::load_certified(&key, &files, trust, SystemTime::now())
+                .map_err(Failure::of),
+            None => Credentials::load(&key, trust).map_err(Failure::of),
+        }
     }
 
     /// The addresses of the peers to connect to.
@@ -310,11 +328,10 @@ impl Secure {
     /// Opens the link of this node, an id without a component.
     ///
     /// # Errors
-    /// A key or trust file that cannot be used, or an address that cannot be listened on.
+    /// A key, certificate or trust file that cannot be used, or an address that cannot be listened on.
     pub fn open(&self, node: JausId) -> Result<SecureLink, Failure> {
-        let key = self.key()?;
         trust_at_first_start(&self.files.trusted_keys()?, &self.trust)?;
-        let trust = self.trust()?;
+        let credentials = self.credentials()?;
         let any = || match self.peers.first() {
             Some(Address(SocketAddr::V6(_))) => SocketAddr::from(([0; 16], 0)),
             _ => SocketAddr::from(([0; 4], 0)),
@@ -330,7 +347,7 @@ impl Secure {
         if let Some(Budget(octets)) = self.budget {
             settings = settings.budget(octets);
         }
-        let mut link = SecureLink::open(&key, trust, settings).map_err(Failure::of)?;
+        let mut link = SecureLink::open_with(credentials, settings).map_err(Failure::of)?;
         if let Some(path) = &self.audit {
             let log = AuditLog::open(path, Limits::default()).map_err(Failure::of)?;
             link = link.audited(log);
@@ -344,7 +361,7 @@ impl Secure {
 fn trust_at_first_start(file: &Path, peers: &[Peer]) -> Result<(), Failure> {
     if !file.exists() {
         let mut each = peers.iter();
-        return each.try_for_each(|peer| edit::trust(file, peer).map_err(Failure::of));
+        return each.try_for_each(|peer| edit::trust(file, peer, false).map_err(Failure::of));
     }
     if peers.is_empty() {
         return Ok(());
@@ -405,7 +422,7 @@ mod tests {
         let trust = TrustFile::load(&file).unwrap();
         assert_eq!(trust.find(operator.key), Some(operator.clone()));
 
-        edit::revoke(&file, "operator").unwrap();
+        edit::revoke(&file, "operator", None).unwrap();
         let refused = trust_at_first_start(&file, peers).unwrap_err().to_string();
         let remedy = format!("jaus keys trust operator {key} 60.255.255");
         assert!(refused.contains(&remedy), "{refused}");

@@ -4,66 +4,109 @@ use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::Path;
 
+use crate::key::PublicKey;
 use crate::rules::Rules;
-use crate::trust::{Peer, Trust, TrustError, line_of};
+use crate::trust::{Grant, Peer, Trust, TrustError, line_of, line_of_grant};
 
-/// Adds a peer to a trust file, which is created if necessary.
+/// Adds a peer to a trust file, which is created if necessary. A name that has a key already gets
+/// another one only if `also` says so.
 ///
 /// # Errors
 /// If the file cannot be read or written, has a malformed line, or lists the key or name already.
-pub fn trust(path: &Path, peer: &Peer) -> Result<(), TrustError> {
-    let mut text = text_of(path)?;
+pub fn trust(path: &Path, peer: &Peer, also: bool) -> Result<(), TrustError> {
+    let text = text_of(path)?;
+    let known = Trust::parse(&text)?;
+    if !also && known.peers().iter().any(|it| it.name == peer.name) {
+        return Err(TrustError::Known(peer.name.clone()));
+    }
+    append(path, text, &line_of(peer))
+}
+
+/// Adds the line for a certificate to a trust file, which is created if necessary.
+///
+/// # Errors
+/// If the file cannot be read or written, has a malformed line, or has a line for the certificate
+/// already.
+pub fn grant(path: &Path, grant: &Grant) -> Result<(), TrustError> {
+    append(path, text_of(path)?, &line_of_grant(grant))
+}
+
+fn append(path: &Path, mut text: String, line: &str) -> Result<(), TrustError> {
     if !text.is_empty() && !text.ends_with('\n') {
         text.push('\n');
     }
-    text.push_str(&line_of(peer));
+    text.push_str(line);
     Trust::parse(&text)?;
-    replace(path, &text)
+    replace(path, &text).map_err(|source| in_file(path, source))
 }
 
-/// Replaces the rules of the peer with this name; returns whether it was there. A running node
-/// applies them within seconds.
+/// Replaces the rules of the peer or certificate with this name; returns whether it was there. A
+/// running node applies them within seconds.
 ///
 /// # Errors
 /// If the file cannot be read or written, or has a malformed line.
 pub fn allow(path: &Path, name: &str, rules: &Rules) -> Result<bool, TrustError> {
     let text = text_of(path)?;
-    let trust = Trust::parse(&text)?;
-    let Some(peer) = trust.peers().iter().find(|it| it.name == name) else {
-        return Ok(false);
-    };
-    let line = line_of(&Peer {
-        rules: rules.clone(),
-        ..peer.clone()
-    });
-    let changed: String = text
-        .lines()
-        .map(|it| {
-            if is_of(name, it) {
-                line.clone()
-            } else {
-                format!("{it}\n")
-            }
-        })
-        .collect();
-    replace(path, &changed)?;
-    Ok(true)
+    Trust::parse(&text)?;
+    let mut is_there = false;
+    let mut changed = String::new();
+    for line in text.lines() {
+        if is_of(name, line) {
+            is_there = true;
+            changed.push_str(&with_rules(line, rules)?);
+        } else {
+            changed.extend([line, "\n"]);
+        }
+    }
+    if is_there {
+        replace(path, &changed).map_err(|source| in_file(path, source))?;
+    }
+    Ok(is_there)
 }
 
-/// Removes the peer with this name from a trust file; returns whether it was there. A running node
-/// closes its session within seconds.
+/// A line of a trust file with other rules.
+fn with_rules(line: &str, rules: &Rules) -> Result<String, TrustError> {
+    let trust = Trust::parse(line)?;
+    let rules = rules.clone();
+    let peers = trust.peers().iter().cloned();
+    let peers = peers.map(|it| {
+        line_of(&Peer {
+            rules: rules.clone(),
+            ..it
+        })
+    });
+    let grants = trust.grants().iter().cloned();
+    let grants = grants.map(|it| {
+        line_of_grant(&Grant {
+            rules: rules.clone(),
+            ..it
+        })
+    });
+    Ok(peers.chain(grants).collect())
+}
+
+/// Removes the peer with this name from a trust file, or only one `key` of it; returns whether it
+/// was there. A running node closes its session within seconds.
 ///
 /// # Errors
 /// If the file cannot be read or written, or has a malformed line.
-pub fn revoke(path: &Path, name: &str) -> Result<bool, TrustError> {
+pub fn revoke(path: &Path, name: &str, key: Option<PublicKey>) -> Result<bool, TrustError> {
     let text = text_of(path)?;
     Trust::parse(&text)?;
-    let rest: Vec<_> = text.lines().filter(|line| !is_of(name, line)).collect();
+    let of_key = |line: &str| {
+        let word = line
+            .split_whitespace()
+            .nth(1)
+            .and_then(|it| it.parse().ok());
+        key.is_none_or(|key| word == Some(key))
+    };
+    let goes = |line: &&str| is_of(name, line) && of_key(line);
+    let rest: Vec<_> = text.lines().filter(|line| !goes(line)).collect();
     if rest.len() == text.lines().count() {
         return Ok(false);
     }
     let rest: String = rest.iter().flat_map(|line| [*line, "\n"]).collect();
-    replace(path, &rest)?;
+    replace(path, &rest).map_err(|source| in_file(path, source))?;
     Ok(true)
 }
 
@@ -80,15 +123,12 @@ fn text_of(path: &Path) -> Result<String, TrustError> {
 }
 
 /// Replaces a file in one step, so that a reader finds the old or the new text.
-fn replace(path: &Path, text: &str) -> Result<(), TrustError> {
+pub(crate) fn replace(path: &Path, text: &str) -> io::Result<()> {
     let draft = path.with_extension("new");
-    let write = || -> io::Result<()> {
-        let mut file = File::create(&draft)?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
-        fs::rename(&draft, path)
-    };
-    write().map_err(|source| in_file(path, source))
+    let mut file = File::create(&draft)?;
+    file.write_all(text.as_bytes())?;
+    file.sync_all()?;
+    fs::rename(&draft, path)
 }
 
 fn in_file(path: &Path, source: io::Error) -> TrustError {
@@ -101,7 +141,6 @@ fn in_file(path: &Path, source: io::Error) -> TrustError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::key::PublicKey;
 
     fn peer(name: &str, octet: u8) -> Peer {
         Peer {
@@ -117,16 +156,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trusted_keys");
         fs::write(&path, "# our team").unwrap();
-        trust(&path, &peer("rover", 1)).unwrap();
-        trust(&path, &peer("console", 2)).unwrap();
+        trust(&path, &peer("rover", 1), false).unwrap();
+        trust(&path, &peer("console", 2), false).unwrap();
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.starts_with("# our team\nrover "), "{text}");
         assert_eq!(
             Trust::parse(&text).unwrap().peers(),
             [peer("rover", 1), peer("console", 2)]
         );
-        assert!(revoke(&path, "rover").unwrap());
-        assert!(!revoke(&path, "rover").unwrap());
+        assert!(revoke(&path, "rover", None).unwrap());
+        assert!(!revoke(&path, "rover", None).unwrap());
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.starts_with("# our team\nconsole "), "{text}");
     }
@@ -136,8 +175,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trusted_keys");
         fs::write(&path, "# our team\n").unwrap();
-        trust(&path, &peer("rover", 1)).unwrap();
-        trust(&path, &peer("console", 2)).unwrap();
+        trust(&path, &peer("rover", 1), false).unwrap();
+        trust(&path, &peer("console", 2), false).unwrap();
         let rules: Rules = "control=127 with=101.255.255".parse().unwrap();
         assert!(allow(&path, "console", &rules).unwrap());
         assert!(!allow(&path, "tablet", &rules).unwrap());
@@ -152,11 +191,44 @@ mod tests {
     fn a_change_that_would_make_the_file_unusable_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trusted_keys");
-        trust(&path, &peer("rover", 1)).unwrap();
+        trust(&path, &peer("rover", 1), false).unwrap();
         let before = fs::read_to_string(&path).unwrap();
         for bad in [peer("rover", 2), peer("other", 1), peer("two words", 3)] {
-            assert!(trust(&path, &bad).is_err(), "{bad:?}");
+            assert!(trust(&path, &bad, false).is_err(), "{bad:?}");
         }
         assert_eq!(fs::read_to_string(&path).unwrap(), before);
+    }
+
+    #[test]
+    fn a_name_gets_a_second_key_on_request_and_loses_the_first_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trusted_keys");
+        let (old, new) = (peer("rover", 1), peer("rover", 2));
+        trust(&path, &old, false).unwrap();
+        let refused = trust(&path, &new, false).unwrap_err().to_string();
+        assert!(refused.contains("--also"), "{refused}");
+        trust(&path, &new, true).unwrap();
+        assert!(!revoke(&path, "console", Some(old.key)).unwrap());
+        assert!(revoke(&path, "rover", Some(old.key)).unwrap());
+        let text = fs::read_to_string(&path).unwrap();
+        assert_eq!(Trust::parse(&text).unwrap().peers(), [new]);
+    }
+
+    #[test]
+    fn a_certificate_gets_one_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trusted_keys");
+        let ids = vec!["60.1.255".parse().unwrap()];
+        let console = Grant {
+            name: "console".to_owned(),
+            ids,
+            rules: Rules::default(),
+        };
+        grant(&path, &console).unwrap();
+        assert!(grant(&path, &console).is_err());
+        let text = fs::read_to_string(&path).unwrap();
+        assert_eq!(text, "console certificate 60.1.255\n");
+        assert_eq!(Trust::parse(&text).unwrap().grants(), [console]);
+        assert!(revoke(&path, "console", None).unwrap());
     }
 }

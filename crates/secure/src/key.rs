@@ -81,9 +81,11 @@ impl Key {
             .map_err(|_| KeyError::NoRandomness)?;
         let key = Self::from_pkcs8(document.as_ref())
             .ok_or_else(|| KeyError::Malformed(path.to_owned()))?;
-        write_new(path, &pem(document.as_ref())).map_err(|source| match source.kind() {
-            io::ErrorKind::AlreadyExists => KeyError::Exists(path.to_owned()),
-            _ => in_file(path, source),
+        write_new(path, &pem("PRIVATE KEY", document.as_ref())).map_err(|source| {
+            match source.kind() {
+                io::ErrorKind::AlreadyExists => KeyError::Exists(path.to_owned()),
+                _ => in_file(path, source),
+            }
         })?;
         Ok(key)
     }
@@ -108,10 +110,35 @@ impl Key {
         Some(Self { signing, public })
     }
 
+    /// The file of the key that is to replace the one in `path`: `node.key.next`.
+    #[must_use]
+    pub fn next_path(path: &Path) -> PathBuf {
+        let mut name = path.as_os_str().to_owned();
+        name.push(".next");
+        name.into()
+    }
+
+    /// Puts the key of [`next_path`](Self::next_path) in place of the one in `path`. A running node
+    /// notices it within seconds.
+    ///
+    /// # Errors
+    /// If the file of the next key cannot be used, or the key file not be replaced.
+    pub fn replace_by_next(path: &Path) -> Result<Self, KeyError> {
+        let next = Self::next_path(path);
+        let key = Self::load(&next)?;
+        fs::rename(&next, path).map_err(|source| in_file(path, source))?;
+        Ok(key)
+    }
+
     /// The public key.
     #[must_use]
     pub const fn public(&self) -> PublicKey {
         self.public
+    }
+
+    #[cfg(feature = "ca")]
+    pub(crate) const fn public_ref(&self) -> &PublicKey {
+        &self.public
     }
 
     /// A secret for another purpose, the same whenever the node runs with this key.
@@ -169,6 +196,12 @@ impl PublicKey {
         octets.try_into().ok().map(Self)
     }
 
+    /// The octets of the key.
+    #[cfg(feature = "ca")]
+    pub(crate) const fn octets(&self) -> &[u8; 32] {
+        &self.0
+    }
+
     pub(crate) fn spki(self) -> SubjectPublicKeyInfoDer<'static> {
         [&SPKI_PREFIX[..], &self.0].concat().into()
     }
@@ -215,9 +248,10 @@ impl Fingerprint {
     }
 }
 
-fn pem(octets: &[u8]) -> String {
+/// The PEM encoding of octets.
+pub(crate) fn pem(label: &str, octets: &[u8]) -> String {
     let base64 = BASE64.encode(octets);
-    let mut text = "-----BEGIN PRIVATE KEY-----\n".to_owned();
+    let mut text = format!("-----BEGIN {label}-----\n");
     let mut rest = base64.as_str();
     while !rest.is_empty() {
         let (line, after) = rest.split_at(rest.len().min(PEM_LINE));
@@ -225,7 +259,7 @@ fn pem(octets: &[u8]) -> String {
         text.push('\n');
         rest = after;
     }
-    text + "-----END PRIVATE KEY-----\n"
+    text + &format!("-----END {label}-----\n")
 }
 
 fn in_file(path: &Path, source: io::Error) -> KeyError {

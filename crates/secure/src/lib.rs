@@ -9,6 +9,8 @@
 //! * A [`TrustFile`] lists the public keys of the other nodes, and the JAUS ids that each may speak
 //!   for. A node without an entry cannot complete the handshake. A message from an id that its
 //!   sender's key may not speak for is refused and counted.
+//! * Instead, a node may have a [`Certificate`] of its team's [`Authority`], which names it and
+//!   holds its ids; see [`Credentials`].
 //! * [`SecureLink`] is the link. It listens on a UDP port of its own and dials the configured peers;
 //!   one side has to be reachable. With [beacons](beacon), nodes of one network find each other. The peers are two nodes of this crate: other JAUS
 //!   implementations have no counterpart.
@@ -34,8 +36,14 @@
 //! The protocol logic ([`transport`]) does no I/O and reads no clock; [`SecureLink`] adds the socket.
 #![forbid(unsafe_code)]
 
+mod authority;
 pub mod beacon;
+#[cfg(feature = "ca")]
+pub mod ca;
+mod certificate;
+mod credentials;
 pub mod edit;
+mod follow;
 mod key;
 mod link;
 pub mod rules;
@@ -43,6 +51,9 @@ mod tls;
 pub mod transport;
 mod trust;
 
+pub use authority::{Authority, Rejection};
+pub use certificate::{Certificate, CertificateError, Defect};
+pub use credentials::{CertificateFiles, Credentials, CredentialsError};
 pub use key::{Fingerprint, Key, KeyError, PublicKey};
 pub use link::{Announce, OpenError, Reached, SecureLink, Settings};
-pub use trust::{Peer, Trust, TrustError, TrustFile};
+pub use trust::{Grant, Peer, Trust, TrustError, TrustFile};

@@ -10,7 +10,7 @@ use std::io;
 use std::net::SocketAddr;
 use std::num::NonZeroU32;
 use std::task::{Context, Poll};
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 
 use jaus::endpoint::{Remote, To, Transmit};
 use jaus::link;
@@ -22,6 +22,7 @@ use beacons::Beacons;
 use socket::Socket;
 
 use crate::beacon;
+use crate::credentials::Credentials;
 use crate::key::Key;
 use crate::transport::{Datagrams, Transport};
 use crate::trust::TrustFile;
@@ -103,6 +104,7 @@ pub enum OpenError {
 pub struct SecureLink {
     socket: Socket,
     transport: Transport,
+    credentials: Credentials,
     beacons: Option<Beacons>,
     /// The datagrams that the kernel had no room for.
     leaving: Option<Datagrams>,
@@ -117,22 +119,31 @@ impl SecureLink {
     /// If the address is not one of this host, or its port is taken; or if an interface for beacons
     /// does not exist.
     pub fn open(key: &Key, trust: TrustFile, settings: Settings) -> Result<Self, OpenError> {
+        Self::open_with(Credentials::pinned(key.clone(), trust), settings)
+    }
+
+    /// Opens the link with these credentials, and follows their files.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_with(credentials: Credentials, settings: Settings) -> Result<Self, OpenError> {
         let address = settings.listen;
         let socket =
             Socket::bind(address).map_err(|source| OpenError::Listen { address, source })?;
         let local = socket.local_addr();
         let local = local.map_err(|source| OpenError::Listen { address, source })?;
         let announce = settings.announce;
-        let beacons = announce.map(|it| Beacons::open(key, trust.clone(), local, it));
-        tracing::info!(listening = %local, key = %key.public(), "secure link opened");
-        trust.follow();
-        let mut transport = Transport::new(key, trust, settings.connect);
+        let beacons = announce.map(|it| Beacons::open(credentials.clone(), local, it));
+        tracing::info!(listening = %local, key = %credentials.public(), "secure link opened");
+        credentials.follow();
+        let mut transport = Transport::with_credentials(credentials.clone(), settings.connect);
         if let Some(budget) = settings.budget {
             transport = transport.with_budget(budget);
         }
         Ok(Self {
             socket,
             transport,
+            credentials,
             beacons: beacons.transpose()?,
             leaving: None,
             timeout: Some(node::now()),
@@ -264,6 +275,8 @@ impl CustomLink for SecureLink {
         if let Some(arrival) = self.transport.poll_arrival() {
             return Poll::Ready(arrival);
         }
+        self.credentials
+            .set_clock(SystemTime::UNIX_EPOCH + node::time_of_day());
         self.transport.handle_timeout(now);
         let beacons_wait = self.read_beacons(cx, now);
         if self.read(cx, now) || beacons_wait {

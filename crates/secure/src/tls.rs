@@ -1,68 +1,69 @@
-//! TLS 1.3 with raw public keys (RFC 7250): both sides prove that they have a key that the other
-//! side trusts.
+//! TLS 1.3 with raw public keys (RFC 7250) or certificates: both sides prove that they have a key
+//! that the other side accepts.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
 use quinn_proto::crypto::rustls::{QuicClientConfig, QuicServerConfig};
 use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
-use rustls::client::{AlwaysResolvesClientRawPublicKeys, Resumption};
+use rustls::client::{AlwaysResolvesClientRawPublicKeys, ResolvesClientCert, Resumption};
 use rustls::crypto::{
-    CryptoProvider, WebPkiSupportedAlgorithms, verify_tls13_signature_with_raw_key,
+    CryptoProvider, WebPkiSupportedAlgorithms, verify_tls13_signature,
+    verify_tls13_signature_with_raw_key,
 };
 use rustls::pki_types::{CertificateDer, ServerName, SubjectPublicKeyInfoDer, UnixTime};
 use rustls::server::danger::{ClientCertVerified, ClientCertVerifier};
-use rustls::server::{AlwaysResolvesServerRawPublicKeys, NoServerSessionStorage};
-use rustls::sign::CertifiedKey;
+use rustls::server::{
+    AlwaysResolvesServerRawPublicKeys, NoServerSessionStorage, ResolvesServerCert,
+};
+use rustls::sign::SingleCertAndKey;
 use rustls::{
-    CertificateError, ClientConfig, DigitallySignedStruct, DistinguishedName, Error,
-    PeerIncompatible, ServerConfig, SignatureScheme, version::TLS13,
+    ClientConfig, DigitallySignedStruct, DistinguishedName, Error, PeerIncompatible, ServerConfig,
+    SignatureScheme, version::TLS13,
 };
 
-use crate::key::{Key, PublicKey};
-use crate::trust::TrustFile;
+use crate::authority::Rejection;
+use crate::credentials::Credentials;
 
 /// The application protocol: the JUDP datagrams of AS5669A, version 1 of this link.
 const PROTOCOL: &[u8] = b"jaus/1";
 
-/// The key that was refused last, for a warning.
+/// Why a peer was refused last.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Refusals(Arc<Mutex<Option<PublicKey>>>);
+pub(crate) struct Refusals(Arc<Mutex<Option<Rejection>>>);
 
 impl Refusals {
-    fn note(&self, key: PublicKey) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(key);
+    fn note(&self, rejection: Rejection) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(rejection);
     }
 
-    /// The key refused since the last call, if any.
-    pub(crate) fn take(&self) -> Option<PublicKey> {
+    /// The refusal since the last call, if any.
+    pub(crate) fn take(&self) -> Option<Rejection> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }
 
-/// Accepts keys that the trust file lists, and no others.
+/// Accepts the peers that the credentials identify, and no others.
 #[derive(Debug)]
 struct Verifier {
-    trust: TrustFile,
+    credentials: Credentials,
     refusals: Refusals,
     algorithms: WebPkiSupportedAlgorithms,
 }
 
-/// The configurations of both sides of a handshake.
+/// The configurations of both sides of a handshake, with the present key and certificate of the
+/// node.
 pub(crate) fn configs(
-    key: &Key,
-    trust: &TrustFile,
+    credentials: &Credentials,
     refusals: &Refusals,
 ) -> (Arc<QuicServerConfig>, Arc<QuicClientConfig>) {
     let provider = Arc::new(rustls::crypto::ring::default_provider());
     let verifier = Arc::new(Verifier {
-        trust: trust.clone(),
+        credentials: credentials.clone(),
         refusals: refusals.clone(),
         algorithms: provider.signature_verification_algorithms,
     });
-    let spki = CertificateDer::from(key.public().spki().to_vec());
-    let certified = Arc::new(CertifiedKey::new(vec![spki], key.signing()));
-    let server = server(provider.clone(), verifier.clone(), certified.clone());
-    let client = client(provider, verifier, certified);
+    let server = server(provider.clone(), verifier.clone());
+    let client = client(provider, verifier);
     (Arc::new(server), Arc::new(client))
 }
 
@@ -70,16 +71,18 @@ pub(crate) fn configs(
     clippy::expect_used,
     reason = "the provider `ring` has TLS 1.3 and the cipher suite of QUIC's first packets"
 )]
-fn server(
-    provider: Arc<CryptoProvider>,
-    verifier: Arc<Verifier>,
-    key: Arc<CertifiedKey>,
-) -> QuicServerConfig {
+fn server(provider: Arc<CryptoProvider>, verifier: Arc<Verifier>) -> QuicServerConfig {
+    let key = verifier.credentials.certified_key();
+    let resolver: Arc<dyn ResolvesServerCert> = if verifier.credentials.uses_certificates() {
+        Arc::new(SingleCertAndKey::from(key))
+    } else {
+        Arc::new(AlwaysResolvesServerRawPublicKeys::new(key))
+    };
     let mut config = ServerConfig::builder_with_provider(provider)
         .with_protocol_versions(&[&TLS13])
         .expect("the provider has cipher suites of TLS 1.3")
         .with_client_cert_verifier(verifier)
-        .with_cert_resolver(Arc::new(AlwaysResolvesServerRawPublicKeys::new(key)));
+        .with_cert_resolver(resolver);
     config.alpn_protocols = vec![PROTOCOL.to_vec()];
     // A resumed session would not be checked against the trust file again.
     config.send_tls13_tickets = 0;
@@ -91,17 +94,19 @@ fn server(
     clippy::expect_used,
     reason = "the provider `ring` has TLS 1.3 and the cipher suite of QUIC's first packets"
 )]
-fn client(
-    provider: Arc<CryptoProvider>,
-    verifier: Arc<Verifier>,
-    key: Arc<CertifiedKey>,
-) -> QuicClientConfig {
+fn client(provider: Arc<CryptoProvider>, verifier: Arc<Verifier>) -> QuicClientConfig {
+    let key = verifier.credentials.certified_key();
+    let resolver: Arc<dyn ResolvesClientCert> = if verifier.credentials.uses_certificates() {
+        Arc::new(SingleCertAndKey::from(key))
+    } else {
+        Arc::new(AlwaysResolvesClientRawPublicKeys::new(key))
+    };
     let mut config = ClientConfig::builder_with_provider(provider)
         .with_protocol_versions(&[&TLS13])
         .expect("the provider has cipher suites of TLS 1.3")
         .dangerous()
         .with_custom_certificate_verifier(verifier)
-        .with_client_cert_resolver(Arc::new(AlwaysResolvesClientRawPublicKeys::new(key)));
+        .with_client_cert_resolver(resolver);
     config.alpn_protocols = vec![PROTOCOL.to_vec()];
     config.resumption = Resumption::disabled();
     config.enable_sni = false;
@@ -109,24 +114,31 @@ fn client(
 }
 
 impl Verifier {
-    fn check(&self, certificate: &CertificateDer<'_>) -> Result<(), Error> {
-        let refused = Error::InvalidCertificate(CertificateError::ApplicationVerificationFailure);
-        let key = PublicKey::from_spki(certificate).ok_or_else(|| refused.clone())?;
-        if self.trust.find(key).is_none() {
-            self.refusals.note(key);
-            return Err(refused);
-        }
-        Ok(())
+    fn check(&self, shown: &CertificateDer<'_>) -> Result<(), Error> {
+        let identified = self.credentials.identify(shown);
+        identified.map(|_| ()).map_err(|it| self.refuse(it))
     }
 
     fn check_signature(
         &self,
         message: &[u8],
-        certificate: &CertificateDer<'_>,
+        shown: &CertificateDer<'_>,
         signature: &DigitallySignedStruct,
     ) -> Result<HandshakeSignatureValid, Error> {
-        let key = SubjectPublicKeyInfoDer::from(certificate.as_ref());
-        verify_tls13_signature_with_raw_key(message, &key, signature, &self.algorithms)
+        let checked = if self.credentials.uses_certificates() {
+            verify_tls13_signature(message, shown, signature, &self.algorithms)
+        } else {
+            let key = SubjectPublicKeyInfoDer::from(shown.as_ref());
+            verify_tls13_signature_with_raw_key(message, &key, signature, &self.algorithms)
+        };
+        checked.map_err(|_| self.refuse(Rejection::NotItsKey))
+    }
+
+    /// Notes why a peer is refused; returns what TLS tells it.
+    fn refuse(&self, rejection: Rejection) -> Error {
+        let alert = rejection.alert();
+        self.refusals.note(rejection);
+        alert
     }
 }
 
@@ -170,7 +182,7 @@ impl ServerCertVerifier for Verifier {
     }
 
     fn requires_raw_public_keys(&self) -> bool {
-        true
+        !self.credentials.uses_certificates()
     }
 }
 
@@ -212,6 +224,6 @@ impl ClientCertVerifier for Verifier {
     }
 
     fn requires_raw_public_keys(&self) -> bool {
-        true
+        !self.credentials.uses_certificates()
     }
 }

@@ -9,21 +9,25 @@
 //! rover      WkE5vXW4lFyQ3nDzGnUlnQ0Xs0mB5bqkVHk0pJ1Yd2s=  101.255.255
 //! console    0b2yKQZ0C3r1mHqkqfM3d5bq0f5fY1b5o8hGxqj9n3E=  60.1.255,60.2.255  control=127
 //! ```
+//!
+//! A name may have several keys, so that a key can be replaced. A node that uses certificates needs
+//! no line for a peer; a line with the word `certificate` in place of the key narrows the ids of the
+//! certificate with that name, and grants it rules.
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::sync::{Arc, PoisonError, RwLock, Weak};
-use std::time::{Duration, SystemTime};
 
 use jaus::address::JausId;
 
+use crate::certificate::Certificate;
+use crate::follow::Followed;
 use crate::key::{KeyError, PublicKey};
 use crate::rules::{RuleError, Rules};
 
-/// How often a running node looks whether its trust file has changed.
-const FOLLOW_INTERVAL: Duration = Duration::from_secs(1);
+/// What stands in place of the key in a line for a certificate.
+const CERTIFICATE: &str = "certificate";
 /// The longest trust file, in octets: some ten thousand keys.
 const LONGEST: u64 = 1 << 20;
 
@@ -72,7 +76,13 @@ pub enum TrustError {
         /// The reason.
         source: RuleError,
     },
-    /// A key or name appears twice.
+    /// The name has a key already.
+    #[error(
+        "`{0}` has a key already: add another one with `--also`, or remove the first with \
+         `jaus keys revoke`"
+    )]
+    Known(String),
+    /// A key appears twice, or a name in lines for certificates.
     #[error("line {line}: `{name}` or its key is already in line {first}: remove one of them")]
     Twice {
         /// The line's number, from 1.
@@ -110,19 +120,40 @@ impl FromStr for Peer {
     type Err = TrustError;
 
     fn from_str(text: &str) -> Result<Self, TrustError> {
-        parse_line(1, text)
+        match parse_line(1, text)? {
+            Line::Peer(peer) => Ok(peer),
+            Line::Grant(_) => Err(TrustError::Key {
+                line: 1,
+                source: KeyError::Text(CERTIFICATE.to_owned()),
+            }),
+        }
     }
+}
+
+/// What a trust file grants to the certificate with a name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Grant {
+    /// The name in the certificate.
+    pub name: String,
+    /// The ids that it may speak for, of those in the certificate; with wildcards.
+    pub ids: Vec<JausId>,
+    /// What it may do.
+    pub rules: Rules,
 }
 
 /// The trusted peers of a node.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Trust(Vec<Peer>);
+pub struct Trust {
+    peers: Vec<Peer>,
+    grants: Vec<Grant>,
+}
 
 impl Trust {
     /// Trusts these peers.
     #[must_use]
     pub const fn new(peers: Vec<Peer>) -> Self {
-        Self(peers)
+        let grants = Vec::new();
+        Self { peers, grants }
     }
 
     /// Reads the text of a trust file.
@@ -130,92 +161,175 @@ impl Trust {
     /// # Errors
     /// The first line that is malformed.
     pub fn parse(text: &str) -> Result<Self, TrustError> {
-        let mut peers: Vec<(usize, Peer)> = Vec::new();
+        let mut lines: Vec<(usize, Line)> = Vec::new();
         for (index, text) in text.lines().enumerate() {
-            let line = index + 1;
+            let number = index + 1;
             let text = text.split('#').next().unwrap_or_default().trim();
             if text.is_empty() {
                 continue;
             }
-            let peer = parse_line(line, text)?;
-            let same = |(_, it): &&(usize, Peer)| it.key == peer.key || it.name == peer.name;
-            if let Some(&(first, _)) = peers.iter().find(same) {
-                let name = peer.name;
+            let line = parse_line(number, text)?;
+            if let Some(&(first, _)) = lines.iter().find(|(_, it)| it.repeats(&line)) {
+                let (line, name) = (number, line.name().to_owned());
                 return Err(TrustError::Twice { line, first, name });
             }
-            peers.push((line, peer));
+            lines.push((number, line));
         }
-        Ok(Self(peers.into_iter().map(|(_, peer)| peer).collect()))
+        let mut trust = Self::default();
+        for (_, line) in lines {
+            match line {
+                Line::Peer(peer) => trust.peers.push(peer),
+                Line::Grant(grant) => trust.grants.push(grant),
+            }
+        }
+        Ok(trust)
     }
 
     /// The peer with this key.
     #[must_use]
     pub fn find(&self, key: PublicKey) -> Option<&Peer> {
-        self.0.iter().find(|peer| peer.key == key)
+        self.peers.iter().find(|peer| peer.key == key)
     }
 
-    /// All peers, in the order of the file.
+    /// The peer with this certificate, which has been verified.
+    #[must_use]
+    pub fn certified(&self, certificate: &Certificate) -> Peer {
+        let grant = self.grants.iter().find(|it| it.name == certificate.name());
+        let ids = certificate.ids();
+        Peer {
+            name: certificate.name().to_owned(),
+            key: certificate.key(),
+            ids: grant.map_or_else(|| ids.to_vec(), |it| common(ids, &it.ids)),
+            rules: grant.map_or_else(Rules::default, |it| it.rules.clone()),
+        }
+    }
+
+    /// The peers that are trusted by their keys, in the order of the file.
     #[must_use]
     pub fn peers(&self) -> &[Peer] {
-        &self.0
+        &self.peers
+    }
+
+    /// What is granted to certificates, in the order of the file.
+    #[must_use]
+    pub fn grants(&self) -> &[Grant] {
+        &self.grants
     }
 }
 
-fn parse_line(line: usize, text: &str) -> Result<Peer, TrustError> {
+/// The ids that match an id of both lists.
+fn common(some: &[JausId], others: &[JausId]) -> Vec<JausId> {
+    let pairs = some
+        .iter()
+        .flat_map(|one| others.iter().map(move |other| (*one, *other)));
+    pairs
+        .filter_map(|(one, other)| overlap(one, other))
+        .collect()
+}
+
+/// The ids that match both of these.
+fn overlap(one: JausId, other: JausId) -> Option<JausId> {
+    fn field<T: PartialEq>(one: T, other: T, any: &T) -> Option<T> {
+        match (one == *any, other == *any) {
+            (true, _) => Some(other),
+            (_, true) => Some(one),
+            _ => (one == other).then_some(one),
+        }
+    }
+    Some(JausId::new(
+        field(one.subsystem(), other.subsystem(), &JausId::ANY_SUBSYSTEM)?,
+        field(one.node(), other.node(), &JausId::ANY_NODE)?,
+        field(one.component(), other.component(), &JausId::ANY_COMPONENT)?,
+    ))
+}
+
+/// A line of a trust file.
+enum Line {
+    Peer(Peer),
+    Grant(Grant),
+}
+
+impl Line {
+    fn name(&self) -> &str {
+        match self {
+            Self::Peer(Peer { name, .. }) | Self::Grant(Grant { name, .. }) => name,
+        }
+    }
+
+    /// Whether both are about the same key or certificate.
+    fn repeats(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Peer(one), Self::Peer(other)) => one.key == other.key,
+            (Self::Grant(one), Self::Grant(other)) => one.name == other.name,
+            _ => false,
+        }
+    }
+}
+
+fn parse_line(line: usize, text: &str) -> Result<Line, TrustError> {
     let mut words = text.split_whitespace();
     let (Some(name), Some(key), Some(ids)) = (words.next(), words.next(), words.next()) else {
         return Err(TrustError::Parts { line });
     };
-    let key = key
-        .parse()
-        .map_err(|source| TrustError::Key { line, source })?;
+    let name = name.to_owned();
+    let key = match key {
+        CERTIFICATE => None,
+        key => Some(
+            key.parse()
+                .map_err(|source| TrustError::Key { line, source })?,
+        ),
+    };
     let ids = ids.split(',').map(|text| {
         text.parse().map_err(|_| TrustError::Id {
             line,
             text: text.chars().take(60).collect(),
         })
     });
+    let ids = ids.collect::<Result<_, _>>()?;
     let rules = Rules::parse(words).map_err(|source| TrustError::Rule { line, source })?;
-    Ok(Peer {
-        name: name.to_owned(),
-        key,
-        ids: ids.collect::<Result<_, _>>()?,
-        rules,
+    Ok(match key {
+        Some(key) => Line::Peer(Peer {
+            name,
+            key,
+            ids,
+            rules,
+        }),
+        None => Line::Grant(Grant { name, ids, rules }),
     })
 }
 
 /// The line of a peer in a trust file.
 pub(crate) fn line_of(peer: &Peer) -> String {
-    let ids: Vec<_> = peer.ids.iter().map(JausId::to_string).collect();
-    let line = format!(
-        "{} {} {} {}",
-        peer.name,
-        peer.key,
-        ids.join(","),
-        peer.rules
-    );
+    line(&peer.name, &peer.key.to_string(), &peer.ids, &peer.rules)
+}
+
+/// The line of a certificate in a trust file.
+pub(crate) fn line_of_grant(grant: &Grant) -> String {
+    line(&grant.name, CERTIFICATE, &grant.ids, &grant.rules)
+}
+
+fn line(name: &str, key: &str, ids: &[JausId], rules: &Rules) -> String {
+    let ids: Vec<_> = ids.iter().map(JausId::to_string).collect();
+    let line = format!("{name} {key} {} {rules}", ids.join(","));
     format!("{}\n", line.trim_end())
 }
 
 /// The trust of a running node, shared by its link and its handshakes. Replacing it takes effect at
 /// once: the link closes the sessions of keys that are no longer trusted.
-#[derive(Clone, Debug, Default)]
-pub struct TrustFile {
-    trust: Shared,
-    path: Option<PathBuf>,
-}
+#[derive(Clone, Debug)]
+pub struct TrustFile(Followed<Trust, TrustError>);
 
-/// The trust, and how often it was replaced.
-type Shared = Arc<RwLock<(u64, Trust)>>;
+impl Default for TrustFile {
+    fn default() -> Self {
+        Self::of(Trust::default())
+    }
+}
 
 impl TrustFile {
     /// Shares a trust that is not in a file.
     #[must_use]
     pub fn of(trust: Trust) -> Self {
-        Self {
-            trust: Arc::new(RwLock::new((0, trust))),
-            path: None,
-        }
+        Self(Followed::of(trust))
     }
 
     /// Reads a trust file.
@@ -223,10 +337,23 @@ impl TrustFile {
     /// # Errors
     /// If it cannot be read, or a line is malformed.
     pub fn load(path: &Path) -> Result<Self, TrustError> {
-        Ok(Self {
-            path: Some(path.to_owned()),
-            ..Self::of(read(path)?)
-        })
+        let owned = path.to_owned();
+        Followed::load(vec![path.to_owned()], move || read(&owned)).map(Self)
+    }
+
+    /// Reads a trust file, which may be missing as long as there is nothing to say.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn load_optional(path: &Path) -> Result<Self, TrustError> {
+        let owned = path.to_owned();
+        let read = move || match read(&owned) {
+            Err(TrustError::File { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
+                Ok(Trust::default())
+            }
+            other => other,
+        };
+        Followed::load(vec![path.to_owned()], read).map(Self)
     }
 
     /// Reads the file again. On an error the previous trust stays in force.
@@ -234,42 +361,35 @@ impl TrustFile {
     /// # Errors
     /// As [`load`](Self::load).
     pub fn reload(&self) -> Result<(), TrustError> {
-        if let Some(path) = &self.path {
-            self.replace(read(path)?);
-        }
-        Ok(())
+        self.0.reload()
     }
 
     /// Reads the file again whenever it has changed, as long as the trust is in use. Must be called
     /// within a tokio runtime. A file that has become unusable changes nothing, and is logged.
-    #[expect(
-        clippy::disallowed_methods,
-        reason = "the task only looks at a file, and ends with the trust"
-    )]
     pub fn follow(&self) {
-        if let Some(path) = &self.path {
-            tokio::spawn(follow(Arc::downgrade(&self.trust), path.clone()));
-        }
+        self.0.follow();
     }
 
     /// Replaces the trust.
     pub fn replace(&self, trust: Trust) {
-        let mut inner = self.trust.write().unwrap_or_else(PoisonError::into_inner);
-        *inner = (inner.0 + 1, trust);
+        self.0.replace(trust);
     }
 
     /// The peer with this key.
     #[must_use]
     pub fn find(&self, key: PublicKey) -> Option<Peer> {
-        let inner = self.trust.read().unwrap_or_else(PoisonError::into_inner);
-        inner.1.find(key).cloned()
+        self.0.get().find(key).cloned()
+    }
+
+    /// The peer with this certificate, which has been verified.
+    pub(crate) fn certified(&self, certificate: &Certificate) -> Peer {
+        self.0.get().certified(certificate)
     }
 
     /// The number of trusted keys.
     #[must_use]
     pub fn len(&self) -> usize {
-        let inner = self.trust.read().unwrap_or_else(PoisonError::into_inner);
-        inner.1.peers().len()
+        self.0.get().peers().len()
     }
 
     /// Whether no key is trusted.
@@ -280,47 +400,14 @@ impl TrustFile {
 
     /// All trusted keys.
     pub(crate) fn keys(&self) -> Vec<PublicKey> {
-        let inner = self.trust.read().unwrap_or_else(PoisonError::into_inner);
-        inner.1.peers().iter().map(|peer| peer.key).collect()
+        let trust = self.0.get();
+        trust.peers().iter().map(|peer| peer.key).collect()
     }
 
     /// How often the trust was replaced.
     pub(crate) fn edition(&self) -> u64 {
-        let inner = self.trust.read().unwrap_or_else(PoisonError::into_inner);
-        inner.0
+        self.0.edition()
     }
-}
-
-#[expect(
-    clippy::disallowed_methods,
-    reason = "looks at a file in real time, also while a test pauses the clock"
-)]
-async fn follow(trust: Weak<RwLock<(u64, Trust)>>, path: PathBuf) {
-    let mut seen = modified(&path);
-    loop {
-        tokio::time::sleep(FOLLOW_INTERVAL).await;
-        let Some(trust) = trust.upgrade() else {
-            return;
-        };
-        let now = modified(&path);
-        if now == seen {
-            continue;
-        }
-        seen = now;
-        let file = TrustFile {
-            trust,
-            path: Some(path.clone()),
-        };
-        match file.reload() {
-            Ok(()) => tracing::info!(path = %path.display(), "trust file read again"),
-            Err(error) => tracing::error!(%error, "the previous trust stays in force"),
-        }
-    }
-}
-
-/// When the file was changed last; `None` if it is not there.
-fn modified(path: &Path) -> Option<SystemTime> {
-    fs::metadata(path).and_then(|it| it.modified()).ok()
 }
 
 fn read(path: &Path) -> Result<Trust, TrustError> {

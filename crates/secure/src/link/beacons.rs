@@ -10,8 +10,7 @@ use jaus::link::{Error, Group, Interface, Interfaces, Ip, Slab, interface};
 use jaus::wire::Priority;
 
 use crate::beacon::{Announcer, Counters, GROUP, GROUP6, Neighbors, Sighting};
-use crate::key::Key;
-use crate::trust::TrustFile;
+use crate::credentials::Credentials;
 
 /// Datagrams to read before the link's sessions have their turn.
 const BATCH: usize = 16;
@@ -32,6 +31,11 @@ pub struct Announce {
 pub(super) struct Beacons {
     announcer: Announcer,
     neighbors: Neighbors,
+    /// The id that it announces.
+    node: JausId,
+    credentials: Credentials,
+    /// The edition of the key that signs the beacons.
+    key: u64,
     interfaces: Interfaces,
     /// The address of the secure link; beacons are sent only where peers can reach it.
     link: SocketAddr,
@@ -42,8 +46,7 @@ pub(super) struct Beacons {
 impl Beacons {
     /// For the secure link that listens at this address.
     pub(super) fn open(
-        key: &Key,
-        trust: TrustFile,
+        credentials: Credentials,
         link: SocketAddr,
         announce: Announce,
     ) -> Result<Self, Error> {
@@ -55,8 +58,11 @@ impl Beacons {
             interfaces.choose(ip_version(link))?;
         }
         let mut beacons = Self {
-            announcer: Announcer::new(key, announce.node, link.port()),
-            neighbors: Neighbors::new(key.public(), trust),
+            announcer: Announcer::new(&credentials.own_key(), announce.node, link.port()),
+            neighbors: Neighbors::new(credentials.public(), credentials.trust()),
+            node: announce.node,
+            key: credentials.own_edition(),
+            credentials,
             interfaces,
             link,
             links: Vec::new(),
@@ -82,6 +88,7 @@ impl Beacons {
         if !self.announcer.is_due(now) {
             return;
         }
+        self.follow_key();
         self.follow_interfaces();
         let addresses = self.links.iter().map(|link| link.interface().address);
         let beacons = self.announcer.announce(now, time_of_day, addresses);
@@ -89,6 +96,16 @@ impl Beacons {
             if let Some(beacon) = beacon {
                 link.send_to_group(Priority::Standard, &beacon);
             }
+        }
+    }
+
+    /// Signs with the present key of the node.
+    fn follow_key(&mut self) {
+        let edition = self.credentials.own_edition();
+        if edition != self.key {
+            self.key = edition;
+            let key = self.credentials.own_key();
+            self.announcer = Announcer::new(&key, self.node, self.link.port());
         }
     }
 

@@ -74,6 +74,11 @@ impl Dial {
         Some(self.address)
     }
 
+    /// Makes the next attempt due at once.
+    pub(super) const fn hasten(&mut self) {
+        self.due = None;
+    }
+
     /// Makes no more attempts until a beacon comes.
     const fn rest(&mut self) {
         self.due = None;

@@ -16,7 +16,9 @@
 mod dial;
 mod egress;
 mod inlet;
+mod parameters;
 mod record;
+mod renewal;
 mod report;
 mod screen;
 mod session;
@@ -33,30 +35,24 @@ use bytes::{Bytes, BytesMut};
 use jaus::endpoint::{Buckets, Rate, SessionId};
 use jaus::link::custom::Arrival;
 use quinn_proto::{
-    ClientConfig, ConnectionError, ConnectionHandle, DatagramEvent, Endpoint, EndpointConfig,
-    Event, HashedConnectionIdGenerator, IdleTimeout, Incoming, ServerConfig, StreamEvent,
-    TransportConfig, VarInt,
+    ClientConfig, ConnectionError, ConnectionHandle, DatagramEvent, Endpoint, Event, Incoming,
+    StreamEvent, VarInt,
 };
-use ring::hmac;
-use rustls::pki_types::CertificateDer;
 
 pub use egress::Datagrams;
 pub use inlet::{Inlet, framed};
 pub use record::{Act, Fault, Record};
 pub use report::{Counters, SessionReport};
 
+use crate::authority::Rejection;
+use crate::credentials::Credentials;
 use crate::key::{Key, PublicKey};
-use crate::tls::{self, Refusals};
+use crate::tls::Refusals;
 use crate::trust::TrustFile;
 use dial::Dial;
 use egress::Budget;
-use session::{STREAMS, Session};
+use session::Session;
 
-/// A session without a packet from the peer for this time has ended. The stack's own timeouts, which
-/// stop a vehicle, are of the same order.
-const IDLE: Duration = Duration::from_secs(5);
-/// The interval of keep-alives, which also keep a NAT's mapping.
-const KEEP_ALIVE: Duration = Duration::from_secs(1);
 /// Limit of unfinished handshakes.
 const MOST_HANDSHAKES: usize = 64;
 /// Limit of unfinished handshakes from one network address.
@@ -68,10 +64,7 @@ const RETRY_FROM: usize = 4;
 const FIRST_PACKETS: Rate = Rate::new(50, 100);
 /// Limit of addresses whose first packets are counted. Further ones share one count.
 const MOST_ADDRESSES: usize = 4096;
-/// Octets of QUIC datagrams that may wait in a connection. What exceeds them waits in the backlog of
-/// the session, where an urgent message can overtake it.
-const DATAGRAM_BUFFER: usize = 16 << 10;
-/// The shortest interval between warnings about refused keys.
+/// The shortest interval between warnings about refused peers.
 const WARNING_PAUSE: Duration = Duration::from_secs(10);
 
 /// Close codes of this protocol.
@@ -79,17 +72,21 @@ mod code {
     pub(super) const SHUTDOWN: u32 = 0;
     pub(super) const DUPLICATE: u32 = 1;
     pub(super) const REVOKED: u32 = 2;
+    pub(super) const RENEWED: u32 = 3;
 }
 
 /// The sessions of one node. See the [module](self).
 #[derive(Debug)]
 pub struct Transport {
     own: PublicKey,
-    trust: TrustFile,
+    credentials: Credentials,
     /// The edition of the trust with which the sessions were last compared.
     edition: u64,
+    /// The edition of the own key and certificate in use.
+    own_edition: u64,
     refusals: Refusals,
     warned: Option<Instant>,
+    reminded: Option<Instant>,
     endpoint: Endpoint,
     client: ClientConfig,
     first_packets: Buckets<IpAddr>,
@@ -112,21 +109,29 @@ impl Transport {
     /// addresses until it has a session with each.
     #[must_use]
     pub fn new(key: &Key, trust: TrustFile, dials: impl IntoIterator<Item = SocketAddr>) -> Self {
+        Self::with_credentials(Credentials::pinned(key.clone(), trust), dials)
+    }
+
+    /// Creates the transport of a node with these credentials; otherwise as [`new`](Self::new). The
+    /// owner sets their clock ([`Credentials::set_clock`]) before each `handle_timeout`.
+    #[must_use]
+    pub fn with_credentials(
+        credentials: Credentials,
+        dials: impl IntoIterator<Item = SocketAddr>,
+    ) -> Self {
         let refusals = Refusals::default();
-        let (server, client) = tls::configs(key, &trust, &refusals);
-        let transport = Arc::new(transport_config());
-        let mut server = ServerConfig::with_crypto(server);
-        server.transport_config(transport.clone());
-        let mut client = ClientConfig::new(client);
-        client.transport_config(transport);
-        let config = Arc::new(endpoint_config(key));
+        let (own, own_edition) = (credentials.public(), credentials.own_edition());
+        let (server, client) = parameters::of_sides(&credentials, &refusals);
+        let config = Arc::new(parameters::of_endpoint(&credentials.own_key()));
         Self {
-            own: key.public(),
-            edition: trust.edition(),
-            trust,
+            own,
+            edition: credentials.trust_edition(),
+            own_edition,
+            credentials,
             refusals,
             warned: None,
-            endpoint: Endpoint::new(config, Some(Arc::new(server)), true, None),
+            reminded: None,
+            endpoint: Endpoint::new(config, Some(server), true, None),
             client,
             first_packets: Buckets::new(FIRST_PACKETS, MOST_ADDRESSES),
             dials: dials.into_iter().map(Dial::new).collect(),
@@ -195,7 +200,9 @@ impl Transport {
     /// Performs what is due: retransmissions, timeouts, dials; and closes the sessions of keys that
     /// are no longer trusted.
     pub fn handle_timeout(&mut self, now: Instant) {
+        self.apply_own(now);
         self.apply_trust(now);
+        self.remind(now);
         self.dial(now);
         let due: Vec<_> = self
             .sessions
@@ -239,28 +246,6 @@ impl Transport {
             self.end(now, id, code::SHUTDOWN, "the node stops");
         }
         !running.is_empty()
-    }
-
-    /// Closes the sessions of keys that the trust file no longer lists, and applies changes of ids.
-    fn apply_trust(&mut self, now: Instant) {
-        let edition = self.trust.edition();
-        if edition == self.edition {
-            return;
-        }
-        self.edition = edition;
-        let mut revoked = Vec::new();
-        for (&id, session) in &mut self.sessions {
-            let Some(peer) = &mut session.peer else {
-                continue;
-            };
-            match self.trust.find(peer.key) {
-                Some(trusted) => *peer = trusted,
-                None => revoked.push(id),
-            }
-        }
-        for id in revoked {
-            self.end(now, id, code::REVOKED, "the key is no longer trusted");
-        }
     }
 
     /// Decides on a new connection from a peer.
@@ -358,14 +343,20 @@ impl Transport {
         let Some(session) = self.sessions.get_mut(&id) else {
             return;
         };
-        // The handshake has found it in the trust file, which may have changed meanwhile.
-        let Some(peer) = peer_key(session).and_then(|key| self.trust.find(key)) else {
-            self.end(now, id, code::REVOKED, "the key is no longer trusted");
-            return;
+        // The handshake has accepted it, but the trust may have changed meanwhile.
+        let identified = match session.identify(&self.credentials) {
+            Ok(identified) => identified,
+            Err(rejection) => {
+                tracing::warn!(%rejection, "refused after the handshake");
+                self.end(now, id, code::REVOKED, renewal::NOT_ACCEPTED);
+                return;
+            }
         };
+        let peer = identified.peer;
         let (key, address) = (peer.key, session.connection.remote_address());
         tracing::info!(peer = peer.name, %address, "secure session established");
         session.peer = Some(peer);
+        session.valid_until = identified.valid_until;
         self.counters.established += 1;
         match session.dial {
             // There are no dials any more after `close`.
@@ -423,8 +414,10 @@ impl Transport {
             self.record(id, Act::Disconnected { reason });
         } else if session.peer.is_none() {
             self.counters.handshakes_failed += 1;
-            let untrusted = self.refusals.take();
-            let fault = Fault::of(reason, untrusted);
+            let rejection = self.refusals.take();
+            self.counters.count(rejection.as_ref());
+            let key = rejection.as_ref().and_then(Rejection::key);
+            let fault = Fault::of(reason, rejection);
             if self.warned.is_none_or(|at| now >= at + WARNING_PAUSE) {
                 self.warned = Some(now);
                 let remedy = fault.remedy().unwrap_or_default();
@@ -432,7 +425,7 @@ impl Transport {
             }
             self.push_record(Record {
                 peer: None,
-                key: untrusted,
+                key,
                 address,
                 act: Act::HandshakeFailed(fault),
             });
@@ -479,35 +472,4 @@ impl Transport {
 /// Whether a datagram begins with an Initial packet of QUIC 1 (RFC 9000, section 17.2.2).
 fn is_first_packet(datagram: &[u8]) -> bool {
     datagram.first().is_some_and(|first| first & 0xF0 == 0xC0)
-}
-
-/// Parameters of the endpoint. With the same secrets after a restart it resets the connections of
-/// its previous life, so that the peers dial again before these time out.
-fn endpoint_config(key: &Key) -> EndpointConfig {
-    let secret = key.secret_for(b"jaus/1 stateless reset");
-    let mut config =
-        EndpointConfig::new(Arc::new(hmac::Key::new(hmac::HMAC_SHA256, secret.as_ref())));
-    let mut ids = [0; 8];
-    ids.copy_from_slice(&key.secret_for(b"jaus/1 connection ids").as_ref()[..8]);
-    let ids = u64::from_le_bytes(ids);
-    config.cid_generator(move || Box::new(HashedConnectionIdGenerator::from_key(ids)));
-    config
-}
-
-/// Parameters of every connection.
-fn transport_config() -> TransportConfig {
-    let mut config = TransportConfig::default();
-    config
-        .max_concurrent_uni_streams(VarInt::from_u32(STREAMS))
-        .max_concurrent_bidi_streams(VarInt::from_u32(0))
-        .max_idle_timeout(IdleTimeout::try_from(IDLE).ok())
-        .keep_alive_interval(Some(KEEP_ALIVE))
-        .datagram_send_buffer_size(DATAGRAM_BUFFER);
-    config
-}
-
-fn peer_key(session: &Session) -> Option<PublicKey> {
-    let identity = session.connection.crypto_session().peer_identity()?;
-    let certificates = identity.downcast::<Vec<CertificateDer<'static>>>().ok()?;
-    PublicKey::from_spki(certificates.first()?)
 }

@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 use jaus::address::JausId;
 use quinn_proto::ConnectionError;
 
+use crate::authority::Rejection;
 use crate::key::PublicKey;
 use crate::rules::Refusal;
 
@@ -72,6 +73,9 @@ pub enum Fault {
     /// The peer's key is not trusted here.
     #[error("the key {0} is not trusted here")]
     UntrustedKey(PublicKey),
+    /// The peer's certificate, or the proof of its key, is refused here.
+    #[error(transparent)]
+    Rejected(Rejection),
     /// The peer ended the handshake, most often because it does not trust the key of this node.
     #[error("the peer refused the handshake ({0})")]
     RefusedByPeer(String),
@@ -84,9 +88,10 @@ pub enum Fault {
 }
 
 impl Fault {
-    pub(super) fn of(error: &ConnectionError, untrusted: Option<PublicKey>) -> Self {
-        match (untrusted, error) {
-            (Some(key), _) => Self::UntrustedKey(key),
+    pub(super) fn of(error: &ConnectionError, rejection: Option<Rejection>) -> Self {
+        match (rejection, error) {
+            (Some(Rejection::UntrustedKey(key)), _) => Self::UntrustedKey(key),
+            (Some(rejection), _) => Self::Rejected(rejection),
             (None, ConnectionError::ConnectionClosed(_)) => Self::RefusedByPeer(error.to_string()),
             (None, ConnectionError::TimedOut) => Self::NoAnswer,
             (None, _) => Self::Other(error.to_string()),
@@ -102,13 +107,14 @@ impl Fault {
             ),
             Self::RefusedByPeer(_) => Some(
                 "on the peer's host, `jaus keys trust` the key that `jaus keys show` prints here; \
-                 the log of the peer names the key that it refused",
+                 the log of the peer names the key that it refused; of a certificate, the peer's \
+                 authority, revocation list and clock decide",
             ),
             Self::NoAnswer => Some(
                 "is the peer running with --secure-listen, and does its firewall let this UDP port \
                  pass?",
             ),
-            Self::Other(_) => None,
+            Self::Rejected(_) | Self::Other(_) => None,
         }
     }
 }

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use jaus::endpoint::SessionId;
 
+use crate::authority::Rejection;
 use crate::trust::Peer;
 
 /// Counts of a transport since it was created.
@@ -15,6 +16,17 @@ pub struct Counters {
     pub established: u64,
     /// Handshakes that failed, most often because a side does not trust the key of the other.
     pub handshakes_failed: u64,
+    /// Handshakes refused by this side because it does not trust the key.
+    pub refused_keys: u64,
+    /// Handshakes refused by this side because the certificate has expired or is not valid yet.
+    pub refused_times: u64,
+    /// Handshakes refused by this side because the certificate is revoked.
+    pub refused_revoked: u64,
+    /// Handshakes refused by this side for another defect of the certificate, its authority, or
+    /// the proof of its key.
+    pub refused_certificates: u64,
+    /// Warnings that the node's own certificate has expired or expires soon.
+    pub reminders: u64,
     /// First packets ignored because too many came from one address, or too many handshakes were
     /// unfinished.
     pub handshakes_dropped: u64,
@@ -33,6 +45,27 @@ pub struct Counters {
     pub send_overflows: u64,
     /// Datagrams dropped because their session had ended.
     pub no_session: u64,
+}
+
+impl Counters {
+    /// Counts a refused handshake.
+    pub(super) const fn count(&mut self, rejection: Option<&Rejection>) {
+        match rejection {
+            None => {}
+            Some(Rejection::UntrustedKey(_) | Rejection::NotEd25519) => {
+                self.refused_keys += 1;
+            }
+            Some(Rejection::Expired { .. } | Rejection::NotYetValid { .. }) => {
+                self.refused_times += 1;
+            }
+            Some(Rejection::Revoked { .. }) => {
+                self.refused_revoked += 1;
+            }
+            Some(_) => {
+                self.refused_certificates += 1;
+            }
+        }
+    }
 }
 
 /// The current state of a session.

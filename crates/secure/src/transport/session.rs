@@ -12,8 +12,11 @@ use bytes::{Buf as _, Bytes};
 use jaus::link::backlog::{Backlog, Bounds};
 use jaus::wire::{Acknowledgement, DataControl, Priority, judp};
 use quinn_proto::{Connection, ConnectionHandle, Dir, SendDatagramError, StreamId};
+use rustls::pki_types::{CertificateDer, UnixTime};
 
 use super::inlet::{Inlet, framed};
+use crate::authority::Rejection;
+use crate::credentials::{Credentials, Identified};
 use crate::trust::Peer;
 
 /// Limits of what waits for one session.
@@ -34,6 +37,8 @@ pub(super) struct Session {
     pub(super) dial: Option<usize>,
     /// The peer, after the handshake.
     pub(super) peer: Option<Peer>,
+    /// Until when its certificate is valid, if it has one.
+    pub(super) valid_until: Option<UnixTime>,
     /// Whether it has ended and only waits for late packets of the peer.
     pub(super) ended: bool,
     /// When the peer was last told that a message of its was refused.
@@ -66,6 +71,7 @@ impl Session {
             connection,
             dial,
             peer: None,
+            valid_until: None,
             ended: false,
             noticed: None,
             backlog: Backlog::new(WAITING),
@@ -80,6 +86,14 @@ impl Session {
     /// The peer, while messages can be exchanged with it.
     pub(super) fn established(&self) -> Option<&Peer> {
         self.peer.as_ref().filter(|_| !self.ended)
+    }
+
+    /// The peer that the key or certificate of the handshake belongs to, if it is accepted now.
+    pub(super) fn identify(&self, credentials: &Credentials) -> Result<Identified, Rejection> {
+        let identity = self.connection.crypto_session().peer_identity();
+        let shown = identity.and_then(|it| it.downcast::<Vec<CertificateDer<'static>>>().ok());
+        let first = shown.as_ref().and_then(|it| it.first());
+        credentials.identify(first.ok_or(Rejection::NotEd25519)?)
     }
 
     /// Whether this side has dialled, and the peer has not accepted its key yet.

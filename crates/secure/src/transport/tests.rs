@@ -12,9 +12,12 @@ use std::collections::BTreeMap;
 use jaus::address::JausId;
 use jaus::wire::{DataControl, Flags, Frame, Priority, judp};
 
+use super::parameters::{IDLE, KEEP_ALIVE};
 use super::*;
 use crate::rules::Rules;
 use crate::trust::{Peer, Trust};
+
+mod certificates;
 
 /// The one-way delay of the network.
 const DELAY: Duration = Duration::from_millis(5);
@@ -74,8 +77,12 @@ impl Network {
     }
 
     fn add(&mut self, key: &Key, trust: &TrustFile, dials: &[SocketAddr]) -> usize {
+        self.add_with(Credentials::pinned(key.clone(), trust.clone()), dials)
+    }
+
+    fn add_with(&mut self, credentials: Credentials, dials: &[SocketAddr]) -> usize {
         let number = u8::try_from(self.hosts.len() + 1).unwrap();
-        let transport = Transport::new(key, trust.clone(), dials.iter().copied());
+        let transport = Transport::with_credentials(credentials, dials.iter().copied());
         self.hosts.push(Host {
             address: address(number),
             transport,

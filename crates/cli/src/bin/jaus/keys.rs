@@ -1,4 +1,7 @@
-//! `jaus keys`: the key of this host's node, and the keys that it trusts.
+//! `jaus keys`: the key of this host's node, the keys that it trusts, and the team's certificates.
+
+mod ca;
+mod rotate;
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +14,7 @@ use jaus_cli::folders::make_folder_of;
 use jaus_cli::output::{Output, say};
 use jaus_cli::secure::KeyFiles;
 use jaus_secure::rules::Rules;
-use jaus_secure::{Key, Peer, PublicKey, Trust, edit};
+use jaus_secure::{Grant, Key, Peer, PublicKey, Trust, edit};
 use serde_json::json;
 
 /// Make the key of this host's node, and choose the keys that it trusts
@@ -26,6 +29,8 @@ use serde_json::json;
     jaus keys trust console 0b2yKQZ0C3r1mHqkqfM3d5bq0f5fY1b5o8hGxqj9n3E= 60.1.255 control=127\n  \
     jaus keys allow console control=200 clear-emergency\n  \
     jaus keys list\n  \
+    jaus keys rotate\n  \
+    jaus keys ca issue rover WkE5vXW4lFyQ3nDzGnUlnQ0Xs0mB5bqkVHk0pJ1Yd2s= 101.255.255 > rover.crt\n  \
     jaus keys revoke rover")]
 pub(crate) struct Keys {
     #[command(subcommand)]
@@ -38,6 +43,8 @@ enum Action {
     New(Files),
     /// Print the public key
     Show(Files),
+    /// Replace the key without stopping the node: first make the next one, then use it
+    Rotate(rotate::Rotate),
     /// Trust the key of a peer for these ids; it may observe, unless there are rules
     Trust(TrustKey),
     /// Replace the rules of a peer: what it may do besides observing
@@ -46,6 +53,8 @@ enum Action {
     Revoke(Revoke),
     /// List the trusted keys, the ids that they may speak for, and their rules
     List(List),
+    /// Issue and revoke certificates, instead of trusting each key on each host
+    Ca(ca::Ca),
 }
 
 #[derive(Args)]
@@ -59,9 +68,10 @@ struct TrustKey {
     /// A name for the peer, without blanks
     name: String,
 
-    /// Its public key, as `jaus keys show` prints it there
+    /// Its public key, as `jaus keys show` prints it there; or the word `certificate` for the ids
+    /// and rules of the certificate with this name
     #[arg(value_name = "KEY")]
-    public_key: PublicKey,
+    proof: Proof,
 
     /// The ids that it may speak for, separated by commas: 101.255.255 for all of subsystem 101
     ids: Ids,
@@ -69,8 +79,30 @@ struct TrustKey {
     #[command(flatten)]
     rules: RuleWords,
 
+    /// Add a further key to a name that has one already
+    #[arg(long)]
+    also: bool,
+
     #[command(flatten)]
     files: KeyFiles,
+}
+
+/// What a peer shows.
+#[derive(Clone)]
+enum Proof {
+    Key(PublicKey),
+    Certificate,
+}
+
+impl FromStr for Proof {
+    type Err = <PublicKey as FromStr>::Err;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text {
+            "certificate" => Ok(Self::Certificate),
+            key => key.parse().map(Self::Key),
+        }
+    }
 }
 
 #[derive(Args)]
@@ -118,6 +150,10 @@ struct Revoke {
     /// The peer's name
     name: String,
 
+    /// Only this key of the peer
+    #[arg(value_name = "KEY")]
+    public_key: Option<PublicKey>,
+
     #[command(flatten)]
     files: KeyFiles,
 }
@@ -141,6 +177,8 @@ impl Keys {
             Action::Allow(it) => it.replace(),
             Action::Revoke(it) => it.remove(),
             Action::List(it) => it.list(),
+            Action::Rotate(it) => it.run(),
+            Action::Ca(it) => it.run(),
         }
     }
 }
@@ -170,13 +208,21 @@ impl TrustKey {
     fn add(&self) -> Result<Outcome, Failure> {
         let path = self.files.trusted_keys()?;
         make_folder_of(&path)?;
-        let peer = Peer {
-            name: self.name.clone(),
-            key: self.public_key,
-            ids: self.ids.0.clone(),
-            rules: self.rules.rules()?,
+        let (name, ids) = (self.name.clone(), self.ids.0.clone());
+        let rules = self.rules.rules()?;
+        let done = match self.proof {
+            Proof::Key(key) => {
+                let peer = Peer {
+                    name,
+                    key,
+                    ids,
+                    rules,
+                };
+                edit::trust(&path, &peer, self.also)
+            }
+            Proof::Certificate => edit::grant(&path, &Grant { name, ids, rules }),
         };
-        edit::trust(&path, &peer).map_err(Failure::of)?;
+        done.map_err(Failure::of)?;
         Ok(Outcome::Done)
     }
 }
@@ -192,7 +238,7 @@ impl Allow {
 impl Revoke {
     fn remove(&self) -> Result<Outcome, Failure> {
         let path = self.files.trusted_keys()?;
-        let was_there = edit::revoke(&path, &self.name).map_err(Failure::of)?;
+        let was_there = edit::revoke(&path, &self.name, self.public_key).map_err(Failure::of)?;
         done_if_there(was_there, &self.name, &path)
     }
 }
@@ -213,22 +259,27 @@ impl List {
         let text = fs::read_to_string(&path).map_err(|error| Failure::file(&path, &error))?;
         let trust = Trust::parse(&text).map_err(Failure::of)?;
         let mut output = Output::new();
-        for peer in trust.peers() {
-            let ids: Vec<_> = peer.ids.iter().map(JausId::to_string).collect();
+        let peers = trust.peers().iter();
+        let keys = peers.map(|it| (&it.name, it.key.to_string(), &it.ids, &it.rules));
+        let grants = trust.grants().iter();
+        let certificates =
+            grants.map(|it| (&it.name, "certificate".to_owned(), &it.ids, &it.rules));
+        let mut is_empty = true;
+        for (name, key, ids, rules) in keys.chain(certificates) {
+            is_empty = false;
+            let ids: Vec<_> = ids.iter().map(JausId::to_string).collect();
             if self.json {
-                let key = peer.key.to_string();
-                let rules = peer.rules.to_string();
-                output
-                    .line(json!({ "name": peer.name, "key": key, "ids": ids, "rules": rules }))?;
+                let rules = rules.to_string();
+                output.line(json!({ "name": name, "key": key, "ids": ids, "rules": rules }))?;
             } else {
-                let (name, key, ids) = (&peer.name, peer.key, ids.join(","));
-                let rules = match peer.rules.to_string() {
+                let ids = ids.join(",");
+                let rules = match rules.to_string() {
                     none if none.is_empty() => "observe".to_owned(),
                     rules => rules,
                 };
-                output.line(format_args!("{name:16} {key}  {ids}  {rules}"))?;
+                output.line(format_args!("{name:16} {key:44}  {ids}  {rules}"))?;
             }
         }
-        Ok(Outcome::complete_if(!trust.peers().is_empty()))
+        Ok(Outcome::complete_if(!is_empty))
     }
 }

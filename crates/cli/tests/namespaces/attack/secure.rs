@@ -85,8 +85,8 @@ fn on_secure_scene(body: impl Fn(Scene<'_>, &Path)) {
         };
         let client = peer("client", key("client.key"), "102.255.255");
         let vehicle = peer("vehicle", key("vehicle.key"), "101.255.255");
-        edit::trust(&path("vehicle.trusted_keys"), &client).unwrap();
-        edit::trust(&path("client.trusted_keys"), &vehicle).unwrap();
+        edit::trust(&path("vehicle.trusted_keys"), &client, false).unwrap();
+        edit::trust(&path("client.trusted_keys"), &vehicle, false).unwrap();
         let [key, trusted, audit] =
             ["vehicle.key", "vehicle.trusted_keys", "audit.jsonl"].map(path);
         let flags = [

@@ -1,5 +1,8 @@
 //! `jaus keys`, and commands that reach a vehicle by a secure link alone.
 
+mod certificates;
+mod rotation;
+
 use std::path::PathBuf;
 
 use jaus_test_kit::waiting::block_until;

@@ -125,14 +125,14 @@ impl Keys {
                 ids: vec![JausId::new(subsystem, node, 255)],
                 rules: rules.parse().map_err(Failure::of)?,
             };
-            edit::trust(&self.trusted_keys(RELAY_KEY), &peer).map_err(Failure::of)?;
+            edit::trust(&self.trusted_keys(RELAY_KEY), &peer, false).map_err(Failure::of)?;
             let peer = Peer {
                 name: RELAY_KEY.to_owned(),
                 key: relay,
                 ids: vec![JausId::EVERYONE],
                 rules: Rules::everything(),
             };
-            edit::trust(&self.trusted_keys(name), &peer).map_err(Failure::of)?;
+            edit::trust(&self.trusted_keys(name), &peer, false).map_err(Failure::of)?;
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! The secure link: are key and trusted keys usable, and does a link to each peer stand?
+//! The secure link: are key, certificate and trusted keys usable, and does a link to each peer stand?
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -16,7 +16,12 @@ const CHECK: &str = "secure";
 
 /// Checks the link, and connects to its peers.
 pub(super) async fn check(secure: &Secure, node: JausId, time: Duration) -> Vec<Finding> {
-    let mut findings = vec![key(secure), trust(secure)];
+    let accepts = if secure.uses_certificates() {
+        certificate
+    } else {
+        trust
+    };
+    let mut findings = vec![key(secure), accepts(secure)];
     if findings.iter().any(Finding::is_problem) {
         return findings;
     }
@@ -67,6 +72,17 @@ fn trust(secure: &Secure) -> Finding {
         Ok(trust) => Finding::ok(
             CHECK,
             format_args!("this node trusts {}", counted(trust.len(), "key")),
+        ),
+        Err(error) => Finding::problem(CHECK, error),
+    }
+}
+
+fn certificate(secure: &Secure) -> Finding {
+    match secure.credentials().map(|it| it.warning()) {
+        Ok(None) => Finding::ok(CHECK, "the certificate of this node is valid"),
+        Ok(Some(warning)) => Finding::warning(
+            CHECK,
+            format_args!("the certificate of this node: {warning}"),
         ),
         Err(error) => Finding::problem(CHECK, error),
     }

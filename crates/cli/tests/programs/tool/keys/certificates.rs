@@ -1,0 +1,163 @@
+//! Nodes with certificates of their team's authority.
+
+use std::time::{Duration, Instant};
+
+use super::*;
+
+/// A host that keeps the authority, and issues certificates for the others.
+struct Office(Host);
+
+impl Office {
+    fn new() -> Self {
+        let office = Self(Host::new());
+        let made = office.ca(&["new"]);
+        assert_eq!(made.status, 0, "{made:?}");
+        office
+    }
+
+    fn ca(&self, arguments: &[&str]) -> Run {
+        let folder = self.0.file("ca");
+        let all = [&["keys", "ca"], arguments, &["--folder", &folder]].concat();
+        run(&all, b"")
+    }
+
+    /// Issues a certificate to a host, for its key, with the files that a node needs.
+    fn issue(&self, to: &Host, name: &str, ids: &str, life: &str) {
+        let key = to.keys(&["show"]).stdout;
+        let issued = self.ca(&["issue", name, key.trim(), ids, "--for", life]);
+        assert_eq!(issued.status, 0, "{issued:?}");
+        std::fs::write(to.file("node.crt"), issued.stdout).unwrap();
+    }
+
+    /// The flags of a node on a host.
+    fn flags(&self, host: &Host) -> Vec<String> {
+        let file = |name: &str| self.0.file(&format!("ca/{name}"));
+        let mut flags = host.flags().to_vec();
+        flags.push(format!("--certificate={}", host.file("node.crt")));
+        flags.push(format!("--authority={}", file("ca.crt")));
+        flags.push(format!("--revoked={}", file("ca.crl")));
+        flags
+    }
+
+    fn start(&self, host: &Host, command: &str, arguments: &[&str]) -> Running {
+        let flags = self.flags(host);
+        let flags: Vec<_> = flags.iter().map(String::as_str).collect();
+        Running::command(command, &[arguments, &flags].concat())
+    }
+
+    /// Queries a vehicle from a host with a certificate.
+    fn query(&self, host: &Host, address: &str, vehicle: &str, timeout: &str) -> Run {
+        let flags = self.flags(host);
+        let mut all = vec!["query", vehicle, "QueryIdentification", WHICH];
+        all.extend([
+            "--id",
+            "60.1.1",
+            "--secure-peer",
+            address,
+            "--timeout",
+            timeout,
+        ]);
+        all.extend(flags.iter().map(String::as_str));
+        run(&all, b"")
+    }
+}
+
+fn host() -> Host {
+    let host = Host::new();
+    host.new_key();
+    host
+}
+
+/// A vehicle with a certificate that listens at a port.
+fn vehicle(office: &Office, id: &str) -> (Running, Host, String) {
+    let host = host();
+    office.issue(&host, "rover", "115.255.255", "30d");
+    let address = format!("127.0.0.1:{}", free_port());
+    let listen = format!("--secure-listen={address}");
+    let mut vehicle = office.start(&host, "vehicle", &["--id", id, &listen]);
+    vehicle.read_until("Ctrl-C");
+    (vehicle, host, address)
+}
+
+#[test]
+fn a_certificate_needs_no_trust_file_and_is_revoked_by_one_command() {
+    let (office, operator) = (Office::new(), host());
+    let (_vehicle, _host, address) = vehicle(&office, "115.1.6");
+    office.issue(&operator, "operator", "60.255.255", "30d");
+    let answered = office.query(&operator, &address, "115.1.6", "20s");
+    assert_eq!(answered.status, 0, "{answered:?}");
+
+    let watch = ["--watch", "--id", "60.1.2", "--secure-peer", &address];
+    let mut watching = office.start(&operator, "discover", &watch);
+    watching.read_until("115.1.6");
+    let revoked = office.ca(&["revoke", "operator"]);
+    assert_eq!(revoked.status, 0, "{revoked:?}");
+    watching.read_until("lost");
+    let refused = office.query(&operator, &address, "115.1.6", "1s");
+    assert_eq!(refused.status, 2, "its own node notices it: {refused:?}");
+    assert!(refused.stderr.contains("is revoked"), "{refused:?}");
+}
+
+#[test]
+fn a_certificate_of_another_authority_gets_no_link() {
+    let (office, other, stranger) = (Office::new(), Office::new(), host());
+    let (_vehicle, _host, address) = vehicle(&office, "115.1.7");
+    other.issue(&stranger, "operator", "60.255.255", "30d");
+    let refused = other.query(&stranger, &address, "115.1.7", "1s");
+    assert_eq!((refused.status, &*refused.stdout), (1, ""), "{refused:?}");
+}
+
+#[test]
+fn a_node_does_not_start_with_a_certificate_that_peers_would_refuse() {
+    let (office, operator) = (Office::new(), host());
+    let address = "127.0.0.1:9";
+    office.issue(&operator, "operator", "60.255.255", "1s");
+    let end = Instant::now() + Duration::from_secs(20);
+    let mut refused = office.query(&operator, address, "115.1.8", "100ms");
+    while refused.status != 2 && Instant::now() < end {
+        refused = office.query(&operator, address, "115.1.8", "100ms");
+    }
+    assert!(refused.stderr.contains("has expired"), "{refused:?}");
+    assert!(refused.stderr.contains("jaus keys ca issue"), "{refused:?}");
+
+    let other = host();
+    office.issue(&other, "other", "61.255.255", "30d");
+    std::fs::copy(other.file("node.crt"), operator.file("node.crt")).unwrap();
+    let refused = office.query(&operator, address, "115.1.8", "100ms");
+    assert_eq!(refused.status, 2, "{refused:?}");
+    assert!(refused.stderr.contains("another key"), "{refused:?}");
+}
+
+#[test]
+fn certificates_are_listed_and_bad_requests_say_what_to_do() {
+    let nothing = Office(Host::new());
+    let key = host().keys(&["show"]).stdout;
+    let issue = |office: &Office, ids: &str, life: &str| {
+        office.ca(&["issue", "rover", key.trim(), ids, "--for", life])
+    };
+    let missing = issue(&nothing, "101.255.255", "30d");
+    assert!(missing.stderr.contains("jaus keys ca new"), "{missing:?}");
+
+    let office = Office::new();
+    assert_eq!(
+        office.ca(&["new"]).status,
+        2,
+        "an authority is not replaced"
+    );
+    assert_eq!(office.ca(&["list"]).status, 1, "nothing is issued");
+    for (ids, life) in [
+        ("101.1", "30d"),
+        ("101.255.255", "0d"),
+        ("101.255.255", "long"),
+    ] {
+        let refused = issue(&office, ids, life);
+        assert_eq!((refused.status, &*refused.stdout), (2, ""), "{refused:?}");
+    }
+    assert_eq!(issue(&office, "101.255.255,102.1.1", "2h").status, 0);
+    assert_eq!(office.ca(&["revoke", "nobody"]).status, 1);
+    let serial = office.ca(&["list", "--json"]).only_line()["serial"].clone();
+    assert_eq!(office.ca(&["revoke", serial.as_str().unwrap()]).status, 0);
+    let listed = office.ca(&["list", "--json"]).only_line();
+    assert_eq!(listed["state"], "revoked");
+    assert_eq!(listed["ids"][1], "102.1.1");
+}

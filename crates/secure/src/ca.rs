@@ -1,0 +1,349 @@
+//! A team's certificate authority: a folder with its key, its certificate, its revocation list, and
+//! the register of the certificates that it has issued.
+//!
+//! | file | contents |
+//! |---|---|
+//! | `ca.key` | the private key, readable by its owner alone; it belongs on no vehicle |
+//! | `ca.crt` | the certificate that nodes need (`authority`) |
+//! | `ca.crl` | the revocation list that nodes need (`revoked`) |
+//! | `issued` | a line for each issued certificate |
+
+mod register;
+
+use std::fs::{self, OpenOptions};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use jaus::address::JausId;
+use rcgen::{
+    BasicConstraints, CertificateParams, CertificateRevocationListParams, DistinguishedName,
+    DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyIdMethod, KeyUsagePurpose, PublicKeyData,
+    RevokedCertParams, SanType, SerialNumber, SignatureAlgorithm, SigningKey,
+};
+use ring::rand::{SecureRandom as _, SystemRandom};
+use rustls::SignatureScheme;
+use rustls::pki_types::CertificateDer;
+use time::OffsetDateTime;
+use x509_cert::der::Decode as _;
+
+use crate::certificate::{
+    Certificate, CertificateError, Defect, MOST_IDS, SCHEME, in_file, is_name, malformed,
+    read_certificate,
+};
+use crate::edit;
+use crate::key::{Key, KeyError, PublicKey, pem};
+pub use register::Issued;
+
+/// How long an authority's certificate is valid.
+const LIFE: Duration = Duration::from_secs(10 * 365 * 24 * 60 * 60);
+/// The longest life of a node's certificate.
+const LONGEST_LIFE: Duration = LIFE;
+/// By how much a certificate is valid before it was issued, for hosts whose clocks are slow.
+const SLACK: Duration = Duration::from_secs(60 * 60);
+/// Octets of a serial number.
+const SERIAL: usize = 16;
+
+/// Why an authority cannot do something.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum AuthorityError {
+    /// A file cannot be used.
+    #[error(transparent)]
+    File(#[from] CertificateError),
+    /// A line of the register is malformed.
+    #[error("line {line} of {}: {what}", .path.display())]
+    Register {
+        /// The register.
+        path: PathBuf,
+        /// The line's number, from 1.
+        line: usize,
+        /// What is wrong.
+        what: String,
+    },
+    /// The name is not usable.
+    #[error(
+        "`{}` cannot be a name: use 1 to 64 ASCII letters, digits and punctuation without `#`",
+        .0.escape_default()
+    )]
+    Name(String),
+    /// The certificate would have no ids, or too many.
+    #[error("a certificate has 1 to 32 ids, not {0}")]
+    Ids(usize),
+    /// The certificate would live too long.
+    #[error("a certificate is valid for 1 s to 3650 days")]
+    Life,
+    /// The certificate cannot be encoded.
+    #[error("the certificate cannot be made: {0}")]
+    Encoding(#[from] rcgen::Error),
+}
+
+impl From<KeyError> for AuthorityError {
+    fn from(error: KeyError) -> Self {
+        Self::File(error.into())
+    }
+}
+
+/// A certificate to issue.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Request {
+    /// The name of the node.
+    pub name: String,
+    /// The node's public key. That the node has the private one is not proved here: it proves it in
+    /// each handshake.
+    pub key: PublicKey,
+    /// The ids that the node may speak for; with wildcards.
+    pub ids: Vec<JausId>,
+    /// How long the certificate is valid.
+    pub life: Duration,
+}
+
+/// A certificate authority.
+#[derive(Debug)]
+pub struct CertificateAuthority {
+    folder: PathBuf,
+    key: Key,
+    name: String,
+}
+
+impl CertificateAuthority {
+    /// Makes an authority with this name in a folder, which must exist.
+    ///
+    /// # Errors
+    /// If the name is not usable, the folder has an authority already, or it cannot be written.
+    pub fn create(folder: &Path, name: &str, now: SystemTime) -> Result<Self, AuthorityError> {
+        if !is_name(name) {
+            return Err(AuthorityError::Name(name.to_owned()));
+        }
+        let authority = Self {
+            folder: folder.to_owned(),
+            key: Key::create(&folder.join("ca.key"))?,
+            name: name.to_owned(),
+        };
+        let mut params = authority.params();
+        params.serial_number = Some(serial()?);
+        params.not_before = time(now - SLACK);
+        params.not_after = time(now + LIFE);
+        let certificate = params.self_signed(&authority.key)?;
+        write(
+            &folder.join("ca.crt"),
+            &pem("CERTIFICATE", certificate.der()),
+        )?;
+        authority.write_list(&[], now)?;
+        Ok(authority)
+    }
+
+    /// Opens the authority in a folder.
+    ///
+    /// # Errors
+    /// If a file of it cannot be used.
+    pub fn open(folder: &Path) -> Result<Self, AuthorityError> {
+        let path = folder.join("ca.crt");
+        let name = common_name(&read_certificate(&path)?);
+        Ok(Self {
+            folder: folder.to_owned(),
+            key: Key::load(&folder.join("ca.key"))?,
+            name: name.ok_or_else(|| malformed(&path, "certificate of an authority"))?,
+        })
+    }
+
+    /// Issues a certificate and registers it. Returns it as PEM.
+    ///
+    /// # Errors
+    /// If a field of the request is out of range, or the register cannot be written.
+    pub fn issue(&self, request: &Request, now: SystemTime) -> Result<String, AuthorityError> {
+        check(request)?;
+        let mut params = CertificateParams::default();
+        params.distinguished_name = named(&request.name);
+        params.subject_alt_names = names(&request.ids)?;
+        params.serial_number = Some(serial()?);
+        params.not_before = time(now - SLACK);
+        params.not_after = time(now + request.life);
+        params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
+        params.extended_key_usages = vec![
+            ExtendedKeyUsagePurpose::ClientAuth,
+            ExtendedKeyUsagePurpose::ServerAuth,
+        ];
+        params.use_authority_key_identifier_extension = true;
+        let issued = params.signed_by(&request.key, &self.issuer())?;
+        // It is read back, so that nothing is issued that nodes would not accept.
+        let certificate =
+            Certificate::from_der(issued.der()).map_err(|defect| self.defect(defect))?;
+        self.append(&Issued::of(&certificate))?;
+        Ok(pem("CERTIFICATE", issued.der()))
+    }
+
+    /// Revokes the certificates with this name, or the one with this serial number, and writes the
+    /// revocation list. Returns the certificates that were not revoked before.
+    ///
+    /// # Errors
+    /// If the register cannot be read, or a file cannot be written.
+    pub fn revoke(&self, which: &str, now: SystemTime) -> Result<Vec<Issued>, AuthorityError> {
+        let mut issued = self.issued()?;
+        let mut revoked = Vec::new();
+        for it in &mut issued {
+            let is_meant = it.name == which || it.serial == which;
+            if is_meant && it.revoked.is_none() && it.not_after > now {
+                it.revoked = Some(now);
+                revoked.push(it.clone());
+            }
+        }
+        // The list first: what it names is revoked, even if the register could not be written.
+        self.write_list(&issued, now)?;
+        let text: String = issued.iter().map(Issued::to_string).collect();
+        let path = self.register();
+        edit::replace(&path, &text).map_err(|source| in_file(&path, source))?;
+        Ok(revoked)
+    }
+
+    /// The certificates that it has issued, oldest first.
+    ///
+    /// # Errors
+    /// If the register cannot be read.
+    pub fn issued(&self) -> Result<Vec<Issued>, AuthorityError> {
+        register::read(&self.register())
+    }
+
+    fn register(&self) -> PathBuf {
+        self.folder.join("issued")
+    }
+
+    fn append(&self, issued: &Issued) -> Result<(), AuthorityError> {
+        let path = self.register();
+        let append = || -> io::Result<()> {
+            let mut file = OpenOptions::new().append(true).create(true).open(&path)?;
+            file.write_all(issued.to_string().as_bytes())?;
+            file.sync_all()
+        };
+        append().map_err(|source| in_file(&path, source).into())
+    }
+
+    /// Writes the list of the revoked certificates that have not expired.
+    fn write_list(&self, issued: &[Issued], now: SystemTime) -> Result<(), AuthorityError> {
+        let millis = now.duration_since(SystemTime::UNIX_EPOCH);
+        let number = millis.map_or(0, |it| u64::try_from(it.as_millis()).unwrap_or(u64::MAX));
+        let revoked = issued.iter().filter(|it| it.not_after > now);
+        let list = CertificateRevocationListParams {
+            this_update: time(now),
+            // Nodes use a list until they get a newer one: a vehicle without a network stays usable.
+            next_update: time(now + LIFE),
+            crl_number: SerialNumber::from(number),
+            issuing_distribution_point: None,
+            revoked_certs: revoked.filter_map(listed).collect(),
+            key_identifier_method: KeyIdMethod::Sha256,
+        };
+        let list = list.signed_by(&self.issuer())?;
+        let path = self.folder.join("ca.crl");
+        edit::replace(&path, &pem("X509 CRL", list.der()))
+            .map_err(|source| in_file(&path, source).into())
+    }
+
+    /// The parameters of its own certificate.
+    fn params(&self) -> CertificateParams {
+        let mut params = CertificateParams::default();
+        params.distinguished_name = named(&self.name);
+        params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
+        params.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::CrlSign];
+        params
+    }
+
+    fn issuer(&self) -> Issuer<'static, Key> {
+        Issuer::new(self.params(), self.key.clone())
+    }
+
+    fn defect(&self, defect: Defect) -> AuthorityError {
+        let path = self.folder.join("ca.crt");
+        CertificateError::Defect { path, defect }.into()
+    }
+}
+
+fn check(request: &Request) -> Result<(), AuthorityError> {
+    if !is_name(&request.name) {
+        return Err(AuthorityError::Name(request.name.clone()));
+    }
+    if !(1..=MOST_IDS).contains(&request.ids.len()) {
+        return Err(AuthorityError::Ids(request.ids.len()));
+    }
+    if request.life < Duration::from_secs(1) || request.life > LONGEST_LIFE {
+        return Err(AuthorityError::Life);
+    }
+    Ok(())
+}
+
+fn named(name: &str) -> DistinguishedName {
+    let mut names = DistinguishedName::new();
+    names.push(DnType::CommonName, name);
+    names
+}
+
+fn names(ids: &[JausId]) -> Result<Vec<SanType>, rcgen::Error> {
+    let name = |id: &JausId| Ok(SanType::URI(format!("{SCHEME}{id}").try_into()?));
+    ids.iter().map(name).collect()
+}
+
+fn common_name(der: &CertificateDer<'_>) -> Option<String> {
+    let parsed = x509_cert::Certificate::from_der(der).ok()?;
+    let name = parsed.tbs_certificate().subject().common_name().ok()??;
+    Some(name.value().into_owned())
+}
+
+/// A random serial number.
+fn serial() -> Result<SerialNumber, KeyError> {
+    let mut octets = [0; SERIAL];
+    SystemRandom::new()
+        .fill(&mut octets)
+        .map_err(|_| KeyError::NoRandomness)?;
+    // Positive, and of a fixed length.
+    octets[0] = octets[0] & 0x7F | 0x40;
+    Ok(SerialNumber::from_slice(&octets))
+}
+
+/// The entry of the revocation list for a certificate, if it is revoked.
+fn listed(issued: &Issued) -> Option<RevokedCertParams> {
+    Some(RevokedCertParams {
+        serial_number: SerialNumber::from_slice(&issued.serial_octets()?),
+        revocation_time: time(issued.revoked?),
+        reason_code: None,
+        invalidity_date: None,
+    })
+}
+
+fn time(time: SystemTime) -> OffsetDateTime {
+    time.into()
+}
+
+fn write(path: &Path, text: &str) -> Result<(), CertificateError> {
+    fs::write(path, text).map_err(|source| in_file(path, source))
+}
+
+impl PublicKeyData for PublicKey {
+    fn der_bytes(&self) -> &[u8] {
+        self.octets()
+    }
+
+    fn algorithm(&self) -> &'static SignatureAlgorithm {
+        &rcgen::PKCS_ED25519
+    }
+}
+
+impl PublicKeyData for Key {
+    fn der_bytes(&self) -> &[u8] {
+        self.public_ref().octets()
+    }
+
+    fn algorithm(&self) -> &'static SignatureAlgorithm {
+        &rcgen::PKCS_ED25519
+    }
+}
+
+impl SigningKey for Key {
+    fn sign(&self, message: &[u8]) -> Result<Vec<u8>, rcgen::Error> {
+        let signer = self.signing().choose_scheme(&[SignatureScheme::ED25519]);
+        signer
+            .and_then(|it| it.sign(message).ok())
+            .ok_or(rcgen::Error::RingUnspecified)
+    }
+}
+
+#[cfg(test)]
+mod tests;
