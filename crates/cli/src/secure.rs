@@ -109,7 +109,7 @@ pub struct SecureFlags {
 
     /// Write an audit log to this file: sessions, refused messages, control, emergencies
     #[arg(long, value_name = "FILE")]
-    audit: Option<PathBuf>,
+    secure_audit: Option<PathBuf>,
 
     /// At the first start, trust this key for these ids: NAME, KEY and IDS, separated by blanks
     /// (repeatable)
@@ -162,11 +162,13 @@ struct Table {
     /// The file of this node's certificate, with which it accepts peers by theirs instead of by
     /// trusted keys. Flag: `--certificate`.
     certificate: Option<PathBuf>,
-    /// The certificate of the authority; by default `ca.crt` beside the node's. Flag: `--authority`.
+    /// The certificate of the authority; by default `ca.crt` beside the node's. Flag:
+    /// `--certificate-authority`.
     authority: Option<PathBuf>,
     /// The authority's list of revoked certificates. Flag: `--revoked`.
     revoked: Option<PathBuf>,
-    /// The file of the audit log: sessions, refused messages, control, emergencies. Flag: `--audit`.
+    /// The file of the audit log: sessions, refused messages, control, emergencies. Flag:
+    /// `--secure-audit`.
     audit: Option<PathBuf>,
 }
 
@@ -225,7 +227,7 @@ impl SecureFlags {
         let secure = Secure {
             listen: self.secure_listen.or(table.listen),
             peers: [&table.peers[..], &self.secure_peer].concat(),
-            audit: self.audit.clone().or(table.audit),
+            audit: self.secure_audit.clone().or(table.audit),
             trust: self.trust.clone(),
             announce: table.announce.interfaces(&self.secure_announce),
             budget: self.secure_budget.or(table.budget),

@@ -17,7 +17,11 @@ pub(super) struct Certificates {
 
     /// The certificate of the authority that issued all of them [default: ca.crt beside the
     /// certificate]
-    #[arg(long, value_name = "FILE")]
+    #[arg(
+        long = "certificate-authority",
+        id = "certificate_authority",
+        value_name = "FILE"
+    )]
     pub(super) authority: Option<PathBuf>,
 
     /// The authority's list of revoked certificates; without it, a certificate is accepted until it

@@ -92,7 +92,7 @@ fn on_secure_scene(body: impl Fn(Scene<'_>, &Path)) {
         let flags = [
             ("--key", key),
             ("--trusted-keys", trusted),
-            ("--audit", audit),
+            ("--secure-audit", audit),
         ]
         .map(|(flag, path)| format!("{flag}={}", path.display()));
         let flags: Vec<_> = flags

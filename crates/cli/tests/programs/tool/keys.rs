@@ -61,7 +61,7 @@ fn vehicle_and_operator(id: &str) -> (Running, Host, Host, String) {
     let listen = format!("--secure-listen={address}");
     let flags = at_vehicle.flags();
     let flags = flags.each_ref().map(String::as_str);
-    let audit = format!("--audit={}", at_vehicle.file("audit.jsonl"));
+    let audit = format!("--secure-audit={}", at_vehicle.file("audit.jsonl"));
     let own = ["--id", id, &listen, &audit];
     let mut vehicle = Running::command("vehicle", &[&own[..], &flags].concat());
     vehicle.read_until("Ctrl-C");

@@ -34,7 +34,7 @@ impl Office {
         let file = |name: &str| self.0.file(&format!("ca/{name}"));
         let mut flags = host.flags().to_vec();
         flags.push(format!("--certificate={}", host.file("node.crt")));
-        flags.push(format!("--authority={}", file("ca.crt")));
+        flags.push(format!("--certificate-authority={}", file("ca.crt")));
         flags.push(format!("--revoked={}", file("ca.crl")));
         flags
     }
