@@ -234,8 +234,14 @@ fn secure(id: JausId, folder: &Path, settings: Settings) -> (Component, SocketAd
         key.expect("written before")
     });
     let (key, peer) = match id {
-        OURS => (&ours, format!("theirs {} 101.255.255", theirs.public())),
-        _ => (&theirs, format!("ours {} 60.255.255", ours.public())),
+        OURS => (
+            &ours,
+            format!("theirs {} 101.255.255 command", theirs.public()),
+        ),
+        _ => (
+            &theirs,
+            format!("ours {} 60.255.255 command", ours.public()),
+        ),
     };
     let trust = TrustFile::of(Trust::parse(&peer).expect("a trusted key"));
     let link = SecureLink::open(key, trust, settings).expect("a free port");
