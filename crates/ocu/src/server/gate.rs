@@ -10,6 +10,7 @@ use tokio::task::spawn_blocking;
 
 use super::logins::{Ending, Login, LoginId, Logins};
 use super::trail::Trail;
+use super::visitor::Visitor;
 use crate::token::Token;
 use crate::users::{PasswordHash, UserRole, Users, UsersFile};
 
@@ -26,43 +27,11 @@ pub(crate) enum Gate {
     Users(UserGate),
 }
 
-/// Who uses a page or sends a request, and with which role.
-#[derive(Debug)]
-pub(super) struct Visitor {
-    pub(super) user: Arc<str>,
-    pub(super) address: SocketAddr,
-    /// The session of a user.
-    pub(super) login: Option<LoginId>,
-    /// `None` without permission to see anything. The right token raises it.
-    role: Mutex<Option<UserRole>>,
-}
-
-impl Visitor {
-    pub(super) fn may(&self, needed: UserRole) -> bool {
-        self.role().is_some_and(|role| role >= needed)
-    }
-
-    pub(super) fn role(&self) -> Option<UserRole> {
-        *self.role.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The visitor has shown the token.
-    pub(super) fn trust(&self) {
-        let mut role = self.role.lock().unwrap_or_else(PoisonError::into_inner);
-        *role = Some(UserRole::Drive);
-    }
-}
-
 impl Gate {
     /// The sender of a request, with the role that the request shows; `None` for one who has to
     /// log in first.
     pub(super) fn visitor(&self, headers: &HeaderMap, address: SocketAddr) -> Option<Visitor> {
-        let visitor = |role| Visitor {
-            user: Arc::from(OPERATOR),
-            address,
-            login: None,
-            role: Mutex::new(role),
-        };
+        let visitor = |role| Visitor::new(OPERATOR, address, None, role);
         match self {
             Self::Open => Some(visitor(Some(UserRole::Drive))),
             Self::Token { to_read: false, .. } => Some(visitor(Some(UserRole::Observe))),
@@ -146,12 +115,13 @@ impl UserGate {
         let secret = self.secret(headers)?;
         let logins = self.logins();
         let login = logins.find(secret)?;
-        Some(Visitor {
-            user: Arc::from(&*login.user.name),
+        let name = &login.user.name;
+        Some(Visitor::new(
+            name,
             address,
-            login: Some(login.id),
-            role: Mutex::new(Some(login.role())),
-        })
+            Some(login.id),
+            Some(login.role()),
+        ))
     }
 
     /// The secret in the request's cookie.

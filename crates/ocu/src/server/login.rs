@@ -12,9 +12,10 @@ use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use tokio::time::timeout;
 
-use super::gate::{LoginError, UserGate, Visitor};
+use super::gate::{LoginError, UserGate};
 use super::logins::{Ending, LoginId};
 use super::places::Source;
+use super::visitor::Visitor;
 use super::{Refusal, Shared};
 use crate::users::UserRole;
 

@@ -13,6 +13,7 @@ mod places;
 mod socket;
 mod trail;
 mod view;
+mod visitor;
 
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};

@@ -13,8 +13,8 @@ use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
 use super::Shared;
 use super::bounds::{Bucket, FRAMES};
-use super::gate::Visitor;
 use super::view::{self, MessageView};
+use super::visitor::Visitor;
 use crate::answer::Said as Answer;
 use crate::request::{Frame, MessageFilter, OperatorRequest, Said};
 use crate::session::{Order, Reply};

@@ -6,8 +6,8 @@ use std::net::SocketAddr;
 use jaus::address::JausId;
 use jaus_audit::{AuditLog, Entry, Outcome};
 
-use super::gate::Visitor;
 use super::logins::{Ending, Login};
+use super::visitor::Visitor;
 use crate::request::OperatorRequest;
 
 /// The audit log of a station, if it has one.

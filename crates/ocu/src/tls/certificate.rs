@@ -7,7 +7,7 @@ use std::time::{Duration, SystemTime};
 
 use rcgen::{CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, KeyPair};
 
-use super::https::{TlsError, in_file};
+use super::error::{TlsError, in_file};
 
 /// Validity of a new certificate: longer than a station is in use, because a new one has a new
 /// fingerprint.

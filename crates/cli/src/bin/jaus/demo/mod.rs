@@ -24,11 +24,11 @@ use jaus_vehicle::parts::{
 };
 
 use crate::events::EventFormat;
-use network::OwnNetwork;
+use network::{OPERATOR, OwnNetwork, VEHICLE};
 use operator::{Ending, Operator};
 use story::{Story, Who};
 use surprise::Surprise;
-use system::{OPERATOR, System, VEHICLE};
+use system::System;
 
 /// Run a whole vehicle on this computer and watch it drive a mission on the operator's page
 ///

@@ -1,4 +1,4 @@
-//! A network of a demo's own: the multicast group and ports that keep it apart from other demos on
+//! The subsystems of a demo, and a network of its own: the multicast group and ports that keep it apart from other demos on
 //! the same host, whose components have the same ids.
 
 use std::fs::File;
@@ -8,6 +8,10 @@ use jaus::link::{Group, STANDARD_GROUP};
 use jaus_cli::failure::Failure;
 use jaus_vehicle::parts::DEBUG_ADDRESS;
 
+/// The operator's subsystem.
+pub(super) const OPERATOR: u16 = 42;
+/// The vehicle's subsystem.
+pub(super) const VEHICLE: u16 = 101;
 /// The maximum number of demos on one host.
 const MOST: u16 = 16;
 

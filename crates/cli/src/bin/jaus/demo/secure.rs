@@ -10,7 +10,7 @@ use jaus_cli::failure::Failure;
 use jaus_secure::rules::Rules;
 use jaus_secure::{Key, Peer, PublicKey, SecureLink, Settings, TrustFile, edit};
 
-use super::system::{OPERATOR, VEHICLE};
+use super::network::{OPERATOR, VEHICLE};
 
 /// The subsystem of commands in another terminal.
 const VISITOR: u16 = 43;

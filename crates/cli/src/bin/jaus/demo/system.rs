@@ -15,14 +15,10 @@ use jaus_vehicle::parts::{KnowledgeStore, Part, PartError, Slot};
 use jaus_vehicle::sensing::Scenery;
 use tokio::task::JoinSet;
 
-use super::network::OwnNetwork;
+use super::network::{OPERATOR, OwnNetwork};
 #[cfg(feature = "secure")]
 use super::secure::SecureLinks;
 
-/// The operator's subsystem.
-pub(super) const OPERATOR: u16 = 42;
-/// The vehicle's subsystem.
-pub(super) const VEHICLE: u16 = 101;
 /// Name of the vehicle.
 pub(super) const NAME: &str = "G-Bat";
 

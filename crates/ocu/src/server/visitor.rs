@@ -1,0 +1,48 @@
+//! Who uses a page.
+
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::logins::LoginId;
+use crate::users::UserRole;
+
+/// Who uses a page or sends a request, and with which role.
+#[derive(Debug)]
+pub(super) struct Visitor {
+    pub(super) user: Arc<str>,
+    pub(super) address: SocketAddr,
+    /// The session of a user.
+    pub(super) login: Option<LoginId>,
+    /// `None` without permission to see anything. The right token raises it.
+    role: Mutex<Option<UserRole>>,
+}
+
+impl Visitor {
+    pub(super) fn new(
+        user: &str,
+        address: SocketAddr,
+        login: Option<LoginId>,
+        role: Option<UserRole>,
+    ) -> Self {
+        Self {
+            user: Arc::from(user),
+            address,
+            login,
+            role: Mutex::new(role),
+        }
+    }
+
+    pub(super) fn may(&self, needed: UserRole) -> bool {
+        self.role().is_some_and(|role| role >= needed)
+    }
+
+    pub(super) fn role(&self) -> Option<UserRole> {
+        *self.role.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The visitor has shown the token.
+    pub(super) fn trust(&self) {
+        let mut role = self.role.lock().unwrap_or_else(PoisonError::into_inner);
+        *role = Some(UserRole::Drive);
+    }
+}
