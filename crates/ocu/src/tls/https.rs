@@ -183,6 +183,8 @@ fn fingerprint(certificate: &CertificateDer<'_>) -> String {
 mod tests {
     use std::time::Duration;
 
+    use std::path::PathBuf;
+
     use super::*;
 
     const YEAR: Duration = Duration::from_secs(365 * 24 * 3600);
