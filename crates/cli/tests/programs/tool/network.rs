@@ -29,7 +29,7 @@ fn the_demo_drives_a_mission_round_an_obstacle_or_says_why_it_can_not() {
             "system    starts 101.1.35, the communicator",
             "starts 101.3.36, the planner",
             "operator  takes control of the planner 101.3.36 with authority 150",
-            "operator  sets the destination x 0 m, y 2 m",
+            "operator  sets the destination 0 m north and 2 m east of the start",
             "planner   all stages are ready: under way",
             "planner   arrived",
             "vehicle   at x",

@@ -58,8 +58,8 @@ pub(crate) struct Demo {
     #[arg(long)]
     headless: bool,
 
-    /// The destination: NORTH,EAST of the start in metres
-    #[arg(long, value_name = "X,Y", default_value = "6,6.5", value_parser = place, allow_hyphen_values = true)]
+    /// The destination, in metres north and east of the start
+    #[arg(long, value_name = "NORTH,EAST", default_value = "6,6.5", value_parser = place, allow_hyphen_values = true)]
     to: (f64, f64),
 
     /// Steer the front wheels, as in a car, instead of turning on the spot

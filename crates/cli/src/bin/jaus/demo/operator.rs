@@ -66,7 +66,10 @@ impl<'s> Operator<'s> {
         control.deliver(&destination).await.map_err(Failure::of)?;
         self.tell(
             Who::Operator,
-            format!("sets the destination x {x} m, y {y} m, and approves the planned path"),
+            format!(
+                "sets the destination {x} m north and {y} m east of the start, and approves the \
+                 planned path"
+            ),
         )?;
         let ending = self.watch(planner, sensor).await;
         self.leave(control).await;
@@ -187,7 +190,7 @@ impl<'s> Operator<'s> {
         };
         self.tell(
             Who::System,
-            format!("an obstacle appears on the path, at x {x:.1} m, y {y:.1} m"),
+            format!("an obstacle appears on the path, {x:.1} m north and {y:.1} m east"),
         )
     }
 
@@ -198,7 +201,7 @@ impl<'s> Operator<'s> {
             Ok(pose) => self.tell(
                 Who::Vehicle,
                 format!(
-                    "at x {:.1} m, y {:.1} m, heading {:.0}°",
+                    "{:.1} m north, {:.1} m east, heading {:.0}°",
                     pose.x_m().unwrap_or_default(),
                     pose.y_m().unwrap_or_default(),
                     pose.yaw_rad()
