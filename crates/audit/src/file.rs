@@ -30,6 +30,8 @@ pub(crate) struct LogFile {
     limits: Limits,
     file: File,
     length: u64,
+    /// Whether the last line may be incomplete, because it could not be written.
+    is_torn: bool,
 }
 
 impl LogFile {
@@ -41,6 +43,7 @@ impl LogFile {
             limits,
             file,
             length,
+            is_torn: false,
         })
     }
 
@@ -49,7 +52,12 @@ impl LogFile {
         if self.length > 0 && self.length + line.len() as u64 > self.limits.file {
             self.rotate()?;
         }
+        if std::mem::take(&mut self.is_torn) {
+            self.file.write_all(b"\n")?;
+        }
+        self.is_torn = true;
         self.file.write_all(line)?;
+        self.is_torn = false;
         self.length += line.len() as u64;
         Ok(())
     }
@@ -63,7 +71,13 @@ impl LogFile {
         if self.limits.kept == 0 {
             fs::remove_file(&self.path)?;
         }
-        for number in (1..=self.limits.kept).rev() {
+        // It is gone if an earlier attempt has failed to open the next one: nothing is to be moved.
+        let moved = if self.path.exists() {
+            self.limits.kept
+        } else {
+            0
+        };
+        for number in (1..=moved).rev() {
             let from = match number {
                 1 => self.path.clone(),
                 _ => self.full(number - 1),
@@ -85,13 +99,16 @@ impl LogFile {
     }
 }
 
-/// Opens a file for appending; a new one is for its owner alone.
+/// Opens a file for appending, readable by its owner alone.
 fn append_to(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.append(true).create(true);
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    options.open(path)
+    let file = options.open(path)?;
+    #[cfg(unix)]
+    file.set_permissions(std::os::unix::fs::PermissionsExt::from_mode(0o600))?;
+    Ok(file)
 }
 
 #[cfg(test)]

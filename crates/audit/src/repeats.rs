@@ -2,16 +2,21 @@
 
 use std::time::{Duration, Instant};
 
-use crate::entry::Entry;
+use crate::entry::{Entry, Outcome};
 
 /// How long repetitions of an entry are counted before a line says how many there were.
 const PERIOD: Duration = Duration::from_secs(10);
-/// Different entries whose repetitions are counted at a time. Further ones are written each time.
+/// Different entries whose repetitions are counted at a time. Of further ones refusals are counted
+/// together, so that a flood of them does not fill the log, and all others are written.
 const MOST: usize = 64;
 
 /// The entries written in the last [`PERIOD`], each with the repetitions since.
 #[derive(Debug, Default)]
-pub(crate) struct Repeats(Vec<Recent>);
+pub(crate) struct Repeats {
+    recent: Vec<Recent>,
+    /// Refusals beyond the bound.
+    others: u64,
+}
 
 #[derive(Debug)]
 struct Recent {
@@ -23,35 +28,48 @@ struct Recent {
 impl Repeats {
     /// Whether the entry is to be written now. If not, it has been counted.
     pub(crate) fn is_new(&mut self, now: Instant, entry: &Entry) -> bool {
-        if let Some(recent) = self.0.iter_mut().find(|it| entry.repeats(&it.entry)) {
+        if let Some(recent) = self.recent.iter_mut().find(|it| entry.repeats(&it.entry)) {
             recent.again += 1;
             recent.entry.time = entry.time;
             return false;
         }
-        if self.0.len() < MOST {
-            self.0.push(Recent {
+        if self.recent.len() < MOST {
+            self.recent.push(Recent {
                 entry: entry.clone(),
                 again: 0,
                 due: now + PERIOD,
             });
+            return true;
         }
-        true
+        let is_counted = entry.result == Outcome::Refused;
+        self.others += u64::from(is_counted);
+        !is_counted
     }
 
     /// The counted repetitions whose period is over at `now`; all of them without a time.
     pub(crate) fn take(&mut self, now: Option<Instant>) -> Vec<Entry> {
         let is_due = |recent: &mut Recent| now.is_none_or(|now| recent.due <= now);
-        let due = self.0.extract_if(.., is_due).filter(|it| it.again > 0);
-        due.map(|it| Entry {
+        let due: Vec<_> = self.recent.extract_if(.., is_due).collect();
+        let others = match due.is_empty() {
+            true => 0,
+            false => std::mem::take(&mut self.others),
+        };
+        let again = |it: Recent| Entry {
             times: it.again,
             ..it.entry
-        })
-        .collect()
+        };
+        let others = (others > 0).then(|| Entry {
+            times: others,
+            ..Entry::new("several", "various", Outcome::Refused)
+                .because("more different refusals at once than are listed")
+        });
+        let due = due.into_iter().filter(|it| it.again > 0).map(again);
+        due.chain(others).collect()
     }
 
     /// When the next period ends.
     pub(crate) fn due(&self) -> Option<Instant> {
-        self.0.iter().map(|it| it.due).min()
+        self.recent.iter().map(|it| it.due).min()
     }
 }
 
@@ -62,7 +80,6 @@ impl Repeats {
 )]
 mod tests {
     use super::*;
-    use crate::Outcome;
 
     fn entry(what: &str) -> Entry {
         Entry::new("console", what, Outcome::Refused)
@@ -88,12 +105,19 @@ mod tests {
     }
 
     #[test]
-    fn beyond_the_bound_every_entry_is_written() {
+    fn beyond_the_bound_refusals_are_counted_together_and_others_written() {
         let (start, mut repeats) = (Instant::now(), Repeats::default());
-        for index in 0..2 * MOST {
+        for index in 0..MOST {
             assert!(repeats.is_new(start, &entry(&index.to_string())));
         }
-        assert!(repeats.is_new(start, &entry(&MOST.to_string())));
-        assert_eq!(repeats.0.len(), MOST);
+        for index in MOST..1000 {
+            assert!(!repeats.is_new(start, &entry(&index.to_string())));
+        }
+        let allowed = Entry::new("console", "Reset", Outcome::Allowed);
+        assert!(repeats.is_new(start, &allowed) && repeats.is_new(start, &allowed));
+        let counted = repeats.take(repeats.due());
+        assert_eq!(counted.len(), 1);
+        assert_eq!(counted[0].times, 1000 - MOST as u64);
+        assert!(repeats.is_new(start + PERIOD, &entry("1000")));
     }
 }

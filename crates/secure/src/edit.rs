@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::key::PublicKey;
 use crate::rules::Rules;
-use crate::trust::{Grant, Peer, Trust, TrustError, line_of, line_of_grant};
+use crate::trust::{CERTIFICATE, Grant, Peer, Trust, TrustError, line_of, line_of_grant};
 
 /// Adds a peer to a trust file, which is created if necessary. A name that has a key already gets
 /// another one only if `also` says so.
@@ -89,7 +89,8 @@ fn with_rules(line: &str, rules: &Rules) -> Result<String, TrustError> {
 /// was there. A running node closes its session within seconds.
 ///
 /// # Errors
-/// If the file cannot be read or written, or has a malformed line.
+/// If the file cannot be read or written, has a malformed line, or has only limits of a certificate
+/// under this name.
 pub fn revoke(path: &Path, name: &str, key: Option<PublicKey>) -> Result<bool, TrustError> {
     let text = text_of(path)?;
     Trust::parse(&text)?;
@@ -105,9 +106,18 @@ pub fn revoke(path: &Path, name: &str, key: Option<PublicKey>) -> Result<bool, T
     if rest.len() == text.lines().count() {
         return Ok(false);
     }
+    if text.lines().filter(goes).any(is_grant) {
+        // Without its limits the certificate would be allowed more.
+        return Err(TrustError::Certificate(name.to_owned()));
+    }
     let rest: String = rest.iter().flat_map(|line| [*line, "\n"]).collect();
     replace(path, &rest).map_err(|source| in_file(path, source))?;
     Ok(true)
+}
+
+/// Whether a line limits a certificate.
+fn is_grant(line: &str) -> bool {
+    line.split_whitespace().nth(1) == Some(CERTIFICATE)
 }
 
 /// Whether a line is that of the peer with this name.
@@ -229,6 +239,7 @@ mod tests {
         let text = fs::read_to_string(&path).unwrap();
         assert_eq!(text, "console certificate 60.1.255\n");
         assert_eq!(Trust::parse(&text).unwrap().grants(), [console]);
-        assert!(revoke(&path, "console", None).unwrap());
+        let refused = revoke(&path, "console", None).unwrap_err().to_string();
+        assert!(refused.contains("jaus keys ca revoke console"), "{refused}");
     }
 }

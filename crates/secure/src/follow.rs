@@ -18,6 +18,8 @@ struct Inner<T, E> {
     /// The value, and how often it was replaced.
     state: RwLock<(u64, Arc<T>)>,
     files: Vec<PathBuf>,
+    /// Their state before the value was read first.
+    seen: Changes,
     /// Reads the files; `None` for a value that is in none.
     read: Option<Read<T, E>>,
 }
@@ -25,7 +27,7 @@ struct Inner<T, E> {
 impl<T, E> Followed<T, E> {
     /// Shares a value that is not in a file.
     pub(crate) fn of(value: T) -> Self {
-        Self::with(value, Vec::new(), None)
+        Self::with(value, Vec::new(), Vec::new(), None)
     }
 
     /// Reads a value from these files.
@@ -33,12 +35,19 @@ impl<T, E> Followed<T, E> {
         files: Vec<PathBuf>,
         read: impl Fn() -> Result<T, E> + Send + Sync + 'static,
     ) -> Result<Self, E> {
-        Ok(Self::with(read()?, files, Some(Box::new(read))))
+        // A change between the two is noticed later.
+        let seen = changes(&files);
+        let value = read()?;
+        Ok(Self::with(value, files, seen, Some(Box::new(read))))
     }
 
-    fn with(value: T, files: Vec<PathBuf>, read: Option<Read<T, E>>) -> Self {
-        let state = RwLock::new((0, Arc::new(value)));
-        Self(Arc::new(Inner { state, files, read }))
+    fn with(value: T, files: Vec<PathBuf>, seen: Changes, read: Option<Read<T, E>>) -> Self {
+        Self(Arc::new(Inner {
+            state: RwLock::new((0, Arc::new(value))),
+            files,
+            seen,
+            read,
+        }))
     }
 
     /// The current value.
@@ -82,36 +91,33 @@ where
     )]
     pub(crate) fn follow(&self) {
         if self.0.read.is_some() {
-            tokio::spawn(follow(Arc::downgrade(&self.0), self.0.changes()));
+            tokio::spawn(follow(Arc::downgrade(&self.0), self.0.seen.clone()));
         }
     }
 }
 
-impl<T, E> Inner<T, E> {
-    /// When each file was changed last, and its length; `None` if it is not there.
-    fn changes(&self) -> Vec<Option<(SystemTime, u64)>> {
-        let change = |path| {
-            let metadata = fs::metadata(path).ok()?;
-            Some((metadata.modified().ok()?, metadata.len()))
-        };
-        self.files.iter().map(change).collect()
-    }
+/// When each file was changed last, and its length; `None` if it is not there.
+type Changes = Vec<Option<(SystemTime, u64)>>;
+
+fn changes(files: &[PathBuf]) -> Changes {
+    let change = |path| {
+        let metadata = fs::metadata(path).ok()?;
+        Some((metadata.modified().ok()?, metadata.len()))
+    };
+    files.iter().map(change).collect()
 }
 
 #[expect(
     clippy::disallowed_methods,
     reason = "looks at files in real time, also while a test pauses the clock"
 )]
-async fn follow<T, E: fmt::Display>(
-    value: Weak<Inner<T, E>>,
-    mut seen: Vec<Option<(SystemTime, u64)>>,
-) {
+async fn follow<T, E: fmt::Display>(value: Weak<Inner<T, E>>, mut seen: Changes) {
     loop {
         tokio::time::sleep(INTERVAL).await;
         let Some(inner) = value.upgrade() else {
             return;
         };
-        let now = inner.changes();
+        let now = changes(&inner.files);
         if now == seen {
             continue;
         }

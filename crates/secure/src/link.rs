@@ -110,6 +110,8 @@ pub struct SecureLink {
     leaving: Option<Datagrams>,
     timeout: Option<Instant>,
     audit: Option<AuditLog>,
+    /// Lost records that the audit log knows of.
+    records_lost: u64,
 }
 
 impl SecureLink {
@@ -148,6 +150,7 @@ impl SecureLink {
             leaving: None,
             timeout: Some(node::now()),
             audit: None,
+            records_lost: 0,
         })
     }
 
@@ -174,9 +177,13 @@ impl SecureLink {
     }
 
     fn write_records(&mut self) {
-        if let Some(log) = &self.audit {
-            let records = std::iter::from_fn(|| self.transport.poll_record());
-            records.for_each(|record| log.write(audit::entry(record)));
+        let Some(log) = &self.audit else { return };
+        let records = std::iter::from_fn(|| self.transport.poll_record());
+        records.for_each(|record| log.write(audit::entry(record)));
+        let lost = self.transport.counters().records_lost;
+        if lost > self.records_lost {
+            log.write(audit::loss(lost - self.records_lost));
+            self.records_lost = lost;
         }
     }
 
@@ -235,7 +242,7 @@ impl CustomLink for SecureLink {
         let (priority, octets) = (transmit.priority, &transmit.payload);
         match transmit.to {
             To::Peer(Remote::Session(session)) => {
-                self.transport.send(session, priority, octets.clone());
+                self.transport.send(session, priority, octets);
             }
             To::Group => self.transport.send_to_all(priority, octets),
             // Not a peer of this link.
@@ -262,6 +269,7 @@ impl CustomLink for SecureLink {
                 }
                 Poll::Pending => {
                     self.leaving = Some(datagrams);
+                    self.write_records();
                     return Poll::Pending;
                 }
             }

@@ -11,8 +11,9 @@
 //! | `only=PrimitiveDriver,D103h` | of all commands, send these alone |
 //! | `except=SetTravelSpeed,Time` | send none of these, whether commands or queries |
 //!
-//! `only` and `except` name services, messages or message codes. They also apply to the message
-//! inside a request for an event, but not to those inside a mission.
+//! `only` and `except` name services, messages or message codes. All rules also apply to the message
+//! inside a request for an event, but not to those inside a list or a mission. Control, emergencies
+//! and configuration have words of their own: `only` does not concern them.
 //!
 //! Everybody may set an emergency, because a stop must never fail for lack of a right.
 
@@ -25,7 +26,7 @@ use std::str::FromStr;
 use jaus::address::JausId;
 use jaus::wire::{DataControl, Frame};
 
-use permission::Permission;
+use permission::{Carried, Permission};
 pub use selection::{Selection, UnknownName};
 
 /// What a trusted key may do. The default is to observe.
@@ -75,6 +76,12 @@ pub enum Refusal {
     /// A component is configured without [`Rules::configure`].
     #[error("its key may not shut down, reset or set the time: add `configure` to its line")]
     Configure,
+    /// A message that commands is for several ids, not all of which are among [`Rules::with`].
+    #[error("`with` in the line of its key does not cover all of these ids")]
+    TooWide,
+    /// The message inside a request for an event is not within the first fragment.
+    #[error("its first fragment does not show the message that it carries")]
+    Hidden,
     /// The command is not among [`Rules::only`], or the message is among [`Rules::except`].
     #[error("`only` or `except` in the line of its key excludes this message")]
     Excluded,
@@ -104,18 +111,28 @@ impl Rules {
         if !self.may_reach(frame.destination) {
             return Err(Refusal::Elsewhere);
         }
-        if is_continuation(frame) {
+        if frame.is_acknowledgement() || (is_later(frame) && !repeats_code(frame)) {
             return Ok(());
         }
         let mut message = &frame.payload[..];
-        while let Some(carried) = self.check_message(message)? {
-            message = carried;
+        loop {
+            let (permission, carried) = self.check_message(message)?;
+            if permission != Permission::Observe && !self.covers(frame.destination) {
+                return Err(Refusal::TooWide);
+            }
+            message = match carried {
+                Carried::Message(carried) => carried,
+                // A whole message without one is malformed, and the component refuses it.
+                Carried::Missing if frame.flags.data() == DataControl::First => {
+                    return Err(Refusal::Hidden);
+                }
+                Carried::Missing | Carried::Nothing => return Ok(()),
+            };
         }
-        Ok(())
     }
 
-    /// Checks a message by itself; returns the one that it carries.
-    fn check_message<'m>(&self, message: &'m [u8]) -> Result<Option<&'m [u8]>, Refusal> {
+    /// Checks a message by itself; returns what it needs, and the message that it carries.
+    fn check_message<'m>(&self, message: &'m [u8]) -> Result<(Permission, Carried<'m>), Refusal> {
         let code = message.first_chunk().ok_or(Refusal::NoCode)?;
         let code = u16::from_le_bytes(*code);
         let permission = Permission::of(code, message);
@@ -123,13 +140,13 @@ impl Rules {
         let carried = permission::carried(code, message);
         // Of a request that carries a command, the command counts.
         let is_selected = permission != Permission::Command
-            || carried.is_some()
+            || carried != Carried::Nothing
             || self.only.is_empty()
             || self.only.contains(code);
         if !is_selected || self.except.contains(code) {
             return Err(Refusal::Excluded);
         }
-        Ok(carried)
+        Ok((permission, carried))
     }
 
     fn check_permission(&self, permission: Permission) -> Result<(), Refusal> {
@@ -151,6 +168,11 @@ impl Rules {
         Ok(())
     }
 
+    /// Whether it may send to every id that a destination means.
+    fn covers(&self, destination: JausId) -> bool {
+        self.with.is_empty() || self.with.iter().any(|with| contains(*with, destination))
+    }
+
     /// Whether it may send to this id, which may have wildcards, or receive from it.
     #[must_use]
     pub fn may_reach(&self, id: JausId) -> bool {
@@ -164,8 +186,21 @@ impl Rules {
     }
 }
 
+/// Whether every id that matches the other one matches this one too.
+fn contains(one: JausId, other: JausId) -> bool {
+    let any = JausId::EVERYONE;
+    let within = |one: u16, other: u16, any: u16| one == other || one == any;
+    within(one.subsystem(), other.subsystem(), any.subsystem())
+        && within(one.node().into(), other.node().into(), any.node().into())
+        && within(
+            one.component().into(),
+            other.component().into(),
+            any.component().into(),
+        )
+}
+
 /// Whether some id matches both.
-fn overlap(one: JausId, other: JausId) -> bool {
+pub(crate) fn overlap(one: JausId, other: JausId) -> bool {
     one.matches(other) || other.matches(one) || {
         // Each has a wildcard where the other has none, such as 101.255.1 and 65535.1.255.
         let equal = |a: u16, b: u16, any: u16| a == b || a == any || b == any;
@@ -180,16 +215,33 @@ fn overlap(one: JausId, other: JausId) -> bool {
     }
 }
 
-/// Whether a frame has no message code of its own: a later fragment or an acknowledgement.
-fn is_continuation(frame: &Frame) -> bool {
-    frame.is_acknowledgement()
-        || matches!(frame.flags.data(), DataControl::Middle | DataControl::Last)
+/// Whether a frame is a later fragment.
+fn is_later(frame: &Frame) -> bool {
+    matches!(frame.flags.data(), DataControl::Middle | DataControl::Last)
 }
 
-/// Whether an audit log holds this frame also if it passes: it concerns control, an emergency or the
-/// configuration of a component.
+/// Whether every fragment has the message code, as with the headers before AS5669A: then each is
+/// checked by its own.
+fn repeats_code(frame: &Frame) -> bool {
+    frame.version.repeated_code_len() > 0
+}
+
+/// Whether an audit log holds this frame also if it passes: it, or the message that it carries,
+/// concerns control, an emergency or the configuration of a component.
 pub(crate) fn is_recorded(frame: &Frame) -> bool {
-    !is_continuation(frame) && frame.code().is_some_and(permission::is_recorded)
+    let mut message = &frame.payload[..];
+    while let (false, Some(code)) = (
+        is_later(frame) || frame.is_acknowledgement(),
+        message.first_chunk(),
+    ) {
+        let code = u16::from_le_bytes(*code);
+        match permission::carried(code, message) {
+            _ if permission::is_recorded(code) => return true,
+            Carried::Message(carried) => message = carried,
+            Carried::Missing | Carried::Nothing => return false,
+        }
+    }
+    false
 }
 
 /// Why a word is no rule.

@@ -27,7 +27,7 @@ use crate::key::{KeyError, PublicKey};
 use crate::rules::{RuleError, Rules};
 
 /// What stands in place of the key in a line for a certificate.
-const CERTIFICATE: &str = "certificate";
+pub(crate) const CERTIFICATE: &str = "certificate";
 /// The longest trust file, in octets: some ten thousand keys.
 const LONGEST: u64 = 1 << 20;
 
@@ -68,6 +68,12 @@ pub enum TrustError {
         /// The text.
         text: String,
     },
+    /// What is to be revoked is a certificate, which the file only limits.
+    #[error(
+        "`{0}` is trusted by its certificate, and this line only limits it: revoke the certificate \
+         with `jaus keys ca revoke {0}`"
+    )]
+    Certificate(String),
     /// A rule is malformed.
     #[error("line {line}: {source}")]
     Rule {

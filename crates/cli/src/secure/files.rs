@@ -24,8 +24,8 @@ pub(super) struct Certificates {
     )]
     pub(super) authority: Option<PathBuf>,
 
-    /// The authority's list of revoked certificates; without it, a certificate is accepted until it
-    /// expires
+    /// The authority's list of revoked certificates; without one, a certificate is accepted until it
+    /// expires [default: ca.crl beside the certificate, if it is there]
     #[arg(long, value_name = "FILE")]
     pub(super) revoked: Option<PathBuf>,
 }
@@ -42,9 +42,19 @@ impl Certificates {
             };
         };
         let beside = || certificate.with_file_name("ca.crt");
+        let list = certificate.with_file_name("ca.crl");
+        let list = self
+            .revoked
+            .clone()
+            .or_else(|| list.exists().then_some(list));
+        if list.is_none() {
+            tracing::warn!(
+                "no list of revoked certificates (--revoked): a stolen one is accepted until it expires"
+            );
+        }
         Ok(Some(CertificateFiles {
             authority: self.authority.clone().unwrap_or_else(beside),
-            revoked: self.revoked.clone(),
+            revoked: list,
             certificate,
         }))
     }

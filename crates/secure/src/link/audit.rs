@@ -6,6 +6,7 @@ use crate::transport::{Act, Record};
 
 /// The entry of a record.
 pub(super) fn entry(record: Record) -> Entry {
+    let is_stranger = record.peer.is_none();
     let who = record.peer.as_deref().unwrap_or("unknown");
     let entry = match record.act {
         Act::Connected => Entry::new(who, "connect", Outcome::Allowed),
@@ -51,9 +52,20 @@ pub(super) fn entry(record: Record) -> Entry {
                 .because("the component's answer")
         }
     };
-    let entry = entry.address(record.address);
+    let entry = match is_stranger {
+        // With its port, each attempt of a flood would be an entry of its own.
+        true => entry.address(record.address.ip()),
+        false => entry.address(record.address),
+    };
     match record.key {
         Some(key) => entry.key(key),
         None => entry,
     }
+}
+
+/// The entry about records that were not kept.
+pub(super) fn loss(count: u64) -> Entry {
+    let mut entry = Entry::new("jaus", "audit", Outcome::Failed);
+    entry.times = count;
+    entry.because("refusals not recorded, because too many came at once")
 }

@@ -1,14 +1,29 @@
 //! The right that a message needs.
 
+use std::ops::RangeInclusive;
+
 use jaus::codec::Message as _;
 use jaus::messages;
 use jaus::messages::core::{
-    CancelEvent, ClearEmergency, CreateCommandEvent, CreateEvent, RegisterServices, ReleaseControl,
-    RequestControl, Reset, SetAuthority, SetEmergency, SetTime, Shutdown, UpdateEvent,
+    CancelEvent, ClearEmergency, ConfirmControl, ConfirmElementRequest, ConfirmEventRequest,
+    CreateCommandEvent, CreateEvent, RegisterServices, RejectControl, RejectElementRequest,
+    RejectEventRequest, ReleaseControl, RequestControl, Reset, SetAuthority, SetEmergency, SetTime,
+    Shutdown, UpdateEvent,
 };
 
-/// The codes that AS5710 sets aside for commands, and those for commands of users.
-const COMMANDS: [std::ops::RangeInclusive<u16>; 2] = [0x0000..=0x1FFF, 0xD000..=0xDFFF];
+/// The codes that AS5710 sets aside for commands.
+const COMMANDS: RangeInclusive<u16> = 0x0000..=0x1FFF;
+/// The codes that it sets aside for commands of users.
+const COMMANDS_OF_USERS: RangeInclusive<u16> = 0xD000..=0xDFFF;
+/// Answers that have codes of commands.
+const ANSWERS: [u16; 6] = [
+    ConfirmControl::CODE,
+    RejectControl::CODE,
+    ConfirmEventRequest::CODE,
+    RejectEventRequest::CODE,
+    ConfirmElementRequest::CODE,
+    RejectElementRequest::CODE,
+];
 
 /// What a sender needs to be allowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,8 +41,7 @@ pub(super) enum Permission {
 }
 
 impl Permission {
-    /// The right that a message, which begins with this code, needs. The definitions tell which
-    /// messages are commands; for an unknown code its range does.
+    /// The right that a message, which begins with this code, needs.
     pub(super) fn of(code: u16, message: &[u8]) -> Self {
         match code {
             RequestControl::CODE | SetAuthority::CODE => Self::Control {
@@ -51,22 +65,36 @@ pub(super) fn is_recorded(code: u16) -> bool {
         || !matches!(needed, Permission::Observe | Permission::Command)
 }
 
+/// Definitions tell which messages are commands, but not for every code of a command in AS5710; for
+/// an unknown code of users its range tells.
 fn is_command(code: u16) -> bool {
     let mut known = messages::registry().by_code(code).peekable();
-    if known.peek().is_some() {
-        return known.any(|message| message.is_command);
-    }
-    COMMANDS.iter().any(|range| range.contains(&code))
+    let is_known = known.peek().is_some();
+    known.any(|message| message.is_command)
+        || (COMMANDS.contains(&code) && !ANSWERS.contains(&code))
+        || (COMMANDS_OF_USERS.contains(&code) && !is_known)
+}
+
+/// What a message carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Carried<'m> {
+    /// It is no message that carries another.
+    Nothing,
+    /// It carries this message.
+    Message(&'m [u8]),
+    /// It should carry one, and does not: it is malformed, or a fragment.
+    Missing,
 }
 
 /// The message inside a request for an event, or for the end of a command.
-pub(super) fn carried(code: u16, message: &[u8]) -> Option<&[u8]> {
+pub(super) fn carried(code: u16, message: &[u8]) -> Carried<'_> {
     // After the code: request, type, rate (and event); or request and time limit; then a length.
     let offset = match code {
         CreateEvent::CODE => 2 + 1 + 1 + 2 + 4,
         UpdateEvent::CODE => 2 + 1 + 1 + 2 + 1 + 4,
         CreateCommandEvent::CODE => 2 + 1 + 4 + 4,
-        _ => return None,
+        _ => return Carried::Nothing,
     };
-    message.get(offset..).filter(|rest| rest.len() >= 2)
+    let carried = message.get(offset..).filter(|rest| rest.len() >= 2);
+    carried.map_or(Carried::Missing, Carried::Message)
 }

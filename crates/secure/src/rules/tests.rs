@@ -4,7 +4,7 @@ use jaus::messages::core::{
     ClearEmergency, QueryIdentification, RequestControl, SetEmergency, Shutdown, Standby,
 };
 use jaus::messages::mobility::{QueryVelocityState, SetTravelSpeed, SetWrenchEffort};
-use jaus::wire::Flags;
+use jaus::wire::{Flags, Version};
 
 use super::*;
 
@@ -168,6 +168,73 @@ fn with_limits_the_ids_also_where_both_sides_have_wildcards() {
         ..frame(&b"\x00\x2B\x02"[..])
     };
     assert_eq!(rules.check(&elsewhere), Err(Refusal::Elsewhere));
+}
+
+#[test]
+fn a_command_to_several_ids_needs_all_of_them_and_a_query_one() {
+    let rules: Rules = "command with=101.1.40,102.255.255".parse().unwrap();
+    let to = |id: &str, payload: &'static [u8]| Frame {
+        destination: id.parse().unwrap(),
+        ..frame(payload)
+    };
+    let wrench = b"\x05\x04\0";
+    assert_eq!(rules.check(&to("101.1.40", wrench)), Ok(()));
+    assert_eq!(rules.check(&to("102.255.255", wrench)), Ok(()));
+    for id in ["101.255.255", "65535.255.255", "101.1.255"] {
+        assert_eq!(rules.check(&to(id, wrench)), Err(Refusal::TooWide), "{id}");
+        assert_eq!(rules.check(&to(id, b"\x00\x2B\x02")), Ok(()), "{id}");
+    }
+}
+
+#[test]
+fn a_carried_message_cannot_hide_behind_the_first_fragment() {
+    let rules = Rules {
+        command: true,
+        ..Rules::default()
+    };
+    let event = |data, octets: usize| Frame {
+        flags: Flags::default().with_data(data),
+        ..frame(&b"\xF6\x01\x01\x0A\0\0\0\x04\0\0\0\x05\x04\0\0"[..octets])
+    };
+    assert_eq!(
+        rules.check(&event(DataControl::First, 11)),
+        Err(Refusal::Hidden)
+    );
+    assert_eq!(
+        rules.check(&event(DataControl::First, 12)),
+        Err(Refusal::Hidden)
+    );
+    assert_eq!(rules.check(&event(DataControl::First, 13)), Ok(()));
+    assert_eq!(rules.check(&event(DataControl::Single, 15)), Ok(()));
+}
+
+#[test]
+fn fragments_that_repeat_the_code_are_checked_each() {
+    let rules = Rules::default();
+    let later = |version| Frame {
+        version,
+        flags: Flags::default().with_data(DataControl::Last),
+        ..frame(&b"\x05\x04\0"[..])
+    };
+    assert_eq!(rules.check(&later(Version::As5669a)), Ok(()));
+    assert_eq!(rules.check(&later(Version::As5669)), Err(Refusal::Command));
+}
+
+#[test]
+fn an_answer_with_the_code_of_a_command_needs_no_right() {
+    for code in [0x000Fu16, 0x0010, 0x01F3, 0x01F4, 0x041C, 0x041D] {
+        let frame = frame(code.to_le_bytes().to_vec());
+        assert_eq!(Rules::default().check(&frame), Ok(()), "{code:04X}");
+    }
+    // Execute List and its like are commands, whatever their definitions say.
+    for code in [0x061Eu16, 0x080B, 0x080C] {
+        let frame = frame(code.to_le_bytes().to_vec());
+        assert_eq!(
+            Rules::default().check(&frame),
+            Err(Refusal::Command),
+            "{code:04X}"
+        );
+    }
 }
 
 #[test]

@@ -27,7 +27,7 @@ mod tests;
 mod traffic;
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, Ipv6Addr, SocketAddr};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -173,7 +173,10 @@ impl Transport {
 
     /// Processes a UDP datagram from this address.
     pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, datagram: &[u8]) {
-        if is_first_packet(datagram) && !self.first_packets.take(now, from.ip()) {
+        if is_first_packet(datagram)
+            && !self.is_dialling(from)
+            && !self.first_packets.take(now, network_of(from.ip()))
+        {
             self.counters.handshakes_dropped += 1;
             return;
         }
@@ -278,11 +281,22 @@ impl Transport {
         }
     }
 
-    /// The connections without an authenticated peer: all, and those from one address.
+    /// The handshakes of peers that are not finished: all, and those from one network address.
     fn handshakes(&self, from: IpAddr) -> (usize, usize) {
-        let unfinished = self.sessions.values().filter(|it| it.peer.is_none());
-        let near = |it: &&Session| it.connection.remote_address().ip() == from;
+        let is_unfinished = |it: &&Session| it.peer.is_none() && !it.ended && it.dial.is_none();
+        let unfinished = self.sessions.values().filter(is_unfinished);
+        let address = |it: &Session| network_of(it.connection.remote_address().ip());
+        let near = |it: &&Session| address(it) == network_of(from);
         (unfinished.clone().count(), unfinished.filter(near).count())
+    }
+
+    /// Whether a handshake of this side with an address is under way.
+    fn is_dialling(&self, address: SocketAddr) -> bool {
+        let mut awaiting = self
+            .sessions
+            .values()
+            .filter(|it| it.is_awaiting_greeting());
+        awaiting.any(|it| it.connection.remote_address() == address)
     }
 
     fn insert(&mut self, session: Session) -> SessionId {
@@ -469,7 +483,16 @@ impl Transport {
     }
 }
 
-/// Whether a datagram begins with an Initial packet of QUIC 1 (RFC 9000, section 17.2.2).
+/// Whether a datagram opens a connection: an Initial packet (RFC 9000, section 17.2.2, whatever its
+/// fixed bit: RFC 9287) in a datagram of the least length (section 14.1).
 fn is_first_packet(datagram: &[u8]) -> bool {
-    datagram.first().is_some_and(|first| first & 0xF0 == 0xC0)
+    datagram.len() >= 1200 && datagram[0] & 0xB0 == 0x80
+}
+
+/// The unit that shares one limit: an IPv4 address, or an IPv6 network of 64 bits.
+fn network_of(address: IpAddr) -> IpAddr {
+    match address.to_canonical() {
+        IpAddr::V6(v6) => Ipv6Addr::from_bits(v6.to_bits() >> 64 << 64).into(),
+        v4 => v4,
+    }
 }

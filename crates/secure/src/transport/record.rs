@@ -66,6 +66,21 @@ pub enum Act {
     },
 }
 
+impl Act {
+    /// Whether something was refused.
+    pub(super) const fn is_refusal(&self) -> bool {
+        matches!(
+            self,
+            Self::HandshakeFailed(_)
+                | Self::ForeignId { .. }
+                | Self::Message {
+                    refusal: Some(_),
+                    ..
+                }
+        )
+    }
+}
+
 /// Why no session was established.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -92,9 +107,9 @@ impl Fault {
         match (rejection, error) {
             (Some(Rejection::UntrustedKey(key)), _) => Self::UntrustedKey(key),
             (Some(rejection), _) => Self::Rejected(rejection),
-            (None, ConnectionError::ConnectionClosed(_)) => Self::RefusedByPeer(error.to_string()),
+            (None, ConnectionError::ConnectionClosed(_)) => Self::RefusedByPeer(shortened(error)),
             (None, ConnectionError::TimedOut) => Self::NoAnswer,
-            (None, _) => Self::Other(error.to_string()),
+            (None, _) => Self::Other(shortened(error)),
         }
     }
 
@@ -117,4 +132,9 @@ impl Fault {
             Self::Rejected(_) | Self::Other(_) => None,
         }
     }
+}
+
+/// As much of an error as is logged: the peer, who may be anybody, words a part of it.
+fn shortened(error: &ConnectionError) -> String {
+    error.to_string().chars().take(120).collect()
 }

@@ -37,6 +37,8 @@ pub struct Counters {
     pub refused: u64,
     /// Messages not sent to a peer because the rules separate it from their source.
     pub separated: u64,
+    /// Records for an audit log that were not kept, because too many waited.
+    pub records_lost: u64,
     /// Notices of peers that they refused a message of this node.
     pub notices: u64,
     /// Datagrams that were no JUDP.

@@ -5,10 +5,11 @@
 //! message does not hold up an urgent one. QUIC's congestion control sets the pace; what it does not
 //! take yet waits in a backlog, most urgent first.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Instant;
 
 use bytes::{Buf as _, Bytes};
+use jaus::address::JausId;
 use jaus::link::backlog::{Backlog, Bounds};
 use jaus::wire::{Acknowledgement, DataControl, Priority, judp};
 use quinn_proto::{Connection, ConnectionHandle, Dir, SendDatagramError, StreamId};
@@ -17,6 +18,7 @@ use rustls::pki_types::{CertificateDer, UnixTime};
 use super::inlet::{Inlet, framed};
 use crate::authority::Rejection;
 use crate::credentials::{Credentials, Identified};
+use crate::rules::overlap;
 use crate::trust::Peer;
 
 /// Limits of what waits for one session.
@@ -24,6 +26,8 @@ const WAITING: Bounds = Bounds {
     items: 8192,
     octets: 4 << 20,
 };
+/// Unanswered requests for control that a session remembers.
+const MOST_REQUESTS: usize = 64;
 /// Octets to read from a stream at once.
 const CHUNK: usize = 64 << 10;
 /// Streams that a peer may open: one for each priority.
@@ -43,6 +47,10 @@ pub(super) struct Session {
     pub(super) ended: bool,
     /// When the peer was last told that a message of its was refused.
     pub(super) noticed: Option<Instant>,
+    /// When the peer's notice about a refused message was last logged.
+    pub(super) heard: Option<Instant>,
+    /// The peer's requests for control that no component has answered yet.
+    pub(super) requests: Requests,
     backlog: Backlog<(Priority, Bytes)>,
     outlets: [Outlet; Priority::ALL.len()],
     inlets: BTreeMap<StreamId, Inlet>,
@@ -60,6 +68,27 @@ struct Outlet {
     leaving: Bytes,
 }
 
+/// Requests for control: the component and the client of each.
+#[derive(Debug, Default)]
+pub(super) struct Requests(VecDeque<(JausId, JausId)>);
+
+impl Requests {
+    /// Adds a request; the oldest goes if there are too many.
+    pub(super) fn add(&mut self, component: JausId, client: JausId) {
+        if self.0.len() == MOST_REQUESTS {
+            self.0.pop_front();
+        }
+        self.0.push_back((component, client));
+    }
+
+    /// Takes the request that a component answers; returns whether there was one.
+    pub(super) fn take(&mut self, component: JausId, client: JausId) -> bool {
+        let answers = |it: &(JausId, JausId)| it.1 == client && overlap(it.0, component);
+        let found = self.0.iter().position(answers);
+        found.and_then(|index| self.0.remove(index)).is_some()
+    }
+}
+
 impl Session {
     pub(super) fn new(
         handle: ConnectionHandle,
@@ -74,6 +103,8 @@ impl Session {
             valid_until: None,
             ended: false,
             noticed: None,
+            heard: None,
+            requests: Requests::default(),
             backlog: Backlog::new(WAITING),
             outlets: Default::default(),
             inlets: BTreeMap::new(),

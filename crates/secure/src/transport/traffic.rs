@@ -14,7 +14,7 @@ use super::Transport;
 use super::record::{Act, Record};
 use super::screen::{self, Stop};
 use super::session::Session;
-use crate::rules::is_recorded;
+use crate::rules::{is_recorded, overlap};
 use crate::trust::Peer;
 
 /// The first octet of a notice: text for the peer, about a message of its that was refused. No
@@ -29,8 +29,7 @@ const MOST_RECORDS: usize = 256;
 
 impl Transport {
     /// Queues a JUDP datagram for a session. It is dropped if the session has ended.
-    pub fn send(&mut self, session: SessionId, priority: Priority, datagram: Bytes) {
-        self.record_granted_control(session, &datagram);
+    pub fn send(&mut self, session: SessionId, priority: Priority, datagram: &Bytes) {
         let is_established = |it: &Session| it.established().is_some();
         if !self.sessions.get(&session).is_some_and(is_established) {
             self.counters.no_session += 1;
@@ -39,6 +38,7 @@ impl Transport {
         let Some(datagram) = self.permitted(session, datagram) else {
             return;
         };
+        self.record_answers(session, &datagram);
         if let Some(session) = self.sessions.get_mut(&session) {
             self.counters.send_overflows += session.queue(priority, datagram);
         }
@@ -51,38 +51,45 @@ impl Transport {
             .iter()
             .filter(|(_, it)| it.established().is_some());
         for id in established.map(|(&id, _)| id).collect::<Vec<_>>() {
-            self.send(id, priority, datagram.clone());
+            self.send(id, priority, datagram);
         }
     }
 
-    /// What of a datagram may go to this session, if the rules separate peers from each other.
-    fn permitted(&mut self, session: SessionId, datagram: Bytes) -> Option<Bytes> {
+    /// What of a datagram may go to this session: messages for its ids, as far as the rules do not
+    /// separate it from their sources.
+    fn permitted(&mut self, session: SessionId, datagram: &Bytes) -> Option<Bytes> {
         let peers = || self.sessions.values().filter_map(Session::established);
-        if peers().all(|peer| peer.rules.with.is_empty()) {
-            return Some(datagram);
-        }
+        let has_limits = peers().any(|peer| !peer.rules.with.is_empty());
         let to = self.sessions.get(&session)?.established()?;
-        let screened = screen::screen(&datagram, |frame| {
-            let speaks = |peer: &&Peer| peer.speaks_for(frame.source);
-            let origins: Vec<_> = peers().filter(speaks).collect();
-            let is_open = screen::may_pass(frame.source, &origins, to);
-            is_open.then_some(()).ok_or(Stop::ForeignId)
+        let screened = screen::screen(datagram, |frame| {
+            let is_addressed = to.ids.iter().any(|ids| overlap(*ids, frame.destination));
+            let is_open = || {
+                let speaks = |peer: &&Peer| peer.speaks_for(frame.source);
+                let origins: Vec<_> = peers().filter(speaks).collect();
+                screen::may_pass(frame.source, &origins, to)
+            };
+            let passes = is_addressed && (!has_limits || is_open());
+            passes.then_some(()).ok_or(Stop::ForeignId)
         })?;
         let stopped = screened.frames.iter().filter(|(_, it)| it.is_err()).count();
         self.counters.separated += stopped as u64;
         screened.passed
     }
 
-    /// Records the answer of a component to a request for control.
-    fn record_granted_control(&mut self, id: SessionId, datagram: &Bytes) {
+    /// Records the answers of components to the peer's requests for control.
+    fn record_answers(&mut self, id: SessionId, datagram: &Bytes) {
         let Ok(frames) = judp::frames(datagram.clone()) else {
             return;
         };
         for frame in frames.map_while(Result::ok) {
-            if let Some(answer) = screen::confirmed_control(&frame) {
+            let (component, client) = (frame.source, frame.destination);
+            let has_asked = |it: &mut Session| it.requests.take(component, client);
+            if let Some(answer) = screen::confirmed_control(&frame)
+                && self.sessions.get_mut(&id).is_some_and(has_asked)
+            {
                 let act = Act::Control {
-                    component: frame.source,
-                    client: frame.destination,
+                    component,
+                    client,
                     is_granted: answer == ResponseCode::CONTROL_ACCEPTED,
                 };
                 self.record(id, act);
@@ -126,7 +133,10 @@ impl Transport {
         };
         if octets.first() == Some(&NOTICE) {
             let text = String::from_utf8_lossy(&octets[1..octets.len().min(1 + LONGEST_NOTICE)]);
-            tracing::warn!(peer = peer.name, notice = ?text, "the peer refused a message");
+            if session.heard.is_none_or(|at| now >= at + NOTICE_PAUSE) {
+                tracing::warn!(peer = peer.name, notice = ?text, "the peer refused a message");
+                session.heard = Some(now);
+            }
             self.counters.notices += 1;
             return;
         }
@@ -161,7 +171,14 @@ impl Transport {
             refusal,
         };
         match decision {
-            Ok(()) if is_recorded(frame) => self.record(id, message(None)),
+            Ok(()) if is_recorded(frame) => {
+                if code == RequestControl::CODE
+                    && let Some(session) = self.sessions.get_mut(&id)
+                {
+                    session.requests.add(destination, source);
+                }
+                self.record(id, message(None));
+            }
             Ok(()) => {}
             Err(Stop::ForeignId) => {
                 self.counters.foreign_ids += 1;
@@ -220,15 +237,21 @@ impl Transport {
         });
     }
 
-    /// Adds a record; the oldest goes if nobody takes them.
+    /// Adds a record. If too many wait, refusals are counted instead, so that a flood of them does
+    /// not displace what was done.
     pub(super) fn push_record(&mut self, record: Record) {
-        if self.records.len() == MOST_RECORDS {
+        if self.records.len() >= MOST_RECORDS && record.act.is_refusal() {
+            self.counters.records_lost += 1;
+            return;
+        }
+        if self.records.len() >= 2 * MOST_RECORDS {
             self.records.pop_front();
+            self.counters.records_lost += 1;
         }
         self.records.push_back(record);
     }
 
-    /// The next record for an audit log. At most 256 wait; then the oldest is dropped.
+    /// The next record for an audit log. If 256 wait, further refusals are only counted.
     pub fn poll_record(&mut self) -> Option<Record> {
         self.records.pop_front()
     }

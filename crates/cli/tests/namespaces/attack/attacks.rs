@@ -44,6 +44,8 @@ pub(crate) async fn run(attack: &str) {
         "flood" | "unending" | "gapped" => Attacker::new().with_echo(),
         "forged-id6" => ip6(9),
         "ra-flood" | "ra-forged" => on_cable(),
+        #[cfg(feature = "secure")]
+        "handshakes" => super::secure::stranger(),
         _ => Attacker::new(),
     };
     match attack {
@@ -77,7 +79,6 @@ pub(crate) async fn run(attack: &str) {
         "many-ids" => attacker.repeat(LONG, 550, |it, number| it.send(cycling(number), &pose())),
         #[cfg(feature = "secure")]
         "handshakes" => {
-            attacker = super::secure::stranger();
             let mut first = super::secure::first_packet();
             attacker.repeat(LONG / 2, HANDSHAKES, move |it, number| {
                 first[6..10].copy_from_slice(&number.to_le_bytes());

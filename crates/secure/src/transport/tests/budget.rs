@@ -26,7 +26,7 @@ fn vehicle_with_budget() -> Network {
 fn send(network: &mut Network, to: &str, priority: Priority, datagram: &Bytes) {
     let vehicle = &mut network.hosts[0].transport;
     let session = vehicle.sessions().find(|it| it.peer.name == to);
-    vehicle.send(session.unwrap().session, priority, datagram.clone());
+    vehicle.send(session.unwrap().session, priority, datagram);
 }
 
 /// UDP octets that the vehicle has sent since the record had this length.

@@ -2,7 +2,7 @@
 
 use jaus::codec::Message as _;
 use jaus::messages::core::{ConfirmControl, RequestControl, SetEmergency};
-use jaus::messages::mobility::SetWrenchEffort;
+use jaus::messages::mobility::{QueryVelocityState, SetWrenchEffort};
 
 use super::*;
 
@@ -209,4 +209,50 @@ fn a_relay_separates_vehicles_and_operators_by_its_rules() {
         1,
         "Anna's message to the truck"
     );
+}
+
+#[test]
+fn a_message_goes_only_to_the_session_of_its_destination() {
+    let mut network = relay();
+    let query = message("200.1.1", "62.1.1", &QueryVelocityState::default());
+    network.hosts[0]
+        .transport
+        .send_to_all(Priority::Standard, &query);
+    network.run(SECOND);
+    for host in 1..=3 {
+        assert!(network.hosts[host].received.is_empty(), "{host}");
+    }
+    // Bert exchanges messages with the truck alone.
+    assert!(network.hosts[4].received.is_empty());
+    let query = message("102.1.1", "62.1.1", &QueryVelocityState::default());
+    network.hosts[0]
+        .transport
+        .send_to_all(Priority::Standard, &query);
+    network.run(SECOND);
+    assert_eq!(network.hosts[4].received, [query]);
+}
+
+#[test]
+fn only_the_answer_to_a_request_is_recorded_as_control() {
+    let (mut network, ..) = vehicle_with_rules("control=127");
+    let confirm = message("101.1.1", "60.1.1", &ConfirmControl::default());
+    network.send(0, Priority::Standard, &confirm);
+    network.run(SECOND);
+    let is_control = |act: &Act| matches!(act, Act::Control { .. });
+    assert!(!records(&mut network, 0).iter().any(is_control));
+}
+
+#[test]
+fn refused_messages_do_not_displace_the_record_of_what_was_done() {
+    let (mut network, ..) = vehicle_with_rules("");
+    let stop = message("60.1.1", "101.1.1", &SetEmergency::default());
+    let wrench = message("60.1.1", "101.1.1", &SetWrenchEffort::default());
+    network.send(1, Priority::Standard, &stop);
+    for _ in 0..1000 {
+        network.send(1, Priority::Standard, &wrench);
+    }
+    network.run(5 * SECOND);
+    assert!(network.counters(0).records_lost > 0);
+    let is_stop = |act: &Act| matches!(act, Act::Message { name, refusal: None, .. } if name == "SetEmergency");
+    assert!(records(&mut network, 0).iter().any(is_stop));
 }
