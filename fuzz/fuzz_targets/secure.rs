@@ -11,7 +11,9 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use jaus::wire::judp;
+use jaus::codec::Message as _;
+use jaus::messages::mobility::SetTravelSpeed;
+use jaus::wire::{DataControl, judp};
 use jaus_secure::beacon::{LENGTH, Neighbors, Received};
 use jaus_secure::transport::{Inlet, framed};
 use jaus_secure::{Peer, PublicKey, Trust, TrustFile};
@@ -23,7 +25,9 @@ const LONGEST: usize = 2 + 65_535;
 /// A trusted peer, of whose private key nobody knows.
 static PEER: LazyLock<Peer> = LazyLock::new(|| {
     let key = PublicKey::from_octets([7; 32]);
-    let trust = Trust::parse(&format!("rover {key} 101.255.255,102.1.255"));
+    let trust = Trust::parse(&format!(
+        "rover {key} 101.255.255,102.1.255 control=127 with=60.255.255 except=SetTravelSpeed"
+    ));
     let trust = trust.expect("a trust file");
     trust.find(key).expect("it is in it").clone()
 });
@@ -81,17 +85,30 @@ fn datagrams(octets: &[u8], piece: usize) -> Vec<Bytes> {
     found
 }
 
-/// A peer speaks for the sources of its own nodes and for no others, wildcards included.
+/// A peer speaks for the sources of its own nodes and for no others, wildcards included; and what its
+/// rules allow is neither for others than they name, nor excluded.
 fn datagram(octets: &[u8]) {
     let Ok(frames) = judp::frames(Bytes::copy_from_slice(octets)) else {
         return;
     };
-    for source in frames.flatten().map(|frame| frame.source) {
+    for frame in frames.flatten() {
+        let source = frame.source;
         let is_component = !matches!(source.component(), 0 | 255);
         let is_own = match (source.subsystem(), source.node()) {
             (101, node) => !matches!(node, 0 | 255),
             node => node == (102, 1),
         };
         assert_eq!(PEER.speaks_for(source), is_component && is_own, "{source}");
+        if PEER.rules.check(&frame).is_ok() {
+            assert!(
+                matches!(frame.destination.subsystem(), 60 | 65535),
+                "{frame:?}"
+            );
+            let is_whole = frame.flags.data() == DataControl::Single && !frame.is_acknowledgement();
+            assert!(
+                !is_whole || frame.code() != Some(SetTravelSpeed::CODE),
+                "{frame:?}"
+            );
+        }
     }
 }
