@@ -161,6 +161,38 @@ impl JausId {
             && (self.component == component.component || self.component == Self::ANY_COMPONENT)
     }
 
+    /// The components that both destinations reach, each possibly with wildcards; `None` if there are
+    /// none.
+    ///
+    /// ```
+    /// use jaus::address::JausId;
+    ///
+    /// let (all_of_101, first_nodes) = (JausId::new(101, 255, 33), JausId::new(65535, 1, 255));
+    /// assert_eq!(all_of_101.intersection(first_nodes), Some(JausId::new(101, 1, 33)));
+    /// assert_eq!(all_of_101.intersection(JausId::new(102, 255, 255)), None);
+    /// ```
+    #[must_use]
+    pub fn intersection(self, other: Self) -> Option<Self> {
+        fn field<T: PartialEq>(one: T, other: T, any: &T) -> Option<T> {
+            match (one == *any, other == *any) {
+                (true, _) => Some(other),
+                (_, true) => Some(one),
+                _ => (one == other).then_some(one),
+            }
+        }
+        Some(Self::new(
+            field(self.subsystem, other.subsystem, &Self::ANY_SUBSYSTEM)?,
+            field(self.node, other.node, &Self::ANY_NODE)?,
+            field(self.component, other.component, &Self::ANY_COMPONENT)?,
+        ))
+    }
+
+    /// Whether some component is reached by both destinations.
+    #[must_use]
+    pub fn overlaps(self, other: Self) -> bool {
+        self.intersection(other).is_some()
+    }
+
     /// The id with each 0 replaced by the wildcard of its field, which is what some peers mean.
     ///
     /// ```
@@ -456,6 +488,25 @@ mod tests {
             prop_assert_eq!(id.to_string().parse(), Ok(id));
             prop_assert_eq!(JausId::from_wire(id.to_wire()), id);
             prop_assert_eq!(id.to_u32(), number);
+        }
+    }
+
+    #[test]
+    fn ids_overlap_where_each_field_is_the_same_or_stands_for_all() {
+        let any = u8::MAX;
+        let subsystem = JausId::ANY_SUBSYSTEM;
+        for (one, other, expected) in [
+            (JausId::new(1, 2, 3), JausId::new(1, 2, 3), true),
+            (JausId::new(1, 2, 3), JausId::new(9, 2, 3), false),
+            (JausId::new(1, 2, 3), JausId::new(1, 9, 3), false),
+            (JausId::new(1, 2, 3), JausId::new(1, 2, 9), false),
+            (JausId::new(1, any, any), JausId::new(1, 2, 3), true),
+            (JausId::new(1, 2, 3), JausId::new(subsystem, 2, any), true),
+            (JausId::new(1, any, 3), JausId::new(1, 2, any), true),
+            (JausId::new(1, any, 3), JausId::new(1, any, 4), false),
+        ] {
+            assert_eq!(one.overlaps(other), expected, "{one} and {other}");
+            assert_eq!(other.overlaps(one), expected, "{other} and {one}");
         }
     }
 }

@@ -41,7 +41,7 @@ fuzz_target!(|input: &[u8]| {
     datagram(octets);
 });
 
-/// Whatever is read as a beacon is one when it is written, and none is accepted without a signature.
+/// A decoded beacon encodes to the same octets, and no beacon is accepted without a signature.
 fn beacon(octets: &[u8]) {
     let key = PEER.key;
     let trust = TrustFile::of(Trust::new(vec![PEER.clone()]));

@@ -72,8 +72,8 @@ pub use event::{AttachError, Event, MessageHandle, Outgoing, Received, Shortfall
 pub use forward::Routing;
 pub use link::{LinkId, LinkProfile, Path, Remote, SessionId, To, Transmit};
 pub use peers::{Peer, RouteState, Traffic};
-pub(crate) use rate::quota_address;
-pub use rate::{Bucket, Buckets, Limits, Rate};
+
+pub use rate::{Bucket, Buckets, Limits, Rate, quota_address};
 pub use send::SendError;
 pub use sink::{Ingress, Sink};
 

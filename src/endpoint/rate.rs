@@ -175,7 +175,8 @@ impl<K: Eq + Hash> Buckets<K> {
 /// The quota that an address belongs to: for IPv4 the address itself, for IPv6 the 64-bit network,
 /// within which one host may use any number of addresses. All hosts on a link share the network of
 /// link-local addresses, so there the address counts.
-pub(crate) fn quota_address(address: IpAddr) -> IpAddr {
+#[must_use]
+pub fn quota_address(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(v6) if !v6.is_unicast_link_local() => {
             Ipv6Addr::from_bits(v6.to_bits() >> 64 << 64).into()

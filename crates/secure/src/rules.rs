@@ -170,48 +170,19 @@ impl Rules {
 
     /// Whether it may send to every id that a destination means.
     fn covers(&self, destination: JausId) -> bool {
-        self.with.is_empty() || self.with.iter().any(|with| contains(*with, destination))
+        self.with.is_empty() || self.with.iter().any(|with| with.matches(destination))
     }
 
     /// Whether it may send to this id, which may have wildcards, or receive from it.
     #[must_use]
     pub fn may_reach(&self, id: JausId) -> bool {
-        self.with.is_empty() || self.with.iter().any(|with| overlap(*with, id))
+        self.with.is_empty() || self.with.iter().any(|with| with.overlaps(id))
     }
 
     /// Whether it may send to, or receive from, any of these ids.
     #[must_use]
     pub fn may_reach_any(&self, ids: &[JausId]) -> bool {
         ids.iter().any(|id| self.may_reach(*id))
-    }
-}
-
-/// Whether every id that matches the other one matches this one too.
-fn contains(one: JausId, other: JausId) -> bool {
-    let any = JausId::EVERYONE;
-    let within = |one: u16, other: u16, any: u16| one == other || one == any;
-    within(one.subsystem(), other.subsystem(), any.subsystem())
-        && within(one.node().into(), other.node().into(), any.node().into())
-        && within(
-            one.component().into(),
-            other.component().into(),
-            any.component().into(),
-        )
-}
-
-/// Whether some id matches both.
-pub(crate) fn overlap(one: JausId, other: JausId) -> bool {
-    one.matches(other) || other.matches(one) || {
-        // Each has a wildcard where the other has none, such as 101.255.1 and 65535.1.255.
-        let equal = |a: u16, b: u16, any: u16| a == b || a == any || b == any;
-        let any = JausId::EVERYONE;
-        equal(one.subsystem(), other.subsystem(), any.subsystem())
-            && equal(one.node().into(), other.node().into(), any.node().into())
-            && equal(
-                one.component().into(),
-                other.component().into(),
-                any.component().into(),
-            )
     }
 }
 
@@ -229,11 +200,11 @@ fn repeats_code(frame: &Frame) -> bool {
 /// Whether an audit log holds this frame also if it passes: it, or the message that it carries,
 /// concerns control, an emergency or the configuration of a component.
 pub(crate) fn is_recorded(frame: &Frame) -> bool {
+    if is_later(frame) || frame.is_acknowledgement() {
+        return false;
+    }
     let mut message = &frame.payload[..];
-    while let (false, Some(code)) = (
-        is_later(frame) || frame.is_acknowledgement(),
-        message.first_chunk(),
-    ) {
+    while let Some(code) = message.first_chunk() {
         let code = u16::from_le_bytes(*code);
         match permission::carried(code, message) {
             _ if permission::is_recorded(code) => return true,

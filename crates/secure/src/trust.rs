@@ -229,24 +229,8 @@ fn common(some: &[JausId], others: &[JausId]) -> Vec<JausId> {
         .iter()
         .flat_map(|one| others.iter().map(move |other| (*one, *other)));
     pairs
-        .filter_map(|(one, other)| overlap(one, other))
+        .filter_map(|(one, other)| one.intersection(other))
         .collect()
-}
-
-/// The ids that match both of these.
-fn overlap(one: JausId, other: JausId) -> Option<JausId> {
-    fn field<T: PartialEq>(one: T, other: T, any: &T) -> Option<T> {
-        match (one == *any, other == *any) {
-            (true, _) => Some(other),
-            (_, true) => Some(one),
-            _ => (one == other).then_some(one),
-        }
-    }
-    Some(JausId::new(
-        field(one.subsystem(), other.subsystem(), &JausId::ANY_SUBSYSTEM)?,
-        field(one.node(), other.node(), &JausId::ANY_NODE)?,
-        field(one.component(), other.component(), &JausId::ANY_COMPONENT)?,
-    ))
 }
 
 /// A line of a trust file.

@@ -338,7 +338,7 @@ impl Peers {
 
     /// The addresses that get a copy of a broadcast to `destination`.
     pub(super) fn broadcast_copies(&self, destination: JausId) -> Vec<Path> {
-        let reached = |peer: &&StaticPeer| peer.gets_broadcasts && overlap(peer.id, destination);
+        let reached = |peer: &&StaticPeer| peer.gets_broadcasts && peer.id.overlaps(destination);
         self.configured
             .iter()
             .filter(reached)
@@ -372,11 +372,4 @@ impl Peers {
         peers.sort_unstable_by_key(|peer| peer.id);
         peers.into_iter()
     }
-}
-
-/// Whether two ids, each possibly with wildcards, overlap.
-fn overlap(one: JausId, other: JausId) -> bool {
-    let fields = |id: JausId| [id.subsystem(), id.node().into(), id.component().into()];
-    let (one, other, any) = (fields(one), fields(other), fields(JausId::EVERYONE));
-    (0..3).all(|at| one[at] == other[at] || [one[at], other[at]].contains(&any[at]))
 }

@@ -2,8 +2,10 @@
 
 use std::collections::HashMap;
 use std::fmt;
-use std::net::{IpAddr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use jaus::endpoint::quota_address;
 
 /// The network address of a browser, as far as limits tell addresses apart: of IPv6 the first 64
 /// bits, because a host chooses the others at will.
@@ -12,13 +14,7 @@ pub(super) struct Source(IpAddr);
 
 impl Source {
     pub(super) fn of(address: SocketAddr) -> Self {
-        Self(match address.ip().to_canonical() {
-            IpAddr::V6(ip) => {
-                let network = ip.to_bits() & !u128::from(u64::MAX);
-                IpAddr::V6(Ipv6Addr::from_bits(network))
-            }
-            ip => ip,
-        })
+        Self(quota_address(address.ip()))
     }
 }
 

@@ -59,20 +59,31 @@ impl Permission {
 }
 
 /// Whether the audit log holds each message with this code.
-pub(super) fn is_recorded(code: u16) -> bool {
-    let needed = Permission::of(code, &[]);
-    matches!(code, ReleaseControl::CODE | SetEmergency::CODE)
-        || !matches!(needed, Permission::Observe | Permission::Command)
+pub(super) const fn is_recorded(code: u16) -> bool {
+    matches!(
+        code,
+        RequestControl::CODE
+            | ReleaseControl::CODE
+            | SetAuthority::CODE
+            | SetEmergency::CODE
+            | ClearEmergency::CODE
+            | Shutdown::CODE
+            | Reset::CODE
+            | SetTime::CODE
+    )
 }
 
-/// Definitions tell which messages are commands, but not for every code of a command in AS5710; for
-/// an unknown code of users its range tells.
+/// In the range of AS5710 all but the answers are commands, whatever the definitions say; elsewhere
+/// the definitions tell, and for an unknown code of users its range.
 fn is_command(code: u16) -> bool {
+    if COMMANDS.contains(&code) {
+        return !ANSWERS.contains(&code);
+    }
     let mut known = messages::registry().by_code(code).peekable();
-    let is_known = known.peek().is_some();
-    known.any(|message| message.is_command)
-        || (COMMANDS.contains(&code) && !ANSWERS.contains(&code))
-        || (COMMANDS_OF_USERS.contains(&code) && !is_known)
+    match known.peek() {
+        Some(_) => known.any(|message| message.is_command),
+        None => COMMANDS_OF_USERS.contains(&code),
+    }
 }
 
 /// What a message carries.

@@ -27,12 +27,12 @@ mod tests;
 mod traffic;
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
-use std::net::{IpAddr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
-use jaus::endpoint::{Buckets, Rate, SessionId};
+use jaus::endpoint::{Buckets, Rate, SessionId, quota_address};
 use jaus::link::custom::Arrival;
 use quinn_proto::{
     ClientConfig, ConnectionError, ConnectionHandle, DatagramEvent, Endpoint, Event, Incoming,
@@ -175,7 +175,7 @@ impl Transport {
     pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, datagram: &[u8]) {
         if is_first_packet(datagram)
             && !self.is_dialling(from)
-            && !self.first_packets.take(now, network_of(from.ip()))
+            && !self.first_packets.take(now, quota_address(from.ip()))
         {
             self.counters.handshakes_dropped += 1;
             return;
@@ -285,8 +285,8 @@ impl Transport {
     fn handshakes(&self, from: IpAddr) -> (usize, usize) {
         let is_unfinished = |it: &&Session| it.peer.is_none() && !it.ended && it.dial.is_none();
         let unfinished = self.sessions.values().filter(is_unfinished);
-        let address = |it: &Session| network_of(it.connection.remote_address().ip());
-        let near = |it: &&Session| address(it) == network_of(from);
+        let address = |it: &Session| quota_address(it.connection.remote_address().ip());
+        let near = |it: &&Session| address(it) == quota_address(from);
         (unfinished.clone().count(), unfinished.filter(near).count())
     }
 
@@ -487,12 +487,4 @@ impl Transport {
 /// fixed bit: RFC 9287) in a datagram of the least length (section 14.1).
 fn is_first_packet(datagram: &[u8]) -> bool {
     datagram.len() >= 1200 && datagram[0] & 0xB0 == 0x80
-}
-
-/// The unit that shares one limit: an IPv4 address, or an IPv6 network of 64 bits.
-fn network_of(address: IpAddr) -> IpAddr {
-    match address.to_canonical() {
-        IpAddr::V6(v6) => Ipv6Addr::from_bits(v6.to_bits() >> 64 << 64).into(),
-        v4 => v4,
-    }
 }

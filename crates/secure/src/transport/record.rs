@@ -134,7 +134,7 @@ impl Fault {
     }
 }
 
-/// As much of an error as is logged: the peer, who may be anybody, words a part of it.
+/// The text of an error, cut to a length for the log: an unauthenticated peer chooses part of it.
 fn shortened(error: &ConnectionError) -> String {
     error.to_string().chars().take(120).collect()
 }

@@ -18,7 +18,6 @@ use rustls::pki_types::{CertificateDer, UnixTime};
 use super::inlet::{Inlet, framed};
 use crate::authority::Rejection;
 use crate::credentials::{Credentials, Identified};
-use crate::rules::overlap;
 use crate::trust::Peer;
 
 /// Limits of what waits for one session.
@@ -81,9 +80,13 @@ impl Requests {
         self.0.push_back((component, client));
     }
 
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// Takes the request that a component answers; returns whether there was one.
     pub(super) fn take(&mut self, component: JausId, client: JausId) -> bool {
-        let answers = |it: &(JausId, JausId)| it.1 == client && overlap(it.0, component);
+        let answers = |it: &(JausId, JausId)| it.1 == client && it.0.overlaps(component);
         let found = self.0.iter().position(answers);
         found.and_then(|index| self.0.remove(index)).is_some()
     }

@@ -14,7 +14,7 @@ use super::Transport;
 use super::record::{Act, Record};
 use super::screen::{self, Stop};
 use super::session::Session;
-use crate::rules::{is_recorded, overlap};
+use crate::rules::is_recorded;
 use crate::trust::Peer;
 
 /// The first octet of a notice: text for the peer, about a message of its that was refused. No
@@ -62,7 +62,7 @@ impl Transport {
         let has_limits = peers().any(|peer| !peer.rules.with.is_empty());
         let to = self.sessions.get(&session)?.established()?;
         let screened = screen::screen(datagram, |frame| {
-            let is_addressed = to.ids.iter().any(|ids| overlap(*ids, frame.destination));
+            let is_addressed = to.ids.iter().any(|ids| ids.overlaps(frame.destination));
             let is_open = || {
                 let speaks = |peer: &&Peer| peer.speaks_for(frame.source);
                 let origins: Vec<_> = peers().filter(speaks).collect();
@@ -78,6 +78,10 @@ impl Transport {
 
     /// Records the answers of components to the peer's requests for control.
     fn record_answers(&mut self, id: SessionId, datagram: &Bytes) {
+        let asks_nothing = |it: &Session| it.requests.is_empty();
+        if self.sessions.get(&id).is_none_or(asks_nothing) {
+            return;
+        }
         let Ok(frames) = judp::frames(datagram.clone()) else {
             return;
         };

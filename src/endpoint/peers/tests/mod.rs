@@ -430,25 +430,6 @@ fn a_number_that_comes_late_is_not_the_latest() {
 }
 
 #[test]
-fn ids_overlap_where_each_field_is_the_same_or_stands_for_all() {
-    let any = u8::MAX;
-    let subsystem = JausId::ANY_SUBSYSTEM;
-    for (one, other, expected) in [
-        (JausId::new(1, 2, 3), JausId::new(1, 2, 3), true),
-        (JausId::new(1, 2, 3), JausId::new(9, 2, 3), false),
-        (JausId::new(1, 2, 3), JausId::new(1, 9, 3), false),
-        (JausId::new(1, 2, 3), JausId::new(1, 2, 9), false),
-        (JausId::new(1, any, any), JausId::new(1, 2, 3), true),
-        (JausId::new(1, 2, 3), JausId::new(subsystem, 2, any), true),
-        (JausId::new(1, any, 3), JausId::new(1, 2, any), true),
-        (JausId::new(1, any, 3), JausId::new(1, any, 4), false),
-    ] {
-        assert_eq!(overlap(one, other), expected, "{one} and {other}");
-        assert_eq!(overlap(other, one), expected, "{other} and {one}");
-    }
-}
-
-#[test]
 fn an_own_entry_comes_before_a_pattern_and_each_address_of_a_pattern_is_accepted() {
     let pin = |id, path, gets_broadcasts| StaticPeer {
         id,

@@ -42,9 +42,8 @@ pub(super) struct SecureLinks {
     keys: Keys,
     relay: Node,
     address: SocketAddr,
-    /// Where the operator's node connects to, if not to the relay.
-    #[cfg(test)]
-    detour: Option<SocketAddr>,
+    /// The address that the operator's node connects to: the relay's, or a NAT's before it.
+    entry_of_operator: SocketAddr,
 }
 
 impl SecureLinks {
@@ -59,8 +58,7 @@ impl SecureLinks {
             keys,
             relay,
             address,
-            #[cfg(test)]
-            detour: None,
+            entry_of_operator: address,
         })
     }
 
@@ -69,20 +67,13 @@ impl SecureLinks {
         let is_wanted = |it: &&(&str, u16, u8, &str)| (it.1, it.2) == (subsystem, number);
         let name = NODES.iter().find(is_wanted).map_or("visitor", |it| it.0);
         let any = SocketAddr::from(([127, 0, 0, 1], 0));
-        let link = self
-            .keys
-            .open(name, Settings::new(any).connect(self.entry(subsystem)))?;
+        let entry = match subsystem {
+            OPERATOR => self.entry_of_operator,
+            _ => self.address,
+        };
+        let link = self.keys.open(name, Settings::new(any).connect(entry))?;
         let config = Config::new(subsystem, number).without_udp();
         Node::start_with(config, vec![Box::new(link)]).map_err(Failure::of)
-    }
-
-    /// The address to which a node connects.
-    fn entry(&self, _subsystem: u16) -> SocketAddr {
-        #[cfg(test)]
-        if let Some(detour) = self.detour.filter(|_| _subsystem == OPERATOR) {
-            return detour;
-        }
-        self.address
     }
 
     /// The flags by which other commands join: they may observe.

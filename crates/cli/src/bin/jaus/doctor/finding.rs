@@ -10,7 +10,7 @@ use serde_json::{Value as Json, json};
 pub(super) enum Mark {
     Ok,
     Warning,
-    /// The warning that no other node was heard, which says nothing about this host.
+    /// The warning that no other node was found, which says nothing about this host.
     Alone,
     Problem,
 }

@@ -49,7 +49,7 @@ pub(super) async fn look(
     findings
 }
 
-/// Longest time to wait for the multicasts of a node that was heard otherwise.
+/// Longest time to wait for the multicasts of a node whose other messages arrive.
 const LONGEST: Duration = Duration::from_secs(30);
 
 /// The time within which each node multicasts: nodes of this stack and of JAUS++ call every 5 s,
@@ -148,8 +148,8 @@ async fn listen(node: Node, config: &Config, time: Duration) -> Result<Heard, At
     Ok(heard)
 }
 
-/// Whether a peer's multicasts should arrive: it speaks AS5669A, was heard on a link with a group,
-/// and is not named in the settings because multicast does not reach it.
+/// Whether a peer's multicasts should arrive: it speaks AS5669A, its messages arrive on a link with
+/// a group, and the settings do not name it as a peer that multicast does not reach.
 fn is_to_multicast(peer: &Peer, config: &Config, links: &[LinkReport]) -> bool {
     let has_group = |link: &LinkReport| link.link == peer.path.link && link.group.is_some();
     let address = peer.path.peer.socket();

@@ -77,7 +77,7 @@ fn a_mission_arrives_although_the_relay_restarts_and_the_operators_address_chang
     runtime.block_on(async {
         let mut links = SecureLinks::make().unwrap();
         let nat = Nat::to(links.address).await;
-        links.detour = Some(nat.inside);
+        links.entry_of_operator = nat.inside;
         let flags = ["demo", "--headless", "--secure", "--json"];
         let Flags { demo } = clap::Parser::parse_from(flags);
         let mut system = System::new(OwnNetwork::take().unwrap()).secured_by(links);
