@@ -38,6 +38,7 @@ pub(crate) const FILES: &[File] = files! {
     "/style.css" CSS "style.css",
     "/sections.css" CSS "sections.css",
     "/icon.svg" IMAGE "icon.svg",
+    "/start.js" SCRIPT "start.js",
     "/main.js" SCRIPT "main.js",
     "/account.js" SCRIPT "account.js",
     "/dom.js" SCRIPT "dom.js",

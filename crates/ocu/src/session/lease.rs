@@ -43,6 +43,9 @@ pub(super) enum Wanted {
 struct Hold {
     /// `None` until the session has begun.
     session: Option<Arc<Session>>,
+    /// Whether the vehicle was resumed since this part was ready. A part that reports the end of
+    /// an emergency later than others, or is under control later, would otherwise stand by for good.
+    resuming: bool,
     /// The state that was logged.
     logged: Option<SessionState>,
 }
@@ -174,6 +177,9 @@ impl Lease {
     }
 
     fn set_target(&mut self, target: TargetState) {
+        for hold in self.holds.values_mut() {
+            hold.resuming = target == TargetState::Ready;
+        }
         if self.target.replace(target) == Some(target) {
             return;
         }
@@ -210,6 +216,7 @@ impl Lease {
         self.go_on_ready(picture, client.component().id());
         for hold in self.holds.values_mut() {
             hold.log();
+            hold.resume();
         }
         self.answer(picture);
     }
@@ -305,6 +312,18 @@ impl Hold {
     fn state(&self) -> SessionState {
         let session = self.session.as_ref();
         session.map_or(SessionState::Seeking, |it| it.state())
+    }
+
+    /// Makes it ready if the operator resumed the vehicle while it could not be.
+    fn resume(&mut self) {
+        let state = self.state();
+        if !self.resuming || !matches!(state, SessionState::Ready(_) | SessionState::Standby(_)) {
+            return;
+        }
+        self.resuming = false;
+        if let (SessionState::Standby(_), Some(session)) = (state, &self.session) {
+            direct(session, TargetState::Ready);
+        }
     }
 
     /// Logs a new state.

@@ -1,9 +1,12 @@
 //! Operator actions: view, take control, drive, release, stop; with one and with two operators.
 
+use std::sync::Arc;
+
 use jaus_ocu::Station;
 use serde_json::json;
 
-use crate::scene::{ATTEMPTS, Page, Scene, driver_of};
+use crate::missing::planner;
+use crate::scene::{ATTEMPTS, Page, Scene, driver_of, planner_of};
 
 #[tokio::test]
 async fn a_page_sees_the_vehicle_and_its_parts_without_asking() {
@@ -133,6 +136,30 @@ async fn an_emergency_needs_no_control_and_ends_only_when_it_is_cleared() {
     driver.ask(json!({"type": "resume"})).await.unwrap();
     driver
         .drive_until(&scene, |scene| scene.speed() > 0.3)
+        .await;
+}
+
+/// A session asks for control again after pauses of its own. A part that is under control only after Resume
+/// is made ready too, instead of standing by for good behind a vehicle that says it is ready.
+#[tokio::test]
+async fn resume_reaches_parts_that_are_under_control_later_than_others() {
+    let scene = Scene::new().await;
+    let mut page = scene.driver().await;
+    page.ask(json!({"type": "emergency", "on": true}))
+        .await
+        .unwrap();
+    page.until(|state| driver_of(state)["state"] == "emergency")
+        .await;
+    let _planner = planner(&scene, Arc::default());
+    page.until(|state| planner_of(state)["state"] == "emergency")
+        .await;
+    page.ask(json!({"type": "emergency", "on": false}))
+        .await
+        .unwrap();
+    page.until(|state| state["vehicle"]["emergency"] == false && state["control"]["held"] == true)
+        .await;
+    page.ask(json!({"type": "resume"})).await.unwrap();
+    page.until(|state| planner_of(state)["state"] == "ready")
         .await;
 }
 

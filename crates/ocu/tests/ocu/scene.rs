@@ -452,9 +452,18 @@ impl Page {
     }
 }
 
-/// The primitive driver in a state.
+/// The primitive driver in a snapshot; null if it is unknown.
 pub(crate) fn driver_of(state: &Value) -> &Value {
+    part_of(state, "primitive_driver")
+}
+
+/// The planner in a snapshot; null if it is unknown.
+pub(crate) fn planner_of(state: &Value) -> &Value {
+    part_of(state, "planner")
+}
+
+fn part_of<'a>(state: &'a Value, role: &str) -> &'a Value {
     let parts = state["vehicle"]["parts"].as_array();
-    let driver = parts.and_then(|it| it.iter().find(|it| it["role"] == "primitive_driver"));
-    driver.unwrap_or(&Value::Null)
+    let part = parts.and_then(|it| it.iter().find(|it| it["role"] == role));
+    part.unwrap_or(&Value::Null)
 }

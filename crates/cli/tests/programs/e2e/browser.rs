@@ -75,6 +75,8 @@ pub(crate) struct Browser {
     number: u64,
     profile: PathBuf,
     complaints: Vec<String>,
+    /// Failed connections, which some tests cause.
+    failures: Vec<String>,
 }
 
 impl Browser {
@@ -142,6 +144,7 @@ impl Browser {
             number: 0,
             profile,
             complaints: Vec::new(),
+            failures: Vec::new(),
         };
         browser.attach();
         browser
@@ -189,17 +192,21 @@ impl Browser {
         }
     }
 
-    /// Collects errors of the page, except failed connections: some tests cause them.
+    /// Collects errors of the page, and apart from them failed connections: some tests cause them.
     fn note(&mut self, said: &Value) {
         let parameters = &said["params"];
         match said["method"].as_str() {
             Some("Runtime.exceptionThrown") => self
                 .complaints
                 .push(parameters["exceptionDetails"].to_string()),
-            Some("Log.entryAdded") if parameters["entry"]["source"] != "network" => {
-                let entry = parameters["entry"]["text"].as_str().unwrap_or_default();
-                if !entry.contains("WebSocket connection to") {
-                    self.complaints.push(entry.to_owned());
+            Some("Log.entryAdded") => {
+                let entry = &parameters["entry"];
+                let text = entry["text"].as_str().unwrap_or_default();
+                if entry["source"] == "network" || text.contains("WebSocket connection to") {
+                    let address = entry["url"].as_str().unwrap_or_default();
+                    self.failures.push(format!("{text} ({address})"));
+                } else {
+                    self.complaints.push(text.to_owned());
                 }
             }
             _ => {}
@@ -239,14 +246,28 @@ impl Browser {
         self.wait("document.readyState === 'complete'");
     }
 
+    /// Lets the loading of files fail whose addresses match one of these patterns.
+    pub(crate) fn withhold(&mut self, patterns: &[&str]) {
+        self.call("Network.enable", &json!({}));
+        self.call("Network.setBlockedURLs", &json!({ "urls": patterns }));
+    }
+
     /// The value of a JavaScript expression in the page.
     #[track_caller]
     pub(crate) fn value(&mut self, expression: &str) -> Value {
+        let value = self.try_value(expression);
+        value.unwrap_or_else(|error| panic!("{expression}: {error}"))
+    }
+
+    /// Like [`Self::value`], but returns an error: the page may be loading anew.
+    fn try_value(&mut self, expression: &str) -> Result<Value, Value> {
         let wanted =
             json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
-        let answer = self.call("Runtime.evaluate", &wanted);
-        assert_eq!(answer["exceptionDetails"], Value::Null, "{expression}");
-        answer["result"]["value"].clone()
+        let answer = self.try_call("Runtime.evaluate", &wanted)?;
+        match &answer["exceptionDetails"] {
+            Value::Null => Ok(answer["result"]["value"].clone()),
+            exception => Err(exception.clone()),
+        }
     }
 
     /// Text of the first element that matches a selector.
@@ -281,7 +302,8 @@ impl Browser {
     #[track_caller]
     pub(crate) fn holds_within(&mut self, limit: Duration, expression: &str) -> bool {
         let deadline = Instant::now() + limit;
-        while self.value(&format!("Boolean({expression})")) != true {
+        let expression = format!("Boolean({expression})");
+        while self.try_value(&expression) != Ok(Value::Bool(true)) {
             if Instant::now() > deadline {
                 return false;
             }
@@ -295,9 +317,10 @@ impl Browser {
         self.screenshot("failed");
         let page = self.value("document.body.innerText.replace(/\\n+/g, ' | ')");
         format!(
-            "{}\n{:?}",
+            "{}\n{:?}\nconnections that failed: {:?}",
             page.as_str().unwrap_or_default(),
-            self.complaints
+            self.complaints,
+            self.failures
         )
     }
 

@@ -8,6 +8,8 @@ use super::steps::{is_accessible, look_from_all_screens};
 const TEST: u8 = 5;
 const TOKEN: &str = "a-token-of-the-tests";
 
+/// The page is loaded anew until all of its files are there.
+///
 /// The emergency stop does not look alive, and asks for the token by touch and by key. With the token
 /// it stops the vehicle.
 pub(crate) fn run() {
@@ -23,8 +25,11 @@ pub(crate) fn run() {
     let (_station, address) = Running::start(TEST, "jaus-ocu", &station, "page is at ");
     let mut page = Browser::start(None);
     page.look_on(SCREENS[0]);
+    page.withhold(&["*/map.js"]);
     // What follows the # is the token.
     page.open(address.split('#').next().unwrap());
+    page.wait("document.querySelector('#link-word').textContent === 'Not loaded'");
+    page.withhold(&[]);
     page.press("#token-no");
     page.wait("document.querySelector('#state-word').textContent === 'Standby'");
     page.wait("document.body.dataset.emergency === 'barred'");
