@@ -41,6 +41,7 @@ mod redial;
 #[cfg(feature = "serial")]
 pub mod serial;
 mod slab;
+pub mod socket;
 #[cfg(unix)]
 mod socket_file;
 mod socket_table;

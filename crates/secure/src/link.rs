@@ -274,6 +274,7 @@ impl CustomLink for SecureLink {
                 }
             }
         }
+        self.socket.rest();
         self.timeout = self.next_timeout(now);
         self.write_records();
         Poll::Ready(())

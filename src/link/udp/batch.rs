@@ -20,9 +20,9 @@ use nix::sys::socket::{
 
 use rustix::net::{MMsgHdr, SendAncillaryBuffer, SendFlags, SocketAddrAny, sendmmsg};
 
-use super::socket::Socket;
 use crate::link::Slab;
 use crate::link::slab::LONGEST;
+use crate::link::socket::Socket;
 
 /// Limit of datagrams or batches per `recvmmsg` call. Each needs a slot of [`LONGEST`] octets.
 const FETCHED: usize = 8;

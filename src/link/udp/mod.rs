@@ -11,7 +11,6 @@ mod open;
 mod receive;
 mod send;
 mod settings;
-mod socket;
 
 use std::collections::VecDeque;
 use std::io;
@@ -20,11 +19,11 @@ use std::net::SocketAddr;
 use bytes::Bytes;
 
 use send::GsoBatch;
-use socket::Socket;
 
 pub use settings::{Broadcasts, PortTaken, Settings};
 
 use super::backlog::{Backlog, Bounds};
+use super::socket::Socket;
 use super::socket_table;
 use super::{Error, Interface};
 

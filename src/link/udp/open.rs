@@ -5,8 +5,8 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
 use socket2::{Domain, InterfaceIndexOrAddress, Protocol, Socket, Type};
 
-use super::socket::Socket as Opened;
 use super::{PortTaken, Settings};
+use crate::link::socket::Socket as Opened;
 use crate::link::{Error, Holder, Interface};
 
 /// Opens the socket that sends everything, bound exclusively to the interface's address.

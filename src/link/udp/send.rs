@@ -11,9 +11,9 @@ use std::task::{Context, Poll, ready};
 use bytes::{Buf, Bytes};
 use socket2::SockRef;
 
-use super::socket::Socket;
 use super::{MAX_SEGMENTS, UdpLink};
 use crate::endpoint::{MOST_OCTETS, Remote, To, Transmit};
+use crate::link::socket::Socket;
 use crate::wire::Priority;
 
 /// Queue length at which the link flushes at once; also the most datagrams per `sendmmsg` call.

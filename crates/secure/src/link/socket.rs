@@ -5,9 +5,8 @@ use std::io::{self, IoSliceMut};
 use std::net::SocketAddr;
 use std::task::{Context, Poll, ready};
 
-use quinn_udp::{RecvMeta, UdpSocketState};
-use tokio::io::Interest;
-use tokio::net::UdpSocket;
+use jaus::link::socket::Socket as Watched;
+use quinn_udp::{BATCH_SIZE, RecvMeta, UdpSocketState};
 
 use crate::transport::Datagrams;
 
@@ -22,7 +21,7 @@ const MOST: usize = 32;
 /// A bound socket. Must be used within a tokio runtime.
 #[derive(Debug)]
 pub(super) struct Socket {
-    io: UdpSocket,
+    io: Watched,
     state: UdpSocketState,
     /// Untouched memory takes no pages.
     buffer: Box<[u8]>,
@@ -32,16 +31,15 @@ impl Socket {
     pub(super) fn bind(address: SocketAddr) -> io::Result<Self> {
         let socket = std::net::UdpSocket::bind(address)?;
         socket.set_nonblocking(true)?;
-        let io = UdpSocket::from_std(socket)?;
         Ok(Self {
-            state: UdpSocketState::new((&io).into())?,
-            io,
+            state: UdpSocketState::new((&socket).into())?,
+            io: Watched::new(socket)?,
             buffer: vec![0; SLOTS * LONGEST].into(),
         })
     }
 
     pub(super) fn local_addr(&self) -> io::Result<SocketAddr> {
-        self.io.local_addr()
+        self.io.get().local_addr()
     }
 
     /// The most datagrams that one call can send.
@@ -51,7 +49,7 @@ impl Socket {
 
     /// Sends datagrams to one peer; pending while the kernel has no room.
     pub(super) fn poll_send(
-        &self,
+        &mut self,
         cx: &mut Context<'_>,
         datagrams: &Datagrams,
     ) -> Poll<io::Result<()>> {
@@ -63,18 +61,21 @@ impl Socket {
             src_ip: None,
         };
         loop {
-            ready!(self.io.poll_send_ready(cx))?;
-            let sent = self.io.try_io(Interest::WRITABLE, || {
-                self.state.try_send((&self.io).into(), &transmit)
-            });
-            match sent {
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+            match self.state.try_send(self.io.get().into(), &transmit) {
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                    ready!(self.io.poll_room(cx))?;
+                }
                 result => return Poll::Ready(result),
             }
         }
     }
 
-    /// Receives with one system call, and passes each datagram to `each`.
+    /// Call this when nothing is left to send.
+    pub(super) fn rest(&mut self) {
+        self.io.rest();
+    }
+
+    /// Receives with one system call, and passes each datagram to `each`; pending if none has arrived.
     pub(super) fn poll_receive(
         &mut self,
         cx: &mut Context<'_>,
@@ -82,15 +83,10 @@ impl Socket {
     ) -> Poll<io::Result<()>> {
         let mut metas = [RecvMeta::default(); SLOTS];
         let received = loop {
-            ready!(self.io.poll_recv_ready(cx))?;
-            let mut slots = self.buffer.chunks_exact_mut(LONGEST);
-            let mut slots: [_; SLOTS] =
-                std::array::from_fn(|_| IoSliceMut::new(slots.next().unwrap_or_default()));
-            let received = self.io.try_io(Interest::READABLE, || {
-                self.state.recv((&self.io).into(), &mut slots, &mut metas)
-            });
-            match received {
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+            match self.receive(&mut metas) {
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                    ready!(self.io.poll_read_ready(cx))?;
+                }
                 result => break result?,
             }
         };
@@ -101,5 +97,25 @@ impl Socket {
             }
         }
         Poll::Ready(Ok(()))
+    }
+
+    /// Receives with one system call; returns the number of filled slots.
+    fn receive(&mut self, metas: &mut [RecvMeta; SLOTS]) -> io::Result<usize> {
+        let mut slots = self.buffer.chunks_exact_mut(LONGEST);
+        let mut slots: [_; SLOTS] =
+            std::array::from_fn(|_| IoSliceMut::new(slots.next().unwrap_or_default()));
+        let mut received = 0;
+        let result = self.io.try_read(|socket| {
+            received = self.state.recv(socket.into(), &mut slots, metas)?;
+            if received < SLOTS.min(BATCH_SIZE) {
+                // The socket is empty; this spares a call that would only confirm it.
+                return Err(io::ErrorKind::WouldBlock.into());
+            }
+            Ok(())
+        });
+        match result {
+            Err(error) if error.kind() != io::ErrorKind::WouldBlock || received == 0 => Err(error),
+            _ => Ok(received),
+        }
     }
 }

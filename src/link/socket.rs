@@ -1,0 +1,148 @@
+//! A UDP socket for links: registered with the runtime on Unix [for reading only](super::watch), and for
+//! writing only while its send buffer is full. This halves the wake-ups of a round trip.
+
+use std::io;
+use std::net::{SocketAddr, UdpSocket};
+use std::task::{Context, Poll};
+
+use tokio::io::Interest;
+
+/// The socket that system calls take.
+#[cfg(unix)]
+pub type Inner = UdpSocket;
+/// The socket that system calls take.
+#[cfg(not(unix))]
+pub type Inner = tokio::net::UdpSocket;
+
+#[cfg(unix)]
+type Watched = tokio::io::unix::AsyncFd<Inner>;
+#[cfg(not(unix))]
+type Watched = Inner;
+
+/// A non-blocking UDP socket. Must be made within a tokio runtime.
+#[derive(Debug)]
+pub struct Socket {
+    watched: Watched,
+    /// A duplicate that is watched for writing while the socket is full.
+    #[cfg(unix)]
+    full: Option<Watched>,
+}
+
+#[cfg(unix)]
+impl Socket {
+    /// Registers a socket, which must be non-blocking.
+    ///
+    /// # Errors
+    /// Those of the operating system.
+    pub fn new(socket: UdpSocket) -> io::Result<Self> {
+        Ok(Self {
+            watched: super::watch::watch(socket, Interest::READABLE)?,
+            full: None,
+        })
+    }
+
+    /// The underlying socket.
+    #[must_use]
+    pub fn get(&self) -> &Inner {
+        self.watched.get_ref()
+    }
+
+    /// Calls `read` if the socket is readable. If `read` returns `WouldBlock`, the socket counts as
+    /// empty until more arrives: so a `read` that has received fewer datagrams than it had room for
+    /// returns that, which spares a call that would only confirm it.
+    ///
+    /// # Errors
+    /// Those of `read`; `WouldBlock` if the socket is not readable.
+    pub fn try_read<R>(&self, read: impl FnOnce(&Inner) -> io::Result<R>) -> io::Result<R> {
+        self.watched.try_io(Interest::READABLE, read)
+    }
+
+    pub(super) fn try_recv(&self, room: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
+        self.try_read(|socket| socket.recv_from(room))
+    }
+
+    /// Waits until something may have arrived.
+    ///
+    /// # Errors
+    /// If the runtime shuts down.
+    pub fn poll_read_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        self.watched.poll_read_ready(cx).map_ok(drop)
+    }
+
+    /// Waits until a full socket may have room again.
+    ///
+    /// # Errors
+    /// If the runtime shuts down.
+    pub fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        let full = match &mut self.full {
+            Some(full) => full,
+            none => {
+                let copy = self.watched.get_ref().try_clone()?;
+                none.insert(super::watch::watch(copy, Interest::WRITABLE)?)
+            }
+        };
+        full.poll_write_ready(cx)
+            .map_ok(|mut ready| ready.clear_ready())
+    }
+
+    /// Call this when nothing is left to send.
+    pub fn rest(&mut self) {
+        self.full = None;
+    }
+}
+
+#[cfg(not(unix))]
+impl Socket {
+    /// Registers a socket, which must be non-blocking.
+    ///
+    /// # Errors
+    /// Those of the operating system.
+    pub fn new(socket: UdpSocket) -> io::Result<Self> {
+        Ok(Self {
+            watched: Watched::from_std(socket)?,
+        })
+    }
+
+    /// The underlying socket.
+    #[must_use]
+    pub fn get(&self) -> &Inner {
+        &self.watched
+    }
+
+    /// Calls `read` if the socket is readable. If `read` returns `WouldBlock`, the socket counts as
+    /// empty until more arrives: so a `read` that has received fewer datagrams than it had room for
+    /// returns that, which spares a call that would only confirm it.
+    ///
+    /// # Errors
+    /// Those of `read`; `WouldBlock` if the socket is not readable.
+    pub fn try_read<R>(&self, read: impl FnOnce(&Inner) -> io::Result<R>) -> io::Result<R> {
+        self.watched
+            .try_io(Interest::READABLE, || read(&self.watched))
+    }
+
+    pub(super) fn try_recv(&self, room: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
+        self.watched.try_recv_from(room)
+    }
+
+    /// Waits until something may have arrived.
+    ///
+    /// # Errors
+    /// If the runtime shuts down.
+    pub fn poll_read_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        self.watched.poll_recv_ready(cx)
+    }
+
+    /// Waits until a full socket may have room again.
+    ///
+    /// # Errors
+    /// If the runtime shuts down.
+    pub fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        // The socket was full; the runtime does not know it yet.
+        let full = || Err::<(), _>(io::ErrorKind::WouldBlock.into());
+        let _ = self.watched.try_io(Interest::WRITABLE, full);
+        self.watched.poll_send_ready(cx)
+    }
+
+    /// Call this when nothing is left to send.
+    pub fn rest(&mut self) {}
+}
