@@ -10,7 +10,7 @@
 
 mod register;
 
-use std::fs::{self, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -169,6 +169,7 @@ impl CertificateAuthority {
         // It is read back, so that nothing is issued that nodes would not accept.
         let certificate =
             Certificate::from_der(issued.der()).map_err(|defect| self.defect(defect))?;
+        let _alone = self.lock()?;
         self.append(&Issued::of(&certificate))?;
         Ok(pem("CERTIFICATE", issued.der()))
     }
@@ -179,11 +180,12 @@ impl CertificateAuthority {
     /// # Errors
     /// If the register cannot be read, or a file cannot be written.
     pub fn revoke(&self, which: &str, now: SystemTime) -> Result<Vec<Issued>, AuthorityError> {
+        let _alone = self.lock()?;
         let mut issued = self.issued()?;
         let mut revoked = Vec::new();
         for it in &mut issued {
             let is_meant = it.name == which || it.serial == which;
-            if is_meant && it.revoked.is_none() && it.not_after > now {
+            if is_meant && it.revoked.is_none() {
                 it.revoked = Some(now);
                 revoked.push(it.clone());
             }
@@ -208,6 +210,12 @@ impl CertificateAuthority {
         self.folder.join("issued")
     }
 
+    /// Keeps other programs from changing the register until it is dropped.
+    fn lock(&self) -> Result<File, AuthorityError> {
+        let path = self.register();
+        edit::lock(&path).map_err(|source| in_file(&path, source).into())
+    }
+
     fn append(&self, issued: &Issued) -> Result<(), AuthorityError> {
         let path = self.register();
         let append = || -> io::Result<()> {
@@ -218,18 +226,18 @@ impl CertificateAuthority {
         append().map_err(|source| in_file(&path, source).into())
     }
 
-    /// Writes the list of the revoked certificates that have not expired.
+    /// Writes the list of the revoked certificates. Expired ones stay in it: whether one has expired is a
+    /// question to a clock, and that of this host or of a vehicle may be wrong.
     fn write_list(&self, issued: &[Issued], now: SystemTime) -> Result<(), AuthorityError> {
         let millis = now.duration_since(SystemTime::UNIX_EPOCH);
         let number = millis.map_or(0, |it| u64::try_from(it.as_millis()).unwrap_or(u64::MAX));
-        let revoked = issued.iter().filter(|it| it.not_after > now);
         let list = CertificateRevocationListParams {
             this_update: time(now),
             // Nodes use a list until they get a newer one: a vehicle without a network stays usable.
             next_update: time(now + LIFE),
             crl_number: SerialNumber::from(number),
             issuing_distribution_point: None,
-            revoked_certs: revoked.filter_map(listed).collect(),
+            revoked_certs: issued.iter().filter_map(listed).collect(),
             key_identifier_method: KeyIdMethod::Sha256,
         };
         let list = list.signed_by(&self.issuer())?;

@@ -14,12 +14,14 @@ use crate::trust::{CERTIFICATE, Grant, Peer, Trust, TrustError, line_of, line_of
 /// # Errors
 /// If the file cannot be read or written, has a malformed line, or lists the key or name already.
 pub fn trust(path: &Path, peer: &Peer, also: bool) -> Result<(), TrustError> {
-    let text = text_of(path)?;
-    let known = Trust::parse(&text)?;
-    if !also && known.peers().iter().any(|it| it.name == peer.name) {
-        return Err(TrustError::Known(peer.name.clone()));
-    }
-    append(path, text, &line_of(peer))
+    change(path, |text| {
+        let known = Trust::parse(text)?;
+        if !also && known.peers().iter().any(|it| it.name == peer.name) {
+            return Err(TrustError::Known(peer.name.clone()));
+        }
+        Ok(Some(with_line(text, &line_of(peer))))
+    })?;
+    Ok(())
 }
 
 /// Adds the line for a certificate to a trust file, which is created if necessary.
@@ -28,16 +30,18 @@ pub fn trust(path: &Path, peer: &Peer, also: bool) -> Result<(), TrustError> {
 /// If the file cannot be read or written, has a malformed line, or has a line for the certificate
 /// already.
 pub fn grant(path: &Path, grant: &Grant) -> Result<(), TrustError> {
-    append(path, text_of(path)?, &line_of_grant(grant))
+    change(path, |text| {
+        Ok(Some(with_line(text, &line_of_grant(grant))))
+    })?;
+    Ok(())
 }
 
-fn append(path: &Path, mut text: String, line: &str) -> Result<(), TrustError> {
-    if !text.is_empty() && !text.ends_with('\n') {
-        text.push('\n');
-    }
-    text.push_str(line);
-    Trust::parse(&text)?;
-    replace(path, &text).map_err(|source| in_file(path, source))
+fn with_line(text: &str, line: &str) -> String {
+    let end = match text.is_empty() || text.ends_with('\n') {
+        true => "",
+        false => "\n",
+    };
+    [text, end, line].concat()
 }
 
 /// Replaces the rules of the peer or certificate with this name; returns whether it was there. A
@@ -46,22 +50,21 @@ fn append(path: &Path, mut text: String, line: &str) -> Result<(), TrustError> {
 /// # Errors
 /// If the file cannot be read or written, or has a malformed line.
 pub fn allow(path: &Path, name: &str, rules: &Rules) -> Result<bool, TrustError> {
-    let text = text_of(path)?;
-    Trust::parse(&text)?;
-    let mut is_there = false;
-    let mut changed = String::new();
-    for line in text.lines() {
-        if is_of(name, line) {
-            is_there = true;
-            changed.push_str(&with_rules(line, rules)?);
-        } else {
-            changed.extend([line, "\n"]);
+    change(path, |text| {
+        Trust::parse(text)?;
+        if !text.lines().any(|line| is_of(name, line)) {
+            return Ok(None);
         }
-    }
-    if is_there {
-        replace(path, &changed).map_err(|source| in_file(path, source))?;
-    }
-    Ok(is_there)
+        let mut changed = String::new();
+        for line in text.lines() {
+            if is_of(name, line) {
+                changed.push_str(&with_rules(line, rules)?);
+            } else {
+                changed.extend([line, "\n"]);
+            }
+        }
+        Ok(Some(changed))
+    })
 }
 
 /// A line of a trust file with other rules.
@@ -92,8 +95,6 @@ fn with_rules(line: &str, rules: &Rules) -> Result<String, TrustError> {
 /// If the file cannot be read or written, has a malformed line, or has only limits of a certificate
 /// under this name.
 pub fn revoke(path: &Path, name: &str, key: Option<PublicKey>) -> Result<bool, TrustError> {
-    let text = text_of(path)?;
-    Trust::parse(&text)?;
     let of_key = |line: &str| {
         let word = line
             .split_whitespace()
@@ -102,17 +103,18 @@ pub fn revoke(path: &Path, name: &str, key: Option<PublicKey>) -> Result<bool, T
         key.is_none_or(|key| word == Some(key))
     };
     let goes = |line: &&str| is_of(name, line) && of_key(line);
-    let rest: Vec<_> = text.lines().filter(|line| !goes(line)).collect();
-    if rest.len() == text.lines().count() {
-        return Ok(false);
-    }
-    if text.lines().filter(goes).any(is_grant) {
-        // Without its limits the certificate would be allowed more.
-        return Err(TrustError::Certificate(name.to_owned()));
-    }
-    let rest: String = rest.iter().flat_map(|line| [*line, "\n"]).collect();
-    replace(path, &rest).map_err(|source| in_file(path, source))?;
-    Ok(true)
+    change(path, |text| {
+        Trust::parse(text)?;
+        if !text.lines().any(|line| goes(&line)) {
+            return Ok(None);
+        }
+        if text.lines().filter(goes).any(is_grant) {
+            // Without its limits the certificate would be allowed more.
+            return Err(TrustError::Certificate(name.to_owned()));
+        }
+        let rest = text.lines().filter(|line| !goes(line));
+        Ok(Some(rest.flat_map(|line| [line, "\n"]).collect()))
+    })
 }
 
 /// Whether a line limits a certificate.
@@ -123,6 +125,35 @@ fn is_grant(line: &str) -> bool {
 /// Whether a line is that of the peer with this name.
 fn is_of(name: &str, line: &str) -> bool {
     line.split_whitespace().next() == Some(name)
+}
+
+/// Changes a trust file, while no other program does; returns whether `change` gave it another text.
+fn change(
+    path: &Path,
+    change: impl FnOnce(&str) -> Result<Option<String>, TrustError>,
+) -> Result<bool, TrustError> {
+    let failed = |source| in_file(path, source);
+    let _alone = lock(path).map_err(failed)?;
+    let Some(changed) = change(&text_of(path)?)? else {
+        return Ok(false);
+    };
+    Trust::parse(&changed)?;
+    replace(path, &changed).map_err(failed)?;
+    Ok(true)
+}
+
+/// Waits until no other program changes the file, and keeps others waiting until it is dropped. The lock
+/// is that of a file beside it, because the file itself is replaced.
+pub(crate) fn lock(path: &Path) -> io::Result<File> {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".lock");
+    let file = File::options()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(name)?;
+    file.lock()?;
+    Ok(file)
 }
 
 fn text_of(path: &Path) -> Result<String, TrustError> {
@@ -178,6 +209,26 @@ mod tests {
         assert!(!revoke(&path, "rover", None).unwrap());
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.starts_with("# our team\nconsole "), "{text}");
+    }
+
+    #[test]
+    fn changes_of_programs_at_once_are_all_made() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trusted_keys");
+        trust(&path, &peer("stolen", 99), false).unwrap();
+        std::thread::scope(|scope| {
+            for octet in 0..20 {
+                let path = &path;
+                let name = format!("rover-{octet}");
+                scope.spawn(move || trust(path, &peer(&name, octet), false).unwrap());
+            }
+            scope.spawn(|| assert!(revoke(&path, "stolen", None).unwrap()));
+        });
+        let text = fs::read_to_string(&path).unwrap();
+        let names = Trust::parse(&text).unwrap();
+        let names = names.peers().iter().map(|it| &it.name);
+        assert_eq!(names.clone().count(), 20, "{text}");
+        assert!(names.clone().all(|it| it != "stolen"), "{text}");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! ```text
 //! cargo bench --bench programs
 //! cargo bench --bench programs -- load               only the thousand components; a minute
+//! cargo bench --bench programs --no-default-features -- programs    without secure links and https
 //! JAUS_WRITE_FIGURES=1 cargo bench --bench programs  also writes docs/figures/programs.md and load.md
 //! ```
 //!
@@ -72,9 +73,18 @@ fn load() {
 
 #[tokio::main(flavor = "current_thread")]
 async fn programs() {
-    let mut figures = Figures::new("programs", "cargo bench --bench programs");
+    let (name, flags, features) = match cfg!(feature = "secure") {
+        true => ("programs", "", "with secure links and https"),
+        false => (
+            "programs-plain",
+            " --no-default-features",
+            "without the features secure and https",
+        ),
+    };
+    let command = format!("cargo bench -p jaus-cli --bench programs{flags} -- programs");
+    let mut figures = Figures::new(name, &command);
     figures.table(
-        "A program of one component",
+        &format!("A program of one component, {features}"),
         [
             "program",
             "without symbols",

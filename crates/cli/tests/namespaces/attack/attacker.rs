@@ -28,15 +28,19 @@ impl Attacker {
     /// Aims at the port of JUDP for as long as the attack says; with the setting `brief:PORT`, at
     /// that port for a quarter of the time.
     pub(crate) fn new() -> Self {
-        let address = |text: &str| SocketAddr::new(text.parse().unwrap(), judp::PORT);
-        let mut victim = address(TO_STRANGERS);
+        Self::from(([10, 217, 0, 9], judp::PORT).into())
+    }
+
+    /// Like [`new`](Self::new), with an address of its own.
+    pub(crate) fn from(own: SocketAddr) -> Self {
         let port = std::env::var(SETTINGS).ok();
         let port = port.and_then(|it| it.strip_prefix("brief:")?.parse().ok());
-        victim.set_port(port.unwrap_or(judp::PORT));
+        let victim = TO_STRANGERS.parse().unwrap();
+        let victim = SocketAddr::new(victim, port.unwrap_or(judp::PORT));
         let hurry = if port.is_some() { 4 } else { 1 };
         Self {
             hurry,
-            ..Self::between(address("10.217.0.9"), victim)
+            ..Self::between(own, victim)
         }
     }
 

@@ -186,9 +186,7 @@ fn create_event(attacker: &mut Attacker, number: u32) {
 /// An attacker with one address of an IPv4 network that belongs to it entirely.
 fn ip4(number: u32) -> Attacker {
     let [.., high, low] = number.to_be_bytes();
-    let own = SocketAddr::from(([10, 217, 100 + high, low], judp::PORT));
-    let victim = TO_STRANGERS.parse().unwrap();
-    Attacker::between(own, SocketAddr::new(victim, judp::PORT))
+    Attacker::from(([10, 217, 100 + high, low], judp::PORT).into())
 }
 
 /// An attacker with one address of an IPv6 network that belongs to it entirely.

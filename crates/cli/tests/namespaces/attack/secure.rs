@@ -23,9 +23,10 @@ const VEHICLE: &str = "10.216.1.1:3795";
 /// The setting of a client with a secure link.
 const FOLDER: &str = "secure:";
 /// Attacks on plain JUDP that have an effect, or would without its defences.
-const ATTACKS: [&str; 11] = [
+const ATTACKS: [&str; 12] = [
     "forged-id",
     "many-ids",
+    "many-addresses",
     "forged-control",
     "queries",
     "events",
