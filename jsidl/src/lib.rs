@@ -45,6 +45,8 @@ pub mod rust;
 pub mod schema;
 mod source;
 mod syntax;
+mod typed;
+pub mod typescript;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Note, Severity};
 #[cfg(feature = "excerpts")]
