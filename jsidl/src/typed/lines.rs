@@ -35,8 +35,13 @@ impl Lines {
 
     /// The line that ends a block.
     pub(crate) fn close(&mut self, line: impl AsRef<str>) {
-        self.depth = self.depth.saturating_sub(1);
+        self.end();
         self.line(line);
+    }
+
+    /// The end of a block that has no line for it.
+    pub(crate) const fn end(&mut self) {
+        self.depth = self.depth.saturating_sub(1);
     }
 
     /// Columns that are left in a line of 100.

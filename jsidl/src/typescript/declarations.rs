@@ -137,7 +137,7 @@ fn union<'t>(
         let end = if place + 1 == kinds.len() { ";" } else { "" };
         out.line(format!("| {kind}{end}"));
     }
-    out.close("");
+    out.end();
 }
 
 fn type_of(ty: &Type, outer: &str) -> String {

@@ -104,7 +104,7 @@ fn agree(ours: &Json, theirs: &Json) -> bool {
 /// A valid message, and octets that are made from it: each beginning, one octet more, and single
 /// octets changed.
 pub(super) fn around(module: &str, id: &Id, message: &Message, octets: &[u8]) -> Vec<Case> {
-    let places = || (0..octets.len()).step_by(octets.len().div_ceil(40).max(1));
+    let places = || (0..octets.len()).step_by(octets.len().div_ceil(10).max(1));
     let changed = |place: usize, to: fn(u8) -> u8| {
         let mut octets = octets.to_vec();
         octets[place] = to(octets[place]);

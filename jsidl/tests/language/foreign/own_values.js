@@ -1,8 +1,8 @@
 // Values that an application sets.
 import assert from "node:assert/strict";
-import * as codec from "./catalogue/codec.js";
-import * as core from "./catalogue/core.js";
-import * as mobility from "./catalogue/mobility.js";
+import * as codec from "./jaus/codec.js";
+import * as core from "./jaus/core.js";
+import * as mobility from "./jaus/mobility.js";
 
 const { ReportGlobalPose } = mobility;
 

@@ -20,7 +20,7 @@ fn write(directory: &Path, module: &str, library: &Library) {
 fn node_directory(test: &str) -> std::path::PathBuf {
     let directory = directory(test);
     fs::write(directory.join("package.json"), "{ \"type\": \"module\" }").unwrap();
-    for name in ["run.js", "own_values.js"] {
+    for name in ["run.js", "own_values.js", "pose.js"] {
         fs::copy(beside(name), directory.join(name)).unwrap();
     }
     directory
@@ -70,7 +70,7 @@ fn random_messages_of_every_type_pass_through_javascript() {
         return;
     }
     let directory = node_directory("random-js");
-    let libraries = [("catalogue", catalogue(), 1), ("constructs", constructs(), 20)];
+    let libraries = [("jaus", catalogue(), 1), ("constructs", constructs(), 8)];
     let mut cases = Vec::new();
     for (module, library, each) in &libraries {
         write(&directory, module, library);
@@ -85,8 +85,13 @@ fn javascript_reads_sets_and_checks_values_in_units() {
         return;
     }
     let directory = node_directory("values-js");
-    for (module, library) in iter::zip(["catalogue", "constructs"], [catalogue(), constructs()]) {
+    for (module, library) in iter::zip(["jaus", "constructs"], [catalogue(), constructs()]) {
         write(&directory, module, &library);
     }
     assert_eq!(run(&mut node(&directory, "own_values.js"), ""), "done\n");
+    // The example of the documentation.
+    let expected = "53.100000 31 undefined\n\
+        true Latitude: 91 is not in -90 to 90 degree\n\
+        true ReportGlobalPose: Longitude: octets needed: 4, left: 2 at octet 8\n";
+    assert_eq!(run(&mut node(&directory, "pose.js"), ""), expected);
 }
