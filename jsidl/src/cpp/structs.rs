@@ -10,11 +10,21 @@ use crate::typed::{Content, Plan, notes};
 pub(super) fn message(out: &mut Lines, plan: &Plan<'_>) {
     let message = plan.message;
     let (_, ident) = plan.definition();
+    types(out, ident, &plan.types);
     comment(out, &notes::message(plan));
     out.open(format!("struct {ident} {{"));
-    out.line(format!("static constexpr std::uint16_t kCode = 0x{:04X};", message.code));
-    out.line(format!("static constexpr const char* kName = {};", quoted(&message.name)));
-    out.line(format!("static constexpr bool kIsCommand = {};", message.is_command));
+    out.line(format!(
+        "static constexpr std::uint16_t kCode = 0x{:04X};",
+        message.code
+    ));
+    out.line(format!(
+        "static constexpr const char* kName = {};",
+        quoted(&message.name)
+    ));
+    out.line(format!(
+        "static constexpr bool kIsCommand = {};",
+        message.is_command
+    ));
     let services = plan.services.iter().map(|id| quoted(&id.to_string()));
     let services: Vec<_> = services.collect();
     out.line(format!(
@@ -22,9 +32,11 @@ pub(super) fn message(out: &mut Lines, plan: &Plan<'_>) {
         services.len(),
         services.join(", ")
     ));
-    for definition in &plan.types {
+    if !plan.types.is_empty() {
         out.line("");
-        define(out, definition);
+    }
+    for Definition { ident: nested, .. } in &plan.types {
+        out.line(format!("using {nested} = {ident}_types::{nested};"));
     }
     let fields = plan.content.fields();
     members(out, fields);
@@ -38,12 +50,32 @@ pub(super) fn message(out: &mut Lines, plan: &Plan<'_>) {
         Content::Sections(fields) => {
             let calls = fields.iter().map(|field| {
                 let name = quoted(field.name);
-                format!("visitor.section({name}, self.{}{})", field.ident, layout(&field.ty))
+                format!(
+                    "visitor.section({name}, self.{}{})",
+                    field.ident,
+                    layout(&field.ty)
+                )
             });
             visit(out, &calls.collect::<Vec<_>>());
         }
     }
     out.close("};");
+}
+
+/// Writes the nested types of a message. They are in a namespace, because in a class they would not
+/// be complete before its end.
+fn types(out: &mut Lines, outer: &str, definitions: &[Definition<'_>]) {
+    if definitions.is_empty() {
+        return;
+    }
+    out.line(format!("namespace {outer}_types {{"));
+    for definition in definitions {
+        out.line("");
+        define(out, definition);
+    }
+    out.line("");
+    out.line(format!("}} // namespace {outer}_types"));
+    out.line("");
 }
 
 /// The data members, and the accessors of scaled ones in their units.
@@ -75,7 +107,9 @@ fn members(out: &mut Lines, fields: &[Field<'_>]) {
         };
         out.line("");
         comment(out, &[notes::accessor(field)]);
-        out.line(format!("{returns} {get}() const {{ return codec::in_units({member}); }}"));
+        out.line(format!(
+            "{returns} {get}() const {{ return codec::in_units({member}); }}"
+        ));
         out.line(format!(
             "codec::Checked {set}(double value) {{ return codec::assign({member}, {ident}::of(value)); }}"
         ));
@@ -94,7 +128,9 @@ fn setter(get: &str, taken: &mut Vec<String>) -> String {
 
 fn group_calls(fields: &[Field<'_>], presence: Option<Unsigned>) -> Vec<String> {
     let optional = fields.iter().filter(|field| field.item.optional);
-    let optional: Vec<_> = optional.map(|field| format!(", self.{}", field.ident)).collect();
+    let optional: Vec<_> = optional
+        .map(|field| format!(", self.{}", field.ident))
+        .collect();
     let presence = presence.map(|width| {
         let width = unsigned(width);
         format!("visitor.presence({width}{{}}{})", optional.concat())
@@ -114,7 +150,9 @@ fn visit(out: &mut Lines, calls: &[String]) {
     };
     let is_used = calls.iter().any(|call| call.contains("self."));
     let parameter = if is_used { " self" } else { "" };
-    out.open(format!("static bool visit(Visitor& visitor, Self&{parameter}) {{"));
+    out.open(format!(
+        "static bool visit(Visitor& visitor, Self&{parameter}) {{"
+    ));
     if others.is_empty() {
         out.line(format!("return {first};"));
     } else {
@@ -157,7 +195,10 @@ fn define(out: &mut Lines, Definition { ident, kind }: &Definition<'_>) {
             });
             let calls: Vec<_> = calls.collect();
             let tag = unsigned(*tag);
-            let call = format!("visitor.variant({tag}{{}}, self.chosen, {})", calls.join(", "));
+            let call = format!(
+                "visitor.variant({tag}{{}}, self.chosen, {})",
+                calls.join(", ")
+            );
             choice(out, ident, &kinds.collect::<Vec<_>>(), &call);
         }
         Kind::Measure { choices, .. } => {
@@ -182,7 +223,9 @@ fn define(out: &mut Lines, Definition { ident, kind }: &Definition<'_>) {
                 Rounding::Ceiling => "up",
             };
             let number = self::number(*number);
-            out.open(format!("struct {ident} : codec::Scaled<{ident}, {number}> {{"));
+            out.open(format!(
+                "struct {ident} : codec::Scaled<{ident}, {number}> {{"
+            ));
             out.line(format!(
                 "static constexpr codec::Range kRange{{{}, {:?}, {:?}, {}, codec::Rounding::{rounding}}};",
                 quoted(name),
@@ -262,7 +305,11 @@ fn type_of(ty: &Type) -> String {
             element,
         } => {
             let sizes = dimensions.iter().map(|size| format!(", {size}"));
-            format!("codec::Array<{}{}>", type_of(element), sizes.collect::<String>())
+            format!(
+                "codec::Array<{}{}>",
+                type_of(element),
+                sizes.collect::<String>()
+            )
         }
     }
 }
@@ -323,7 +370,11 @@ const fn suffix(number: Number) -> &'static str {
 fn comment(out: &mut Lines, paragraphs: &[String]) {
     for line in notes::wrapped(paragraphs, out.width().saturating_sub(4)) {
         // A backslash at the end of a line would continue the comment.
-        let end = if line.ends_with(['\\', '/']) { " ." } else { "" };
+        let end = if line.ends_with(['\\', '/']) {
+            " ."
+        } else {
+            ""
+        };
         out.line(format!("/// {line}{end}").trim_end());
     }
 }

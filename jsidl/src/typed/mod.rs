@@ -74,10 +74,11 @@ impl Plan<'_> {
     /// The version that defines the type, and the type's name.
     pub(crate) fn definition(&self) -> (Version, &str) {
         // A layout has at least one declaring service.
-        self.places.first().map_or(
-            (Version { major: 0, minor: 0 }, ""),
-            |(version, ident)| (*version, ident),
-        )
+        self.places
+            .first()
+            .map_or((Version { major: 0, minor: 0 }, ""), |(version, ident)| {
+                (*version, ident)
+            })
     }
 }
 

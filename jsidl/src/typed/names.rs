@@ -166,7 +166,13 @@ mod tests {
             "",
         ];
         let sets = urns.map(|urn| names.set(urn));
-        let expected = ["core", "environment_sensing", "example_lamps", "class_", "messages"];
+        let expected = [
+            "core",
+            "environment_sensing",
+            "example_lamps",
+            "class_",
+            "messages",
+        ];
         assert_eq!(sets, expected);
     }
 }

@@ -1,7 +1,7 @@
 //! Documentation of types and members, as plain text.
 
-use super::types::{Field, Kind};
 use super::Plan;
+use super::types::{Field, Kind};
 use crate::model::{
     Count, Item, Meaning, NamedValue, Scalar, Shape, SubField, Unsigned, ValueRange, ValueSet,
 };
@@ -9,7 +9,11 @@ use crate::model::{
 /// The paragraphs about a message.
 pub(crate) fn message(plan: &Plan<'_>) -> Vec<String> {
     let message = plan.message;
-    let kind = if message.is_command { ", a command" } else { "" };
+    let kind = if message.is_command {
+        ", a command"
+    } else {
+        ""
+    };
     let services: Vec<_> = plan.services.iter().map(ToString::to_string).collect();
     let mut notes = vec![format!("{} ({:04X}h){kind}.", message.name, message.code)];
     notes.extend(text(&message.description));
@@ -21,12 +25,23 @@ pub(crate) fn message(plan: &Plan<'_>) -> Vec<String> {
 pub(crate) fn definition(kind: &Kind<'_>) -> Vec<String> {
     let (first, item): (String, Option<&Item>) = match kind {
         Kind::Group { item, .. } => (format!("{}.", item.name), Some(item)),
-        Kind::Variant { item, .. } => (format!("{}: one of its alternatives.", item.name), Some(item)),
-        Kind::Measure { item, .. } => (
-            format!("{}: a number whose type and unit are chosen by an index.", item.name),
+        Kind::Variant { item, .. } => (
+            format!("{}: one of its alternatives.", item.name),
             Some(item),
         ),
-        Kind::Scaled { name, number, scale, units } => (
+        Kind::Measure { item, .. } => (
+            format!(
+                "{}: a number whose type and unit are chosen by an index.",
+                item.name
+            ),
+            Some(item),
+        ),
+        Kind::Scaled {
+            name,
+            number,
+            scale,
+            units,
+        } => (
             format!(
                 "{name}{}: {} to {}, carried in {} octets.",
                 in_units(units),
@@ -39,7 +54,8 @@ pub(crate) fn definition(kind: &Kind<'_>) -> Vec<String> {
         Kind::Named { name, set, .. } => {
             let ranges = set.and_then(ranges);
             let ranges = ranges.map_or_else(String::new, |it| format!(" Without a name: {it}."));
-            let first = format!("{name}: a number with named values. Others are preserved.{ranges}");
+            let first =
+                format!("{name}: a number with named values. Others are preserved.{ranges}");
             (first, None)
         }
         Kind::Bits { item, bits, .. } => (

@@ -51,7 +51,10 @@ fn message(out: &mut Lines, plan: &Plan<'_>) {
 /// A class with members. Nested types are in the namespace `outer`.
 fn class(out: &mut Lines, ident: &str, base: &str, fields: &[Field<'_>], outer: &str) {
     out.open(format!("class {ident} extends codec.{base} {{"));
-    out.line(format!("constructor(init?: codec.Init<{}>);", qualified(ident, outer)));
+    out.line(format!(
+        "constructor(init?: codec.Init<{}>);",
+        qualified(ident, outer)
+    ));
     for (field, notes) in fields.iter().zip(notes::members(fields)) {
         let (mark, alternative) = if field.item.optional {
             ("?", " | undefined")
@@ -93,14 +96,20 @@ fn define(out: &mut Lines, Definition { ident, kind }: &Definition<'_>, outer: &
             union(out, ident, kinds, outer);
         }
         Kind::Scaled { .. } => {
-            out.line(format!("class {ident} extends codec.Scaled {{ private constructor(); }}"));
+            out.line(format!(
+                "class {ident} extends codec.Scaled {{ private constructor(); }}"
+            ));
         }
         Kind::Named { number, values, .. } => {
             out.line(format!("type {ident} = {};", number_type(*number)));
             out.open(format!("const {ident}: {{"));
             for (ident, value) in values {
                 comment(out, &notes::value(value));
-                let suffix = if number_type(*number) == "bigint" { "n" } else { "" };
+                let suffix = if number_type(*number) == "bigint" {
+                    "n"
+                } else {
+                    ""
+                };
                 out.line(format!("readonly {ident}: {}{suffix};", value.index));
             }
             out.close("};");
@@ -108,7 +117,10 @@ fn define(out: &mut Lines, Definition { ident, kind }: &Definition<'_>, outer: &
         Kind::Bits { bits, parts, .. } => {
             let raw = number_type(Number::Unsigned(bits.base));
             out.open(format!("class {ident} extends codec.Bits<{raw}> {{"));
-            out.line(format!("constructor(init?: codec.Init<{}>);", qualified(ident, outer)));
+            out.line(format!(
+                "constructor(init?: codec.Init<{}>);",
+                qualified(ident, outer)
+            ));
             for part in parts {
                 comment(out, &notes::part(part.field, part.limits));
                 let ty = match &part.values {
@@ -129,7 +141,11 @@ fn union<'t>(
     outer: &str,
 ) {
     let kinds = kinds.map(|(kind, ty)| {
-        format!("{{ kind: {}; value: {} }}", quoted(kind), type_of(ty, outer))
+        format!(
+            "{{ kind: {}; value: {} }}",
+            quoted(kind),
+            type_of(ty, outer)
+        )
     });
     let kinds: Vec<_> = kinds.collect();
     out.open(format!("type {ident} ="));
@@ -153,7 +169,11 @@ fn type_of(ty: &Type, outer: &str) -> String {
         Type::Array {
             dimensions,
             element,
-        } => format!("{}{}", type_of(element, outer), "[]".repeat(dimensions.len())),
+        } => format!(
+            "{}{}",
+            type_of(element, outer),
+            "[]".repeat(dimensions.len())
+        ),
     }
 }
 

@@ -30,7 +30,11 @@ pub(super) fn message(out: &mut Lines, plan: &Plan<'_>) {
     });
     match &plan.content {
         Content::Members(fields, presence) => {
-            block(out, &format!("codec.body({}, [", unsigned_or_null(*presence)), fields);
+            block(
+                out,
+                &format!("codec.body({}, [", unsigned_or_null(*presence)),
+                fields,
+            );
         }
         Content::Whole(field) => out.line(format!("codec.whole({}),", member(field))),
         Content::Sections(fields) => block(out, "codec.sections([", fields),
@@ -56,7 +60,10 @@ fn define(out: &mut Lines, Definition { ident, kind }: &Definition<'_>) {
             presence, fields, ..
         } => {
             let presence = unsigned_or_null(*presence);
-            out.open(format!("const {ident} = codec.record({}, {presence}, [", quoted(ident)));
+            out.open(format!(
+                "const {ident} = codec.record({}, {presence}, [",
+                quoted(ident)
+            ));
             for field in fields {
                 out.line(format!("{},", member(field)));
             }
@@ -65,10 +72,16 @@ fn define(out: &mut Lines, Definition { ident, kind }: &Definition<'_>) {
         Kind::Variant {
             tag, alternatives, ..
         } => {
-            out.open(format!("const {ident} = codec.variant({}, [", unsigned(*tag)));
+            out.open(format!(
+                "const {ident} = codec.variant({}, [",
+                unsigned(*tag)
+            ));
             for field in alternatives {
                 let (kind, name) = (quoted(&field.ident), quoted(field.name));
-                out.line(format!("codec.alternative({kind}, {name}, {}),", layout(&field.ty)));
+                out.line(format!(
+                    "codec.alternative({kind}, {name}, {}),",
+                    layout(&field.ty)
+                ));
             }
             out.close("]);");
         }
@@ -108,7 +121,10 @@ fn define(out: &mut Lines, Definition { ident, kind }: &Definition<'_>) {
         }
         Kind::Bits { bits, parts, .. } => {
             let base = unsigned(bits.base);
-            out.open(format!("const {ident} = codec.bits({}, {base}, [", quoted(ident)));
+            out.open(format!(
+                "const {ident} = codec.bits({}, {base}, [",
+                quoted(ident)
+            ));
             for part in parts {
                 out.line(sub_field(part));
             }
@@ -121,17 +137,28 @@ fn sub_field(part: &Part<'_>) -> String {
     let (key, name) = (quoted(&part.ident), quoted(&part.field.name));
     let (from, to) = (part.field.from, part.field.to);
     let (lower, upper) = part.limits;
-    format!("codec.part({key}, {name}, {from}, {to}, {}, {}),", integer(lower), integer(upper))
+    format!(
+        "codec.part({key}, {name}, {from}, {to}, {}, {}),",
+        integer(lower),
+        integer(upper)
+    )
 }
 
 fn member(field: &Field<'_>) -> String {
-    let call = if field.item.optional { "optional" } else { "required" };
+    let call = if field.item.optional {
+        "optional"
+    } else {
+        "required"
+    };
     let (key, name) = (quoted(&field.ident), quoted(field.name));
     let accessor = match &field.in_units {
         Some(accessor) => format!(", {}", quoted(accessor)),
         None => String::new(),
     };
-    format!("codec.{call}({key}, {name}, {}{accessor})", layout(&field.ty))
+    format!(
+        "codec.{call}({key}, {name}, {}{accessor})",
+        layout(&field.ty)
+    )
 }
 
 /// An expression for the layout of a type.

@@ -37,8 +37,14 @@ static SPELLING: Spelling = Spelling {
 /// ```
 pub fn files(library: &Library, wanted: impl Fn(&Service) -> bool) -> Vec<(String, String)> {
     let mut files = vec![
-        ("codec.js".to_owned(), include_str!("runtime/codec.js").to_owned()),
-        ("codec.d.ts".to_owned(), include_str!("runtime/codec.d.ts").to_owned()),
+        (
+            "codec.js".to_owned(),
+            include_str!("runtime/codec.js").to_owned(),
+        ),
+        (
+            "codec.d.ts".to_owned(),
+            include_str!("runtime/codec.d.ts").to_owned(),
+        ),
     ];
     for set in typed::sets(library, wanted, &SPELLING) {
         files.push((format!("{}.js", set.name), module(&set)));
@@ -48,7 +54,10 @@ pub fn files(library: &Library, wanted: impl Fn(&Service) -> bool) -> Vec<(Strin
 }
 
 fn introduction(set: &Set<'_>) -> String {
-    format!("// The messages of {}, written by `jaus jsidl typescript`.", set.urn)
+    format!(
+        "// The messages of {}, written by `jaus jsidl typescript`.",
+        set.urn
+    )
 }
 
 fn module(set: &Set<'_>) -> String {

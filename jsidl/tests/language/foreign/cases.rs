@@ -12,14 +12,14 @@ pub(super) struct Case {
     message: String,
     code: u16,
     octets: Vec<u8>,
-    /// The JSON view, or the text of the error.
-    expected: Result<Json, String>,
+    /// The JSON view, if it is to be compared, or the text of the error.
+    expected: Result<Option<Json>, String>,
 }
 
 impl Case {
-    fn new(module: &str, id: &Id, message: &Message, octets: Vec<u8>) -> Self {
+    fn new(module: &str, id: &Id, message: &Message, octets: Vec<u8>, is_viewed: bool) -> Self {
         let expected = match decode(message, &octets) {
-            Ok(value) => Ok(plain(to_json(message, &value).unwrap())),
+            Ok(value) => Ok(is_viewed.then(|| plain(to_json(message, &value).unwrap()))),
             Err(error) => Err(error.to_string()),
         };
         Self {
@@ -56,8 +56,9 @@ impl Case {
             Ok(_) if answer["hex"] != hex(&self.octets).as_str() => {
                 wrong(format!("other octets: {answer}"))
             }
-            Ok(view) if agree(view, &answer["view"]) => Ok(()),
-            Ok(view) => wrong(format!("{} instead of {view}", answer["view"])),
+            Ok(None) => Ok(()),
+            Ok(Some(view)) if agree(view, &answer["view"]) => Ok(()),
+            Ok(Some(view)) => wrong(format!("{} instead of {view}", answer["view"])),
         }
     }
 }
@@ -101,22 +102,23 @@ fn agree(ours: &Json, theirs: &Json) -> bool {
     }
 }
 
-/// A valid message, and octets that are made from it: each beginning, one octet more, and single
-/// octets changed.
+/// A valid message with its view, and octets that are made from it: beginnings, one octet more, and
+/// single octets changed.
 pub(super) fn around(module: &str, id: &Id, message: &Message, octets: &[u8]) -> Vec<Case> {
-    let places = || (0..octets.len()).step_by(octets.len().div_ceil(10).max(1));
+    let places = || (0..octets.len()).step_by(octets.len().div_ceil(8).max(1));
     let changed = |place: usize, to: fn(u8) -> u8| {
         let mut octets = octets.to_vec();
         octets[place] = to(octets[place]);
         octets
     };
-    let longer = [octets, &[0]].concat();
-    let mut all = vec![octets.to_vec(), longer];
-    all.extend(places().map(|place| octets[..place].to_vec()));
-    all.extend(places().map(|place| changed(place, |_| 0xFF)));
-    all.extend(places().map(|place| changed(place, |octet| octet ^ 0x81)));
-    let case = |octets| Case::new(module, id, message, octets);
-    all.into_iter().map(case).collect()
+    let case = |octets, is_viewed| Case::new(module, id, message, octets, is_viewed);
+    let mut others = vec![[octets, &[0]].concat()];
+    others.extend(places().map(|place| octets[..place].to_vec()));
+    others.extend(places().map(|place| changed(place, |_| 0xFF)));
+    others.extend(places().map(|place| changed(place, |octet| octet ^ 0x81)));
+    let mut cases = vec![case(octets.to_vec(), true)];
+    cases.extend(others.into_iter().map(|octets| case(octets, false)));
+    cases
 }
 
 /// Pseudorandom valid messages of every type of a library.

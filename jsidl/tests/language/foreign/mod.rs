@@ -65,7 +65,14 @@ fn check(program: &mut Command, cases: &[Case]) {
     let wrong = compared.filter_map(|(case, answer)| case.check(answer).err());
     let wrong: Vec<_> = wrong.collect();
     let shown = wrong.iter().take(10);
-    let shown: Vec<_> = shown.map(|it| it.chars().take(800).collect::<String>()).collect();
-    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), shown.join("\n"));
+    let shown: Vec<_> = shown
+        .map(|it| it.chars().take(800).collect::<String>())
+        .collect();
+    assert!(
+        wrong.is_empty(),
+        "{} wrong:\n{}",
+        wrong.len(),
+        shown.join("\n")
+    );
     println!("{} cases", cases.len());
 }

@@ -13,7 +13,10 @@ use super::{beside, check, directory, run, write_all};
 use crate::support::{catalogue, golden};
 
 fn write(directory: &Path, module: &str, library: &Library) {
-    write_all(&directory.join(module), &typescript::files(library, |_| true));
+    write_all(
+        &directory.join(module),
+        &typescript::files(library, |_| true),
+    );
 }
 
 /// A directory whose modules Node.js reads as ECMAScript.

@@ -33,6 +33,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let generate = |library: &_, wanted: &dyn Fn(&_) -> bool| jsidl::typescript::files(library, wanted);
+    let generate =
+        |library: &_, wanted: &dyn Fn(&_) -> bool| jsidl::typescript::files(library, wanted);
     sources::generate(&arguments.paths, &arguments.output, generate)
 }
