@@ -145,6 +145,16 @@ static SPELLING: Spelling = Spelling {
     ],
 };
 
+/// The codec, by path.
+const RUNTIME: [(&str, &str); 3] = [
+    ("jaus/codec.hpp", include_str!("runtime/codec.hpp")),
+    (
+        "jaus/codec/values.hpp",
+        include_str!("runtime/codec/values.hpp"),
+    ),
+    ("jaus/json.hpp", include_str!("runtime/json.hpp")),
+];
+
 /// The headers for the services that `wanted` selects, by path: `jaus/codec.hpp`, `jaus/json.hpp`
 /// and a header for each set such as `jaus/core.hpp`.
 ///
@@ -156,16 +166,10 @@ static SPELLING: Spelling = Spelling {
 /// assert!(header.contains("struct ReportIdentification {"));
 /// ```
 pub fn files(library: &Library, wanted: impl Fn(&Service) -> bool) -> Vec<(String, String)> {
-    let mut files = vec![
-        (
-            "jaus/codec.hpp".to_owned(),
-            include_str!("runtime/codec.hpp").to_owned(),
-        ),
-        (
-            "jaus/json.hpp".to_owned(),
-            include_str!("runtime/json.hpp").to_owned(),
-        ),
-    ];
+    let runtime = RUNTIME.iter();
+    let mut files: Vec<_> = runtime
+        .map(|(name, text)| ((*name).to_owned(), (*text).to_owned()))
+        .collect();
     for set in typed::sets(library, wanted, &SPELLING) {
         files.push((format!("jaus/{}.hpp", set.name), header(&set)));
     }

@@ -25,6 +25,14 @@ static SPELLING: Spelling = Spelling {
     reserved: &["codec", "constructor", "encode", "toString", "valueOf"],
 };
 
+/// The codec, by file name.
+const RUNTIME: [(&str, &str); 4] = [
+    ("codec.js", include_str!("runtime/codec.js")),
+    ("codec.d.ts", include_str!("runtime/codec.d.ts")),
+    ("codec/numbers.js", include_str!("runtime/codec/numbers.js")),
+    ("codec/scaled.js", include_str!("runtime/codec/scaled.js")),
+];
+
 /// The files for the services that `wanted` selects, by name: `codec.js`, a module for each set such
 /// as `core.js`, and a declaration file beside each.
 ///
@@ -36,16 +44,10 @@ static SPELLING: Spelling = Spelling {
 /// assert!(declarations.contains("class ReportIdentification extends codec.Message"));
 /// ```
 pub fn files(library: &Library, wanted: impl Fn(&Service) -> bool) -> Vec<(String, String)> {
-    let mut files = vec![
-        (
-            "codec.js".to_owned(),
-            include_str!("runtime/codec.js").to_owned(),
-        ),
-        (
-            "codec.d.ts".to_owned(),
-            include_str!("runtime/codec.d.ts").to_owned(),
-        ),
-    ];
+    let runtime = RUNTIME.iter();
+    let mut files: Vec<_> = runtime
+        .map(|(name, text)| ((*name).to_owned(), (*text).to_owned()))
+        .collect();
     for set in typed::sets(library, wanted, &SPELLING) {
         files.push((format!("{}.js", set.name), module(&set)));
         files.push((format!("{}.d.ts", set.name), declarations::module(&set)));

@@ -47,7 +47,7 @@ fn write(directory: &Path, library: &Library, wanted: impl Fn(&Service) -> bool)
     write_all(directory, &files);
     let sets = files.iter().filter_map(|(path, _)| {
         let set = path.strip_prefix("jaus/")?.strip_suffix(".hpp")?;
-        (!["codec", "json"].contains(&set)).then_some(set)
+        (!["codec", "codec/values", "json"].contains(&set)).then_some(set)
     });
     let sets: Vec<_> = sets.collect();
     let includes = sets
