@@ -108,10 +108,10 @@ fn members(out: &mut Lines, fields: &[Field<'_>]) {
         out.line("");
         comment(out, &[notes::accessor(field)]);
         out.line(format!(
-            "{returns} {get}() const {{ return codec::in_units({member}); }}"
+            "{returns} {get}() const {{ return codec::in_units(this->{member}); }}"
         ));
         out.line(format!(
-            "codec::Checked {set}(double value) {{ return codec::assign({member}, {ident}::of(value)); }}"
+            "codec::Checked {set}(double value) {{ return codec::assign(this->{member}, {ident}::of(value)); }}"
         ));
     }
 }

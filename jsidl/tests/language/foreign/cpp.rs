@@ -149,6 +149,14 @@ fn cpp_reads_sets_and_checks_values_in_units() {
 }
 
 #[test]
+fn a_member_with_the_name_of_the_parameter_is_what_a_setter_sets() {
+    let files = cpp::files(&catalogue(), |service| service.id.urn.contains(":iop:"));
+    let (_, header) = files.last().unwrap();
+    let setter = "{ return codec::assign(this->value, Value::of(value)); }";
+    assert!(header.contains(setter));
+}
+
+#[test]
 #[ignore = "it compiles all definitions, which takes minutes: `.ci/foreign` runs it"]
 fn all_golden_messages_and_every_built_in_type_pass_through_cpp() {
     if !has_compilers() {
