@@ -151,7 +151,7 @@ mod tests {
         let idents = members.map(|name| names.member(name));
         assert_eq!(
             idents,
-            ["class_", "class_2", "x", "x_2", "n3_d", "n", "n_2", "x_2_2"]
+            ["class_", "class_2", "x", "x_2", "n3d", "n", "n_2", "x_2_2"]
         );
     }
 
