@@ -22,6 +22,7 @@ pub mod behaviour;
 pub mod build;
 pub mod catalogue;
 mod check;
+pub mod cpp;
 mod diagnostic;
 pub mod diff;
 pub mod docs;
@@ -45,6 +46,8 @@ pub mod rust;
 pub mod schema;
 mod source;
 mod syntax;
+mod typed;
+pub mod typescript;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Note, Severity};
 #[cfg(feature = "excerpts")]

@@ -19,9 +19,19 @@ pub fn workspace(path: &str) -> PathBuf {
 /// If it is missing and `JAUS_EVIDENCE=required` is set.
 #[must_use]
 pub fn has_tshark() -> bool {
-    let there = Command::new("tshark").arg("--version").output().is_ok();
+    has_program("tshark")
+}
+
+/// Whether a program that answers `--version` is installed. Without it the test proves nothing and
+/// must return.
+///
+/// # Panics
+/// If it is missing and `JAUS_EVIDENCE=required` is set.
+#[must_use]
+pub fn has_program(program: &str) -> bool {
+    let there = Command::new(program).arg("--version").output().is_ok();
     if !there {
-        not_tested(&this_test(), "there is no tshark; install it");
+        not_tested(&this_test(), &format!("there is no {program}; install it"));
     }
     there
 }

@@ -16,6 +16,7 @@ mod dynamic;
 mod emitted;
 mod excerpts;
 mod explain;
+mod foreign;
 mod format;
 mod golden;
 mod loading;

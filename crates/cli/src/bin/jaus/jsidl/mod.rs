@@ -1,6 +1,7 @@
 //! `jaus jsidl`: works on service definitions, one file per subcommand.
 
 mod check;
+mod cpp;
 mod datagram;
 mod definitions;
 mod diff;
@@ -12,6 +13,7 @@ mod ra;
 mod rust;
 mod schema;
 mod sources;
+mod typescript;
 
 use std::process::ExitCode;
 
@@ -33,6 +35,9 @@ enum Command {
     Fmt(fmt::Arguments),
     Diff(diff::Arguments),
     Rust(rust::Arguments),
+    Cpp(cpp::Arguments),
+    #[command(name = "typescript")]
+    TypeScript(typescript::Arguments),
     Lua(lua::Arguments),
     Docs(docs::Arguments),
     Schema(schema::Arguments),
@@ -46,6 +51,8 @@ impl Jsidl {
             Command::Fmt(arguments) => fmt::run(&arguments),
             Command::Diff(arguments) => diff::run(&arguments),
             Command::Rust(arguments) => rust::run(&arguments),
+            Command::Cpp(arguments) => cpp::run(&arguments),
+            Command::TypeScript(arguments) => typescript::run(&arguments),
             Command::Lua(arguments) => lua::run(&arguments),
             Command::Docs(arguments) => docs::run(&arguments),
             Command::Schema(arguments) => schema::run(&arguments),

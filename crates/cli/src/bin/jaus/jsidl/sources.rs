@@ -2,9 +2,10 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use jaus_cli::failure::Failure;
-use jaus_cli::output::counted;
+use jaus_cli::output::{Output, counted, say};
 use jsidl::model::Service;
 use jsidl::{Library, Loaded, Severity, catalogue};
 
@@ -48,6 +49,27 @@ pub(super) fn write(path: &Path, text: &str) -> Result<(), Failure> {
         fs::create_dir_all(parent).map_err(|error| Failure::file(parent, &error))?;
     }
     fs::write(path, text).map_err(|error| Failure::file(path, &error))
+}
+
+/// Writes code in another language for the selected services, unless a definition has errors.
+pub(super) fn generate(
+    paths: &[PathBuf],
+    output: &Path,
+    files: impl Fn(&Library, &dyn Fn(&Service) -> bool) -> Vec<(String, String)>,
+) -> Result<ExitCode, Failure> {
+    let Sources { loaded, sound } = load(paths)?;
+    if !sound {
+        say("nothing was written: correct the definitions first (`jaus jsidl check` says more)");
+        return Ok(ExitCode::from(1));
+    }
+    let wanted = wanted(&loaded.library, paths)?;
+    let files = files(&loaded.library, &wanted);
+    for (name, text) in &files {
+        write(&output.join(name), text)?;
+    }
+    let count = counted(files.len(), "file");
+    Output::new().line(format_args!("{}: {count}", output.display()))?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// For example `3 services with 14 messages`.
