@@ -310,8 +310,8 @@ typedef struct JausNode {
 } JausNode;
 
 /**
- * An event. It is valid during the callback, or until the next call of
- * `jaus_component_next_event`. Fields that the kind does not name are 0. New versions of the library
+ * An event. It is valid during the callback, or until the next call of `jaus_component_next_event` or
+ * the end of the component. Fields that the kind does not name are 0. New versions of the library
  * may add fields at the end.
  */
 typedef struct JausEvent {
@@ -647,6 +647,12 @@ enum JausStatus jaus_control_deliver(struct JausControl control,
  * Releases control and frees it. Waits for the peer's confirmation, but not in a callback.
  */
 enum JausStatus jaus_control_free(struct JausControl control);
+
+/**
+ * Writes the library's log to standard error from now on: 1 errors, 2 also warnings, 3 also the course of
+ * events, 4 also details. Once in a process. Without this call there is no log.
+ */
+enum JausStatus jaus_log_to_stderr(uint8_t level);
 
 /**
  * Creates a node with default settings: all interfaces, UDP port 3794. `subsystem` is 1 to 65534,

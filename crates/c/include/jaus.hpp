@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -42,6 +43,10 @@ inline void check(JausStatus status) {
         throw Error(status, jaus_last_error());
     }
 }
+
+/// Writes the library's log to standard error: 1 errors, 2 also warnings, 3 also the course of events, 4
+/// also details.
+inline void log_to_stderr(std::uint8_t level) { check(jaus_log_to_stderr(level)); }
 
 /// The address of a component, such as 101.1.33.
 struct Address : JausAddress {
@@ -105,7 +110,8 @@ inline void call_event(void *user, const JausEvent *event) noexcept {
 inline void call_answer(void *user, const JausEvent *query, JausAnswer *answer) noexcept {
     const std::optional<Octets> report = (*static_cast<AnswerHandler *>(user))(Event(*query));
     if (report) {
-        check(jaus_answer_set(answer, report->data(), report->size()));
+        // A report without a code is none: the query stays without an answer.
+        static_cast<void>(jaus_answer_set(answer, report->data(), report->size()));
     }
 }
 
@@ -124,15 +130,19 @@ private:
     std::vector<std::shared_ptr<void>> handlers_;
 };
 
-/// A handle that is freed once.
-template <typename Handle, JausStatus (*Free)(Handle)> class Owned {
+/// A handle that is freed once, and the functions that the library may call until then.
+template <typename Handle, JausStatus (*Free)(Handle), typename Handlers = std::nullptr_t>
+class Owned {
 public:
     Owned() noexcept = default;
-    explicit Owned(Handle handle) noexcept : handle_(handle) {}
-    Owned(Owned &&other) noexcept : handle_(std::exchange(other.handle_, Handle{})) {}
+    explicit Owned(Handle handle, Handlers handlers = Handlers()) noexcept
+        : handlers_(std::move(handlers)), handle_(handle) {}
+    Owned(Owned &&other) noexcept
+        : handlers_(std::move(other.handlers_)), handle_(std::exchange(other.handle_, Handle{})) {}
     Owned &operator=(Owned &&other) noexcept {
         if (this != &other) {
             reset();
+            handlers_ = std::move(other.handlers_);
             handle_ = std::exchange(other.handle_, Handle{});
         }
         return *this;
@@ -142,6 +152,7 @@ public:
     ~Owned() { reset(); }
 
     Handle get() const noexcept { return handle_; }
+    const Handlers &handlers() const noexcept { return handlers_; }
 
     void reset() noexcept {
         const Handle handle = std::exchange(handle_, Handle{});
@@ -152,8 +163,20 @@ public:
     }
 
 private:
+    Handlers handlers_{};
     Handle handle_{};
 };
+
+using Handler = std::unique_ptr<EventHandler>;
+
+/// The callback for a handler, if there is one.
+inline JausEventCallback callback_of(const Handler &handler) {
+    return handler ? call_event : nullptr;
+}
+
+inline Handler keep(EventHandler handler) {
+    return handler ? std::make_unique<EventHandler>(std::move(handler)) : nullptr;
+}
 
 inline std::uint32_t milliseconds(Milliseconds time) {
     return static_cast<std::uint32_t>(time.count());
@@ -268,9 +291,9 @@ public:
 
 private:
     friend class Component;
+    using Owned = detail::Owned<JausSubscription, jaus_subscription_free, detail::Handler>;
 
-    std::unique_ptr<EventHandler> handler_;
-    detail::Owned<JausSubscription, jaus_subscription_free> subscription_;
+    Owned subscription_;
 };
 
 /// Control of a peer, which is released when it is destroyed.
@@ -295,19 +318,19 @@ public:
 
 private:
     friend class Component;
+    using Owned = detail::Owned<JausControl, jaus_control_free, detail::Handler>;
 
-    std::unique_ptr<EventHandler> handler_;
-    detail::Owned<JausControl, jaus_control_free> control_;
+    Owned control_;
 };
 
 /// A component. Describe it, then start() it; it ends when it is destroyed.
 class Component {
 public:
-    Component(Node &node, std::uint8_t number, std::uint16_t kind, const std::string &name)
-        : kept_(std::make_shared<detail::Kept>()) {
+    Component(Node &node, std::uint8_t number, std::uint16_t kind, const std::string &name) {
+        auto kept = std::make_shared<detail::Kept>();
         JausComponent component{};
         check(jaus_component_create(node.get(), number, kind, name.c_str(), &component));
-        component_ = Owned(component);
+        component_ = Owned(component, std::move(kept));
     }
 
     Component &access_control(std::uint8_t authority = 1, std::uint8_t timeout_s = 4) {
@@ -320,15 +343,15 @@ public:
     Service offer(const std::string &urn, std::uint8_t major, std::uint8_t minor) {
         JausService service{};
         check(jaus_component_offer(get(), urn.c_str(), major, minor, &service));
-        return Service(service, kept_);
+        return Service(service, component_.handlers());
     }
     Component &on_standing(EventHandler handler) {
-        auto *kept = kept_->keep(std::move(handler));
-        return then(jaus_component_on_standing(get(), detail::call_event, kept));
+        auto *handled = kept().keep(std::move(handler));
+        return then(jaus_component_on_standing(get(), detail::call_event, handled));
     }
     Component &on_discovery(EventHandler handler) {
-        auto *kept = kept_->keep(std::move(handler));
-        return then(jaus_component_on_discovery(get(), detail::call_event, kept));
+        auto *handled = kept().keep(std::move(handler));
+        return then(jaus_component_on_discovery(get(), detail::call_event, handled));
     }
     Component &start() { return then(jaus_component_start(get())); }
 
@@ -405,48 +428,40 @@ public:
     Subscription subscribe(Address peer, const Octets &query, double rate,
                            EventHandler handler = nullptr, double least = 0,
                            std::uint16_t report = 0) {
-        Subscription subscription;
-        const auto callback = take(subscription.handler_, std::move(handler));
+        auto kept = detail::keep(std::move(handler));
         JausSubscription created{};
         check(jaus_component_subscribe(get(), peer, query.data(), query.size(), report, rate, least,
-                                       callback, subscription.handler_.get(), &created));
-        subscription.subscription_ =
-            detail::Owned<JausSubscription, jaus_subscription_free>(created);
+                                       detail::callback_of(kept), kept.get(), &created));
+        Subscription subscription;
+        subscription.subscription_ = Subscription::Owned(created, std::move(kept));
         return subscription;
     }
 
     /// Requests control of a peer, and waits until it is granted. Without a handler, its events are
     /// those of the component.
     Control control(Address peer, std::uint8_t authority, EventHandler handler = nullptr) {
-        Control control;
-        const auto callback = take(control.handler_, std::move(handler));
+        auto kept = detail::keep(std::move(handler));
         JausControl created{};
-        check(jaus_component_control(get(), peer, authority, callback, control.handler_.get(),
+        check(jaus_component_control(get(), peer, authority, detail::callback_of(kept), kept.get(),
                                      &created));
-        control.control_ = detail::Owned<JausControl, jaus_control_free>(created);
+        Control control;
+        control.control_ = Control::Owned(created, std::move(kept));
         return control;
     }
 
     JausComponent get() const noexcept { return component_.get(); }
 
 private:
-    using Owned = detail::Owned<JausComponent, jaus_component_free>;
+    using Owned =
+        detail::Owned<JausComponent, jaus_component_free, std::shared_ptr<detail::Kept>>;
 
     Component &then(JausStatus status) {
         check(status);
         return *this;
     }
 
-    static JausEventCallback take(std::unique_ptr<EventHandler> &place, EventHandler handler) {
-        if (!handler) {
-            return nullptr;
-        }
-        place = std::make_unique<EventHandler>(std::move(handler));
-        return detail::call_event;
-    }
+    detail::Kept &kept() { return *component_.handlers(); }
 
-    /// Destroyed after the component.
-    std::shared_ptr<detail::Kept> kept_;
     Owned component_;
 };
 

@@ -120,6 +120,7 @@ impl ComponentEntry {
 
     fn start(&self) -> Result<(), Failure> {
         check_may_wait()?;
+        let node = self.node.running()?;
         let mut stage = self.stage();
         let draft = match std::mem::replace(&mut *stage, Stage::Ended) {
             Stage::Draft(draft) => draft,
@@ -129,7 +130,6 @@ impl ComponentEntry {
                 return Err(Failure::new(JausStatus::WrongState, text));
             }
         };
-        let node = self.node.running()?;
         let running = self.node.runtime.wait(draft.start(node, &self.queue))?;
         *stage = Stage::Runs(running?);
         Ok(())
@@ -399,7 +399,8 @@ const fn access(authority: u8, timeout: u8) -> AccessControl {
     AccessControl::new().authority(authority).timeout(timeout)
 }
 
-/// Starts a component. When this fails, the component can only be freed. Not in a callback.
+/// Starts a component of a node that runs. When this fails, the component can only be freed. Not in a
+/// callback.
 #[unsafe(no_mangle)]
 pub extern "C" fn jaus_component_start(component: JausComponent) -> JausStatus {
     run(|| COMPONENTS.get(component.id)?.start())

@@ -31,6 +31,7 @@ mod client;
 mod component;
 mod control;
 mod event;
+mod log;
 mod node;
 mod notices;
 mod publications;
@@ -56,6 +57,7 @@ pub use control::{
     jaus_component_control, jaus_control_check, jaus_control_deliver, jaus_control_free,
     jaus_control_resume, jaus_control_send, jaus_control_standby, jaus_control_watch_program,
 };
+pub use log::jaus_log_to_stderr;
 pub use node::{
     jaus_node_add_peer, jaus_node_create, jaus_node_free, jaus_node_of_host, jaus_node_serve_host,
     jaus_node_start, jaus_node_use_group, jaus_node_use_interface, jaus_node_use_loopback,

@@ -129,7 +129,8 @@ pub unsafe extern "C" fn jaus_component_standing(
 }
 
 /// The next event of a component, or null after `timeout` milliseconds without one; a negative timeout
-/// waits for ever. The event is valid until the next call, so one thread at a time may call this. Fails
+/// waits for ever. The event is valid until the next call, or until the component is freed, so one thread
+/// at a time may call this. Fails
 /// with `JausStatus_Stopped` when the component has ended and all events are fetched. Only with a
 /// timeout of 0 in a callback.
 ///

@@ -32,13 +32,14 @@ impl Runtime {
             // An error means that the handle is gone, which is the end, too.
             let _ = runtime.block_on(stopped);
         });
+        let thread = thread.map_err(failed)?;
         let watchdog = Arc::new(Watchdog::default());
-        let watching = watchdog.start().map_err(failed);
+        let watching = watchdog.start().map_err(failed)?;
         Ok(Self {
             handle,
             watchdog,
             stop: Mutex::new(Some(stop)),
-            threads: Mutex::new(vec![thread.map_err(failed)?, watching?]),
+            threads: Mutex::new(vec![thread, watching]),
         })
     }
 

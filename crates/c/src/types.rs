@@ -153,8 +153,8 @@ pub enum JausEventKind {
     Lost = 11,
 }
 
-/// An event. It is valid during the callback, or until the next call of
-/// `jaus_component_next_event`. Fields that the kind does not name are 0. New versions of the library
+/// An event. It is valid during the callback, or until the next call of `jaus_component_next_event` or
+/// the end of the component. Fields that the kind does not name are 0. New versions of the library
 /// may add fields at the end.
 #[repr(C)]
 #[derive(Debug)]

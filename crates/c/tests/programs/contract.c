@@ -180,6 +180,9 @@ int main(void) {
     refuse(123456789);
     REQUIRE(jaus_last_error()[0] != '\0');
     REQUIRE(strlen(jaus_version()) >= 5);
+    REQUIRE(jaus_log_to_stderr(0) == JausStatus_InvalidArgument);
+    REQUIRE(jaus_log_to_stderr(1) == JausStatus_Ok);
+    REQUIRE(jaus_log_to_stderr(1) == JausStatus_WrongState);
     REQUIRE(jaus_node_create(0, 1, &node) == JausStatus_InvalidArgument);
     REQUIRE(jaus_node_create(101, 1, &node) == JausStatus_Ok);
     REQUIRE(jaus_node_use_loopback(node) == JausStatus_Ok);

@@ -35,7 +35,10 @@ void errors_are_thrown() {
     require(status_of([&] { node.group("nonsense"); }) == JausStatus_InvalidArgument, "a group");
     jaus::Component early(node, 1, JAUS_KIND_VEHICLE, "Rover");
     require(status_of([&] { early.start(); }) == JausStatus_WrongState, "the node does not run");
-    require(status_of([&] { early.publish({0x04, 0x44}); }) == JausStatus_Stopped, "it has failed");
+    require(status_of([&] { early.publish({0x04, 0x44}); }) == JausStatus_WrongState, "nor does it");
+    node.loopback().group("off").start();
+    early.start();
+    require(early.standing().first == JAUS_STATE_READY, "it runs now");
 }
 
 void an_unsafe_driver_does_not_start() {
@@ -96,6 +99,27 @@ void a_callback_answers_and_may_not_wait() {
             "no such service");
 }
 
+void handlers_live_as_long_as_the_library_may_call_them() {
+    jaus::Node node = loopback(101);
+    const auto made = [&](int &stops) {
+        jaus::Component driver(node, 33, JAUS_KIND_VEHICLE, "Rover");
+        driver.management();
+        driver.offer("urn:jaus:jss:mobility:PrimitiveDriver", 1, 1)
+            .command(messages::set_wrench_effort, [](const jaus::Event &) {})
+            .decline(messages::query_wrench_effort)
+            .on_stop([&stops, text = std::string(100, 'x')] { stops += text.size() == 100; });
+        driver.start();
+        return driver;
+    };
+    int first = 0, second = 0;
+    jaus::Component driver = made(first);
+    driver = jaus::Component(node, 1, JAUS_KIND_VEHICLE, "Rover");
+    require(first == 1, "the first driver was stopped at its end");
+    driver = made(second);
+    jaus::Component other = std::move(driver);
+    require(second == 0, "a move is no end");
+}
+
 void a_subscription_brings_its_events_and_ends() {
     jaus::Node node = loopback(101);
     jaus::Component sensor(node, 44, JAUS_KIND_VEHICLE, "Rover");
@@ -135,6 +159,7 @@ int main() {
     errors_are_thrown();
     an_unsafe_driver_does_not_start();
     a_callback_answers_and_may_not_wait();
+    handlers_live_as_long_as_the_library_may_call_them();
     a_subscription_brings_its_events_and_ends();
     return 0;
 }
