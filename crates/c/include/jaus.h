@@ -567,7 +567,8 @@ enum JausStatus jaus_component_use_management(struct JausComponent component,
                                               bool initializes);
 
 /**
- * Starts a component. When this fails, the component can only be freed. Not in a callback.
+ * Starts a component of a node that runs. When this fails, the component can only be freed. Not in a
+ * callback.
  */
 enum JausStatus jaus_component_start(struct JausComponent component);
 
@@ -770,7 +771,8 @@ enum JausStatus jaus_component_standing(struct JausComponent component,
 
 /**
  * The next event of a component, or null after `timeout` milliseconds without one; a negative timeout
- * waits for ever. The event is valid until the next call, so one thread at a time may call this. Fails
+ * waits for ever. The event is valid until the next call, or until the component is freed, so one thread
+ * at a time may call this. Fails
  * with `JausStatus_Stopped` when the component has ended and all events are fetched. Only with a
  * timeout of 0 in a callback.
  *

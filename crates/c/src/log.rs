@@ -14,7 +14,11 @@ pub extern "C" fn jaus_log_to_stderr(level: u8) -> JausStatus {
             2 => LevelFilter::WARN,
             3 => LevelFilter::INFO,
             4 => LevelFilter::DEBUG,
-            other => return Err(Failure::argument(format!("log level {other}: choose 1 to 4"))),
+            other => {
+                return Err(Failure::argument(format!(
+                    "log level {other}: choose 1 to 4"
+                )));
+            }
         };
         let log = tracing_subscriber::fmt()
             .with_max_level(level)
