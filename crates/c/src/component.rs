@@ -144,11 +144,18 @@ impl ComponentEntry {
             }
             drop(running.component);
             let ended = running.ended;
-            // An error means that it has ended, or takes too long: its callbacks end all the same.
+            let gone = async {
+                // An error means that it has ended.
+                let _ = ended.await;
+                // The task that owned the services still frees the component's number. One that is
+                // started now on its thread runs after that.
+                let _ = tokio::spawn(async {}).await;
+            };
+            // If it takes too long, its callbacks end all the same.
             let _ = self
                 .node
                 .runtime
-                .wait(async { tokio::time::timeout(END, ended).await })?;
+                .wait(async { tokio::time::timeout(END, gone).await })?;
         }
         self.queue.end();
         let closers = self.closers.lock();
