@@ -90,6 +90,29 @@ impl Control {
         }
     }
 
+    /// The code of the status that the peer has last reported, as in [`State`]; `None` before its
+    /// first report.
+    ///
+    /// # Errors
+    /// The reason if control is lost.
+    pub fn status(&self) -> Result<Option<u8>, ControlError> {
+        self.check_held()?;
+        match *self.condition.borrow() {
+            Condition::Held(status) => Ok(status),
+            Condition::Lost(_) | Condition::Released => Ok(None),
+        }
+    }
+
+    /// Waits until the peer reports another status than `known`, and returns it.
+    ///
+    /// # Errors
+    /// The reason when control is lost.
+    pub async fn status_after(&self, known: Option<u8>) -> Result<Option<u8>, ControlError> {
+        let is_known = |now: &Condition| *now == Condition::Held(known);
+        drop(self.condition.clone().wait_for(|it| !is_known(it)).await);
+        self.status()
+    }
+
     /// Sends a command without acknowledgement.
     ///
     /// # Errors

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU8;
 use std::time::{Duration, SystemTime};
 
+use bytes::Bytes;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::clients::{Hold, NotControlled, NotSubscribed};
@@ -13,7 +14,7 @@ use super::offers::missing_for;
 use super::watch::Outlet;
 use super::{
     Audience, Builder, Control, ControlError, DeliverError, FindError, FromReport, Messages,
-    PublishError, QueryError, SendError, SubscribeError, Subscription, Undecoded, Watch,
+    PublishError, QueryError, SendError, SubscribeError, Subscription, Watch,
 };
 use crate::address::JausId;
 use crate::codec::{Message, Query, Report, ServiceId};
@@ -293,41 +294,61 @@ impl Component {
         peer: JausId,
         message: &M,
     ) -> Result<R, QueryError> {
+        let names = (M::NAME, R::NAME);
+        let query = message.encode().map_err(|error| QueryError::NotSent {
+            peer,
+            query: M::NAME,
+            source: error.into(),
+        })?;
+        let octets = self.ask(options, peer, query, R::CODE, names).await?;
+        R::decode(&octets).map_err(|source| QueryError::Unreadable {
+            peer,
+            query: M::NAME,
+            source,
+        })
+    }
+
+    /// Sends a query, beginning with its message code, and waits for the report with the code
+    /// `report`. The names are those of the query and of the report.
+    pub(super) async fn ask(
+        &self,
+        options: QueryOptions,
+        peer: JausId,
+        query: Bytes,
+        report: u16,
+        names: (&'static str, &'static str),
+    ) -> Result<Bytes, QueryError> {
+        let (name, report_name) = names;
+        let code = code_of(&query).unwrap_or_default();
         let directory = self.directory();
         let services = directory.component(peer).map_or_else(Vec::new, |peer| {
-            missing_for(&messages::registry(), peer, M::CODE)
+            missing_for(&messages::registry(), peer, code)
         });
         if !services.is_empty() {
             return Err(QueryError::NotOffered {
                 peer,
-                query: M::NAME,
+                query: name,
                 services,
             });
         }
-        let not_sent = |source| QueryError::NotSent {
-            peer,
-            query: M::NAME,
-            source,
-        };
-        let payload = message.encode().map_err(|error| not_sent(error.into()))?;
         let (reply, answer) = oneshot::channel();
         let command = Command::Ask(Box::new(Ask {
             peer,
-            query: payload,
-            report: R::CODE,
+            query,
+            report,
             options,
             reply,
         }));
         let sent = self.shared.commands.send(command).await;
         sent.map_err(|_| QueryError::Stopped)?;
         match answer.await.map_err(|_| QueryError::Stopped)? {
-            Answer::Report(octets) => R::decode(&octets).map_err(|source| QueryError::Unreadable {
+            Answer::Report(octets) => Ok(octets),
+            Answer::None(failure) => Err(QueryError::no_answer(name, report_name, &failure)),
+            Answer::NotSent(error) => Err(QueryError::NotSent {
                 peer,
-                query: M::NAME,
-                source,
+                query: name,
+                source: error.into(),
             }),
-            Answer::None(failure) => Err(QueryError::no_answer(M::NAME, R::NAME, &failure)),
-            Answer::NotSent(error) => Err(not_sent(error.into())),
         }
     }
 
@@ -357,21 +378,6 @@ impl Component {
             when,
         };
         self.subscribe_to(topic, Q::NAME).await
-    }
-
-    /// Subscribes to a topic whose messages need no types, and yields its reports
-    /// [undecoded](Undecoded): for programs that read definitions at run time.
-    ///
-    /// # Errors
-    /// Those of [`subscribe`](Self::subscribe).
-    pub async fn subscribe_undecoded(
-        &self,
-        topic: Topic,
-    ) -> Result<Subscription<Undecoded>, SubscribeError> {
-        let code = code_of(&topic.query).unwrap_or_default();
-        let known = messages::registry().by_code(code).next();
-        let query = known.map_or("the query", |info| info.name);
-        self.subscribe_to(topic, query).await
     }
 
     /// Subscribes to a topic; `query` is the name of its query.

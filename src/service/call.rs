@@ -104,21 +104,51 @@ impl<'a> Call<'a> {
         moves: bool,
         step: impl FnOnce(M, &mut Self) -> Outcome,
     ) -> Result<(), DecodeError> {
-        let Some(received) = self.received else {
+        let Some(received) = self.permitted(may, M::NAME) else {
             return Ok(());
         };
-        let source = received.source;
-        if !may(self.standing(), source) {
-            tracing::debug!(%source, message = M::NAME, "ignored: sender not in control");
-            return Ok(());
-        }
         match step(M::decode(&received.payload)?, self) {
             Outcome::Handled => self.accepted |= moves,
             outcome => {
+                let source = received.source;
                 tracing::debug!(%source, message = M::NAME, ?outcome, "not accepted in this state");
             }
         }
         Ok(())
+    }
+
+    /// Passes the message on, undecoded, if its sender may send it. `name` is the message's name,
+    /// and a `validity` means that it is a command that moves something.
+    pub(super) fn guarded_undecoded(
+        &mut self,
+        may: fn(&Standing, JausId) -> bool,
+        validity: Option<Validity>,
+        name: &'static str,
+        handle: impl FnOnce(&'a Received, &mut Context<'_>),
+    ) {
+        let Some(received) = self.permitted(may, name) else {
+            return;
+        };
+        if let Some(validity) = validity {
+            self.set_validity(validity);
+            self.accepted = true;
+        }
+        handle(received, &mut self.context);
+    }
+
+    /// The message, if its sender may send it.
+    fn permitted(
+        &self,
+        may: fn(&Standing, JausId) -> bool,
+        name: &'static str,
+    ) -> Option<&'a Received> {
+        let received = self.received?;
+        let source = received.source;
+        if !may(self.standing(), source) {
+            tracing::debug!(%source, message = name, "ignored: sender not in control");
+            return None;
+        }
+        Some(received)
     }
 }
 

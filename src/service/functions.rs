@@ -5,12 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use super::publication::Latest;
+use super::undecoded::unanswered_query;
 use super::{Call, Context, Handlers, Hazards, Publication, Standing, Validity};
 use crate::address::JausId;
 use crate::codec::machine::Outcome;
-use crate::codec::{self, Call as _, DecodeError, Message, Query, ServiceId, ServiceInfo};
+use crate::codec::{self, Call as _, DecodeError, Message, Query, ServiceId};
 use crate::endpoint::Received;
-use crate::messages;
 
 type Stop = Box<dyn FnMut(&mut Context<'_>) + Send>;
 
@@ -303,16 +303,8 @@ impl<'a> codec::Provider<Call<'a>> for Functions {
     }
 
     fn unanswered_query(&self) -> Option<(ServiceId, &'static str)> {
-        let registry = messages::registry();
-        let of_ours = |info: &&ServiceInfo| self.offers.contains(&info.id);
-        let services = registry.services().filter(of_ours);
-        let mut messages =
-            services.flat_map(|info| info.inputs.iter().map(|&code| (info.id, code)));
-        let (service, query) = messages.find(|(_, code)| {
-            let is_known = self.by_code.contains_key(code) || self.declined.contains(code);
-            codec::report_code(*code).is_some() && !is_known
-        })?;
-        Some((service, registry.in_service(service, query)?.name))
+        let is_known = |code: &u16| self.by_code.contains_key(code) || self.declined.contains(code);
+        unanswered_query(&self.offers, is_known)
     }
 
     fn receive(&mut self, code: u16, call: &mut Call<'a>) -> Option<Result<(), DecodeError>> {
@@ -340,6 +332,7 @@ mod tests {
     use std::sync::atomic::{AtomicU32, Ordering};
 
     use super::*;
+    use crate::messages;
     use crate::messages::core::report_time::{DateStamp, TimeStamp};
     use crate::messages::core::{
         QueryTime, QueryTimeout, ReportTime, SetAuthority, list_manager, time,

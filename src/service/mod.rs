@@ -51,6 +51,7 @@ mod stack_rig;
 mod standing;
 mod time;
 mod transport;
+mod undecoded;
 
 use std::time::Instant;
 
@@ -87,6 +88,7 @@ pub use stack::{Event, Stack};
 pub use standing::{Controller, Standing, State};
 pub use time::{Time, TimeOfDay};
 pub use transport::Transport;
+pub use undecoded::{NeedsControl, UndecodedFunctions};
 
 /// One service of a component.
 pub trait Service: Send {

@@ -280,6 +280,28 @@ async fn control_is_told_when_it_is_lost_and_commands_are_refused_then() {
 }
 
 #[tokio::test]
+async fn control_tells_each_status_that_the_peer_reports_and_its_own_loss() {
+    let mut scene = Scene::new();
+    let control = scene.controlled().await;
+    assert_eq!(control.status(), Ok(None));
+    let mut known = None;
+    for code in [2, 1] {
+        let reporting = async {
+            scene.peer.expect::<QueryStatus>().await;
+            scene.peer.say(&status(code));
+        };
+        let next = async { tokio::join!(control.status_after(known), reporting).0 };
+        assert_eq!(within_limit(next).await, Ok(Some(code)));
+        known = Some(code);
+    }
+    assert_eq!(control.status(), Ok(known));
+    scene.peer.say(&RejectControl::default());
+    let lost = within_limit(control.status_after(known)).await;
+    assert!(matches!(lost, Err(ControlError::Lost { .. })), "{lost:?}");
+    assert_eq!(control.status(), lost);
+}
+
+#[tokio::test]
 async fn control_is_given_back_when_it_is_dropped() {
     let mut scene = Scene::new();
     let control = scene.controlled().await;

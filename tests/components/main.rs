@@ -19,3 +19,4 @@ mod requests;
 mod servers;
 #[path = "../support/streams.rs"]
 mod streams;
+mod undecoded;

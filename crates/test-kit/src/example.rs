@@ -27,8 +27,14 @@ impl Example {
 
     /// Starts an example with arguments.
     pub fn start_with(name: &'static str, arguments: &[&str]) -> Self {
-        let mut program = Command::new(path(name))
-            .args(arguments)
+        let mut command = Command::new(path(name));
+        command.args(arguments);
+        Self::start_command(name, command)
+    }
+
+    /// Starts an example that is not one of cargo's, for instance in another language.
+    pub fn start_command(name: &'static str, mut command: Command) -> Self {
+        let mut program = command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -79,9 +85,21 @@ impl Example {
 
     /// Ends it as Ctrl-C does.
     pub fn interrupt(&mut self) -> ExitStatus {
+        self.signal("INT");
+        self.end()
+    }
+
+    /// Sends it a signal, such as `STOP`.
+    pub fn signal(&self, signal: &str) {
         let id = self.program.id().to_string();
-        let sent = Command::new("kill").args(["-INT", &id]).status();
-        assert!(sent.unwrap().success(), "SIGINT to {}", self.name);
+        let sent = Command::new("kill")
+            .args([&format!("-{signal}"), &id])
+            .status();
+        assert!(sent.unwrap().success(), "SIG{signal} to {}", self.name);
+    }
+
+    /// Waits until it has ended.
+    pub fn end(&mut self) -> ExitStatus {
         self.program.wait().unwrap()
     }
 }

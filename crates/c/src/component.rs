@@ -1,0 +1,425 @@
+//! Components: description, start and end.
+#![expect(clippy::disallowed_methods, reason = "an end has a time limit")]
+
+use std::ffi::{c_char, c_void};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use jaus::component::{
+    AccessControl, AttachError, Builder, Component, Handlers, Kind, Management, Service,
+    UndecodedFunctions,
+};
+use jaus::endpoint::Received;
+use jaus::service::{Context, Handled, UnsafeService};
+use tokio::sync::oneshot;
+use tokio::task::AbortHandle;
+
+use crate::argument::{check_out, put, text};
+use crate::attended::Attended;
+use crate::event::EventQueue;
+use crate::node::{NODES, NodeEntry, Stage as NodeStage, not_attached};
+use crate::notices;
+use crate::publications::Publications;
+use crate::service::ServiceDraft;
+use crate::sink::Sink;
+use crate::status::{Failure, JausStatus, check_may_wait, run};
+use crate::table::Table;
+use crate::types::{JausComponent, JausEventCallback, JausNode};
+use crate::watchdog::Watchdog;
+use crate::{control, subscription};
+
+pub(crate) static COMPONENTS: Table<ComponentEntry> = Table::new("component");
+
+/// How long a component that ends may take to stop and to release what it controls.
+const END: Duration = Duration::from_secs(2);
+
+/// A component of the program.
+pub(crate) struct ComponentEntry {
+    pub(crate) node: Arc<NodeEntry>,
+    pub(crate) queue: Arc<EventQueue>,
+    pub(crate) publications: Arc<Publications>,
+    stage: Mutex<Stage>,
+    /// Close the callbacks that the component may call.
+    closers: Mutex<Vec<Box<dyn Fn() + Send>>>,
+}
+
+enum Stage {
+    Draft(Box<Draft>),
+    Runs(Running),
+    Ended,
+}
+
+/// A component before its start.
+pub(crate) struct Draft {
+    number: u8,
+    kind: u16,
+    name: String,
+    guard: Guard,
+    pub(crate) services: Vec<ServiceDraft>,
+    pub(crate) on_standing: Option<Sink>,
+    pub(crate) on_discovery: Option<Sink>,
+}
+
+enum Guard {
+    None,
+    AccessControl(AccessControl),
+    Management(Management),
+}
+
+struct Running {
+    component: Component,
+    /// Ends when the component's services are gone.
+    ended: oneshot::Receiver<()>,
+    notices: Vec<AbortHandle>,
+}
+
+impl ComponentEntry {
+    fn stage(&self) -> MutexGuard<'_, Stage> {
+        self.stage.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn watchdog(&self) -> Arc<Watchdog> {
+        self.node.runtime.watchdog()
+    }
+
+    /// Calls `close` when the component has ended.
+    pub(crate) fn close_at_end(&self, close: impl Fn() + Send + 'static) {
+        let closers = self.closers.lock();
+        closers
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(Box::new(close));
+    }
+
+    /// The receiver of events: a callback, which is closed with the component, or its queue.
+    ///
+    /// # Safety
+    /// Until the component is freed, `callback` can be called with `user` on any thread.
+    pub(crate) unsafe fn sink(&self, callback: JausEventCallback, user: *mut c_void) -> Sink {
+        // SAFETY: as the caller guarantees; it is closed when the component has ended.
+        let sink = unsafe { Sink::new(callback, user, &self.queue, self.watchdog()) };
+        self.close_at_end({
+            let sink = sink.clone();
+            move || sink.close()
+        });
+        sink
+    }
+
+    pub(crate) fn running(&self) -> Result<Component, Failure> {
+        match &*self.stage() {
+            Stage::Runs(running) => Ok(running.component.clone()),
+            Stage::Draft(_) => Err(Failure::new(
+                JausStatus::WrongState,
+                "the component does not run: call jaus_component_start first",
+            )),
+            Stage::Ended => Err(Failure::new(
+                JausStatus::Stopped,
+                "the component has stopped",
+            )),
+        }
+    }
+
+    fn start(&self) -> Result<(), Failure> {
+        check_may_wait()?;
+        let node = self.node.running()?;
+        let mut stage = self.stage();
+        let draft = match std::mem::replace(&mut *stage, Stage::Ended) {
+            Stage::Draft(draft) => draft,
+            other => {
+                *stage = other;
+                let text = "the component was started before";
+                return Err(Failure::new(JausStatus::WrongState, text));
+            }
+        };
+        let running = self.node.runtime.wait(draft.start(node, &self.queue))?;
+        *stage = Stage::Runs(running?);
+        Ok(())
+    }
+
+    /// Ends the component and its callbacks.
+    fn end(&self) -> Result<(), Failure> {
+        let stage = std::mem::replace(&mut *self.stage(), Stage::Ended);
+        if let Stage::Runs(running) = stage {
+            for notices in &running.notices {
+                notices.abort();
+            }
+            drop(running.component);
+            let ended = running.ended;
+            let gone = async {
+                // An error means that it has ended.
+                let _ = ended.await;
+                // The task that owned the services still frees the component's number. One that is
+                // started now on its thread runs after that.
+                let _ = tokio::spawn(async {}).await;
+            };
+            // If it takes too long, its callbacks end all the same.
+            let _ = self
+                .node
+                .runtime
+                .wait(async { tokio::time::timeout(END, gone).await })?;
+        }
+        self.queue.end();
+        let closers = self.closers.lock();
+        let closers = std::mem::take(&mut *closers.unwrap_or_else(PoisonError::into_inner));
+        for close in closers {
+            close();
+        }
+        Ok(())
+    }
+}
+
+impl Draft {
+    async fn start(self, node: NodeStage, queue: &Arc<EventQueue>) -> Result<Running, Failure> {
+        let number = self.number;
+        let (on_standing, on_discovery) = (self.on_standing.clone(), self.on_discovery.clone());
+        let (alive, ended) = oneshot::channel();
+        let builder = self.builder(queue)?.offer(Ending { _alive: alive });
+        let component = match node {
+            NodeStage::Host(host) => {
+                let port = host
+                    .attach(number)
+                    .await
+                    .map_err(|error| not_attached(&error))?;
+                builder.live_on(port)
+            }
+            NodeStage::Runs(node) => builder.attach(&node, number),
+            NodeStage::Settings(_) | NodeStage::Ended => {
+                return Err(Failure::new(JausStatus::Stopped, "the node has stopped"));
+            }
+        };
+        let component = component.map_err(|error| refused(&error))?;
+        let standing = on_standing.map(|sink| notices::of_standing(&component, sink));
+        let discovery = on_discovery.map(|sink| notices::of_discovery(&component, sink));
+        Ok(Running {
+            notices: standing.into_iter().chain(discovery).collect(),
+            component,
+            ended,
+        })
+    }
+
+    fn builder(self, queue: &Arc<EventQueue>) -> Result<Builder, Failure> {
+        let mut builder = Component::builder(kind(self.kind), self.name);
+        builder = match self.guard {
+            Guard::None => builder,
+            Guard::AccessControl(settings) => builder.access_control(settings),
+            Guard::Management(settings) => builder.management(settings),
+        };
+        for service in self.services {
+            let handlers: Handlers<UndecodedFunctions> = service.handlers.ok_or_else(|| {
+                let text = "a call for a service of the component has failed";
+                Failure::new(JausStatus::WrongState, text)
+            })?;
+            builder = match service.is_polled {
+                true => builder.offer(Attended::new(handlers, queue.clone())),
+                false => builder.offer(handlers),
+            };
+        }
+        Ok(builder)
+    }
+}
+
+fn kind(number: u16) -> Kind {
+    match number {
+        10001 => Kind::Vehicle,
+        20001 => Kind::OperatorControlUnit,
+        30001 => Kind::OtherSubsystem,
+        40001 => Kind::Node,
+        50001 => Kind::Payload,
+        60001 => Kind::Component,
+        other => Kind::Unknown(other),
+    }
+}
+
+/// Why a component was not attached, in the words of this interface.
+fn refused(error: &AttachError) -> Failure {
+    let AttachError::Unsafe(unsafe_service) = error else {
+        return Failure::of(JausStatus::NotStarted, error);
+    };
+    let text = match unsafe_service {
+        UnsafeService::NoManagement { service, command } => format!(
+            "{service} acts on {command}, but without Management the component would obey any \
+             client: call jaus_component_use_management"
+        ),
+        UnsafeService::NoStop { service, command } => {
+            format!("{service} acts on {command}, but nothing stops it: call jaus_service_on_stop")
+        }
+        UnsafeService::NoAccessControl { service, command } => format!(
+            "{command} configures {service}, but without Access Control the component would obey \
+             any client: call jaus_component_use_access_control or jaus_component_use_management"
+        ),
+        UnsafeService::QueryNotAnswered { service, query } => format!(
+            "{service} is offered, but nothing answers {query}: call jaus_service_answer, \
+             jaus_service_publish or jaus_service_decline for it"
+        ),
+        other => other.to_string(),
+    };
+    Failure::new(JausStatus::Unsafe, text)
+}
+
+/// Shows when the services of a component are gone. It offers nothing.
+struct Ending {
+    _alive: oneshot::Sender<()>,
+}
+
+impl Service for Ending {
+    fn offers(&self) -> Vec<jaus::codec::ServiceId> {
+        Vec::new()
+    }
+
+    fn handle_message(
+        &mut self,
+        _: std::time::Instant,
+        _: &Received,
+        _: &mut Context<'_>,
+    ) -> Handled {
+        Handled::No
+    }
+}
+
+/// Changes the description of a component before its start.
+pub(crate) fn edit<T>(
+    component: u64,
+    change: impl FnOnce(&mut Draft, &ComponentEntry) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    let entry = COMPONENTS.get(component)?;
+    match &mut *entry.stage() {
+        Stage::Draft(draft) => change(draft, &entry),
+        Stage::Runs(_) | Stage::Ended => Err(Failure::new(
+            JausStatus::WrongState,
+            "the component was started: describe it before jaus_component_start",
+        )),
+    }
+}
+
+/// A component that runs, with its entry.
+pub(crate) fn running(
+    component: JausComponent,
+) -> Result<(Arc<ComponentEntry>, Component), Failure> {
+    let entry = COMPONENTS.get(component.id)?;
+    let component = entry.running()?;
+    Ok((entry, component))
+}
+
+/// Frees the components of a node.
+pub(crate) fn free_all_of(node: &Arc<NodeEntry>) -> Result<(), Failure> {
+    for id in COMPONENTS.select(|it| Arc::ptr_eq(&it.node, node)) {
+        free(id)?;
+    }
+    Ok(())
+}
+
+fn free(id: u64) -> Result<(), Failure> {
+    let entry = COMPONENTS.remove(id)?;
+    subscription::free_all_of(&entry)?;
+    control::free_all_of(&entry)?;
+    entry.end()
+}
+
+/// Describes a component of a node: its number within the node, 1 to 254, the kind and the name of its
+/// subsystem. Start it with `jaus_component_start`, and free it with `jaus_component_free`.
+///
+/// # Safety
+/// `name` is null, or a text that ends with a 0. `component` is null, or can be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn jaus_component_create(
+    node: JausNode,
+    number: u8,
+    kind: u16,
+    name: *const c_char,
+    component: *mut JausComponent,
+) -> JausStatus {
+    run(|| {
+        check_out(component, "component")?;
+        let node = NODES.get(node.id)?;
+        // SAFETY: as the caller guarantees.
+        let name = unsafe { text(name, "name") }?.to_owned();
+        if !(1..=254).contains(&number) {
+            return Err(Failure::argument(format!(
+                "component {number}: choose 1 to 254"
+            )));
+        }
+        COMPONENTS.check_room()?;
+        let queue = EventQueue::new();
+        let queue = queue.map_err(|error| Failure::of(JausStatus::NotStarted, &error))?;
+        let draft = Draft {
+            number,
+            kind,
+            name,
+            guard: Guard::None,
+            services: Vec::new(),
+            on_standing: None,
+            on_discovery: None,
+        };
+        let id = Table::<ComponentEntry>::reserve();
+        let entry = ComponentEntry {
+            node,
+            queue: Arc::new(queue),
+            publications: Arc::default(),
+            stage: Mutex::new(Stage::Draft(Box::new(draft))),
+            closers: Mutex::default(),
+        };
+        COMPONENTS.insert(id, entry);
+        // SAFETY: as the caller guarantees.
+        unsafe { put(component, JausComponent { id }, "component") }
+    })
+}
+
+/// Offers Access Control: only the client in control may command. Clients with an authority below
+/// `authority` do not get control, which ends a quarter of `timeout` late when it is not renewed for
+/// `timeout` seconds. Usual values are 1 and 4.
+#[unsafe(no_mangle)]
+pub extern "C" fn jaus_component_use_access_control(
+    component: JausComponent,
+    authority: u8,
+    timeout: u8,
+) -> JausStatus {
+    run(|| {
+        edit(component.id, |draft, _| {
+            draft.guard = Guard::AccessControl(access(authority, timeout));
+            Ok(())
+        })
+    })
+}
+
+/// Offers Management, which includes Access Control: the component acts only while a client controls it
+/// and has made it ready. With `initializes` it starts in the state Initialize, until
+/// `jaus_component_set_condition` ends that.
+#[unsafe(no_mangle)]
+pub extern "C" fn jaus_component_use_management(
+    component: JausComponent,
+    authority: u8,
+    timeout: u8,
+    initializes: bool,
+) -> JausStatus {
+    run(|| {
+        edit(component.id, |draft, _| {
+            let settings = Management::new().access_control(access(authority, timeout));
+            draft.guard = Guard::Management(match initializes {
+                true => settings.initializes(),
+                false => settings,
+            });
+            Ok(())
+        })
+    })
+}
+
+const fn access(authority: u8, timeout: u8) -> AccessControl {
+    AccessControl::new().authority(authority).timeout(timeout)
+}
+
+/// Starts a component of a node that runs. When this fails, the component can only be freed. Not in a
+/// callback.
+#[unsafe(no_mangle)]
+pub extern "C" fn jaus_component_start(component: JausComponent) -> JausStatus {
+    run(|| COMPONENTS.get(component.id)?.start())
+}
+
+/// Ends a component and frees it, with its subscriptions and control: it stops what it moves, and
+/// releases what it controls. Not in a callback. Waits for callbacks that run, and 2 s at most for the
+/// rest. When it returns, no callback of the component runs or will run.
+#[unsafe(no_mangle)]
+pub extern "C" fn jaus_component_free(component: JausComponent) -> JausStatus {
+    run(|| {
+        check_may_wait()?;
+        free(component.id)
+    })
+}

@@ -1,0 +1,229 @@
+//! Subscriptions to the reports of peers.
+
+use std::ffi::c_void;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use jaus::component::{SubscribeError, Subscription, Undecoded, Update, When};
+use jaus::node::now;
+use jaus::service::Topic;
+use tokio::task::JoinHandle;
+
+use crate::argument::{check_out, message, one_component, put};
+use crate::client::report_of;
+use crate::component::{ComponentEntry, running};
+use crate::event::Event;
+use crate::sink::Sink;
+use crate::status::{Failure, JausStatus, check_may_wait, run};
+use crate::table::Table;
+use crate::types::{
+    JausAddress, JausComponent, JausEventCallback, JausEventKind, JausSubscription,
+    JausSubscriptionState,
+};
+
+static SUBSCRIPTIONS: Table<SubscriptionEntry> = Table::new("subscription");
+
+/// A subscription of the program.
+struct SubscriptionEntry {
+    component: Arc<ComponentEntry>,
+    sink: Sink,
+    shown: Arc<Mutex<Shown>>,
+    task: Mutex<Option<JoinHandle<()>>>,
+}
+
+/// The state of a subscription at its last update.
+#[derive(Default)]
+struct Shown {
+    state: JausSubscriptionState,
+    arrived: Option<Instant>,
+}
+
+impl Shown {
+    fn note(&mut self, reports: &Subscription<Undecoded>, is_report: bool) {
+        self.state.is_up = reports.is_up();
+        self.state.rate = reports.hz().unwrap_or_default();
+        self.state.lost = reports.lost();
+        self.state.missed = reports.missed();
+        if is_report {
+            self.arrived = reports.age().map(|age| now() - age);
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn not_subscribed(error: &SubscribeError) -> Failure {
+    let status = match error {
+        SubscribeError::Impossible { .. } => JausStatus::InvalidArgument,
+        SubscribeError::Ended { .. } => JausStatus::Refused,
+        SubscribeError::Stopped => JausStatus::Stopped,
+        _ => JausStatus::NotSent,
+    };
+    Failure::of(status, error)
+}
+
+/// Passes updates on until the subscription ends.
+async fn follow(
+    mut reports: Subscription<Undecoded>,
+    subject: u64,
+    shown: Arc<Mutex<Shown>>,
+    sink: Sink,
+) {
+    let peer = reports.peer();
+    let event = |kind| Event {
+        subject,
+        ..Event::new(kind, peer)
+    };
+    while let Some(update) = reports.next().await {
+        let is_report = matches!(update, Update::Report(_));
+        lock(&shown).note(&reports, is_report);
+        sink.tell(match update {
+            Update::Report(Undecoded(message)) => Event {
+                message,
+                arrived: lock(&shown).arrived,
+                lost: reports.lost(),
+                ..event(JausEventKind::Report)
+            },
+            Update::Up => Event {
+                rate: reports.hz().unwrap_or_default(),
+                ..event(JausEventKind::SubscriptionUp)
+            },
+            Update::Down { why, .. } => event(JausEventKind::SubscriptionDown).because(&why),
+        });
+    }
+    lock(&shown).note(&reports, false);
+    let ended = event(JausEventKind::SubscriptionEnded);
+    sink.tell(match reports.end() {
+        Some(end) => ended.because(&end),
+        None => ended.because(&"the component has stopped"),
+    });
+}
+
+impl SubscriptionEntry {
+    /// Ends the subscription. Waits for a callback that runs, but not in a callback.
+    fn end(&self) {
+        if let Some(task) = lock(&self.task).take() {
+            task.abort();
+            if check_may_wait().is_ok() {
+                // Its end by the abort is what is waited for.
+                let _ = self.component.node.runtime.wait(task);
+            }
+        }
+        self.sink.close();
+    }
+}
+
+/// Frees the subscriptions of a component.
+pub(crate) fn free_all_of(component: &Arc<ComponentEntry>) -> Result<(), Failure> {
+    for id in SUBSCRIPTIONS.select(|it| Arc::ptr_eq(&it.component, component)) {
+        SUBSCRIPTIONS.remove(id)?.end();
+    }
+    Ok(())
+}
+
+/// Subscribes to the answers to a query, `length` octets from its code, and waits until the peer
+/// confirms. `report` is the code of the report (0: as the standard's numbers give it). `rate` is in
+/// hertz, 1/60 to 1092; 0 means on every change. With `least`, also in hertz, a lower confirmed rate is
+/// an error. Not in a callback.
+///
+/// The subscription renews itself, and survives failures of the peer, until it is freed. Its events are
+/// `JausEventKind_Report`, `..._SubscriptionUp`, `..._SubscriptionDown` and `..._SubscriptionEnded`.
+/// Without a callback they are events of the component.
+///
+/// # Safety
+/// `data` is null, or points to `length` octets. Until the subscription or the component is freed,
+/// `callback` can be called with `user` on any thread. `subscription` is null, or can be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn jaus_component_subscribe(
+    component: JausComponent,
+    peer: JausAddress,
+    data: *const u8,
+    length: usize,
+    report: u16,
+    rate: f64,
+    least: f64,
+    callback: JausEventCallback,
+    user: *mut c_void,
+    subscription: *mut JausSubscription,
+) -> JausStatus {
+    run(|| {
+        check_out(subscription, "subscription")?;
+        // SAFETY: as the caller guarantees.
+        let query = unsafe { message(data, length) }?;
+        let topic = Topic {
+            peer: one_component(peer)?,
+            report: report_of(&query, report)?,
+            query,
+            when: when(rate, least)?,
+        };
+        SUBSCRIPTIONS.check_room()?;
+        let (entry, component) = running(component)?;
+        let runtime = &entry.node.runtime;
+        let reports = runtime.wait(component.subscribe_undecoded(topic))?;
+        let reports = reports.map_err(|error| not_subscribed(&error))?;
+        drop(component);
+        // SAFETY: as the caller guarantees; it is closed with the subscription.
+        let sink = unsafe { Sink::new(callback, user, &entry.queue, entry.watchdog()) };
+        let id = Table::<SubscriptionEntry>::reserve();
+        // Before the first event, which names it.
+        // SAFETY: as the caller guarantees.
+        unsafe { put(subscription, JausSubscription { id }, "subscription") }?;
+        let shown = Arc::<Mutex<Shown>>::default();
+        lock(&shown).note(&reports, false);
+        let task = runtime
+            .handle()
+            .spawn(follow(reports, id, shown.clone(), sink.clone()));
+        let subscribed = SubscriptionEntry {
+            component: entry,
+            sink,
+            shown,
+            task: Mutex::new(Some(task)),
+        };
+        SUBSCRIPTIONS.insert(id, subscribed);
+        Ok(())
+    })
+}
+
+fn when(rate: f64, least: f64) -> Result<When, Failure> {
+    match rate {
+        0.0 => Ok(When::OnChange),
+        rate if rate > 0.0 && least >= 0.0 => Ok(When::hz(rate).at_least(least)),
+        _ => Err(Failure::argument(format!(
+            "{rate} Hz, at least {least} Hz: neither may be negative"
+        ))),
+    }
+}
+
+/// The state of a subscription as of its last event.
+///
+/// # Safety
+/// `state` is null, or can be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn jaus_subscription_state(
+    subscription: JausSubscription,
+    state: *mut JausSubscriptionState,
+) -> JausStatus {
+    run(|| {
+        let entry = SUBSCRIPTIONS.get(subscription.id)?;
+        let shown = lock(&entry.shown);
+        let age = shown.arrived.map(|arrived| (now() - arrived).as_secs_f64());
+        let current = JausSubscriptionState {
+            age: age.unwrap_or(-1.0),
+            ..shown.state
+        };
+        // SAFETY: as the caller guarantees.
+        unsafe { put(state, current, "state") }
+    })
+}
+
+/// Ends a subscription and frees it. When it returns, its callback will not be called any more, but for
+/// a call that runs when this is called in it.
+#[unsafe(no_mangle)]
+pub extern "C" fn jaus_subscription_free(subscription: JausSubscription) -> JausStatus {
+    run(|| {
+        SUBSCRIPTIONS.remove(subscription.id)?.end();
+        Ok(())
+    })
+}

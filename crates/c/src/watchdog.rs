@@ -1,0 +1,100 @@
+//! The watch over callbacks: if one hangs, the stop callbacks of the node are called beside it.
+//!
+//! A callback that hangs holds up the library's thread, so nothing of the node looks alive to its peers
+//! any more. But what a driver has set in motion would go on, because the services that would stop it
+//! are held up, too.
+
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use jaus::node::now;
+
+use crate::callback::{Callback, StopFunction};
+
+/// Watches the callbacks of one node.
+#[derive(Default)]
+pub(crate) struct Watchdog {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    /// Since when a callback has been running, until it is found to hang.
+    since: Option<Instant>,
+    stops: Vec<Weak<Callback<StopFunction>>>,
+    has_ended: bool,
+}
+
+impl Watchdog {
+    /// A callback that runs for longer than this hangs.
+    pub(crate) const HUNG: Duration = Duration::from_millis(500);
+    /// How often its thread looks.
+    const INTERVAL: Duration = Duration::from_millis(50);
+
+    /// Starts the thread that watches. It ends with [`end`](Self::end).
+    pub(crate) fn start(self: &Arc<Self>) -> std::io::Result<JoinHandle<()>> {
+        let watchdog = self.clone();
+        let thread = std::thread::Builder::new().name("jaus-watchdog".to_owned());
+        thread.spawn(move || watchdog.run())
+    }
+
+    pub(crate) fn end(&self) {
+        self.lock().has_ended = true;
+        self.changed.notify_all();
+    }
+
+    /// Adds a stop callback, for as long as it exists.
+    pub(crate) fn add_stop(&self, stop: &Arc<Callback<StopFunction>>) {
+        let mut state = self.lock();
+        state.stops.retain(|stop| stop.strong_count() > 0);
+        state.stops.push(Arc::downgrade(stop));
+    }
+
+    /// Watches a callback until the result is dropped.
+    pub(crate) fn watch(&self) -> Watched<'_> {
+        self.lock().since = Some(now());
+        Watched(self)
+    }
+
+    fn run(&self) {
+        while let Some(stops) = self.wait() {
+            if !stops.is_empty() {
+                tracing::error!("stopped: a callback of the program hangs");
+            }
+            for stop in stops.iter().filter_map(Weak::upgrade) {
+                stop.stop_beside_a_hung_callback();
+            }
+        }
+    }
+
+    /// Waits until a callback hangs; `None` at the end.
+    fn wait(&self) -> Option<Vec<Weak<Callback<StopFunction>>>> {
+        let mut state = self.lock();
+        loop {
+            if state.has_ended {
+                return None;
+            }
+            if state.since.is_some_and(|since| now() - since > Self::HUNG) {
+                state.since = None;
+                return Some(state.stops.clone());
+            }
+            let waited = self.changed.wait_timeout(state, Self::INTERVAL);
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A callback that is watched.
+pub(crate) struct Watched<'a>(&'a Watchdog);
+
+impl Drop for Watched<'_> {
+    fn drop(&mut self) {
+        self.0.lock().since = None;
+    }
+}
