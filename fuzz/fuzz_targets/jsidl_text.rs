@@ -5,7 +5,7 @@
 use jaus_fuzz::{octets_come_back, with_code};
 use jsidl::docs::{self, Format};
 use jsidl::model::Service;
-use jsidl::{Library, Loader, lua, rust, schema};
+use jsidl::{Library, Loader, diff, explain, format, lua, machine, rust, schema};
 use libfuzzer_sys::fuzz_target;
 
 /// Message bodies to try: zeros satisfy most fields, ones request large counts.
@@ -14,7 +14,8 @@ const BODIES: [[u8; 32]; 3] = [[0; 32], [1; 32], [0xFF; 32]];
 /// Most octets of text that is passed to the emitters: their output is many times as long.
 const LONGEST: usize = 16 << 10;
 
-/// Runs every emitter: for Rust, Wireshark, pages and JSON Schema.
+/// Runs every emitter: for Rust, Wireshark, pages, JSON Schema, drawings of machines, explanations of
+/// messages, and the comparison with nothing and with itself.
 fn emit(library: &Library) {
     let services: Vec<&Service> = library.services().map(AsRef::as_ref).collect();
     let module = rust::module(library, services.iter().copied(), "::jaus::codec");
@@ -34,6 +35,29 @@ fn emit(library: &Library) {
         let text = schema.to_string();
         let read = serde_json::from_str::<serde_json::Value>(&text).ok();
         assert_eq!(read, Some(schema), "{}", service.id);
+    }
+    for service in &services {
+        for machine in library.machines(service) {
+            assert!(!machine::dot(&machine).is_empty() && !machine::mermaid(&machine).is_empty());
+        }
+        for message in service.messages() {
+            for body in BODIES {
+                let octets = with_code(message.code, &body);
+                let (rows, _) = explain::explain_as(message, &octets);
+                assert!(!explain::table(&rows).is_empty());
+            }
+        }
+    }
+    assert!(diff::compare(library, library, |_| true).is_empty());
+    let nothing = Library::default();
+    diff::compare(&nothing, library, |_| true);
+    diff::compare(library, &nothing, |_| true);
+}
+
+/// A formatted text has the same format, and the same definitions.
+fn format_twice(text: &str) {
+    if let Ok(formatted) = format::format("fuzz.xml", text) {
+        assert_eq!(format::format("fuzz.xml", &formatted), Ok(formatted));
     }
 }
 
@@ -58,5 +82,6 @@ fuzz_target!(|text: &str| {
     }
     if text.len() <= LONGEST {
         emit(&loaded.library);
+        format_twice(text);
     }
 });

@@ -17,6 +17,9 @@
 //! }
 //! ```
 //!
+//! With [`runtime("::jaus_codec")`](Build::runtime) the library needs only the crate `jaus-codec`; then it
+//! may be `no_std`.
+//!
 //! Mistakes in definitions come out as errors of the build, with file, line and column.
 
 use std::env;
@@ -32,7 +35,7 @@ use crate::rust;
 #[derive(Debug)]
 pub struct Build {
     loader: Loader,
-    runtime: String,
+    settings: rust::Settings,
     /// Names, each with the beginnings of URNs.
     modules: Vec<(String, Vec<String>)>,
     paths: Vec<PathBuf>,
@@ -53,7 +56,7 @@ impl Build {
         loader.catalogue().reference_architecture();
         Self {
             loader,
-            runtime: "::jaus::codec".to_owned(),
+            settings: rust::Settings::new("::jaus::codec"),
             modules: Vec::new(),
             paths: Vec::new(),
             out_dir: None,
@@ -83,7 +86,16 @@ impl Build {
     /// Where the generated code finds the codec runtime; `::jaus::codec` if nothing is said.
     #[must_use]
     pub fn runtime(mut self, path: &str) -> Self {
-        path.clone_into(&mut self.runtime);
+        self.settings = self.settings.with_runtime(path);
+        self
+    }
+
+    /// Where the generated code finds the messages of services whose URN begins with `urn`, as
+    /// [`rust::Settings::extern_path`] describes: `.extern_path("urn:jaus:jss:core:",
+    /// "::jaus::messages::core")`.
+    #[must_use]
+    pub fn extern_path(mut self, urn: &str, path: &str) -> Self {
+        self.settings = self.settings.extern_path(urn, path);
         self
     }
 
@@ -129,7 +141,7 @@ impl Build {
             let services = loaded.library.services().map(AsRef::<Service>::as_ref);
             let chosen =
                 services.filter(|it| urns.iter().any(|urn| it.id.urn.starts_with(urn.as_str())));
-            let text = rust::module(&loaded.library, chosen, &self.runtime);
+            let text = rust::module_with(&loaded.library, chosen, &self.settings);
             (format!("{name}.rs"), text)
         };
         let files = self.modules.iter().map(module).collect();

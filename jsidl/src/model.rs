@@ -98,6 +98,8 @@ pub struct Message {
     pub code: u16,
     /// `is_command`: only the controlling client may send it.
     pub is_command: bool,
+    /// `deprecated`: newer services have another message for the purpose.
+    pub is_deprecated: bool,
     /// The author's text, white space folded.
     pub description: String,
     /// Fields between the code and the body. `None` for the usual header, whose only field is the
@@ -373,6 +375,12 @@ pub struct Choice {
     pub name: Option<String>,
     /// Type, units and meaning of the value.
     pub scalar: Scalar,
+}
+
+/// Whether this format of raw octets holds a message that begins with its code. Definitions differ in
+/// the spelling.
+pub(crate) const fn is_message_format(format: &str) -> bool {
+    format.eq_ignore_ascii_case("JAUS MESSAGE")
 }
 
 /// `array`.

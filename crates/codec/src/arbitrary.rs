@@ -3,10 +3,15 @@
 //! Counts are within their limits, strings fit their fields and no number is NaN, so every
 //! generated message encodes and decodes to itself.
 
+use alloc::vec::Vec;
+
 pub use arbitrary::{Arbitrary, Result, Unstructured};
+
+use arbitrary::Error;
 use bytes::Bytes;
 
 use super::blob::FormattedBlob;
+use super::large_array::LargeArray;
 use super::text::Text;
 
 /// Random lists, blobs and strings exceed the minimum length by at most this much.
@@ -15,6 +20,19 @@ const USUAL_LENGTH: u64 = 12;
 /// A count within `min..=max`, at most [`USUAL_LENGTH`] above `min`.
 fn count(random: &mut Unstructured<'_>, min: u64, max: u64) -> Result<u64> {
     random.int_in_range(min..=max.min(min.saturating_add(USUAL_LENGTH)))
+}
+
+/// A function that makes a random value.
+#[doc(hidden)]
+pub type Maker<'a, T> = fn(&mut Unstructured<'a>) -> Result<T>;
+
+/// The value that a function makes.
+#[doc(hidden)]
+pub fn made<'a, T>(
+    random: &mut Unstructured<'a>,
+    make: impl FnOnce(&mut Unstructured<'a>) -> Result<T>,
+) -> Result<T> {
+    make(random)
 }
 
 /// A list with a valid number of elements.
@@ -105,13 +123,22 @@ pub fn optional<'a, T>(
 ///
 /// # Errors
 /// Errors from `element`.
-pub fn array<'a, T: Default, const N: usize>(
+pub fn array<'a, T, const N: usize>(
     random: &mut Unstructured<'a>,
     mut element: impl FnMut(&mut Unstructured<'a>) -> Result<T>,
 ) -> Result<[T; N]> {
-    let mut array = std::array::from_fn(|_| T::default());
-    for slot in &mut array {
-        *slot = element(random)?;
-    }
-    Ok(array)
+    let elements: Vec<T> = (0..N).map(|_| element(random)).collect::<Result<_>>()?;
+    let wrong_number = |_| Error::IncorrectFormat;
+    elements.try_into().map_err(wrong_number)
+}
+
+/// A large array, filled in memory order.
+///
+/// # Errors
+/// Errors from `element`.
+pub fn large_array<'a, T, const N: usize>(
+    random: &mut Unstructured<'a>,
+    mut element: impl FnMut(&mut Unstructured<'a>) -> Result<T>,
+) -> Result<LargeArray<T, N>> {
+    LargeArray::try_from_fn(|_| element(random))
 }

@@ -100,9 +100,70 @@ macro_rules! __codec_bit_field {
     };
 }
 
+/// Implements a getter and a replacement for sub-fields. `as` names the type of those with named values.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_sub_fields {
+    ($name:ident($raw:ty) { $(
+        $(#[$doc:meta])*
+        $get:ident: $int:ty $(as $values:ident)?, $from:literal to $to:literal,
+        $least:literal to $most:literal, $text:literal => $replace:ident;
+    )* }) => {
+        impl $name {
+            $(
+                $(#[$doc])*
+                pub const fn $get(self) -> $crate::sub_field!(type $int $(, $values)?) {
+                    let value = $crate::bits::get(self.0 as u64, $from, $to) as $int;
+                    $crate::sub_field!(wrap value $(, $values)?)
+                }
+
+                #[doc = ::core::concat!("The same with another `", $text, "`.")]
+                ///
+                /// # Errors
+                #[doc = ::core::concat!("If the value is not in ", $least, " to ", $most, ".")]
+                pub const fn $replace(
+                    self,
+                    value: $crate::sub_field!(type $int $(, $values)?),
+                ) -> ::core::result::Result<Self, $crate::OutOfRange> {
+                    let value = $crate::sub_field!(unwrap value $(, $values)?) as u64;
+                    let field = ($text, $from, $to);
+                    match $crate::bits::set_checked(self.0 as u64, field, value, ($least, $most)) {
+                        Ok(raw) => Ok(Self(raw as $raw)),
+                        Err(error) => Err(error),
+                    }
+                }
+            )*
+        }
+    };
+}
+
+/// The parts of an accessor that depend on whether the sub-field has named values.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_sub_field {
+    (type $int:ty) => {
+        $int
+    };
+    (type $int:ty, $values:ident) => {
+        $values
+    };
+    (wrap $value:ident) => {
+        $value
+    };
+    (wrap $value:ident, $values:ident) => {
+        $values($value)
+    };
+    (unwrap $value:ident) => {
+        $value
+    };
+    (unwrap $value:ident, $values:ident) => {
+        $value.0
+    };
+}
+
 /// Prints the sub-fields as a map from name to number.
 #[doc(hidden)]
-pub fn debug<B: Bits>(bits: B, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+pub fn debug<B: Bits>(bits: B, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
     let fields = B::FIELDS
         .iter()
         .map(|&(name, from, to)| (name, get(bits.raw(), from, to)));
@@ -119,6 +180,9 @@ pub(super) fn reserved<B: Bits>() -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use alloc::format;
+    use alloc::string::ToString;
+
     use super::*;
 
     #[test]

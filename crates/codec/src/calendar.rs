@@ -1,6 +1,6 @@
 //! Converts between calendar dates (in messages) and day counts (in clocks).
 
-use std::time::Duration;
+use core::time::Duration;
 
 /// A day of the Gregorian calendar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

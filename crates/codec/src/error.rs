@@ -3,7 +3,11 @@
 //! An error is created at its cause. The names of the enclosing fields are added as it propagates,
 //! so the path costs nothing on success.
 
-use std::fmt;
+use alloc::boxed::Box;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::fmt;
 
 /// The octets are not a valid message of the expected type.
 ///
@@ -194,7 +198,7 @@ macro_rules! failure {
             }
         }
 
-        impl std::error::Error for $error {}
+        impl core::error::Error for $error {}
 
         impl fmt::Display for $error {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

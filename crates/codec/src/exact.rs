@@ -4,7 +4,7 @@
 //! A sum of products is kept as an expansion: non-overlapping floating-point numbers whose exact
 //! sum is the value (Shewchuk 1997). The sign of the expansion is the sign of its largest part.
 
-use std::cmp::Ordering;
+use core::cmp::Ordering;
 
 /// An exact sum of at most [`PARTS`](Self::PARTS) floating-point numbers.
 #[derive(Debug, Default)]
@@ -29,7 +29,7 @@ impl Expansion {
 
     fn add_product(&mut self, a: f64, b: f64) {
         let product = a * b;
-        self.add(a.mul_add(b, -product));
+        self.add(product_error(a, b, product));
         self.add(product);
     }
 
@@ -69,6 +69,38 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
     (sum, (a - a_part) + (b - b_part))
 }
 
+/// The rounding error of a finite product that neither overflows nor underflows, exactly.
+fn product_error(a: f64, b: f64, product: f64) -> f64 {
+    let ((a, a_exponent), (b, b_exponent)) = (parts(a), parts(b));
+    let (rounded, exponent) = parts(product);
+    // Without a bit more than the rounded product, the product is exact.
+    let Ok(shift @ 1..=64) = u32::try_from(exponent - (a_exponent + b_exponent)) else {
+        return 0.0;
+    };
+    let error = a * b - (rounded << shift);
+    error as f64 * power_of_two(a_exponent) * power_of_two(b_exponent)
+}
+
+/// The integer and the exponent of two whose product a finite number is.
+const fn parts(number: f64) -> (i128, i32) {
+    let bits = number.to_bits();
+    let exponent = (bits >> 52 & 0x7FF) as i32;
+    let fraction = (bits & 0xF_FFFF_FFFF_FFFF) as i128;
+    let (integer, exponent) = match exponent {
+        0 => (fraction, -1074),
+        _ => (fraction | 1 << 52, exponent - 1075),
+    };
+    (if bits >> 63 == 1 { -integer } else { integer }, exponent)
+}
+
+/// Two to the power of an exponent from [`parts`].
+const fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(match exponent {
+        -1022.. => ((exponent + 1023) as u64) << 52,
+        _ => 1 << (exponent + 1074),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,5 +128,32 @@ mod tests {
             Ordering::Greater
         );
         assert_eq!(sign_of(1.0, 0.0, factor, 1.0, 0.0, factor), Ordering::Equal);
+    }
+
+    #[test]
+    fn the_rounding_error_of_a_product_is_exact() {
+        let numbers = [
+            0.0,
+            1.0,
+            -1.0,
+            0.1,
+            -0.3,
+            1e9 / 3.0,
+            1e-9 / 7.0,
+            -65_535.0,
+            1e100 / 3.0,
+            2.5e-100,
+            4_294_967_295.0,
+            f64::from_bits(0x4340_0000_0000_0001),
+            1e-280,
+            -123_456.789,
+        ];
+        for a in numbers {
+            for b in numbers {
+                let product = a * b;
+                let expected = a.mul_add(b, -product);
+                assert_eq!(product_error(a, b, product), expected, "{a} * {b}");
+            }
+        }
     }
 }

@@ -96,7 +96,7 @@ impl<T: Fixed, const N: usize> Fixed for [T; N] {
 
     #[inline]
     fn get(run: &[u8], at: usize) -> Self {
-        std::array::from_fn(|i| T::get(run, at + i * T::SIZE))
+        core::array::from_fn(|i| T::get(run, at + i * T::SIZE))
     }
 
     #[inline]

@@ -10,7 +10,15 @@
 //!   `b`.
 //! - Decoding never panics and never allocates more than the input can fill.
 //! - Errors name the message, the path to the field and the octet offset.
+//!
+//! The crate needs no operating system, only an allocator: it is `no_std`, and so is generated code.
+//! The feature `arbitrary`, which is for tests, needs the standard library.
+#![no_std]
 #![forbid(unsafe_code)]
+
+extern crate alloc;
+#[cfg(test)]
+extern crate std;
 
 #[cfg(feature = "arbitrary")]
 pub mod arbitrary;
@@ -23,7 +31,9 @@ mod enumeration;
 mod error;
 mod exact;
 mod fixed;
+mod large_array;
 pub mod machine;
+mod members;
 mod message;
 mod query;
 mod reader;
@@ -45,10 +55,13 @@ pub use composite::Composite;
 pub use enumeration::Enumeration;
 pub use error::{DecodeError, DecodeErrorKind, EncodeError, EncodeErrorKind};
 pub use fixed::{Count, Fixed};
+pub use large_array::LargeArray;
 #[cfg(not(feature = "serde"))]
 #[doc(hidden)]
 pub use message::View;
 pub use message::{AnyMessage, Message, ServiceId};
+#[doc(hidden)]
+pub use query::keep_if;
 pub use query::{Query, Report, report_code};
 pub use reader::Reader;
 #[doc(hidden)]
@@ -59,12 +72,25 @@ pub use service::{Call, Hazards, InternalEvent, Provider};
 pub use text::Text;
 pub use writer::Writer;
 
+/// Lists of generated fields.
+#[doc(no_inline)]
+pub use alloc::vec::Vec as List;
+
 #[doc(hidden)]
 pub use crate::{
-    __codec_arbitrary_integer as arbitrary_integer, __codec_bit_field as bit_field,
-    __codec_enumeration as enumeration, __codec_fixed_newtype as fixed_newtype,
-    __codec_if_arbitrary as if_arbitrary, __codec_if_serde as if_serde, __codec_scaled as scaled,
+    __codec_accessor as accessor, __codec_accessors as accessors,
+    __codec_alternatives as alternatives, __codec_arbitrary_integer as arbitrary_integer,
+    __codec_bit_field as bit_field, __codec_enumeration as enumeration,
+    __codec_fixed_newtype as fixed_newtype, __codec_if_arbitrary as if_arbitrary,
+    __codec_if_serde as if_serde, __codec_members as members,
+    __codec_random_alternatives as random_alternatives, __codec_random_members as random_members,
+    __codec_requests as requests, __codec_scaled as scaled, __codec_sub_field as sub_field,
+    __codec_sub_fields as sub_fields,
 };
+
+#[cfg(feature = "arbitrary")]
+#[doc(hidden)]
+pub use crate::__codec_random_member as random_member;
 
 #[cfg(feature = "serde")]
 #[doc(hidden)]

@@ -1,8 +1,10 @@
 //! Common interface of all messages: a trait for types known at compile time, and a trait object
 //! for types known only by message code.
 
-use std::any::Any;
-use std::fmt::{self, Debug};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use core::any::Any;
+use core::fmt::{self, Debug};
 
 use bytes::Bytes;
 
@@ -48,11 +50,11 @@ pub trait Message: Sized + View + Clone + Debug + PartialEq + Send + Sync + 'sta
     /// The name in the definition, for example `ReportIdentification`.
     const NAME: &'static str;
     /// Whether the definition marks the message as a command.
-    const IS_COMMAND: bool;
+    const IS_COMMAND: bool = false;
     /// Whether the message is a command of a service that inherits Access Control, which only the
     /// client in control may send. Exceptions are Set Emergency and Clear Emergency: Management
     /// accepts them from any client.
-    const NEEDS_CONTROL: bool;
+    const NEEDS_CONTROL: bool = false;
     /// Whether the message is a command of a service that inherits Management: the component obeys
     /// it only while it is ready, and stops what it has started.
     const NEEDS_READINESS: bool = false;

@@ -1,6 +1,6 @@
 //! Queries and the reports that answer them: by type and by message code.
 
-use std::time::Duration;
+use core::time::Duration;
 
 use super::message::Message;
 
@@ -54,4 +54,42 @@ mod tests {
             assert_eq!(report_code(other), None, "{other:04X}");
         }
     }
+}
+
+/// Drops the content of an optional field that is not requested.
+#[doc(hidden)]
+pub fn keep_if<T>(is_requested: bool, field: &mut Option<T>) {
+    if !is_requested {
+        *field = None;
+    }
+}
+
+/// Implements the builder methods that set bits of presence vectors.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_requests {
+    ($name:ty, new {
+        $($(#[$of_new:meta])* fn($($const:tt)?) $new:ident => $value:expr;)*
+    } with {
+        $($(#[$doc:meta])* $method:ident: $vector:ident | $bit:literal;)*
+    }) => {
+        impl $name {
+            $(
+                $(#[$of_new])*
+                #[must_use]
+                pub $($const)? fn $new() -> Self {
+                    $value
+                }
+            )*
+
+            $(
+                $(#[$doc])*
+                #[must_use]
+                pub const fn $method(mut self) -> Self {
+                    self.$vector |= $bit;
+                    self
+                }
+            )*
+        }
+    };
 }

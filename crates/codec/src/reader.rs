@@ -1,11 +1,16 @@
 //! A cursor over a received message.
 
+use alloc::vec::Vec;
+
 use bytes::Bytes;
 
 use super::blob::FormattedBlob;
 use super::error::{DecodeError, DecodeErrorKind};
 use super::fixed::{Count, Fixed};
 use super::text::Text;
+
+/// Octets that a list may allocate in advance for even the shortest input.
+const LEAST_RESERVED: usize = 1024;
 
 /// A cursor over a received message. It keeps a slice for reading fields, and the shared octets so
 /// that strings and blobs need no copy.
@@ -118,6 +123,18 @@ impl<'a> Reader<'a> {
             },
             self.offset(),
         )
+    }
+
+    /// Checks that at least so many octets are left, before memory is allocated for their content.
+    ///
+    /// # Errors
+    /// If there are fewer.
+    #[inline]
+    pub fn require(&self, octets: usize) -> Result<(), DecodeError> {
+        if octets > self.rest.len() {
+            return Err(self.short(octets as u64));
+        }
+        Ok(())
     }
 
     /// Reads one fixed-size value.
@@ -248,9 +265,10 @@ impl<'a> Reader<'a> {
         mut element: impl FnMut(&mut Self) -> Result<T, DecodeError>,
     ) -> Result<Vec<T>, DecodeError> {
         let count = self.count::<C>(min, max, least)?;
-        // Each element consumes at least `least` octets of input, which bounds the allocation.
-        // Elements that may be empty get no memory in advance.
-        let mut list = Vec::with_capacity(if least == 0 { 0 } else { count });
+        // An element can take more memory than input: what is allocated before the first is read is
+        // about the size of the input. The rest is allocated as elements arrive.
+        let most = self.rest.len().max(LEAST_RESERVED) / size_of::<T>().max(1);
+        let mut list = Vec::with_capacity(count.min(most));
         for index in 0..count {
             match element(self) {
                 Ok(value) => list.push(value),

@@ -1,6 +1,7 @@
 //! Tables of generated types: services by identity, messages by code and by name.
 
-use std::fmt;
+use alloc::boxed::Box;
+use core::fmt;
 
 use bytes::Bytes;
 
@@ -135,7 +136,7 @@ impl Registry {
     }
 
     fn sets(&self) -> impl Iterator<Item = &'static ServiceSet> + use<> {
-        std::iter::successors(Some(*self), |registry| registry.base.copied())
+        core::iter::successors(Some(*self), |registry| registry.base.copied())
             .flat_map(|registry| registry.sets)
     }
 

@@ -1,7 +1,9 @@
 //! Real numbers encoded as scaled integers (JSIDL `scale_range`).
 
-use std::cmp::Ordering;
-use std::fmt;
+use alloc::format;
+use alloc::string::String;
+use core::cmp::Ordering;
+use core::fmt;
 
 use super::exact::Expansion;
 
@@ -249,7 +251,7 @@ impl OutOfRange {
     }
 }
 
-impl std::error::Error for OutOfRange {}
+impl core::error::Error for OutOfRange {}
 
 impl fmt::Display for OutOfRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -4,6 +4,8 @@
 //! struct `Server`, which passes messages to it. The stack knows a `Server` as a [`Provider`], and
 //! the `Server` knows the stack as a [`Call`]. Neither does I/O.
 
+use alloc::vec::Vec;
+
 use super::error::DecodeError;
 use super::machine::Outcome;
 use super::message::{Message, ServiceId};

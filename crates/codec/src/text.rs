@@ -1,7 +1,8 @@
 //! Strings as received from peers: octets, in practice ASCII.
 
-use std::borrow::Cow;
-use std::fmt;
+use alloc::borrow::Cow;
+use alloc::string::String;
+use core::fmt;
 
 use bytes::Bytes;
 
@@ -43,7 +44,7 @@ impl Text {
 
     /// The text, if it is valid UTF-8.
     pub fn as_str(&self) -> Option<&str> {
-        std::str::from_utf8(&self.0).ok()
+        core::str::from_utf8(&self.0).ok()
     }
 
     /// The text, with replacement characters for invalid UTF-8.
@@ -115,6 +116,9 @@ impl fmt::Display for Text {
 
 #[cfg(test)]
 mod tests {
+    use alloc::borrow::ToOwned;
+    use alloc::format;
+
     use super::*;
 
     #[test]

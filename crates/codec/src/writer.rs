@@ -1,5 +1,7 @@
 //! Appends a message to a buffer.
 
+use alloc::vec::Vec;
+
 use super::blob::FormattedBlob;
 use super::error::{EncodeError, EncodeErrorKind};
 use super::fixed::{Count, Fixed};

@@ -5,7 +5,7 @@ use crate::model::{Count, Group, GroupKind, Item, Meaning, Number, Shape, Unsign
 use crate::source::{Span, Spanned};
 use crate::syntax::{CountField, Node};
 
-/// Maximum octets of a fixed length string, or elements of an array. No transport carries more in
+/// Maximum octets of a fixed length string, or of the smallest content of an array. No transport carries more in
 /// one message with reasonable effort, and a decoder must not be tricked into allocating gigabytes.
 const LARGEST: u32 = 1 << 20;
 
@@ -206,20 +206,59 @@ pub(crate) fn size(report: &mut Report, span: Span, attribute: &str, value: i128
     size
 }
 
-/// The total number of elements is limited, too.
-pub(crate) fn array(report: &mut Report, span: Span, dimensions: &[u32]) -> bool {
-    let elements = dimensions
+/// The octets of all elements are limited, too.
+pub(crate) fn array(report: &mut Report, span: Span, dimensions: &[u32], element: &Item) -> bool {
+    let octets = dimensions
         .iter()
-        .try_fold(1_u32, |product, &size| product.checked_mul(size));
-    let small = elements.is_some_and(|elements| elements <= LARGEST);
+        .fold(least(&element.shape), |octets, &size| {
+            octets.saturating_mul(size.into())
+        });
+    let small = octets <= LARGEST.into();
     if !small {
         report.error(
             span,
             format!(
-                "the array has more than {LARGEST} elements: use a `list` or a \
-                 `variable_length_field` for bulk data"
+                "the array has at least {octets} octets, but must not have more than {LARGEST}: use \
+                 a `list` or a `variable_length_field` for bulk data"
             ),
         );
     }
     small
+}
+
+/// The octets of the smallest value.
+fn least(shape: &Shape) -> u64 {
+    let size = |unsigned: Unsigned| unsigned.size() as u64;
+    let number = |number: Number| number.size() as u64;
+    let counted = |count: &Count| count.min.saturating_add(size(count.unsigned));
+    let smallest = |sizes: &mut dyn Iterator<Item = u64>| sizes.min().unwrap_or(0);
+    match shape {
+        Shape::Scalar(scalar) => number(scalar.number),
+        Shape::Bits(bits) => size(bits.base),
+        Shape::FixedString { length } => (*length).into(),
+        Shape::VariableString { count } | Shape::Blob { count, .. } => counted(count),
+        Shape::FormattedBlob { count, .. } => counted(count).saturating_add(1),
+        Shape::Measure { choices } => {
+            1 + smallest(&mut choices.iter().map(|it| number(it.scalar.number)))
+        }
+        Shape::Group(group) => {
+            let required = group.members.iter().filter(|member| !member.optional);
+            let sizes = required.map(|member| least(&member.shape));
+            sizes.fold(group.presence.map_or(0, size), u64::saturating_add)
+        }
+        Shape::List(list) => {
+            let elements = list.count.min.saturating_mul(least(&list.element.shape));
+            elements.saturating_add(size(list.count.unsigned))
+        }
+        Shape::Variant(variant) => {
+            let alternatives = variant.alternatives.iter();
+            smallest(&mut alternatives.map(|it| least(&it.shape))).saturating_add(size(variant.tag))
+        }
+        Shape::Array(array) => array
+            .dimensions
+            .iter()
+            .fold(least(&array.element.shape), |octets, &length| {
+                octets.saturating_mul(length.into())
+            }),
+    }
 }

@@ -128,7 +128,28 @@ pub(crate) fn value_set(report: &mut Report, set: &syntax::ValueSet, resolved: &
         .iter()
         .zip(&set.values)
         .map(|(v, s)| (v.index, s.span));
-    unique_indices(report, "values", indices)
+    unique_indices(report, "values", indices) && not_shifted(report, set, resolved)
+}
+
+/// Values are on the wire as they are. The standard counts those of a set with
+/// `offset_to_lower_limit` from the lowest one, but the code that the JAUS Tool Set generates does
+/// not, so two peers would disagree unless the lowest value is 0.
+fn not_shifted(report: &mut Report, set: &syntax::ValueSet, resolved: &ValueSet) -> bool {
+    let ranges = resolved.ranges.iter().map(|range| range.lower);
+    let values = resolved.values.iter().map(|value| value.index as f64);
+    let lowest = ranges.chain(values).fold(f64::INFINITY, f64::min);
+    let shifted = set.offset_to_lower_limit && lowest != 0.0;
+    if shifted {
+        report.error(
+            set.span,
+            format!(
+                "`offset_to_lower_limit` would count the values from {lowest} on the wire, but the \
+                 code of the JAUS Tool Set sends them as they are, so that peers disagree: set it to \
+                 `false`, and state the numbers that are on the wire"
+            ),
+        );
+    }
+    !shifted
 }
 
 /// The values fit the type of the field.
@@ -169,13 +190,7 @@ fn within(
     greatest: i128,
     holder: &str,
 ) -> bool {
-    // With `offset_to_lower_limit` the values are counted from the lowest one.
-    let shift = if set.offset_to_lower_limit {
-        lowest(resolved)
-    } else {
-        0.0
-    };
-    let holds = |value: f64| (least as f64..=greatest as f64).contains(&(value - shift));
+    let holds = |value: f64| (least as f64..=greatest as f64).contains(&value);
     let mut sound = true;
     let mut complain = |span: Span, text: String| {
         report.error(
@@ -202,12 +217,6 @@ fn within(
     }
     sound
 }
-fn lowest(set: &ValueSet) -> f64 {
-    let ranges = set.ranges.iter().map(|range| range.lower);
-    let values = set.values.iter().map(|value| value.index as f64);
-    ranges.chain(values).fold(f64::INFINITY, f64::min)
-}
-
 /// The bits of a sub-field lie within the bit field, the lower bound first.
 pub(crate) fn bits(
     report: &mut Report,

@@ -187,6 +187,9 @@ fn described(message: &Message) -> Line {
     if message.is_command {
         line.extend([Inline::Badge("command"), text(" ")]);
     }
+    if message.is_deprecated {
+        line.extend([Inline::Badge("deprecated"), text(" ")]);
+    }
     line.push(text(&message.description));
     line
 }
@@ -221,6 +224,9 @@ fn details(service: &Service, message: &Message) -> [Block; 4] {
             text(" "),
             Inline::Badge("command: from the client in control"),
         ]);
+    }
+    if message.is_deprecated {
+        line.extend([text(" "), Inline::Badge("deprecated")]);
     }
     [
         heading(3, message.name.clone(), Some(names::anchor(message))),

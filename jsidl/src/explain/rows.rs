@@ -7,7 +7,7 @@ use crate::dynamic::trace::{Part, Place, Trace};
 use crate::dynamic::{Raw, Steps};
 use crate::model::{
     BitField, Choice, Count, Format, Group, Item, Meaning, Scalar, Unsigned, ValueRange, ValueSet,
-    Variant,
+    Variant, is_message_format,
 };
 
 /// Creates a row for every traced part.
@@ -84,7 +84,7 @@ impl<'m> Trace<'m> for Recorder<'m, '_> {
             Part::Number(scalar, raw) => number(row(Kind::Value), scalar, raw),
             Part::Bits(_, raw) => row(Kind::Bits).with_number(raw),
             Part::Text => text(row(Kind::Value), octets),
-            Part::Octets("JAUS MESSAGE") if !octets.is_empty() => {
+            Part::Octets(format) if is_message_format(format) && !octets.is_empty() => {
                 row(Kind::Message).with_note("unknown message")
             }
             Part::Octets(_) => row(Kind::Value).with_note(match octets.len() {

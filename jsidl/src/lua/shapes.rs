@@ -7,7 +7,7 @@ use super::fields::{Fields, Kind, within};
 use super::text;
 use crate::model::{
     Array, BitField, Choice, Count, Format, Group, Item, List, Meaning, Message, Number, Rounding,
-    Scalar, Shape, Signed, Unsigned, Variant,
+    Scalar, Shape, Signed, Unsigned, Variant, is_message_format,
 };
 
 /// The header, body and footer that exist.
@@ -64,7 +64,7 @@ impl Emitter<'_> {
             }
             Shape::Blob { count, format } => {
                 let field = self.field(name, Kind::Octets, None);
-                let (size, message) = (count.unsigned.size(), is_message(format));
+                let (size, message) = (count.unsigned.size(), is_message_format(format));
                 // Field, size and limits of the count, whether the content is a message.
                 let (min, max) = limits_or_nil(count);
                 format!("{{\"blob\",{field},{size},{min},{max},{message}}}")
@@ -123,7 +123,9 @@ impl Emitter<'_> {
         let named = formats.iter().map(|f| (u64::from(f.index), &*f.name));
         let names = self.fields.names_of(named);
         let format = self.field(&format!("{name}_format"), Kind::Uint, names);
-        let messages = formats.iter().filter(|format| is_message(&format.name));
+        let messages = formats
+            .iter()
+            .filter(|format| is_message_format(&format.name));
         let messages: Vec<_> = messages
             .map(|format| format!("[{}]=true", format.index))
             .collect();
@@ -234,9 +236,4 @@ fn limits_or_nil(count: &Count) -> (String, String) {
     } else {
         (count.min.to_string(), count.max.to_string())
     }
-}
-
-/// Whether this format holds a message that begins with its code.
-fn is_message(format: &str) -> bool {
-    format.eq_ignore_ascii_case("JAUS MESSAGE")
 }

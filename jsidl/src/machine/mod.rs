@@ -117,7 +117,7 @@ impl<'s> Stimulus<'s> {
         }
     }
 
-    fn triggers(&self, transition: &Transition) -> bool {
+    pub(crate) fn triggers(&self, transition: &Transition) -> bool {
         let trigger = &transition.trigger;
         let same_message = match (self.message, trigger.message()) {
             (Some(message), Some(named)) => named.eq_ignore_ascii_case(message),

@@ -206,7 +206,7 @@ impl Resolver<'_> {
         let required = check::required(self.report, what, element, item.as_ref());
         let item = item?;
         let dimensions: Vec<u32> = sizes.into_iter().collect::<Option<_>>()?;
-        let small = check::array(self.report, node.span, &dimensions);
+        let small = check::array(self.report, node.span, &dimensions, &item);
         (unique && required && small).then(|| Array {
             dimensions,
             element: Box::new(item),

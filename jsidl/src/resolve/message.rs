@@ -25,6 +25,7 @@ impl Resolver<'_> {
             name: declaration.name.clone(),
             code: message.code,
             is_command: message.is_command,
+            is_deprecated: message.is_deprecated,
             description: message.description.clone(),
             header,
             body: self.taken(body?, &message.body)?,

@@ -1,7 +1,7 @@
 //! Generates enums for `variant` and `variable_field`.
 
 use super::docs;
-use super::types::{Field, Type, unsigned_type};
+use super::types::{Field, Type, total, unsigned_type};
 use super::writer::Writer;
 use super::{decode, encode, random};
 use crate::model::{Choice, Item, Variant};
@@ -25,10 +25,8 @@ pub(super) fn variant(
     out.push("#[derive(Debug, Clone, PartialEq)]");
     out.push(format!("pub enum {ident} {{"));
     for field in alternatives {
-        out.doc([
-            docs::field(field, None).as_str(),
-            &docs::interpretation(field.item),
-        ]);
+        let interpretation = docs::interpretation(field.item);
+        out.doc([docs::joined(&docs::field(field, None), &interpretation).as_str()]);
         out.push(format!("{}({}),", field.ident, field.ty.rust("")));
     }
     out.push("}");
@@ -42,20 +40,13 @@ pub(super) fn variant(
         .unwrap_or(0);
     out.push(format!(
         "const MIN_LEN: usize = {};",
-        least + variant.tag.size()
+        total([least, variant.tag.size()].into_iter())
     ));
     variant_len(out, variant.tag.size(), alternatives);
     variant_write(out, tag, alternatives);
     variant_read(out, tag, alternatives);
     out.push("}");
-    variant_view(out, ident, alternatives);
-    random::one_of(
-        out,
-        ident,
-        alternatives
-            .iter()
-            .map(|field| (field.ident.as_str(), &field.ty)),
-    );
+    variant_members(out, ident, alternatives);
 }
 
 fn default_impl(out: &mut Writer, ident: &str, first: &str) {
@@ -125,40 +116,15 @@ fn variant_read(out: &mut Writer, tag: &str, alternatives: &[Field<'_>]) {
     out.push("}\n}");
 }
 
-fn variant_view(out: &mut Writer, ident: &str, alternatives: &[Field<'_>]) {
+/// Writes the view and random values.
+fn variant_members(out: &mut Writer, ident: &str, alternatives: &[Field<'_>]) {
+    let alternative = |field: &Field<'_>| {
+        let made = random::maker(field).map_or_else(String::new, |maker| format!(" = {maker}"));
+        format!("{}: {:?}{made}", field.ident, field.item.name)
+    };
+    let members: Vec<_> = alternatives.iter().map(alternative).collect();
     out.gap();
-    out.push("codec::if_serde! {");
-    out.push(format!("impl codec::view::View for {ident} {{"));
-    out.push("fn view(&self) -> codec::view::Value {");
-    out.push("match self {");
-    for field in alternatives {
-        out.push(format!("Self::{}(value) => {{", field.ident));
-        let value = "codec::view::View::view(value)";
-        out.push(format!(
-            "codec::view::Value::alternative({:?}, {value})\n}}",
-            field.item.name
-        ));
-    }
-    out.push(
-        "}\n}\n\nfn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {",
-    );
-    out.push("let (name, value) = value.chosen()?;\nlet read = match name {");
-    for field in alternatives {
-        let name = &field.item.name;
-        out.push(format!(
-            "{name:?} => codec::view::View::from_view(value).map(Self::{}),",
-            field.ident
-        ));
-    }
-    let names: Vec<_> = alternatives
-        .iter()
-        .map(|field| field.item.name.as_str())
-        .collect();
-    out.push(format!(
-        "_ => return Err(codec::view::Error::unknown_key(name, &{names:?})),"
-    ));
-    out.push("};\nread.map_err(|error| error.within(name))\n}\n}");
-    out.push(format!("codec::serde_by_view!({ident});\n}}"));
+    out.list(&format!("codec::alternatives!({ident} {{"), &members, "});");
 }
 
 /// A variant without alternatives consists of its tag, 0.
@@ -176,8 +142,7 @@ fn without_alternatives(out: &mut Writer, ident: &str, tag: &str, size: usize) {
     out.gap();
     out.push("fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {");
     out.push(format!("input.tag::<{tag}>(0)?;\nOk(Self)\n}}\n}}"));
-    super::view::group(out, ident, &[]);
-    random::group(out, ident, &[]);
+    super::members::group(out, ident, &[]);
 }
 
 /// Writes the type of a `variable_field`.

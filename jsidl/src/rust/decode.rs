@@ -67,9 +67,8 @@ pub(super) fn some(out: &mut Writer, fields: &[Field<'_>]) {
 /// Builds the struct from variables with the names of its fields.
 fn construct(out: &mut Writer, fields: &[Field<'_>]) {
     let idents: Vec<_> = fields.iter().map(|field| field.ident.as_str()).collect();
-    out.push("Ok(Self {");
-    out.push(idents.join(",\n") + ",");
-    out.push("})\n}");
+    out.list("Ok(Self {", &idents, "})");
+    out.push("}");
 }
 
 /// Local variables with names that differ from all fields.
@@ -97,19 +96,18 @@ fn full(out: &mut Writer, fields: &[Field<'_>], names: &Locals) {
     let (run, present, all) = (&names.run, &names.present, all_bits(fields));
     out.push(format!("if {present} == {all:#x} {{"));
     take_run(out, fields, names);
-    out.push("return Ok(Self {");
     let mut at = 0;
-    for field in fields {
+    let member = |field: &Field<'_>| {
         let value = format!("codec::Fixed::get({run}, {at})");
-        let value = if optional(field) {
-            format!("Some({value})")
-        } else {
-            value
-        };
-        out.push(format!("{}: {value},", field.ident));
         at += field.ty.size().unwrap_or(0);
-    }
-    out.push("});\n}");
+        match optional(field) {
+            true => format!("{}: Some({value})", field.ident),
+            false => format!("{}: {value}", field.ident),
+        }
+    };
+    let members: Vec<_> = fields.iter().map(member).collect();
+    out.list("return Ok(Self {", &members, "});");
+    out.push("}");
 }
 
 /// Reads several values of fixed size with one length check.
@@ -119,14 +117,11 @@ fn take_run(out: &mut Writer, fields: &[Field<'_>], names: &Locals) {
         .flat_map(|f| f.ty.named_sizes(&f.item.name))
         .collect();
     let size: usize = sizes.iter().map(|(_, size)| size).sum();
-    out.push(format!(
-        "let {} = {}.run::<{size}>(&[",
-        names.run, names.input
-    ));
-    for (name, size) in sizes {
-        out.push(format!("({name:?}, {size}),"));
-    }
-    out.push("])?;");
+    let open = format!("let {} = {}.run::<{size}>(&[", names.run, names.input);
+    let sizes = sizes
+        .iter()
+        .map(|(name, size)| format!("({name:?}, {size})"));
+    out.list(&open, &sizes.collect::<Vec<_>>(), "])?;");
 }
 
 fn members(out: &mut Writer, fields: &[Field<'_>], names: &Locals) {
@@ -203,26 +198,21 @@ fn value(ty: &Type) -> String {
         Type::Array {
             dimensions,
             element,
-        } if ty.size().is_none() => array(dimensions, element),
+        } if ty.size().is_none() => array(dimensions, element, ty),
         Type::Composite { .. } => "codec::Composite::read(input)".to_owned(),
         _ => "input.fixed()".to_owned(),
     }
 }
 
 /// The first dimension is the innermost loop.
-fn array(dimensions: &[u32], element: &Type) -> String {
-    let empty = |inner, _: &u32| format!("::std::array::from_fn(|_| {inner})");
-    let empty = dimensions
-        .iter()
-        .fold("Default::default()".to_owned(), empty);
+fn array(dimensions: &[u32], element: &Type, whole: &Type) -> String {
+    let empty = whole.filled("Default::default()");
     let indices: String = (0..dimensions.len()).map(|i| format!("[i{i}]")).collect();
-    let ty = dimensions
-        .iter()
-        .rev()
-        .fold("_".to_owned(), |inner, size| format!("[{inner}; {size}]"));
+    let ty = whole.array_of("_");
     let mut body = format!("array{indices} = {}?;", value(element));
     for (i, size) in dimensions.iter().enumerate() {
         body = format!("for i{i} in 0..{size} {{ {body} }}");
     }
-    format!("{{ let mut array: {ty} = {empty}; {body} Ok(array) }}")
+    let least = whole.least();
+    format!("{{ input.require({least})?; let mut array: {ty} = {empty}; {body} Ok(array) }}")
 }

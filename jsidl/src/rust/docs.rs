@@ -97,6 +97,14 @@ pub(super) fn ranges(set: &ValueSet) -> Option<String> {
     (!ranges.is_empty()).then(|| ranges.join(" or "))
 }
 
+/// The facts about a part of a message and the author's text, as one paragraph.
+pub(super) fn joined(facts: &str, text: &str) -> String {
+    match text.is_empty() {
+        true => facts.to_owned(),
+        false => format!("{facts} {text}"),
+    }
+}
+
 /// The author's text about an item.
 pub(super) fn interpretation(item: &Item) -> String {
     prose(&item.interpretation)

@@ -42,23 +42,15 @@ fn encoded_len(out: &mut Writer, body: &Body<'_>) {
             }
         }
     }
-    out.push("fn encoded_len(&self) -> usize {");
-    sum(out, constant, &terms);
-    out.push("}");
-}
-
-fn sum(out: &mut Writer, constant: usize, terms: &[String]) {
-    if terms.is_empty() {
-        out.push(constant.to_string());
-        return;
+    if constant > 0 || terms.is_empty() {
+        terms.insert(0, constant.to_string());
     }
-    let first = if constant > 0 {
-        vec![constant.to_string()]
-    } else {
-        Vec::new()
-    };
-    let all: Vec<_> = first.into_iter().chain(terms.iter().cloned()).collect();
-    out.push(all.join("\n+ "));
+    if let [term] = &*terms {
+        return out.push(format!("fn encoded_len(&self) -> usize {{ {term} }}"));
+    }
+    out.push("fn encoded_len(&self) -> usize {");
+    out.terms(&terms, "+ ");
+    out.push("}");
 }
 
 /// The size of a value in octets, if it is constant.
@@ -89,15 +81,15 @@ pub(super) fn length(ty: &Type, value: &str) -> String {
             let before = count.unsigned.size();
             match constant_len(element) {
                 Some(size) => format!("{before} + {}", times(size, &format!("{value}.len()"))),
-                None => format!("{before} + {}", total(value, element)),
+                None => format!("{before} + {}", total(&format!("{value}.iter()"), element)),
             }
         }
         Type::Array {
             dimensions,
             element,
         } => {
-            let flat = ".as_flattened()".repeat(dimensions.len() - 1);
-            total(&format!("{value}{flat}"), element)
+            let flat = ".flatten()".repeat(dimensions.len() - 1);
+            total(&format!("{value}.iter(){flat}"), element)
         }
         // `value` is the reference of a closure or a pattern, anything else a place expression.
         _ if value == "value" => "codec::Composite::encoded_len(value)".to_owned(),
@@ -113,9 +105,9 @@ fn times(size: usize, count: &str) -> String {
     }
 }
 
-/// An expression for the size of all elements.
+/// An expression for the size of all elements, given an iterator over them.
 fn total(elements: &str, element: &Type) -> String {
-    format!("{elements}.iter().map({}).sum::<usize>()", measure(element))
+    format!("{elements}.map({}).sum::<usize>()", measure(element))
 }
 
 /// A function for the size of a value: a path or a closure.
@@ -168,8 +160,15 @@ fn members(out: &mut Writer, body: &Body<'_>) {
                 0 => format!("{ty}::from(self.{}.is_some())", field.ident),
                 _ => format!("{ty}::from(self.{}.is_some()) << {bit}", field.ident),
             });
-        out.push("let present =");
-        out.push(bits.collect::<Vec<_>>().join("\n| ") + ";");
+        let mut bits: Vec<_> = bits.collect();
+        bits.iter_mut()
+            .take(1)
+            .for_each(|first| first.insert_str(0, "let present = "));
+        bits.iter_mut()
+            .last()
+            .into_iter()
+            .for_each(|last| last.push(';'));
+        out.terms(&bits, "| ");
         vector = Type::Number(Number::Unsigned(presence));
         before.push(("present".to_owned(), &vector));
     }
@@ -195,18 +194,16 @@ fn members(out: &mut Writer, body: &Body<'_>) {
 fn full(out: &mut Writer, body: &Body<'_>, presence: Unsigned) {
     let Body { fields, .. } = body;
     let taken: Vec<_> = fields.iter().map(|field| field.ident.as_str()).collect();
-    out.push("if let Self {");
-    for field in *fields {
-        let binding = binding(field, &taken);
-        let ident = &field.ident;
-        out.push(match optional(field) {
-            true => format!("{ident}: Some({binding}),"),
-            false if binding == *ident => format!("{ident},"),
-            false => format!("{ident}: {binding},"),
-        });
-    }
-    out.push("} = self");
-    out.push("{");
+    let pattern = |field: &Field<'_>| {
+        let (binding, ident) = (binding(field, &taken), &field.ident);
+        match optional(field) {
+            true => format!("{ident}: Some({binding})"),
+            false if binding == *ident => binding,
+            false => format!("{ident}: {binding}"),
+        }
+    };
+    let patterns: Vec<_> = fields.iter().map(pattern).collect();
+    out.list("if let Self {", &patterns, "} = self {");
     let all = all_bits(fields);
     let code = body.message.then(|| (CODE.0.to_owned(), &CODE.1));
     let vector = Type::Number(Number::Unsigned(presence));

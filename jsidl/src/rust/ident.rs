@@ -1,6 +1,6 @@
 //! Converts names of the definition to Rust identifiers: case, keywords, collisions.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use heck::{ToShoutySnakeCase, ToSnakeCase, ToUpperCamelCase};
 
@@ -62,6 +62,8 @@ const PRELUDE: &[&str] = &[
 #[derive(Debug, Default, Clone)]
 pub(super) struct Names {
     taken: HashSet<String>,
+    /// The last number after each name that was taken.
+    numbers: HashMap<String, u32>,
 }
 
 impl Names {
@@ -69,7 +71,13 @@ impl Names {
     pub(super) fn reserving(names: &[&str]) -> Self {
         Self {
             taken: names.iter().map(|&name| name.to_owned()).collect(),
+            numbers: HashMap::new(),
         }
+    }
+
+    /// Reserves more names.
+    pub(super) fn reserve(&mut self, names: &[String]) {
+        self.taken.extend(names.iter().cloned());
     }
 
     /// Identifier of a field, function or module: `Position_RMS` becomes `position_rms`.
@@ -80,6 +88,19 @@ impl Names {
         } else {
             ident
         }
+    }
+
+    /// Identifier of a function, and that of another one with a prefix: `speed_m` and `set_speed_m`.
+    /// Neither is that of an earlier function.
+    pub(super) fn snake_pair(&mut self, name: &str, prefix: &str) -> (String, String) {
+        let base = leading(&name.to_snake_case(), "_");
+        let mut free = base.clone();
+        while self.taken.contains(&free) || self.taken.contains(&format!("{prefix}{free}")) {
+            free = format!("{base}_{}", self.next_number(&base));
+        }
+        let first = self.snake(&free);
+        let second = self.snake(&format!("{prefix}{free}"));
+        (first, second)
     }
 
     /// Identifier of a type or an alternative: `ReportServiceList`.
@@ -97,13 +118,21 @@ impl Names {
         let reserved = PATH_KEYWORDS.contains(&ident.as_str()) || PRELUDE.contains(&ident.as_str());
         let base = if reserved { format!("{ident}_") } else { ident };
         let mut candidate = base.clone();
-        let mut number = 2;
         while !self.taken.insert(candidate.clone()) {
-            let separator = if base.ends_with('_') { "" } else { separator };
-            candidate = format!("{base}{separator}{number}");
-            number += 1;
+            let number = self.next_number(&base);
+            candidate = match base.strip_suffix('_') {
+                Some(stem) => format!("{stem}{separator}{number}"),
+                None => format!("{base}{separator}{number}"),
+            };
         }
         candidate
+    }
+
+    /// The next number after a name, from 2.
+    fn next_number(&mut self, base: &str) -> u32 {
+        let number = self.numbers.entry(base.to_owned()).or_insert(1);
+        *number = number.saturating_add(1);
+        *number
     }
 }
 

@@ -1,46 +1,20 @@
 //! Generates a message: its struct, its codec, and the module of its nested types.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
+use super::conversions::Member;
+use super::plan::Plan;
 use super::structs::Body;
 use super::types::{Definition, Field, Kind, Nested};
 use super::writer::Writer;
-use super::{choices, decode, docs, encode, newtypes, random, structs, view};
+use super::{choices, conversions, decode, docs, encode, members, newtypes, structs};
 use crate::model::{Group, Id, Item, Message, Shape, Unsigned};
 
-/// A message type to generate.
-#[derive(Debug)]
-pub(super) struct Plan<'m> {
-    pub(super) message: &'m Message,
-    /// Name of the type, and of the module with its nested types.
-    pub(super) ident: String,
-    pub(super) module: String,
-    /// The module of an older layout; `None` for the newest.
-    pub(super) version: Option<String>,
-    /// The declaring services, the newest version first.
-    pub(super) services: Vec<&'m Id>,
-    /// Whether the command requires control.
-    pub(super) needs_control: bool,
-    /// Whether the command requires a component that is ready.
-    pub(super) needs_readiness: bool,
-}
-
-impl Plan<'_> {
-    /// The type's path from the root of the set.
-    pub(super) fn path(&self) -> String {
-        match &self.version {
-            Some(version) => format!("{version}::{}", self.ident),
-            None => self.ident.clone(),
-        }
-    }
-
-    /// The path of the module with its nested types from the root of the set.
-    pub(super) fn module_path(&self) -> String {
-        match &self.version {
-            Some(version) => format!("{version}::{}", self.module),
-            None => self.module.clone(),
-        }
-    }
+/// What was written of a message.
+pub(super) struct Written {
+    /// Whether there is a module with its nested types.
+    pub(super) has_module: bool,
+    pub(super) members: Vec<Member>,
 }
 
 /// Members of a message's struct.
@@ -58,7 +32,7 @@ pub(super) fn message<'m>(
     sections: &'m [Item],
     other_layouts: &[String],
     shared: &mut HashMap<String, String>,
-) {
+) -> Written {
     let mut nested = Nested::new(shared, plan.module_path());
     let content = content(plan.message, sections, &mut nested);
     let definitions = nested.definitions;
@@ -75,6 +49,11 @@ pub(super) fn message<'m>(
             kind(message)
         )
         .as_str(),
+        if message.is_deprecated {
+            DEPRECATED
+        } else {
+            ""
+        },
         &docs::prose(&message.description),
         &format!("Declared by {}.", services(&plan.services)),
     ]);
@@ -87,11 +66,12 @@ pub(super) fn message<'m>(
     out.push(format!("impl codec::Message for {ident} {{"));
     out.push(format!("const CODE: u16 = 0x{:04X};", message.code));
     out.push(format!("const NAME: &'static str = {:?};", message.name));
-    out.push(format!("const IS_COMMAND: bool = {};", message.is_command));
-    out.push(format!(
-        "const NEEDS_CONTROL: bool = {};",
-        plan.needs_control
-    ));
+    if message.is_command {
+        out.push("const IS_COMMAND: bool = true;");
+    }
+    if plan.needs_control {
+        out.push("const NEEDS_CONTROL: bool = true;");
+    }
     if plan.needs_readiness {
         out.push("const NEEDS_READINESS: bool = true;");
     }
@@ -111,14 +91,20 @@ pub(super) fn message<'m>(
         },
     );
     match &content {
-        Content::Flat(fields, _) => view::group(out, ident, fields),
-        Content::Single(fields) => view::transparent(out, ident, &fields[0]),
+        Content::Flat(fields, _) => members::group(out, ident, fields),
+        Content::Single(fields) => members::transparent(out, ident, &fields[0]),
     }
-    random::group(out, ident, fields);
-    if !definitions.is_empty() {
+    let has_module = !definitions.is_empty();
+    if has_module {
         module(out, plan, &definitions);
     }
+    Written {
+        has_module,
+        members: conversions::members(fields, &definitions, &plan.module_path()),
+    }
 }
+
+const DEPRECATED: &str = "Deprecated: newer components use another message in its place.";
 
 fn kind(message: &Message) -> &'static str {
     if message.is_command {
@@ -191,7 +177,6 @@ pub(super) fn fields<'m>(message: &'m Message, nested: &mut Nested<'m, '_>) -> V
 
 /// Completes an `impl` of the codec.
 fn codec(out: &mut Writer, ident: &str, body: &Body<'_>) {
-    out.gap();
     encode::group(out, body);
     out.gap();
     decode::group(out, body);
@@ -210,26 +195,24 @@ fn module(out: &mut Writer, plan: &Plan<'_>, definitions: &[Definition<'_>]) {
     out.gap();
     out.push(format!("/// The types inside [`{}`].", plan.ident));
     out.push(format!("pub mod {} {{", plan.module));
-    let root = if plan.version.is_some() {
-        "super::super::"
-    } else {
-        "super::"
-    };
+    let root = "super::super::";
     if definitions
         .iter()
         .any(|definition| !matches!(definition.kind, Kind::Reused(_)))
     {
         out.push("use super::codec;");
     }
+    let mut reused: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for definition in definitions {
-        if let Kind::Reused(path) = &definition.kind {
-            out.push("#[doc(inline)]");
-            let renamed = match path.rsplit_once("::") {
-                Some((_, last)) if last == definition.ident => String::new(),
-                _ => format!(" as {}", definition.ident),
-            };
-            out.push(format!("pub use {root}{path}{renamed};"));
+        if let Kind::Reused(path) = &definition.kind
+            && let Some((module, name)) = path.rsplit_once("::")
+        {
+            let types = reused.entry(module).or_default();
+            types.push(super::alias(name, &definition.ident));
         }
+    }
+    for (module, types) in reused {
+        out.import(&format!("{root}{module}"), &types);
     }
     for definition in definitions {
         define(out, definition);
@@ -298,6 +281,5 @@ fn structure(out: &mut Writer, ident: &str, item: &Item, group: &Group, fields: 
         out.push(format!("const MIN_LEN: usize = {};", body.least()));
         codec(out, ident, &body);
     }
-    view::group(out, ident, fields);
-    random::group(out, ident, fields);
+    members::group(out, ident, fields);
 }

@@ -2,20 +2,25 @@
 //! `jaus`.
 //!
 //! The output is indented and documented, to be included from a build script's `OUT_DIR`;
-//! [`build`](crate::build) does all of that. Messages are flat in the module; the types inside a
-//! message are in a module with its name. A message that several services or versions declare with
-//! one layout is one type; an older layout is in a module of its version, such as `v1_0`. The state
-//! machine of a service is in the service's module.
+//! [`build`](crate::build) does all of that. Messages are in modules of the versions of their services,
+//! such as `v1_0`; the types inside a message are in a module with its name. The newest layouts are in
+//! the root, too. A message that several services or versions declare with one layout is one type. A
+//! message converts into its next newer layout if that loses nothing. The state machine of a service is
+//! in the service's module.
 
+mod arrays;
 mod choices;
+mod conversions;
 mod decode;
 mod docs;
 mod encode;
 mod ident;
 mod layout;
 mod machine;
+mod members;
 mod messages;
 mod newtypes;
+mod plan;
 mod queries;
 mod random;
 mod registry;
@@ -24,19 +29,57 @@ pub(crate) mod selections;
 mod services;
 mod structs;
 mod types;
-mod view;
 mod writer;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use self::ident::{Names, version_module};
-use self::machine::Messages;
-use self::messages::Plan;
+use self::machine::{Extern, Messages};
+use self::messages::Written;
+use self::plan::Plan;
 use self::registry::ServicePaths;
 use self::writer::Writer;
-use crate::fingerprint;
 use crate::library::Library;
-use crate::model::{Id, Message, Service, Version};
+use crate::model::{Service, Version};
+
+/// How generated code finds what it refers to.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Settings {
+    runtime: String,
+    /// Paths of other modules, each with the beginnings of the URNs of its services.
+    externs: Vec<(String, Vec<String>)>,
+}
+
+impl Settings {
+    /// `runtime` is the path of the codec runtime as the generated module sees it, for example
+    /// `::jaus::codec`.
+    pub fn new(runtime: &str) -> Self {
+        Self {
+            runtime: runtime.to_owned(),
+            externs: Vec::new(),
+        }
+    }
+
+    /// The same with another path of the codec runtime.
+    #[must_use]
+    pub fn with_runtime(mut self, path: &str) -> Self {
+        path.clone_into(&mut self.runtime);
+        self
+    }
+
+    /// The module that has the messages of the services whose URN begins with `urn`, for example
+    /// `::jaus::messages::core`. State machines then get these messages as their types instead of as
+    /// octets. The module must have been generated from the same definitions.
+    #[must_use]
+    pub fn extern_path(mut self, urn: &str, path: &str) -> Self {
+        match self.externs.iter_mut().find(|(known, _)| known == path) {
+            Some((_, urns)) => urns.push(urn.to_owned()),
+            None => self.externs.push((path.to_owned(), vec![urn.to_owned()])),
+        }
+        self
+    }
+}
 
 /// Generates the Rust module of a set of services, which may inherit from others in the library.
 ///
@@ -47,6 +90,16 @@ pub fn module<'m>(
     services: impl IntoIterator<Item = &'m Service>,
     runtime: &str,
 ) -> String {
+    module_with(library, services, &Settings::new(runtime))
+}
+
+/// [`module`] with other settings.
+pub fn module_with<'m>(
+    library: &'m Library,
+    services: impl IntoIterator<Item = &'m Service>,
+    settings: &Settings,
+) -> String {
+    let runtime = &settings.runtime;
     let mut services: Vec<_> = services.into_iter().collect();
     services.sort_by_key(|service| &service.id);
     let mut out = Writer::default();
@@ -56,12 +109,20 @@ pub fn module<'m>(
         " as codec"
     };
     out.push(format!("use {runtime}{rename};"));
+    let modules = plan::version_modules(&services);
     let mut names = Names::reserving(&["codec"]);
+    names.reserve(&modules);
     let versions = registry::versions(&services, &mut names);
-    let plans = plan(library, &services, &mut names);
+    let plans = plan::plan(library, &services, &mut names);
+    let externs: Vec<_> = settings
+        .externs
+        .iter()
+        .map(|(path, urns)| Extern::of(library, path, urns))
+        .collect();
     let messages = Messages {
         library,
         plans: &plans,
+        externs: &externs,
     };
     let paths = registry::services(&mut out, &versions, messages);
     registry::tables(&mut out, &services, &paths, &plans);
@@ -69,152 +130,83 @@ pub fn module<'m>(
     out.finish()
 }
 
-/// Plans the types: one for every code, name and layout; sorted by code, the newest layout of a
-/// message first.
-fn plan<'m>(library: &Library, services: &[&'m Service], names: &mut Names) -> Vec<Plan<'m>> {
-    let mut messages: BTreeMap<(u16, &str), Vec<Declared<'m>>> = BTreeMap::new();
-    for service in services {
-        for message in service.messages() {
-            let layouts = messages.entry((message.code, &message.name)).or_default();
-            let needs = |base| message.is_command && inherits(library, service, base);
-            let layout = declare(layouts, message, &service.id);
-            layout.needs_control |= needs(ACCESS_CONTROL);
-            layout.needs_readiness |= needs(MANAGEMENT);
-        }
-    }
-    let mut plans = Vec::new();
-    let mut versions: BTreeMap<String, Names> = BTreeMap::new();
-    for mut layouts in messages.into_values() {
-        layouts.sort_by_key(|layout| std::cmp::Reverse(layout.version()));
-        for (age, mut layout) in layouts.into_iter().enumerate() {
-            layout
-                .services
-                .sort_by_key(|id| std::cmp::Reverse(id.version));
-            let version = (age > 0).then(|| version_module(layout.version()));
-            let names = match &version {
-                Some(version) => versions
-                    .entry(version.clone())
-                    .or_insert_with(|| Names::reserving(&["codec"])),
-                None => &mut *names,
-            };
-            plans.push(Plan {
-                message: layout.message,
-                ident: names.camel(&layout.message.name),
-                module: names.snake(&layout.message.name),
-                version,
-                services: layout.services,
-                needs_control: layout.needs_control,
-                needs_readiness: layout.needs_readiness,
-            });
-        }
-    }
-    // The modules of versions are names in the root, too.
-    for version in versions.keys() {
-        names.snake(version);
-    }
-    plans
-}
-
-/// One layout of a message with its declaring services.
-struct Declared<'m> {
-    layout: String,
-    /// The newest declaration.
-    message: &'m Message,
-    services: Vec<&'m Id>,
-    needs_control: bool,
-    needs_readiness: bool,
-}
-
-impl Declared<'_> {
-    fn version(&self) -> Version {
-        let versions = self.services.iter().map(|id| id.version);
-        versions.max().unwrap_or(Version { major: 0, minor: 0 })
-    }
-}
-
-/// Whether a service is derived from another one.
-fn inherits(library: &Library, service: &Service, urn: &str) -> bool {
-    let mut bases = library
-        .lineage(service)
-        .filter_map(|it| it.inherits_from.as_ref());
-    bases.any(|base| &*base.id.urn == urn)
-}
-
-const ACCESS_CONTROL: &str = "urn:jaus:jss:core:AccessControl";
-const MANAGEMENT: &str = "urn:jaus:jss:core:Management";
-
-/// The layout of a message in a service, which is added if it is new.
-fn declare<'l, 'm>(
-    layouts: &'l mut Vec<Declared<'m>>,
-    message: &'m Message,
-    service: &'m Id,
-) -> &'l mut Declared<'m> {
-    let layout = fingerprint::layout(message);
-    let known = layouts.iter().position(|it| it.layout == layout);
-    let index = known.unwrap_or(layouts.len());
-    if known.is_none() {
-        layouts.push(Declared {
-            layout,
-            message,
-            services: Vec::new(),
-            needs_control: false,
-            needs_readiness: false,
-        });
-    }
-    let declared = &mut layouts[index];
-    if service.version > declared.version() {
-        declared.message = message;
-    }
-    if !declared.services.contains(&service) {
-        declared.services.push(service);
-    }
-    declared
-}
-
 fn write(out: &mut Writer, plans: &[Plan<'_>], paths: &ServicePaths<'_>) {
     let sections: Vec<_> = plans
         .iter()
         .map(|plan| messages::sections(plan.message))
         .collect();
-    let all = || plans.iter().zip(&sections);
     let mut shared = HashMap::new();
-    for (plan, sections) in all().filter(|(plan, _)| plan.version.is_none()) {
-        let others = other_layouts(plan, plans, paths);
-        messages::message(out, plan, sections, &others, &mut shared);
-        queries::implement(out, plan, plans, &shared);
-        reports::implement(out, plan, plans);
-    }
-    let mut versions: Vec<_> = plans
-        .iter()
-        .filter_map(|plan| plan.version.as_ref())
-        .collect();
-    versions.sort();
-    versions.dedup();
-    for version in versions {
+    let mut written: Vec<Option<Written>> = plans.iter().map(|_| None).collect();
+    let versions = plans.iter().flat_map(|plan| {
+        let later = plan.later.iter().map(|(version, _)| *version);
+        std::iter::once(plan.version).chain(later)
+    });
+    for version in versions.collect::<BTreeSet<_>>() {
         out.gap();
-        let number = version.trim_start_matches('v').replace('_', ".");
         out.push(format!(
-            "/// Messages as services of version {number} had them, where newer ones differ."
+            "/// The messages of services of version {version}."
         ));
-        out.push(format!("pub mod {version} {{\nuse super::codec;"));
-        for (plan, sections) in all().filter(|(plan, _)| plan.version.as_ref() == Some(version)) {
-            let others = other_layouts(plan, plans, paths);
-            messages::message(out, plan, sections, &others, &mut shared);
-            queries::implement(out, plan, plans, &shared);
-            reports::implement(out, plan, plans);
+        out.push(format!("pub mod {} {{", version_module(version)));
+        if plans.iter().any(|plan| plan.version == version) {
+            out.push("use super::codec;");
+        }
+        aliases(out, plans, &written, |plan| {
+            let mut later = plan.later.iter();
+            later.find(|(it, _)| *it == version).map(|(_, names)| names)
+        });
+        for (place, plan) in plans.iter().enumerate() {
+            if plan.version == version {
+                let others = other_layouts(plan, plans, paths);
+                let section = &sections[place];
+                written[place] = Some(messages::message(out, plan, section, &others, &mut shared));
+                queries::implement(out, plan, plans, &shared);
+                reports::implement(out, plan, plans);
+            }
         }
         out.push("}");
+    }
+    aliases(out, plans, &written, |plan| plan.root.as_ref());
+    let members = written.into_iter().flatten().map(|it| it.members);
+    conversions::implement(out, plans, &members.collect::<Vec<_>>());
+}
+
+/// Writes the imports of types that are defined in the modules of other versions, by the names that
+/// they get.
+fn aliases<'p>(
+    out: &mut Writer,
+    plans: &'p [Plan<'_>],
+    written: &[Option<Written>],
+    names: impl Fn(&'p Plan<'_>) -> Option<&'p [String; 2]>,
+) {
+    let root = if out.is_in_module() { "super::" } else { "" };
+    let mut by_version: BTreeMap<Version, Vec<String>> = BTreeMap::new();
+    for (plan, written) in plans.iter().zip(written) {
+        let (Some([ident, module]), Some(written)) = (names(plan), written) else {
+            continue;
+        };
+        let items = by_version.entry(plan.version).or_default();
+        items.push(alias(&plan.ident, ident));
+        if written.has_module {
+            items.push(alias(&plan.module, module));
+        }
+    }
+    for (version, items) in by_version {
+        out.gap();
+        out.import(&format!("{root}{}", version_module(version)), &items);
+    }
+}
+
+fn alias(name: &str, new: &str) -> String {
+    match name == new {
+        true => name.to_owned(),
+        false => format!("{name} as {new}"),
     }
 }
 
 /// The identities of the services that declare a message with another layout.
 fn other_layouts(plan: &Plan<'_>, plans: &[Plan<'_>], paths: &ServicePaths<'_>) -> Vec<String> {
-    let root = plan.version.as_ref().map_or("", |_| "super::");
-    let same = |it: &&Plan<'_>| {
-        (it.message.code, &it.message.name) == (plan.message.code, &plan.message.name)
-    };
-    let others = plans.iter().filter(same);
+    let others = plans.iter().filter(|it| it.is_layout_of(plan.message));
     let others = others.flat_map(|it| &it.services);
     let others = others.filter(|id| !plan.services.contains(id));
-    others.map(|id| format!("{root}{}", paths[*id])).collect()
+    others.map(|id| format!("super::{}", paths[*id])).collect()
 }

@@ -4,7 +4,9 @@ use super::docs;
 use super::types::{SubType, number_type, unsigned_type, width};
 use super::writer::Writer;
 use crate::dynamic::Steps;
-use crate::model::{BitField, Item, NamedValue, Number, Rounding, Scale, Unsigned, ValueSet};
+use crate::model::{
+    BitField, Item, NamedValue, Number, Rounding, Scale, SubField, Unsigned, ValueSet,
+};
 
 const DERIVES: &str = "#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]";
 
@@ -68,10 +70,9 @@ pub(super) fn enumeration(
     out.gap();
     out.push(format!("impl {ident} {{"));
     for (constant, value) in values {
-        out.doc([
-            format!("`{}` = {}.", docs::prose(&value.name), value.index).as_str(),
-            &docs::prose(&value.interpretation),
-        ]);
+        let value_is = format!("`{}` = {}.", docs::prose(&value.name), value.index);
+        let interpretation = docs::prose(&value.interpretation);
+        out.doc([docs::joined(&value_is, &interpretation).as_str()]);
         out.push(format!(
             "pub const {constant}: Self = Self({});",
             value.index
@@ -79,11 +80,13 @@ pub(super) fn enumeration(
     }
     out.push("}");
     out.gap();
-    out.push(format!("codec::enumeration!({ident}({ty}), ["));
-    for (_, value) in values {
-        out.push(format!("({}, {:?}),", value.index, value.name));
-    }
-    out.push("]);");
+    let entry = |(_, value): &(String, NamedValue)| format!("({}, {:?})", value.index, value.name);
+    let entries: Vec<_> = values.iter().map(entry).collect();
+    out.list(
+        &format!("codec::enumeration!({ident}({ty}), ["),
+        &entries,
+        "]);",
+    );
 }
 
 /// Writes the type of a bit field.
@@ -103,32 +106,31 @@ pub(super) fn bits(
     out.push(DERIVES);
     out.push(format!("pub struct {ident}(pub {ty});"));
     out.gap();
-    out.push(format!("impl {ident} {{"));
+    out.push(format!("codec::sub_fields!({ident}({ty}) {{"));
     for field in fields {
-        sub_field(out, bits.base, field);
+        sub_field(out, field);
     }
+    out.push("});");
     if is_time_stamp(bits) {
         out.gap();
+        out.push(format!("impl {ident} {{"));
         out.push("/// The stamp of a time since the beginning of 1970 (UTC).\n#[must_use]");
-        out.push("pub const fn at(since_1970: ::std::time::Duration) -> Self {");
-        out.push("Self(codec::time_stamp(since_1970))\n}");
+        out.push("pub const fn at(since_1970: ::core::time::Duration) -> Self {");
+        out.push("Self(codec::time_stamp(since_1970))\n}\n}");
     }
-    out.push("}");
     out.gap();
-    out.push(format!("codec::bit_field!({ident}({ty}), ["));
-    for SubType {
-        field, enumeration, ..
-    } in fields
-    {
-        let values = enumeration
-            .as_ref()
-            .map_or_else(String::new, |values| format!(", {values}"));
-        out.push(format!(
-            "({:?}, {}, {}{values}),",
-            field.name, field.from, field.to
-        ));
-    }
-    out.push("]);");
+    let entry = |sub: &SubType<'_>| {
+        let values = sub.enumeration.as_ref();
+        let values = values.map_or_else(String::new, |values| format!(", {values}"));
+        let SubField { name, from, to, .. } = sub.field;
+        format!("({name:?}, {from}, {to}{values})")
+    };
+    let entries: Vec<_> = fields.iter().map(entry).collect();
+    out.list(
+        &format!("codec::bit_field!({ident}({ty}), ["),
+        &entries,
+        "]);",
+    );
 }
 
 /// Whether it is the standard's time stamp, in the layout of `jaus_codec::time_stamp`.
@@ -146,14 +148,14 @@ const TIME_STAMP: [(&str, u8, u8); 5] = [
     ("Day", 27, 31),
 ];
 
-fn sub_field(out: &mut Writer, base: Unsigned, sub: &SubType<'_>) {
+fn sub_field(out: &mut Writer, sub: &SubType<'_>) {
     let SubType {
         field,
         ident,
+        replace,
         enumeration,
     } = sub;
     let (name, from, to) = (&field.name, field.from, field.to);
-    let base = unsigned_type(base);
     let int = unsigned_type(width(field));
     let (least, greatest) = limits(sub);
     let place = if from == to {
@@ -163,48 +165,14 @@ fn sub_field(out: &mut Writer, base: Unsigned, sub: &SubType<'_>) {
     };
     let range =
         docs::ranges(&field.values).map_or_else(String::new, |ranges| format!(", {ranges}"));
-    out.gap();
-    out.doc([
-        format!("`{name}`: {place}{range}.").as_str(),
-        &docs::prose(&field.interpretation),
-    ]);
-    let raw = if base == "u64" {
-        "self.0"
-    } else {
-        "self.0 as u64"
-    };
-    let get = format!("codec::bits::get({raw}, {from}, {to}) as {int}");
-    let ty = enumeration.as_deref().unwrap_or(int);
-    let wrapped = if enumeration.is_some() {
-        format!("{ty}({get})")
-    } else {
-        get
-    };
+    let facts = format!("`{name}`: {place}{range}.");
+    let interpretation = docs::prose(&field.interpretation);
+    out.doc([docs::joined(&facts, &interpretation).as_str()]);
+    let values = enumeration
+        .as_ref()
+        .map_or_else(String::new, |values| format!(" as {values}"));
     out.push(format!(
-        "pub const fn {ident}(self) -> {ty} {{\n{wrapped}\n}}"
-    ));
-    out.gap();
-    let value = if enumeration.is_some() {
-        "value.0"
-    } else {
-        "value"
-    };
-    out.doc([
-        format!("The same with another `{name}`.").as_str(),
-        "# Errors",
-    ]);
-    out.push(format!("/// If the value is not in {least} to {greatest}."));
-    let function = format!("with_{}", ident.trim_start_matches("r#"));
-    out.push(format!(
-        "pub const fn {function}(self, value: {ty}) -> Result<Self, codec::OutOfRange> {{"
-    ));
-    let field = format!("({name:?}, {from}, {to})");
-    let value = format!("{value} as u64");
-    out.push(format!(
-        "match codec::bits::set_checked({raw}, {field}, {value}, ({least}, {greatest})) {{"
-    ));
-    out.push(format!(
-        "Ok(raw) => Ok(Self(raw as {base})),\nErr(error) => Err(error),\n}}\n}}"
+        "{ident}: {int}{values}, {from} to {to}, {least} to {greatest}, {name:?} => {replace};"
     ));
 }
 

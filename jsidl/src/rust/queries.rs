@@ -4,8 +4,9 @@ use std::collections::HashMap;
 
 use super::ident::Names;
 use super::layout::Layout;
-use super::messages::Plan;
+use super::plan::Plan;
 use super::selections::{Record, Selection, Step, selections};
+use super::structs::method_names;
 use super::types::{Field, Kind, Type, shared_key};
 use super::writer::Writer;
 use crate::fingerprint;
@@ -22,39 +23,46 @@ pub(super) fn implement(
     let Some(report) = report(query, plans) else {
         return;
     };
-    let path = match (&query.version, &report.version) {
-        (Some(version), reports) if reports.as_ref() != Some(version) => {
-            format!("super::{}", report.path())
-        }
-        (Some(_), _) => report.ident.clone(),
-        (None, _) => report.path(),
+    let (path, types) = match report.names_in(query.version) {
+        Some([ident, module]) => (ident.to_owned(), module.to_owned()),
+        None => (
+            format!("super::{}", report.definition()),
+            format!("super::{}", report.module_path()),
+        ),
     };
     let layouts = Layout::of(query.message).zip(Layout::of(report.message));
     let request = layouts
         .as_ref()
         .and_then(|(query, report)| Request::of(query, report));
     out.gap();
-    out.push(format!("impl codec::Query for {} {{", query.ident));
-    out.push(format!("type Report = {path};"));
-    let types = path.strip_suffix(&report.ident).unwrap_or_default();
-    let types = format!("{types}{}::", report.module);
-    if let Some(request) = &request {
-        request.drop_unrequested(out, &path, &types);
+    let has_vectors = request.as_ref().is_some_and(Request::drops);
+    if !has_vectors {
+        out.push(format!(
+            "impl codec::Query for {} {{ type Report = {path}; }}",
+            query.ident
+        ));
     }
-    out.push("}");
+    if let Some(request) = request.as_ref().filter(|_| has_vectors) {
+        out.push(format!("impl codec::Query for {} {{", query.ident));
+        out.push(format!("type Report = {path};"));
+        request.drop_unrequested(out, &path, &format!("{types}::"));
+        out.push("}");
+    }
     match request {
         Some(Request {
             selections,
             has_more,
             list: None,
-        }) => Builder::new(&selections, has_more).write(out, &query.ident, &path),
+            names,
+        }) => Builder::new(&selections, has_more).write(out, &query.ident, &path, names),
         Some(Request {
             selections,
             has_more,
             list: Some(list),
+            names,
         }) if list.is_defined_in(query, shared) => {
             let ident = format!("{}::{}", query.module, list.ident);
-            Builder::new(&selections, has_more).write(out, &ident, &path);
+            Builder::new(&selections, has_more).write(out, &ident, &path, names);
         }
         _ => {}
     }
@@ -97,6 +105,8 @@ struct Request<'m> {
     has_more: bool,
     /// The query's list, if the vectors are in its elements.
     list: Option<List<'m>>,
+    /// The methods that the record has besides.
+    names: Names,
 }
 
 /// The list of a query whose elements have presence vectors.
@@ -118,6 +128,7 @@ impl<'m> Request<'m> {
                 has_more: query.fields.len() > own.len(),
                 selections: own,
                 list: None,
+                names: method_names(&query.fields),
             });
         }
         let [field] = &*query.fields else {
@@ -135,13 +146,16 @@ impl<'m> Request<'m> {
             has_more: fields.len() > selections.len(),
             selections,
             list: Some(list),
+            names: method_names(fields),
         })
     }
 
+    /// Whether it is known which fields of the report a query does not request.
+    fn drops(&self) -> bool {
+        self.list.as_ref().is_none_or(|list| list.keys.is_some())
+    }
+
     fn drop_unrequested(&self, out: &mut Writer, report: &str, types: &str) {
-        if self.list.as_ref().is_some_and(|list| list.keys.is_none()) {
-            return;
-        }
         out.gap();
         out.push(format!(
             "fn drop_unrequested(&self, report: &mut {report}) {{"
@@ -248,8 +262,9 @@ fn drop_fields(
     }
     for (bit, (_, field)) in record.fields.iter().enumerate() {
         let mask = 1_u64 << bit;
-        out.push(format!("if {request}.{vector} & {mask:#06x} == 0 {{"));
-        out.push(format!("{place}.{field} = None;\n}}"));
+        out.push(format!(
+            "codec::keep_if({request}.{vector} & {mask:#06x} != 0, &mut {place}.{field});"
+        ));
     }
     for _ in 0..blocks {
         out.push("}");
@@ -276,25 +291,24 @@ impl<'s, 'm> Builder<'s, 'm> {
         }
     }
 
-    fn write(&self, out: &mut Writer, ident: &str, report: &str) {
+    fn write(&self, out: &mut Writer, ident: &str, report: &str, mut names: Names) {
         out.gap();
-        out.push(format!("impl {ident} {{"));
+        out.push(format!("codec::requests!({ident}, new {{"));
         let all = |selection: &Selection<'_>| {
             let bits = selection.fields().into_iter().map(|(_, bit)| 1_u64 << bit);
             bits.fold(0, std::ops::BitOr::bitor)
         };
         let doc = format!("Requests every optional field of [`{report}`].");
-        self.constructor(out, &doc, "all", all);
-        out.gap();
+        self.constructor(out, &doc, &names.snake("all"), all);
         let doc = format!("Requests no optional field of [`{report}`] yet.");
-        self.constructor(out, &doc, "none", |_| 0);
-        let mut names = Names::reserving(&["all", "none"]);
+        self.constructor(out, &doc, &names.snake("none"), |_| 0);
+        out.push("} with {");
         for selection in self.selections {
             for (name, bit) in selection.fields() {
                 self.method(out, &mut names, selection, (name, bit));
             }
         }
-        out.push("}");
+        out.push("});");
     }
 
     fn method(
@@ -310,15 +324,9 @@ impl<'s, 'm> Builder<'s, 'm> {
             stem => ("", format!(" of `{stem}`")),
         };
         let method = names.snake(&format!("with {part} {name}"));
-        let mask = 1_u64 << bit;
-        out.gap();
+        let (vector, mask) = (&selection.vector, 1_u64 << bit);
         out.doc([format!("Also requests `{name}`{of}, bit {bit}.").as_str()]);
-        out.push("#[must_use]");
-        out.push(format!("pub const fn {method}(mut self) -> Self {{"));
-        out.push(format!(
-            "self.{} |= {mask:#06x};\nself\n}}",
-            selection.vector
-        ));
+        out.push(format!("{method}: {vector} | {mask:#06x};"));
     }
 
     fn constructor(
@@ -329,15 +337,16 @@ impl<'s, 'm> Builder<'s, 'm> {
         value: impl Fn(&Selection<'_>) -> u64,
     ) {
         let (constness, rest) = match self.has_more {
-            true => ("", "..Self::default()\n"),
-            false => ("const ", ""),
+            true => ("", ", ..Self::default()"),
+            false => ("const", ""),
         };
+        let vectors = self.selections.iter();
+        let vectors = vectors.map(|it| format!("{}: {:#06x}", it.vector, value(it)));
+        let vectors: Vec<_> = vectors.collect();
         out.doc([doc]);
-        out.push("#[must_use]");
-        out.push(format!("pub {constness}fn {name}() -> Self {{\nSelf {{"));
-        for selection in self.selections {
-            out.push(format!("{}: {:#06x},", selection.vector, value(selection)));
-        }
-        out.push(format!("{rest}}}\n}}"));
+        out.push(format!(
+            "fn({constness}) {name} => Self {{ {}{rest} }};",
+            vectors.join(", ")
+        ));
     }
 }

@@ -5,26 +5,19 @@ use super::types::{Field, Type};
 use super::writer::Writer;
 use crate::model::{Count, Number};
 
-/// Writes `Arbitrary` for a struct.
-pub(super) fn group(out: &mut Writer, ident: &str, fields: &[Field<'_>]) {
-    begin(out, ident, if fields.is_empty() { "_" } else { "random" });
-    if fields.is_empty() {
-        out.push("Ok(Self)");
-    } else {
-        out.push("Ok(Self {");
-        for field in fields {
-            let value = value(&field.ty);
-            let value = if optional(field) {
-                format!("codec::arbitrary::optional(random, {})", maker(&field.ty))
-            } else {
-                value
-            };
-            out.push(format!("{}: {value}?,", field.ident));
-        }
-        out.push("})");
+/// A function that creates a random value of a member; `None` if `Arbitrary` does.
+pub(super) fn maker(field: &Field<'_>) -> Option<String> {
+    let maker = make(&field.ty);
+    if maker == ARBITRARY {
+        return None;
     }
-    out.push("}\n}\n}");
+    Some(match optional(field) {
+        true => format!("|random| codec::arbitrary::optional(random, {maker})"),
+        false => maker,
+    })
 }
+
+const ARBITRARY: &str = "codec::arbitrary::Arbitrary::arbitrary";
 
 /// Writes `Arbitrary` for an enum whose alternatives each hold one value.
 pub(super) fn one_of<'t>(
@@ -32,7 +25,7 @@ pub(super) fn one_of<'t>(
     ident: &str,
     alternatives: impl ExactSizeIterator<Item = (&'t str, &'t Type)>,
 ) {
-    begin(out, ident, "random");
+    begin(out, ident);
     let last = alternatives.len().saturating_sub(1);
     out.push(format!("match random.int_in_range(0..={last})? {{"));
     for (position, (variant, ty)) in alternatives.enumerate() {
@@ -46,13 +39,13 @@ pub(super) fn one_of<'t>(
     out.push("}\n}\n}\n}");
 }
 
-fn begin(out: &mut Writer, ident: &str, random: &str) {
+fn begin(out: &mut Writer, ident: &str) {
     out.gap();
     out.push("codec::if_arbitrary! {");
     out.push(format!(
         "impl<'a> codec::arbitrary::Arbitrary<'a> for {ident} {{"
     ));
-    out.push(format!("fn arbitrary({random}: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {{"));
+    out.push("fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {");
 }
 
 /// An expression for a random value, of type `Result`.
@@ -71,27 +64,27 @@ fn value(ty: &Type) -> String {
         Type::Blob(count) => counted("blob", count),
         Type::Formatted { count, .. } => counted("formatted", count),
         Type::List { count, element } => {
-            let (min, max, make) = (count.min, count.max, maker(element));
+            let (min, max, make) = (count.min, count.max, make(element));
             format!("codec::arbitrary::list(random, {min}, {max}, {make})")
         }
-        Type::Array {
-            dimensions,
-            element,
-        } => {
-            let array = |make| format!("codec::arbitrary::array(random, {make})");
-            let inner = dimensions.iter().skip(1);
-            array(inner.fold(maker(element), |make, _| {
-                format!("|random| {}", array(make))
-            }))
+        Type::Array { element, .. } => {
+            let inwards_out = ty.dimensions().into_iter().rev();
+            let make = inwards_out.fold(make(element), |make, dimension| {
+                format!(
+                    "|random| codec::arbitrary::{}(random, {make})",
+                    dimension.random()
+                )
+            });
+            make.trim_start_matches("|random| ").to_owned()
         }
         Type::Number(_) | Type::Newtype { .. } | Type::Record { .. } | Type::Composite { .. } => {
-            "codec::arbitrary::Arbitrary::arbitrary(random)".to_owned()
+            format!("{ARBITRARY}(random)")
         }
     }
 }
 
 /// A function that creates a random value: a path or a closure.
-fn maker(ty: &Type) -> String {
+fn make(ty: &Type) -> String {
     let value = value(ty);
     match value.strip_suffix("(random)") {
         Some(function) => function.to_owned(),

@@ -1,11 +1,12 @@
 //! Generates the tables of a set: services by identity, messages by code.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::docs;
 use super::ident::{Names, version_constant};
 use super::machine::{self, Messages};
-use super::messages::Plan;
+use super::plan::Plan;
 use super::services::service;
 use super::writer::Writer;
 use crate::model::{Id, Message, Service};
@@ -90,24 +91,19 @@ pub(super) fn tables(
     out.push("/// The services of the set, by URN and version.");
     out.push("pub static SERVICES: &[codec::ServiceInfo] = &[");
     for service in services {
-        out.push("codec::ServiceInfo {");
-        out.push(format!(
-            "name: {:?},\nid: {},",
-            service.name, paths[&service.id]
-        ));
         let base = match &service.inherits_from {
             Some(base) => format!("Some({})", service_id(&base.id, paths)),
             None => "None".to_owned(),
         };
-        out.push(format!("inherits_from: {base},"));
-        out.push(format!(
-            "inputs: &[{}],",
-            codes(service.inputs.iter().map(AsRef::as_ref))
-        ));
-        out.push(format!(
-            "outputs: &[{}],\n}},",
-            codes(service.outputs.iter().map(AsRef::as_ref))
-        ));
+        let codes = |messages: &[Arc<Message>]| codes(messages.iter().map(AsRef::as_ref));
+        let members = [
+            format!("name: {:?}", service.name),
+            format!("id: {}", paths[&service.id]),
+            format!("inherits_from: {base}"),
+            format!("inputs: &[{}]", codes(&service.inputs)),
+            format!("outputs: &[{}]", codes(&service.outputs)),
+        ];
+        out.list("codec::ServiceInfo {", &members, "},");
     }
     out.push("];");
     out.gap();
@@ -116,11 +112,13 @@ pub(super) fn tables(
     );
     out.push("pub static MESSAGES: &[codec::MessageInfo] = &[");
     for plan in plans {
-        out.push(format!("codec::MessageInfo::of::<{}>(&[", plan.path()));
-        for id in &plan.services {
-            out.push(format!("{},", service_id(id, paths)));
-        }
-        out.push("]),");
+        let services: Vec<_> = plan
+            .services
+            .iter()
+            .map(|id| service_id(id, paths))
+            .collect();
+        let open = format!("codec::MessageInfo::of::<{}>(&[", plan.path());
+        out.list(&open, &services, "]),");
     }
     out.push("];");
 }

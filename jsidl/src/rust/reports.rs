@@ -1,8 +1,8 @@
 //! Generates the trait of reports: the time of the sample, and the report without values.
 
 use super::layout::{Layout, unsigned_bits};
-use super::messages::Plan;
 use super::newtypes::is_time_stamp;
+use super::plan::Plan;
 use super::queries::report;
 use super::types::{Field, Kind, Type};
 use super::writer::Writer;
@@ -32,7 +32,7 @@ pub(super) fn implement(out: &mut Writer, plan: &Plan<'_>, plans: &[Plan<'_>]) {
     }
     out.push(format!("impl codec::Report for {} {{", plan.ident));
     if !times.is_empty() {
-        out.push("fn stamp(&mut self, since_1970: ::std::time::Duration) {");
+        out.push("fn stamp(&mut self, since_1970: ::core::time::Duration) {");
         for line in times {
             out.push(line);
         }

@@ -5,8 +5,8 @@
 //! services, and a service inherits their messages only to name them, so neither has a place here.
 
 use super::ident::{Names, version_constant};
-use super::machine::{Connection, Messages};
-use super::messages::Plan;
+use super::machine::{Connection, Messages, excess, machines_of};
+use super::plan::Plan;
 use super::queries;
 use super::writer::Writer;
 use crate::model::{Message, Service};
@@ -25,8 +25,16 @@ pub(super) fn service(out: &mut Writer, messages: Messages<'_>, versions: &[&Ser
     if service.inputs.is_empty() || service.is_core() {
         return;
     }
-    let Ok(connection) = Connection::of(service, messages) else {
-        return;
+    let machines = match service.behaviour.is_empty() {
+        true => Vec::new(),
+        false => machines_of(messages.library, service),
+    };
+    // Several machines have no common trait.
+    let connection = match &*machines {
+        [] => None,
+        [machine] if excess(machine).is_some() => return,
+        [machine] => Some(Connection::of(service, messages, machine)),
+        _ => return,
     };
     let generator = Generator {
         service,
@@ -150,7 +158,7 @@ impl<'a> Generator<'a> {
         out.push("impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {");
         let offers = self.offers().join(", ");
         out.push(format!(
-            "fn offers(&self) -> Vec<codec::ServiceId> {{\nvec![{offers}]\n}}"
+            "fn offers(&self) -> codec::List<codec::ServiceId> {{\ncodec::List::from([{offers}])\n}}"
         ));
         self.hazards(out);
         out.gap();
@@ -188,8 +196,14 @@ impl<'a> Generator<'a> {
 
     fn receive(&self, out: &mut Writer) {
         out.push("fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {");
-        if let Some(connection) = &self.connection {
-            connection.started(out);
+        let arms = self.connection.as_ref().map(Connection::arms);
+        match &arms {
+            Some(arms) if arms.is_empty() => out.push("self.machine.as_ref()?;"),
+            Some(_) => {
+                out.push("let machine = self.machine.as_mut()?;");
+                out.push("let service = &mut self.service;");
+            }
+            None => {}
         }
         out.push("Some(match code {");
         for Input {
@@ -208,8 +222,8 @@ impl<'a> Generator<'a> {
                 plan.message.code
             ));
         }
-        if let Some(connection) = &self.connection {
-            connection.arms(out);
+        for arm in arms.iter().flatten() {
+            out.push(arm);
         }
         out.push("_ => return None,\n})\n}");
     }

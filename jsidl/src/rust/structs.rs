@@ -2,9 +2,9 @@
 
 use super::docs;
 use super::ident::{Names, unit_suffix};
-use super::types::{Field, Type};
+use super::types::{Field, Type, total};
 use super::writer::Writer;
-use crate::model::Unsigned;
+use crate::model::{Scale, Unsigned};
 
 /// Writes a struct with its accessors, after its documentation.
 pub(super) fn declare(
@@ -29,7 +29,7 @@ pub(super) fn declare(
     for field in fields {
         let interpretation = docs::interpretation(field.item);
         let bit = if optional(field) { bits.next() } else { None };
-        out.doc([docs::field(field, bit).as_str(), &interpretation]);
+        out.doc([docs::joined(&docs::field(field, bit), &interpretation).as_str()]);
         out.push(format!(
             "pub {}: {},",
             field.ident,
@@ -73,8 +73,9 @@ impl Body<'_> {
     /// Minimum number of octets.
     pub(super) fn least(&self) -> usize {
         let required = self.fields.iter().filter(|field| !optional(field));
-        let members = required.map(|field| field.ty.least()).sum::<usize>();
-        self.code_size() + self.presence.map_or(0, Unsigned::size) + members
+        let members = required.map(|field| field.ty.least());
+        let before = [self.code_size(), self.presence.map_or(0, Unsigned::size)];
+        total(before.into_iter().chain(members))
     }
 }
 
@@ -95,11 +96,7 @@ fn default_impl(out: &mut Writer, ident: &str, fields: &[Field<'_>]) {
     out.push("Self {");
     for field in fields {
         let value = match &field.ty {
-            Type::Array { dimensions, .. } if !optional(field) => {
-                let inner = "Default::default()".to_owned();
-                let nested = |inner, _: &u32| format!("::std::array::from_fn(|_| {inner})");
-                dimensions.iter().fold(inner, nested)
-            }
+            Type::Array { .. } if !optional(field) => field.ty.filled("Default::default()"),
             _ => "Default::default()".to_owned(),
         };
         out.push(format!("{}: {value},", field.ident));
@@ -107,61 +104,81 @@ fn default_impl(out: &mut Writer, ident: &str, fields: &[Field<'_>]) {
     out.push("}\n}\n}");
 }
 
+/// Methods of every struct, whose names accessors must not hide.
+const METHODS: &[&str] = &[
+    "read_some",
+    "write_some",
+    "encoded_len",
+    "encode",
+    "encode_into",
+    "decode",
+    "read",
+    "write",
+    "get",
+    "put",
+    "view",
+    "from_view",
+    "clone",
+    "eq",
+    "default",
+    "stamp",
+    "without_values",
+    "drop_unrequested",
+];
+
+/// The scale of a scaled number, with its unit.
+fn scale<'f>(field: &'f Field<'_>) -> Option<(&'f Scale, &'f str)> {
+    match &field.ty {
+        Type::Newtype {
+            scale: Some((scale, unit)),
+            ..
+        } => Some((scale, unit)),
+        _ => None,
+    }
+}
+
+/// The names of the getter and the setter of a field in its unit.
+fn accessor_names(names: &mut Names, field: &Field<'_>, unit: &str) -> (String, String) {
+    let name = format!("{} {}", field.item.name, unit_suffix(unit));
+    names.snake_pair(&name, "set_")
+}
+
+/// The names that the methods of a struct with these fields have.
+pub(super) fn method_names(fields: &[Field<'_>]) -> Names {
+    let mut names = Names::reserving(METHODS);
+    for (field, (_, unit)) in fields.iter().filter_map(|it| Some((it, scale(it)?))) {
+        accessor_names(&mut names, field, unit);
+    }
+    names
+}
+
 /// Getters and setters in the unit of the field.
 fn accessors(out: &mut Writer, ident: &str, fields: &[Field<'_>], prefix: &str) {
-    let scaled = |field: &&Field<'_>| matches!(field.ty, Type::Newtype { scale: Some(_), .. });
-    if !fields.iter().any(|field| scaled(&field)) {
+    if !fields.iter().any(|field| scale(field).is_some()) {
         return;
     }
     out.gap();
-    out.push(format!("impl {ident} {{"));
-    let mut names = Names::default();
+    out.push(format!("codec::accessors!({ident} {{"));
+    let mut names = Names::reserving(METHODS);
     for field in fields {
-        let Type::Newtype {
-            scale: Some((scale, unit)),
-            ..
-        } = &field.ty
-        else {
+        let Some((scale, unit)) = scale(field) else {
             continue;
         };
-        let name = names.snake(&format!("{} {}", field.item.name, unit_suffix(unit)));
+        let (getter, setter) = accessor_names(&mut names, field, unit);
+        let in_unit = match unit {
+            "one" => String::new(),
+            unit => format!(" in {}", docs::prose(unit)),
+        };
+        let what = format!("`{}`{in_unit}", field.item.name);
         let ty = field.ty.rust(prefix);
-        let what = &field.item.name;
-        let unit = if unit == "one" {
-            String::new()
-        } else {
-            format!(" in {}", docs::prose(unit))
-        };
-        let member = &field.ident;
-        let (returns, get, set) = if optional(field) {
-            let get = format!("self.{member}.map({ty}::value)");
-            ("Option<f64>", get, format!("Some({ty}::new(value)?)"))
-        } else {
-            (
-                "f64",
-                format!("self.{member}.value()"),
-                format!("{ty}::new(value)?"),
-            )
-        };
-        out.gap();
-        out.doc([format!("`{what}`{unit}.").as_str()]);
-        out.push(format!("pub fn {name}(&self) -> {returns} {{\n{get}\n}}"));
-        out.gap();
-        out.doc([
-            format!("Sets `{what}`{unit} to the nearest value that the field can hold.").as_str(),
-            "# Errors",
-        ]);
+        let optional = if optional(field) { ", ?" } else { "" };
+        let range = format!("{} to {}", scale.lower, scale.upper);
         out.push(format!(
-            "/// If the value is not in {} to {}.",
-            scale.lower, scale.upper
+            "{}: {ty}{optional} => {getter}, {setter}, {what:?}, {range:?};",
+            field.ident
         ));
-        out.push(format!(
-            "pub fn set_{}(&mut self, value: f64) -> Result<(), codec::OutOfRange> {{",
-            name.trim_start_matches("r#")
-        ));
-        out.push(format!("self.{member} = {set};\nOk(())\n}}"));
     }
-    out.push("}");
+    out.push("});");
 }
 
 /// Writes the codec of a fixed size struct.

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 
 use heck::ToUpperCamelCase;
 
+use super::arrays::Dimension;
 use super::ident::Names;
 use crate::fingerprint;
 use crate::model::{
@@ -108,6 +109,8 @@ pub(super) enum Kind<'m> {
 pub(super) struct SubType<'m> {
     pub(super) field: &'m SubField,
     pub(super) ident: String,
+    /// The function that replaces it.
+    pub(super) replace: String,
     pub(super) enumeration: Option<String>,
 }
 
@@ -246,15 +249,10 @@ impl<'m, 's> Nested<'m, 's> {
             };
         }
         let optional = |(member, ty): (&Item, &Type)| if member.optional { 0 } else { ty.least() };
-        let least = group
-            .members
-            .iter()
-            .zip(&types)
-            .map(optional)
-            .sum::<usize>();
+        let members = total(group.members.iter().zip(&types).map(optional));
         Type::Composite {
             ident,
-            least: least + group.presence.map_or(0, Unsigned::size),
+            least: at_least(members, group.presence.map_or(0, Unsigned::size)),
         }
     }
 
@@ -283,7 +281,7 @@ impl<'m, 's> Nested<'m, 's> {
             .unwrap_or(0);
         Type::Composite {
             ident,
-            least: least + variant.tag.size(),
+            least: at_least(least, variant.tag.size()),
         }
     }
 
@@ -367,9 +365,9 @@ impl<'m, 's> Nested<'m, 's> {
     fn bits(&mut self, item: &'m Item, bits: &'m BitField) -> Type {
         let content = fingerprint::content(&item.shape);
         let ident = self.define(&item.name, &content, |nested| {
-            let mut names = Names::reserving(&["raw", "names"]);
+            let mut names = Names::reserving(&["raw", "names", "at"]);
             let fields = bits.fields.iter().map(|field| {
-                let ident = names.snake(&field.name);
+                let (ident, replace) = names.snake_pair(&field.name, "with_");
                 let number = Number::Unsigned(width(field));
                 let values = &field.values;
                 let enumeration = (!values.values.is_empty()).then(|| {
@@ -379,6 +377,7 @@ impl<'m, 's> Nested<'m, 's> {
                 SubType {
                     field,
                     ident,
+                    replace,
                     enumeration,
                 }
             });
@@ -425,11 +424,13 @@ impl Type {
         match self {
             Self::Number(number) | Self::Newtype { number, .. } => Some(number.size()),
             Self::Record { size, .. } => Some(*size),
-            Self::Array {
-                dimensions,
-                element,
-            } => match dimensions[..] {
-                [length] => element.size().map(|size| size * length as usize),
+            Self::Array { element, .. } => match self.dimensions()[..] {
+                [
+                    Dimension {
+                        length,
+                        on_heap: false,
+                    },
+                ] => element.size().map(|size| size * length as usize),
                 _ => None,
             },
             _ => None,
@@ -447,18 +448,20 @@ impl Type {
         }
     }
 
-    /// Minimum size of a value in octets.
+    /// Minimum size of a value in octets, at most [`MOST`].
     pub(super) fn least(&self) -> usize {
         match self {
             Self::FixedText(length) => *length as usize,
             Self::Text(count) | Self::Blob(count) => counted(count, 1),
-            Self::Formatted { count, .. } => 1 + counted(count, 1),
+            Self::Formatted { count, .. } => at_least(1, counted(count, 1)),
             Self::Composite { least, .. } => *least,
             Self::List { count, element } => counted(count, element.least()),
             Self::Array {
                 dimensions,
                 element,
-            } => element.least() * dimensions.iter().product::<u32>() as usize,
+            } => dimensions.iter().fold(element.least(), |octets, &length| {
+                octets.saturating_mul(length as usize).min(MOST)
+            }),
             Self::Number(_) | Self::Newtype { .. } | Self::Record { .. } => {
                 self.size().unwrap_or(0)
             }
@@ -467,42 +470,53 @@ impl Type {
 
     /// The Rust type, seen from where its module is called `prefix` (`report_x::` or nothing).
     pub(super) fn rust(&self, prefix: &str) -> String {
+        self.named(&|ident| format!("{prefix}{ident}"))
+    }
+
+    /// The Rust type, with nested types by the paths that a function gives.
+    pub(super) fn named(&self, path: &dyn Fn(&str) -> String) -> String {
         match self {
             Self::Number(number) => number_type(*number).to_owned(),
             Self::Newtype { ident, .. }
             | Self::Record { ident, .. }
-            | Self::Composite { ident, .. } => format!("{prefix}{ident}"),
+            | Self::Composite { ident, .. } => path(ident),
             Self::FixedText(_) | Self::Text(_) => "codec::Text".to_owned(),
             Self::Blob(_) => "codec::Bytes".to_owned(),
-            Self::Formatted { format, .. } => format!("codec::FormattedBlob<{prefix}{format}>"),
-            Self::List { element, .. } => format!("Vec<{}>", element.rust(prefix)),
-            Self::Array {
-                dimensions,
-                element,
-            } => {
-                let element = element.rust(prefix);
-                dimensions
-                    .iter()
-                    .rev()
-                    .fold(element, |inner, size| format!("[{inner}; {size}]"))
-            }
+            Self::Formatted { format, .. } => format!("codec::FormattedBlob<{}>", path(format)),
+            Self::List { element, .. } => format!("codec::List<{}>", element.named(path)),
+            Self::Array { element, .. } => self.array_of(&element.named(path)),
         }
     }
 
     /// Whether `Default` can be derived; the standard library implements it for arrays up to 32.
     pub(super) fn derives_default(&self) -> bool {
         match self {
-            Self::Array {
-                dimensions,
-                element,
-            } => dimensions.iter().all(|&size| size <= 32) && element.derives_default(),
+            Self::Array { element, .. } => {
+                let mut dimensions = self.dimensions().into_iter();
+                dimensions.all(|it| it.on_heap || it.length <= 32) && element.derives_default()
+            }
             _ => true,
         }
     }
 }
 
+/// The highest minimum size that is stated. Larger ones, which no message reaches, are rounded down to
+/// it: it fits the `usize` of every target.
+const MOST: usize = i32::MAX as usize;
+
+/// The sum of two minimum sizes.
+fn at_least(one: usize, other: usize) -> usize {
+    one.saturating_add(other).min(MOST)
+}
+
+/// The sum of several minimum sizes.
+pub(super) fn total(sizes: impl Iterator<Item = usize>) -> usize {
+    sizes.fold(0, at_least)
+}
+
 fn counted(count: &Count, size: usize) -> usize {
-    count.unsigned.size() + usize::try_from(count.min).unwrap_or(0).saturating_mul(size)
+    let elements = usize::try_from(count.min).unwrap_or(usize::MAX);
+    at_least(elements.saturating_mul(size), count.unsigned.size())
 }
 
 /// A number's type in Rust.

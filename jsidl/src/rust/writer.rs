@@ -1,5 +1,8 @@
 //! Collects Rust text and indents it.
 
+/// Characters in a line of code.
+const WIDTH: usize = 100;
+
 /// Collects lines and indents them by the brackets at their ends.
 #[derive(Debug, Default)]
 pub(super) struct Writer {
@@ -18,6 +21,10 @@ impl Writer {
 
     fn line(&mut self, line: &str) {
         let comment = line.starts_with("//");
+        let line = match comment {
+            true => &*line.replace(is_misleading, ""),
+            false => line,
+        };
         if !comment && line.starts_with(['}', ')', ']']) {
             self.depth = self.depth.saturating_sub(1);
         }
@@ -29,6 +36,64 @@ impl Writer {
         if !comment && line.ends_with(['{', '(', '[']) {
             self.depth += 1;
         }
+    }
+
+    /// Writes items between brackets, separated by commas: in one line if they fit, otherwise in as few
+    /// as possible.
+    pub(super) fn list(&mut self, open: &str, items: &[impl AsRef<str>], close: &str) {
+        let width = WIDTH.saturating_sub(4 * self.depth);
+        let items: Vec<_> = items.iter().map(AsRef::as_ref).collect();
+        let is_import = open.ends_with("::{");
+        let pad = if open.ends_with('{') && !is_import && !items.is_empty() {
+            " "
+        } else {
+            ""
+        };
+        let line = format!("{open}{pad}{}{pad}{close}", items.join(", "));
+        if line.len() <= width {
+            return self.line(&line);
+        }
+        self.line(open);
+        let mut line = String::new();
+        for item in items {
+            if !line.is_empty() && line.len() + item.len() + 6 > width {
+                self.line(&std::mem::take(&mut line));
+            }
+            let gap = if line.is_empty() { "" } else { " " };
+            line.push_str(&format!("{gap}{item},"));
+        }
+        self.line(&line);
+        self.line(close);
+    }
+
+    /// Writes a public import of items from a module. A crate need not use all of them.
+    pub(super) fn import(&mut self, module: &str, items: &[String]) {
+        self.line("#[doc(inline)]");
+        self.line("#[allow(unused_imports)]");
+        match items {
+            [item] => self.line(&format!("pub use {module}::{item};")),
+            _ => self.list(&format!("pub use {module}::{{"), items, "};"),
+        }
+    }
+
+    /// Whether a module or another block has begun.
+    pub(super) const fn is_in_module(&self) -> bool {
+        self.depth > 0
+    }
+
+    /// Writes the terms of an expression in as few lines as possible.
+    pub(super) fn terms(&mut self, terms: &[String], operator: &str) {
+        let width = WIDTH.saturating_sub(4 * self.depth);
+        let mut line = String::new();
+        for (place, term) in terms.iter().enumerate() {
+            let operator = if place == 0 { "" } else { operator };
+            if !line.is_empty() && line.len() + operator.len() + term.len() + 1 > width {
+                self.line(&std::mem::take(&mut line));
+            }
+            let gap = if line.is_empty() { "" } else { " " };
+            line.push_str(&format!("{gap}{operator}{term}"));
+        }
+        self.line(&line);
     }
 
     /// Adds a blank line, unless a block has just begun.
@@ -59,6 +124,16 @@ impl Writer {
     pub(super) fn finish(self) -> String {
         self.text
     }
+}
+
+/// Whether a character of a comment would be invisible or change the order in which text is shown.
+/// The compiler refuses some of them, also in comments.
+const fn is_misleading(c: char) -> bool {
+    matches!(
+        c,
+        '\0'..='\x1F' | '\x7F'..='\u{9F}' | '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}'
+            | '\u{2060}'..='\u{206F}' | '\u{FEFF}'
+    )
 }
 
 /// Wraps text at blanks into lines of at most `width` characters.

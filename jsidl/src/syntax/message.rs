@@ -74,11 +74,13 @@ impl Reader<'_> {
         let is_command = self
             .required(xml, "is_command")
             .and_then(|text| self.word(&text, "is_command", &FLAGS));
+        let is_deprecated = self.flag(xml, "deprecated");
         let mut description = None;
         let [header, body, footer] = self.sections(xml, &mut description);
         Some(MessageDef {
             code: code?,
             is_command: is_command?,
+            is_deprecated: is_deprecated.ok()?.unwrap_or(false),
             description: description.unwrap_or_default(),
             header: header?,
             body: body?,

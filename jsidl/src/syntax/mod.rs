@@ -155,6 +155,7 @@ impl DeclarationKind {
 pub(crate) struct MessageDef {
     pub(crate) code: u16,
     pub(crate) is_command: bool,
+    pub(crate) is_deprecated: bool,
     pub(crate) description: String,
     pub(crate) header: Section,
     pub(crate) body: Section,

@@ -195,3 +195,29 @@ fn a_service_is_named_in_full_or_by_its_last_part() {
     let explained = explain(&library, &[0x0D, 0x00, 0x80], Some(&management)).unwrap();
     assert_eq!(explained.message, "RequestControl");
 }
+
+#[test]
+fn octets_are_a_message_however_the_definition_spells_their_format() {
+    let kinds = |format: &str| {
+        let mut loader = jsidl::Loader::new();
+        loader.text(
+            "t.xml",
+            &format!(
+                r#"<service_def name="S" id="urn:example:S" version="1.0" xmlns="urn:jaus:jsidl:1.1">
+<description/><assumptions/><message_set><input_set/><output_set>
+<message_def name="M" message_id="D001" is_command="false"><description/>
+<header name="Header"><record name="HeaderRec" optional="false"><fixed_field name="MessageID" optional="false" field_type="unsigned short integer" field_units="one"/></record></header>
+<body name="Body"><record name="BodyRec" optional="false">
+<variable_length_field name="Data" optional="false" field_format="{format}">
+<count_field field_type_unsigned="unsigned byte"/></variable_length_field></record></body>
+<footer name="Footer"/></message_def></output_set></message_set></service_def>"#
+            ),
+        );
+        let loaded = loader.load();
+        let explained = explain(&loaded.library, &[0x01, 0xD0, 2, 0x34, 0x12], None).unwrap();
+        explained.rows.iter().any(|row| row.kind == Kind::Message)
+    };
+    assert!(kinds("JAUS MESSAGE"));
+    assert!(kinds("JAUS Message"));
+    assert!(!kinds("User Defined"));
+}

@@ -43,8 +43,8 @@ pub mod arrays {
     }
 
     impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
-        fn offers(&self) -> Vec<codec::ServiceId> {
-            vec![V1_0]
+        fn offers(&self) -> codec::List<codec::ServiceId> {
+            codec::List::from([V1_0])
         }
 
         fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
@@ -60,329 +60,206 @@ pub mod arrays {
 /// The services of the set, by URN and version.
 pub static SERVICES: &[codec::ServiceInfo] = &[
     codec::ServiceInfo {
-        name: "Arrays",
-        id: arrays::V1_0,
-        inherits_from: None,
-        inputs: &[0xF051, 0xF052],
+        name: "Arrays", id: arrays::V1_0, inherits_from: None, inputs: &[0xF051, 0xF052],
         outputs: &[],
     },
 ];
 
 /// The message types of the set, by code; of several with one code the newest first.
 pub static MESSAGES: &[codec::MessageInfo] = &[
-    codec::MessageInfo::of::<ReportArrays>(&[
-        arrays::V1_0,
-    ]),
-    codec::MessageInfo::of::<ReportArrayList>(&[
-        arrays::V1_0,
-    ]),
+    codec::MessageInfo::of::<ReportArrays>(&[arrays::V1_0]),
+    codec::MessageInfo::of::<ReportArrayList>(&[arrays::V1_0]),
 ];
 
-/// `ReportArrays` (F051h).
-///
-/// Arrays of one, two and three dimensions.
-///
-/// Declared by `urn:example:Arrays 1.0`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ReportArrays {
-    /// `Vector`: meter, -30 to 30.
-    pub vector: [report_arrays::Element; 3],
-    /// `Matrix`.
-    pub matrix: [[u16; 3]; 2],
-    /// `Cube`.
-    pub cube: [[[u8; 4]; 3]; 2],
-    /// `Many`.
-    pub many: [f64; 40],
-    /// `Names`: up to 255 octets of text.
-    pub names: [codec::Text; 2],
-    /// `Grid`: up to 255 octets of text.
-    pub grid: [[codec::Text; 2]; 2],
-    /// `Stamps`.
-    pub stamps: [report_arrays::Stamp; 2],
-    /// `Maybe`: bit 0 of the presence vector.
-    pub maybe: Option<[u8; 4]>,
-    /// `Codes`: at most 3 octets of text.
-    pub codes: [codec::Text; 2],
-}
-
-impl Default for ReportArrays {
-    fn default() -> Self {
-        Self {
-            vector: ::std::array::from_fn(|_| Default::default()),
-            matrix: ::std::array::from_fn(|_| ::std::array::from_fn(|_| Default::default())),
-            cube: ::std::array::from_fn(|_| ::std::array::from_fn(|_| ::std::array::from_fn(|_| Default::default()))),
-            many: ::std::array::from_fn(|_| Default::default()),
-            names: ::std::array::from_fn(|_| Default::default()),
-            grid: ::std::array::from_fn(|_| ::std::array::from_fn(|_| Default::default())),
-            stamps: ::std::array::from_fn(|_| Default::default()),
-            maybe: Default::default(),
-            codes: ::std::array::from_fn(|_| Default::default()),
-        }
-    }
-}
-
-impl codec::Message for ReportArrays {
-    const CODE: u16 = 0xF051;
-    const NAME: &'static str = "ReportArrays";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        379
-        + self.names.iter().map(|value| 1 + value.len()).sum::<usize>()
-        + self.grid.as_flattened().iter().map(|value| 1 + value.len()).sum::<usize>()
-        + 4 * usize::from(self.maybe.is_some())
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let present =
-        u8::from(self.maybe.is_some());
-        let run = output.run::<15>();
-        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
-        codec::Fixed::put(present, run, 2);
-        codec::Fixed::put(self.vector, run, 3);
-        output.member("Matrix", |output| { for i1 in 0..3 { for i0 in 0..2 { { output.fixed(self.matrix[i0][i1]); Ok(()) }?; } } Ok(()) })?;
-        output.member("Cube", |output| { for i2 in 0..4 { for i1 in 0..3 { for i0 in 0..2 { { output.fixed(self.cube[i0][i1][i2]); Ok(()) }?; } } } Ok(()) })?;
-        output.fixed(self.many);
-        output.member("Names", |output| { for i0 in 0..2 { output.text::<u8>(&self.names[i0], 0, 255)?; } Ok(()) })?;
-        output.member("Grid", |output| { for i1 in 0..2 { for i0 in 0..2 { output.text::<u8>(&self.grid[i0][i1], 0, 255)?; } } Ok(()) })?;
-        output.fixed(self.stamps);
-        output.optional(self.maybe);
-        output.member("Codes", |output| { for i0 in 0..2 { output.fixed_text(&self.codes[i0], 3)?; } Ok(()) })?;
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let present = input.presence::<u8>(0x1)?;
-        let vector = input.member("Vector", codec::Reader::fixed)?;
-        let matrix = input.member("Matrix", |input| { let mut array: [[_; 3]; 2] = ::std::array::from_fn(|_| ::std::array::from_fn(|_| Default::default())); for i1 in 0..3 { for i0 in 0..2 { array[i0][i1] = input.fixed()?; } } Ok(array) })?;
-        let cube = input.member("Cube", |input| { let mut array: [[[_; 4]; 3]; 2] = ::std::array::from_fn(|_| ::std::array::from_fn(|_| ::std::array::from_fn(|_| Default::default()))); for i2 in 0..4 { for i1 in 0..3 { for i0 in 0..2 { array[i0][i1][i2] = input.fixed()?; } } } Ok(array) })?;
-        let many = input.member("Many", codec::Reader::fixed)?;
-        let names = input.member("Names", |input| { let mut array: [_; 2] = ::std::array::from_fn(|_| Default::default()); for i0 in 0..2 { array[i0] = input.text::<u8>(0, 255)?; } Ok(array) })?;
-        let grid = input.member("Grid", |input| { let mut array: [[_; 2]; 2] = ::std::array::from_fn(|_| ::std::array::from_fn(|_| Default::default())); for i1 in 0..2 { for i0 in 0..2 { array[i0][i1] = input.text::<u8>(0, 255)?; } } Ok(array) })?;
-        let stamps = input.member("Stamps", codec::Reader::fixed)?;
-        let maybe = input.optional(present & 0x1 != 0, "Maybe", codec::Reader::fixed)?;
-        let codes = input.member("Codes", |input| { let mut array: [_; 2] = ::std::array::from_fn(|_| Default::default()); for i0 in 0..2 { array[i0] = input.fixed_text(3)?; } Ok(array) })?;
-        Ok(Self {
-            vector,
-            matrix,
-            cube,
-            many,
-            names,
-            grid,
-            stamps,
-            maybe,
-            codes,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportArrays {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(9)
-            .with("Vector", codec::view::View::view(&self.vector))
-            .with("Matrix", codec::view::View::view(&self.matrix))
-            .with("Cube", codec::view::View::view(&self.cube))
-            .with("Many", codec::view::View::view(&self.many))
-            .with("Names", codec::view::View::view(&self.names))
-            .with("Grid", codec::view::View::view(&self.grid))
-            .with("Stamps", codec::view::View::view(&self.stamps))
-            .with("Maybe", codec::view::View::view(&self.maybe))
-            .with("Codes", codec::view::View::view(&self.codes))
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            let object = codec::view::Object::new(value, &["Vector", "Matrix", "Cube", "Many", "Names", "Grid", "Stamps", "Maybe", "Codes"])?;
-            Ok(Self {
-                vector: object.member("Vector")?,
-                matrix: object.member("Matrix")?,
-                cube: object.member("Cube")?,
-                many: object.member("Many")?,
-                names: object.member("Names")?,
-                grid: object.member("Grid")?,
-                stamps: object.member("Stamps")?,
-                maybe: object.member("Maybe")?,
-                codes: object.member("Codes")?,
-            })
-        }
-    }
-    codec::serde_by_view!(ReportArrays);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportArrays {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                vector: codec::arbitrary::array(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                matrix: codec::arbitrary::array(random, |random| codec::arbitrary::array(random, codec::arbitrary::Arbitrary::arbitrary))?,
-                cube: codec::arbitrary::array(random, |random| codec::arbitrary::array(random, |random| codec::arbitrary::array(random, codec::arbitrary::Arbitrary::arbitrary)))?,
-                many: codec::arbitrary::array(random, codec::arbitrary::f64)?,
-                names: codec::arbitrary::array(random, |random| codec::arbitrary::text(random, 0, 255))?,
-                grid: codec::arbitrary::array(random, |random| codec::arbitrary::array(random, |random| codec::arbitrary::text(random, 0, 255)))?,
-                stamps: codec::arbitrary::array(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                maybe: codec::arbitrary::optional(random, |random| codec::arbitrary::array(random, codec::arbitrary::Arbitrary::arbitrary))?,
-                codes: codec::arbitrary::array(random, |random| codec::arbitrary::fixed_text(random, 3))?,
-            })
-        }
-    }
-}
-
-/// The types inside [`ReportArrays`].
-pub mod report_arrays {
+/// The messages of services of version 1.0.
+pub mod v1_0 {
     use super::codec;
 
-    /// `Element` in meter: -30 to 30 in steps of 1.397e-8, carried as `u32`.
-    #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-    pub struct Element(u32);
-
-    codec::scaled!(Element(u32), "Element", -30.0_f64 to 30.0_f64 "meter", Round);
-
-    /// `Stamp`: several numbers in one `u8`. Bits outside all of them are kept.
-    #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-    pub struct Stamp(pub u8);
-
-    impl Stamp {
-        /// `Low`: bits 0 to 3, 0 to 15.
-        pub const fn low(self) -> u8 {
-            codec::bits::get(self.0 as u64, 0, 3) as u8
-        }
-
-        /// The same with another `Low`.
-        ///
-        /// # Errors
-        /// If the value is not in 0 to 15.
-        pub const fn with_low(self, value: u8) -> Result<Self, codec::OutOfRange> {
-            match codec::bits::set_checked(self.0 as u64, ("Low", 0, 3), value as u64, (0, 15)) {
-                Ok(raw) => Ok(Self(raw as u8)),
-                Err(error) => Err(error),
-            }
-        }
+    /// `ReportArrays` (F051h).
+    ///
+    /// Arrays of one, two and three dimensions.
+    ///
+    /// Declared by `urn:example:Arrays 1.0`.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct ReportArrays {
+        /// `Vector`: meter, -30 to 30.
+        pub vector: [report_arrays::Element; 3],
+        /// `Matrix`.
+        pub matrix: [[u16; 3]; 2],
+        /// `Cube`.
+        pub cube: [[[u8; 4]; 3]; 2],
+        /// `Many`.
+        pub many: [f64; 40],
+        /// `Names`: up to 255 octets of text.
+        pub names: [codec::Text; 2],
+        /// `Grid`: up to 255 octets of text.
+        pub grid: [[codec::Text; 2]; 2],
+        /// `Stamps`.
+        pub stamps: [report_arrays::Stamp; 2],
+        /// `Maybe`: bit 0 of the presence vector.
+        pub maybe: Option<[u8; 4]>,
+        /// `Codes`: at most 3 octets of text.
+        pub codes: [codec::Text; 2],
     }
 
-    codec::bit_field!(Stamp(u8), [
-        ("Low", 0, 3),
-    ]);
-}
-
-/// `ReportArrayList` (F052h).
-///
-/// Arrays in a list.
-///
-/// Declared by `urn:example:Arrays 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportArrayList {
-    /// `Rows`: up to 255 elements.
-    pub rows: Vec<report_array_list::RowRec>,
-}
-
-impl codec::Message for ReportArrayList {
-    const CODE: u16 = 0xF052;
-    const NAME: &'static str = "ReportArrayList";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        2
-        + 1 + 6 * self.rows.len()
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(<Self as codec::Message>::CODE);
-        output.member("Rows", |output| output.list::<u8, _>(&self.rows, 0, 255, |value, output| { output.fixed(*value); Ok(()) }))?;
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let rows = input.member("Rows", |input| input.list::<u8, _>(0, 255, 6, codec::Reader::fixed))?;
-        Ok(Self {
-            rows,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportArrayList {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::View::view(&self.rows)
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            Ok(Self { rows: codec::view::View::from_view(value)? })
-        }
-    }
-    codec::serde_by_view!(ReportArrayList);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportArrayList {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                rows: codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary)?,
-            })
-        }
-    }
-}
-
-/// The types inside [`ReportArrayList`].
-pub mod report_array_list {
-    use super::codec;
-
-    /// `RowRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct RowRec {
-        /// `Row`.
-        pub row: [i16; 3],
-    }
-
-    impl codec::Fixed for RowRec {
-        const SIZE: usize = 6;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
+    impl Default for ReportArrays {
+        fn default() -> Self {
             Self {
-                row: codec::Fixed::get(run, at),
+                vector: ::core::array::from_fn(|_| Default::default()),
+                matrix: ::core::array::from_fn(|_| ::core::array::from_fn(|_| Default::default())),
+                cube: ::core::array::from_fn(|_| ::core::array::from_fn(|_| ::core::array::from_fn(|_| Default::default()))),
+                many: ::core::array::from_fn(|_| Default::default()),
+                names: ::core::array::from_fn(|_| Default::default()),
+                grid: ::core::array::from_fn(|_| ::core::array::from_fn(|_| Default::default())),
+                stamps: ::core::array::from_fn(|_| Default::default()),
+                maybe: Default::default(),
+                codes: ::core::array::from_fn(|_| Default::default()),
             }
-        }
-
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.row, run, at);
         }
     }
 
-    codec::if_serde! {
-        impl codec::view::View for RowRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("Row", codec::view::View::view(&self.row))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["Row"])?;
-                Ok(Self {
-                    row: object.member("Row")?,
-                })
-            }
+    impl codec::Message for ReportArrays {
+        const CODE: u16 = 0xF051;
+        const NAME: &'static str = "ReportArrays";
+        fn encoded_len(&self) -> usize {
+            379 + self.names.iter().map(|value| 1 + value.len()).sum::<usize>()
+            + self.grid.iter().flatten().map(|value| 1 + value.len()).sum::<usize>()
+            + 4 * usize::from(self.maybe.is_some())
         }
-        codec::serde_by_view!(RowRec);
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            let present = u8::from(self.maybe.is_some());
+            let run = output.run::<15>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(present, run, 2);
+            codec::Fixed::put(self.vector, run, 3);
+            output.member("Matrix", |output| { for i1 in 0..3 { for i0 in 0..2 { { output.fixed(self.matrix[i0][i1]); Ok(()) }?; } } Ok(()) })?;
+            output.member("Cube", |output| { for i2 in 0..4 { for i1 in 0..3 { for i0 in 0..2 { { output.fixed(self.cube[i0][i1][i2]); Ok(()) }?; } } } Ok(()) })?;
+            output.fixed(self.many);
+            output.member("Names", |output| { for i0 in 0..2 { output.text::<u8>(&self.names[i0], 0, 255)?; } Ok(()) })?;
+            output.member("Grid", |output| { for i1 in 0..2 { for i0 in 0..2 { output.text::<u8>(&self.grid[i0][i1], 0, 255)?; } } Ok(()) })?;
+            output.fixed(self.stamps);
+            output.optional(self.maybe);
+            output.member("Codes", |output| { for i0 in 0..2 { output.fixed_text(&self.codes[i0], 3)?; } Ok(()) })?;
+            Ok(())
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
+            let present = input.presence::<u8>(0x1)?;
+            let vector = input.member("Vector", codec::Reader::fixed)?;
+            let matrix = input.member("Matrix", |input| { input.require(12)?; let mut array: [[_; 3]; 2] = ::core::array::from_fn(|_| ::core::array::from_fn(|_| Default::default())); for i1 in 0..3 { for i0 in 0..2 { array[i0][i1] = input.fixed()?; } } Ok(array) })?;
+            let cube = input.member("Cube", |input| { input.require(24)?; let mut array: [[[_; 4]; 3]; 2] = ::core::array::from_fn(|_| ::core::array::from_fn(|_| ::core::array::from_fn(|_| Default::default()))); for i2 in 0..4 { for i1 in 0..3 { for i0 in 0..2 { array[i0][i1][i2] = input.fixed()?; } } } Ok(array) })?;
+            let many = input.member("Many", codec::Reader::fixed)?;
+            let names = input.member("Names", |input| { input.require(2)?; let mut array: [_; 2] = ::core::array::from_fn(|_| Default::default()); for i0 in 0..2 { array[i0] = input.text::<u8>(0, 255)?; } Ok(array) })?;
+            let grid = input.member("Grid", |input| { input.require(4)?; let mut array: [[_; 2]; 2] = ::core::array::from_fn(|_| ::core::array::from_fn(|_| Default::default())); for i1 in 0..2 { for i0 in 0..2 { array[i0][i1] = input.text::<u8>(0, 255)?; } } Ok(array) })?;
+            let stamps = input.member("Stamps", codec::Reader::fixed)?;
+            let maybe = input.optional(present & 0x1 != 0, "Maybe", codec::Reader::fixed)?;
+            let codes = input.member("Codes", |input| { input.require(6)?; let mut array: [_; 2] = ::core::array::from_fn(|_| Default::default()); for i0 in 0..2 { array[i0] = input.fixed_text(3)?; } Ok(array) })?;
+            Ok(Self { vector, matrix, cube, many, names, grid, stamps, maybe, codes })
+        }
     }
 
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for RowRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    row: codec::arbitrary::array(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                })
+    codec::members!(ReportArrays {
+        vector: "Vector" = |random| codec::arbitrary::array(random, codec::arbitrary::Arbitrary::arbitrary),
+        matrix: "Matrix" = |random| codec::arbitrary::array(random, |random| codec::arbitrary::array(random, codec::arbitrary::Arbitrary::arbitrary)),
+        cube: "Cube" = |random| codec::arbitrary::array(random, |random| codec::arbitrary::array(random, |random| codec::arbitrary::array(random, codec::arbitrary::Arbitrary::arbitrary))),
+        many: "Many" = |random| codec::arbitrary::array(random, codec::arbitrary::f64),
+        names: "Names" = |random| codec::arbitrary::array(random, |random| codec::arbitrary::text(random, 0, 255)),
+        grid: "Grid" = |random| codec::arbitrary::array(random, |random| codec::arbitrary::array(random, |random| codec::arbitrary::text(random, 0, 255))),
+        stamps: "Stamps" = |random| codec::arbitrary::array(random, codec::arbitrary::Arbitrary::arbitrary),
+        maybe: "Maybe" = |random| codec::arbitrary::optional(random, |random| codec::arbitrary::array(random, codec::arbitrary::Arbitrary::arbitrary)),
+        codes: "Codes" = |random| codec::arbitrary::array(random, |random| codec::arbitrary::fixed_text(random, 3)),
+    });
+
+    /// The types inside [`ReportArrays`].
+    pub mod report_arrays {
+        use super::codec;
+
+        /// `Element` in meter: -30 to 30 in steps of 1.397e-8, carried as `u32`.
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct Element(u32);
+
+        codec::scaled!(Element(u32), "Element", -30.0_f64 to 30.0_f64 "meter", Round);
+
+        /// `Stamp`: several numbers in one `u8`. Bits outside all of them are kept.
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct Stamp(pub u8);
+
+        codec::sub_fields!(Stamp(u8) {
+            /// `Low`: bits 0 to 3, 0 to 15.
+            low: u8, 0 to 3, 0 to 15, "Low" => with_low;
+        });
+
+        codec::bit_field!(Stamp(u8), [("Low", 0, 3)]);
+    }
+
+    /// `ReportArrayList` (F052h).
+    ///
+    /// Arrays in a list.
+    ///
+    /// Declared by `urn:example:Arrays 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ReportArrayList {
+        /// `Rows`: up to 255 elements.
+        pub rows: codec::List<report_array_list::RowRec>,
+    }
+
+    impl codec::Message for ReportArrayList {
+        const CODE: u16 = 0xF052;
+        const NAME: &'static str = "ReportArrayList";
+        fn encoded_len(&self) -> usize {
+            2 + 1 + 6 * self.rows.len()
+        }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            output.fixed(<Self as codec::Message>::CODE);
+            output.member("Rows", |output| output.list::<u8, _>(&self.rows, 0, 255, |value, output| { output.fixed(*value); Ok(()) }))?;
+            Ok(())
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
+            let rows = input.member("Rows", |input| input.list::<u8, _>(0, 255, 6, codec::Reader::fixed))?;
+            Ok(Self { rows })
+        }
+    }
+
+    codec::members!(ReportArrayList is rows = |random| codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary));
+
+    /// The types inside [`ReportArrayList`].
+    pub mod report_array_list {
+        use super::codec;
+
+        /// `RowRec`.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct RowRec {
+            /// `Row`.
+            pub row: [i16; 3],
+        }
+
+        impl codec::Fixed for RowRec {
+            const SIZE: usize = 6;
+
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    row: codec::Fixed::get(run, at),
+                }
+            }
+
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.row, run, at);
             }
         }
+
+        codec::members!(RowRec {
+            row: "Row" = |random| codec::arbitrary::array(random, codec::arbitrary::Arbitrary::arbitrary),
+        });
     }
 }
+
+#[doc(inline)]
+#[allow(unused_imports)]
+pub use v1_0::{ReportArrays, report_arrays, ReportArrayList, report_array_list};

@@ -40,8 +40,8 @@ pub mod bit_fields {
     }
 
     impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
-        fn offers(&self) -> Vec<codec::ServiceId> {
-            vec![V1_0]
+        fn offers(&self) -> codec::List<codec::ServiceId> {
+            codec::List::from([V1_0])
         }
 
         fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
@@ -56,397 +56,196 @@ pub mod bit_fields {
 /// The services of the set, by URN and version.
 pub static SERVICES: &[codec::ServiceInfo] = &[
     codec::ServiceInfo {
-        name: "BitFields",
-        id: bit_fields::V1_0,
-        inherits_from: None,
-        inputs: &[0xF011],
+        name: "BitFields", id: bit_fields::V1_0, inherits_from: None, inputs: &[0xF011],
         outputs: &[],
     },
 ];
 
 /// The message types of the set, by code; of several with one code the newest first.
 pub static MESSAGES: &[codec::MessageInfo] = &[
-    codec::MessageInfo::of::<ReportTime>(&[
-        bit_fields::V1_0,
-    ]),
+    codec::MessageInfo::of::<ReportTime>(&[bit_fields::V1_0]),
 ];
 
-/// `ReportTime` (F011h).
-///
-/// Bit fields of every width, with free bits.
-///
-/// Declared by `urn:example:BitFields 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportTime {
-    /// `TimeStamp`.
-    pub time_stamp: report_time::TimeStamp,
-    /// `Flags`: bit 0 of the presence vector.
-    pub flags: Option<report_time::Flags>,
-    /// `Wide`: bit 1 of the presence vector.
-    pub wide: Option<report_time::Wide>,
-    /// `Whole`: bit 2 of the presence vector.
-    pub whole: Option<report_time::Whole>,
-}
-
-impl codec::Message for ReportTime {
-    const CODE: u16 = 0xF011;
-    const NAME: &'static str = "ReportTime";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        7
-        + usize::from(self.flags.is_some())
-        + 8 * usize::from(self.wide.is_some())
-        + 2 * usize::from(self.whole.is_some())
-    }
-
-    #[inline]
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        if let Self {
-            time_stamp,
-            flags: Some(flags),
-            wide: Some(wide),
-            whole: Some(whole),
-        } = self
-        {
-            let run = output.run::<18>();
-            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
-            codec::Fixed::put(0x7_u8, run, 2);
-            codec::Fixed::put(*time_stamp, run, 3);
-            codec::Fixed::put(*flags, run, 7);
-            codec::Fixed::put(*wide, run, 8);
-            codec::Fixed::put(*whole, run, 16);
-            return Ok(());
-        }
-        self.write_some(output);
-        Ok(())
-    }
-
-    #[inline]
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let present = input.presence::<u8>(0x7)?;
-        if present == 0x7 {
-            let run = input.run::<15>(&[
-                ("TimeStamp", 4),
-                ("Flags", 1),
-                ("Wide", 8),
-                ("Whole", 2),
-            ])?;
-            return Ok(Self {
-                time_stamp: codec::Fixed::get(run, 0),
-                flags: Some(codec::Fixed::get(run, 4)),
-                wide: Some(codec::Fixed::get(run, 5)),
-                whole: Some(codec::Fixed::get(run, 13)),
-            });
-        }
-        Self::read_some(input, present)
-    }
-}
-
-impl ReportTime {
-    #[inline(never)]
-    fn write_some(&self, output: &mut codec::Writer<'_>) {
-        let present =
-        u8::from(self.flags.is_some())
-        | u8::from(self.wide.is_some()) << 1
-        | u8::from(self.whole.is_some()) << 2;
-        let run = output.run::<7>();
-        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
-        codec::Fixed::put(present, run, 2);
-        codec::Fixed::put(self.time_stamp, run, 3);
-        output.optional(self.flags);
-        output.optional(self.wide);
-        output.optional(self.whole);
-    }
-
-    #[inline(never)]
-    fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
-        let mut input = place.clone();
-        let time_stamp = input.member("TimeStamp", codec::Reader::fixed)?;
-        let flags = input.optional(present & 0x1 != 0, "Flags", codec::Reader::fixed)?;
-        let wide = input.optional(present & 0x2 != 0, "Wide", codec::Reader::fixed)?;
-        let whole = input.optional(present & 0x4 != 0, "Whole", codec::Reader::fixed)?;
-        *place = input;
-        Ok(Self {
-            time_stamp,
-            flags,
-            wide,
-            whole,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportTime {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(4)
-            .with("TimeStamp", codec::view::View::view(&self.time_stamp))
-            .with("Flags", codec::view::View::view(&self.flags))
-            .with("Wide", codec::view::View::view(&self.wide))
-            .with("Whole", codec::view::View::view(&self.whole))
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            let object = codec::view::Object::new(value, &["TimeStamp", "Flags", "Wide", "Whole"])?;
-            Ok(Self {
-                time_stamp: object.member("TimeStamp")?,
-                flags: object.member("Flags")?,
-                wide: object.member("Wide")?,
-                whole: object.member("Whole")?,
-            })
-        }
-    }
-    codec::serde_by_view!(ReportTime);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportTime {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                time_stamp: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                flags: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                wide: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                whole: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-            })
-        }
-    }
-}
-
-/// The types inside [`ReportTime`].
-pub mod report_time {
+/// The messages of services of version 1.0.
+pub mod v1_0 {
     use super::codec;
 
-    /// `TimeStamp`: several numbers in one `u32`. Bits outside all of them are kept.
-    #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-    pub struct TimeStamp(pub u32);
+    /// `ReportTime` (F011h).
+    ///
+    /// Bit fields of every width, with free bits.
+    ///
+    /// Declared by `urn:example:BitFields 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ReportTime {
+        /// `TimeStamp`.
+        pub time_stamp: report_time::TimeStamp,
+        /// `Flags`: bit 0 of the presence vector.
+        pub flags: Option<report_time::Flags>,
+        /// `Wide`: bit 1 of the presence vector.
+        pub wide: Option<report_time::Wide>,
+        /// `Whole`: bit 2 of the presence vector.
+        pub whole: Option<report_time::Whole>,
+    }
 
-    impl TimeStamp {
-        /// `Milliseconds`: bits 0 to 9, 0 to 999.
-        pub const fn milliseconds(self) -> u16 {
-            codec::bits::get(self.0 as u64, 0, 9) as u16
+    impl codec::Message for ReportTime {
+        const CODE: u16 = 0xF011;
+        const NAME: &'static str = "ReportTime";
+        fn encoded_len(&self) -> usize {
+            7 + usize::from(self.flags.is_some()) + 8 * usize::from(self.wide.is_some())
+            + 2 * usize::from(self.whole.is_some())
         }
 
-        /// The same with another `Milliseconds`.
-        ///
-        /// # Errors
-        /// If the value is not in 0 to 999.
-        pub const fn with_milliseconds(self, value: u16) -> Result<Self, codec::OutOfRange> {
-            match codec::bits::set_checked(self.0 as u64, ("Milliseconds", 0, 9), value as u64, (0, 999)) {
-                Ok(raw) => Ok(Self(raw as u32)),
-                Err(error) => Err(error),
+        #[inline]
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            if let Self {
+                time_stamp, flags: Some(flags), wide: Some(wide), whole: Some(whole),
+            } = self {
+                let run = output.run::<18>();
+                codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+                codec::Fixed::put(0x7_u8, run, 2);
+                codec::Fixed::put(*time_stamp, run, 3);
+                codec::Fixed::put(*flags, run, 7);
+                codec::Fixed::put(*wide, run, 8);
+                codec::Fixed::put(*whole, run, 16);
+                return Ok(());
             }
+            self.write_some(output);
+            Ok(())
         }
 
-        /// `Seconds`: bits 10 to 15, 0 to 59.
-        pub const fn seconds(self) -> u8 {
-            codec::bits::get(self.0 as u64, 10, 15) as u8
-        }
-
-        /// The same with another `Seconds`.
-        ///
-        /// # Errors
-        /// If the value is not in 0 to 59.
-        pub const fn with_seconds(self, value: u8) -> Result<Self, codec::OutOfRange> {
-            match codec::bits::set_checked(self.0 as u64, ("Seconds", 10, 15), value as u64, (0, 59)) {
-                Ok(raw) => Ok(Self(raw as u32)),
-                Err(error) => Err(error),
+        #[inline]
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
+            let present = input.presence::<u8>(0x7)?;
+            if present == 0x7 {
+                let run = input.run::<15>(&[
+                    ("TimeStamp", 4), ("Flags", 1), ("Wide", 8), ("Whole", 2),
+                ])?;
+                return Ok(Self {
+                    time_stamp: codec::Fixed::get(run, 0), flags: Some(codec::Fixed::get(run, 4)),
+                    wide: Some(codec::Fixed::get(run, 5)), whole: Some(codec::Fixed::get(run, 13)),
+                });
             }
-        }
-
-        /// `Minutes`: bits 16 to 21, 0 to 59.
-        pub const fn minutes(self) -> u8 {
-            codec::bits::get(self.0 as u64, 16, 21) as u8
-        }
-
-        /// The same with another `Minutes`.
-        ///
-        /// # Errors
-        /// If the value is not in 0 to 59.
-        pub const fn with_minutes(self, value: u8) -> Result<Self, codec::OutOfRange> {
-            match codec::bits::set_checked(self.0 as u64, ("Minutes", 16, 21), value as u64, (0, 59)) {
-                Ok(raw) => Ok(Self(raw as u32)),
-                Err(error) => Err(error),
-            }
-        }
-
-        /// `Hour`: bits 22 to 26, 0 to 23.
-        pub const fn hour(self) -> u8 {
-            codec::bits::get(self.0 as u64, 22, 26) as u8
-        }
-
-        /// The same with another `Hour`.
-        ///
-        /// # Errors
-        /// If the value is not in 0 to 23.
-        pub const fn with_hour(self, value: u8) -> Result<Self, codec::OutOfRange> {
-            match codec::bits::set_checked(self.0 as u64, ("Hour", 22, 26), value as u64, (0, 23)) {
-                Ok(raw) => Ok(Self(raw as u32)),
-                Err(error) => Err(error),
-            }
-        }
-
-        /// `Day`: bits 27 to 31, 1 to 31.
-        pub const fn day(self) -> u8 {
-            codec::bits::get(self.0 as u64, 27, 31) as u8
-        }
-
-        /// The same with another `Day`.
-        ///
-        /// # Errors
-        /// If the value is not in 1 to 31.
-        pub const fn with_day(self, value: u8) -> Result<Self, codec::OutOfRange> {
-            match codec::bits::set_checked(self.0 as u64, ("Day", 27, 31), value as u64, (1, 31)) {
-                Ok(raw) => Ok(Self(raw as u32)),
-                Err(error) => Err(error),
-            }
-        }
-
-        /// The stamp of a time since the beginning of 1970 (UTC).
-        #[must_use]
-        pub const fn at(since_1970: ::std::time::Duration) -> Self {
-            Self(codec::time_stamp(since_1970))
+            Self::read_some(input, present)
         }
     }
 
-    codec::bit_field!(TimeStamp(u32), [
-        ("Milliseconds", 0, 9),
-        ("Seconds", 10, 15),
-        ("Minutes", 16, 21),
-        ("Hour", 22, 26),
-        ("Day", 27, 31),
-    ]);
-
-    /// `Flags Ready`: a number with named values. Others are kept as they come.
-    #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-    pub struct FlagsReady(pub u8);
-
-    impl FlagsReady {
-        /// `No` = 0.
-        pub const NO: Self = Self(0);
-        /// `Yes` = 1.
-        ///
-        /// It is.
-        pub const YES: Self = Self(1);
-    }
-
-    codec::enumeration!(FlagsReady(u8), [
-        (0, "No"),
-        (1, "Yes"),
-    ]);
-
-    /// `Flags`: several numbers in one `u8`. Bits outside all of them are kept.
-    #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-    pub struct Flags(pub u8);
-
-    impl Flags {
-        /// `Ready`: bit 1.
-        pub const fn ready(self) -> FlagsReady {
-            FlagsReady(codec::bits::get(self.0 as u64, 1, 1) as u8)
+    impl ReportTime {
+        #[inline(never)]
+        fn write_some(&self, output: &mut codec::Writer<'_>) {
+            let present = u8::from(self.flags.is_some()) | u8::from(self.wide.is_some()) << 1
+            | u8::from(self.whole.is_some()) << 2;
+            let run = output.run::<7>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(present, run, 2);
+            codec::Fixed::put(self.time_stamp, run, 3);
+            output.optional(self.flags);
+            output.optional(self.wide);
+            output.optional(self.whole);
         }
 
-        /// The same with another `Ready`.
-        ///
-        /// # Errors
-        /// If the value is not in 0 to 1.
-        pub const fn with_ready(self, value: FlagsReady) -> Result<Self, codec::OutOfRange> {
-            match codec::bits::set_checked(self.0 as u64, ("Ready", 1, 1), value.0 as u64, (0, 1)) {
-                Ok(raw) => Ok(Self(raw as u8)),
-                Err(error) => Err(error),
-            }
-        }
-
-        /// `Level`: bits 4 to 6, 0 to 7.
-        pub const fn level(self) -> u8 {
-            codec::bits::get(self.0 as u64, 4, 6) as u8
-        }
-
-        /// The same with another `Level`.
-        ///
-        /// # Errors
-        /// If the value is not in 0 to 7.
-        pub const fn with_level(self, value: u8) -> Result<Self, codec::OutOfRange> {
-            match codec::bits::set_checked(self.0 as u64, ("Level", 4, 6), value as u64, (0, 7)) {
-                Ok(raw) => Ok(Self(raw as u8)),
-                Err(error) => Err(error),
-            }
+        #[inline(never)]
+        fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
+            let mut input = place.clone();
+            let time_stamp = input.member("TimeStamp", codec::Reader::fixed)?;
+            let flags = input.optional(present & 0x1 != 0, "Flags", codec::Reader::fixed)?;
+            let wide = input.optional(present & 0x2 != 0, "Wide", codec::Reader::fixed)?;
+            let whole = input.optional(present & 0x4 != 0, "Whole", codec::Reader::fixed)?;
+            *place = input;
+            Ok(Self { time_stamp, flags, wide, whole })
         }
     }
 
-    codec::bit_field!(Flags(u8), [
-        ("Ready", 1, 1, FlagsReady),
-        ("Level", 4, 6),
-    ]);
+    codec::members!(ReportTime {
+        time_stamp: "TimeStamp", flags: "Flags", wide: "Wide", whole: "Whole",
+    });
 
-    /// `Wide`: several numbers in one `u64`. Bits outside all of them are kept.
-    #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-    pub struct Wide(pub u64);
+    /// The types inside [`ReportTime`].
+    pub mod report_time {
+        use super::codec;
 
-    impl Wide {
-        /// `Low`: bits 0 to 31, 0 to 4294967295.
-        pub const fn low(self) -> u32 {
-            codec::bits::get(self.0, 0, 31) as u32
-        }
+        /// `TimeStamp`: several numbers in one `u32`. Bits outside all of them are kept.
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct TimeStamp(pub u32);
 
-        /// The same with another `Low`.
-        ///
-        /// # Errors
-        /// If the value is not in 0 to 4294967295.
-        pub const fn with_low(self, value: u32) -> Result<Self, codec::OutOfRange> {
-            match codec::bits::set_checked(self.0, ("Low", 0, 31), value as u64, (0, 4294967295)) {
-                Ok(raw) => Ok(Self(raw as u64)),
-                Err(error) => Err(error),
+        codec::sub_fields!(TimeStamp(u32) {
+            /// `Milliseconds`: bits 0 to 9, 0 to 999.
+            milliseconds: u16, 0 to 9, 0 to 999, "Milliseconds" => with_milliseconds;
+            /// `Seconds`: bits 10 to 15, 0 to 59.
+            seconds: u8, 10 to 15, 0 to 59, "Seconds" => with_seconds;
+            /// `Minutes`: bits 16 to 21, 0 to 59.
+            minutes: u8, 16 to 21, 0 to 59, "Minutes" => with_minutes;
+            /// `Hour`: bits 22 to 26, 0 to 23.
+            hour: u8, 22 to 26, 0 to 23, "Hour" => with_hour;
+            /// `Day`: bits 27 to 31, 1 to 31.
+            day: u8, 27 to 31, 1 to 31, "Day" => with_day;
+        });
+
+        impl TimeStamp {
+            /// The stamp of a time since the beginning of 1970 (UTC).
+            #[must_use]
+            pub const fn at(since_1970: ::core::time::Duration) -> Self {
+                Self(codec::time_stamp(since_1970))
             }
         }
 
-        /// `type`: bits 32 to 63, 0 to 4294967295.
-        pub const fn r#type(self) -> u32 {
-            codec::bits::get(self.0, 32, 63) as u32
+        codec::bit_field!(TimeStamp(u32), [
+            ("Milliseconds", 0, 9), ("Seconds", 10, 15), ("Minutes", 16, 21), ("Hour", 22, 26),
+            ("Day", 27, 31),
+        ]);
+
+        /// `Flags Ready`: a number with named values. Others are kept as they come.
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct FlagsReady(pub u8);
+
+        impl FlagsReady {
+            /// `No` = 0.
+            pub const NO: Self = Self(0);
+            /// `Yes` = 1. It is.
+            pub const YES: Self = Self(1);
         }
 
-        /// The same with another `type`.
-        ///
-        /// # Errors
-        /// If the value is not in 0 to 4294967295.
-        pub const fn with_type(self, value: u32) -> Result<Self, codec::OutOfRange> {
-            match codec::bits::set_checked(self.0, ("type", 32, 63), value as u64, (0, 4294967295)) {
-                Ok(raw) => Ok(Self(raw as u64)),
-                Err(error) => Err(error),
-            }
-        }
+        codec::enumeration!(FlagsReady(u8), [(0, "No"), (1, "Yes")]);
+
+        /// `Flags`: several numbers in one `u8`. Bits outside all of them are kept.
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct Flags(pub u8);
+
+        codec::sub_fields!(Flags(u8) {
+            /// `Ready`: bit 1.
+            ready: u8 as FlagsReady, 1 to 1, 0 to 1, "Ready" => with_ready;
+            /// `Level`: bits 4 to 6, 0 to 7.
+            level: u8, 4 to 6, 0 to 7, "Level" => with_level;
+        });
+
+        codec::bit_field!(Flags(u8), [("Ready", 1, 1, FlagsReady), ("Level", 4, 6)]);
+
+        /// `Wide`: several numbers in one `u64`. Bits outside all of them are kept.
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct Wide(pub u64);
+
+        codec::sub_fields!(Wide(u64) {
+            /// `Low`: bits 0 to 31, 0 to 4294967295.
+            low: u32, 0 to 31, 0 to 4294967295, "Low" => with_low;
+            /// `type`: bits 32 to 63, 0 to 4294967295.
+            r#type: u32, 32 to 63, 0 to 4294967295, "type" => with_type;
+        });
+
+        codec::bit_field!(Wide(u64), [("Low", 0, 31), ("type", 32, 63)]);
+
+        /// `Whole`: several numbers in one `u16`. Bits outside all of them are kept.
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct Whole(pub u16);
+
+        codec::sub_fields!(Whole(u16) {
+            /// `All`: bits 0 to 15, 0 to 65535.
+            all: u16, 0 to 15, 0 to 65535, "All" => with_all;
+        });
+
+        codec::bit_field!(Whole(u16), [("All", 0, 15)]);
     }
-
-    codec::bit_field!(Wide(u64), [
-        ("Low", 0, 31),
-        ("type", 32, 63),
-    ]);
-
-    /// `Whole`: several numbers in one `u16`. Bits outside all of them are kept.
-    #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-    pub struct Whole(pub u16);
-
-    impl Whole {
-        /// `All`: bits 0 to 15, 0 to 65535.
-        pub const fn all(self) -> u16 {
-            codec::bits::get(self.0 as u64, 0, 15) as u16
-        }
-
-        /// The same with another `All`.
-        ///
-        /// # Errors
-        /// If the value is not in 0 to 65535.
-        pub const fn with_all(self, value: u16) -> Result<Self, codec::OutOfRange> {
-            match codec::bits::set_checked(self.0 as u64, ("All", 0, 15), value as u64, (0, 65535)) {
-                Ok(raw) => Ok(Self(raw as u16)),
-                Err(error) => Err(error),
-            }
-        }
-    }
-
-    codec::bit_field!(Whole(u16), [
-        ("All", 0, 15),
-    ]);
 }
+
+#[doc(inline)]
+#[allow(unused_imports)]
+pub use v1_0::{ReportTime, report_time};

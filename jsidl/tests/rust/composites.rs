@@ -58,8 +58,8 @@ pub mod composites {
     }
 
     impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
-        fn offers(&self) -> Vec<codec::ServiceId> {
-            vec![V1_0]
+        fn offers(&self) -> codec::List<codec::ServiceId> {
+            codec::List::from([V1_0])
         }
 
         fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
@@ -80,1535 +80,1065 @@ pub mod composites {
 /// The services of the set, by URN and version.
 pub static SERVICES: &[codec::ServiceInfo] = &[
     codec::ServiceInfo {
-        name: "Composites",
-        id: composites::V1_0,
-        inherits_from: None,
-        inputs: &[0xF030, 0xF031, 0xF032, 0xF033, 0xF034, 0xF035, 0xF036],
-        outputs: &[],
+        name: "Composites", id: composites::V1_0, inherits_from: None,
+        inputs: &[0xF030, 0xF031, 0xF032, 0xF033, 0xF034, 0xF035, 0xF036], outputs: &[],
     },
 ];
 
 /// The message types of the set, by code; of several with one code the newest first.
 pub static MESSAGES: &[codec::MessageInfo] = &[
-    codec::MessageInfo::of::<QueryNothing>(&[
-        composites::V1_0,
-    ]),
-    codec::MessageInfo::of::<ReportTree>(&[
-        composites::V1_0,
-    ]),
-    codec::MessageInfo::of::<ReportListOfLists>(&[
-        composites::V1_0,
-    ]),
-    codec::MessageInfo::of::<SetChoice>(&[
-        composites::V1_0,
-    ]),
-    codec::MessageInfo::of::<ReportEmptyVariant>(&[
-        composites::V1_0,
-    ]),
-    codec::MessageInfo::of::<ReportOptional>(&[
-        composites::V1_0,
-    ]),
-    codec::MessageInfo::of::<ReportManyOptional>(&[
-        composites::V1_0,
-    ]),
+    codec::MessageInfo::of::<QueryNothing>(&[composites::V1_0]),
+    codec::MessageInfo::of::<ReportTree>(&[composites::V1_0]),
+    codec::MessageInfo::of::<ReportListOfLists>(&[composites::V1_0]),
+    codec::MessageInfo::of::<SetChoice>(&[composites::V1_0]),
+    codec::MessageInfo::of::<ReportEmptyVariant>(&[composites::V1_0]),
+    codec::MessageInfo::of::<ReportOptional>(&[composites::V1_0]),
+    codec::MessageInfo::of::<ReportManyOptional>(&[composites::V1_0]),
 ];
 
-/// `QueryNothing` (F030h).
-///
-/// An empty body.
-///
-/// Declared by `urn:example:Composites 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct QueryNothing;
-
-impl codec::Message for QueryNothing {
-    const CODE: u16 = 0xF030;
-    const NAME: &'static str = "QueryNothing";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        2
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(<Self as codec::Message>::CODE);
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        Ok(Self)
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for QueryNothing {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(0)
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            codec::view::Object::new(value, &[])?;
-            Ok(Self)
-        }
-    }
-    codec::serde_by_view!(QueryNothing);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for QueryNothing {
-        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self)
-        }
-    }
-}
-
-/// `ReportTree` (F031h).
-///
-/// Lists in lists.
-///
-/// Declared by `urn:example:Composites 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportTree {
-    /// `RequestIDRec`.
-    pub request_id_rec: report_tree::RequestIdRec,
-    /// `Nodes`: up to 65535 elements.
-    pub nodes: Vec<report_tree::NodeSeq>,
-}
-
-impl codec::Message for ReportTree {
-    const CODE: u16 = 0xF031;
-    const NAME: &'static str = "ReportTree";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        3
-        + 2 + self.nodes.iter().map(codec::Composite::encoded_len).sum::<usize>()
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let run = output.run::<3>();
-        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
-        codec::Fixed::put(self.request_id_rec, run, 2);
-        output.member("Nodes", |output| output.list::<u16, _>(&self.nodes, 0, 65535, |value, output| codec::Composite::write(value, output)))?;
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let request_id_rec = input.member("RequestIDRec", codec::Reader::fixed)?;
-        let nodes = input.member("Nodes", |input| input.list::<u16, _>(0, 65535, 3, codec::Composite::read))?;
-        Ok(Self {
-            request_id_rec,
-            nodes,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportTree {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(2)
-            .with("RequestIDRec", codec::view::View::view(&self.request_id_rec))
-            .with("Nodes", codec::view::View::view(&self.nodes))
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            let object = codec::view::Object::new(value, &["RequestIDRec", "Nodes"])?;
-            Ok(Self {
-                request_id_rec: object.member("RequestIDRec")?,
-                nodes: object.member("Nodes")?,
-            })
-        }
-    }
-    codec::serde_by_view!(ReportTree);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportTree {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                request_id_rec: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                nodes: codec::arbitrary::list(random, 0, 65535, codec::arbitrary::Arbitrary::arbitrary)?,
-            })
-        }
-    }
-}
-
-/// The types inside [`ReportTree`].
-pub mod report_tree {
+/// The messages of services of version 1.0.
+pub mod v1_0 {
     use super::codec;
 
-    /// `RequestIDRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct RequestIdRec {
-        /// `RequestID`.
-        pub request_id: u8,
-    }
-
-    impl codec::Fixed for RequestIdRec {
-        const SIZE: usize = 1;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                request_id: codec::Fixed::get(run, at),
-            }
-        }
-
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.request_id, run, at);
-        }
-    }
-
-    codec::if_serde! {
-        impl codec::view::View for RequestIdRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("RequestID", codec::view::View::view(&self.request_id))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["RequestID"])?;
-                Ok(Self {
-                    request_id: object.member("RequestID")?,
-                })
-            }
-        }
-        codec::serde_by_view!(RequestIdRec);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for RequestIdRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    request_id: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
-
-    /// `NodeRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct NodeRec {
-        /// `NodeID`.
-        pub node_id: u8,
-        /// `Kind`.
-        pub kind: u8,
-    }
-
-    impl codec::Fixed for NodeRec {
-        const SIZE: usize = 2;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                node_id: codec::Fixed::get(run, at),
-                kind: codec::Fixed::get(run, at + 1),
-            }
-        }
-
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.node_id, run, at);
-            codec::Fixed::put(self.kind, run, at + 1);
-        }
-    }
-
-    codec::if_serde! {
-        impl codec::view::View for NodeRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(2)
-                .with("NodeID", codec::view::View::view(&self.node_id))
-                .with("Kind", codec::view::View::view(&self.kind))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["NodeID", "Kind"])?;
-                Ok(Self {
-                    node_id: object.member("NodeID")?,
-                    kind: object.member("Kind")?,
-                })
-            }
-        }
-        codec::serde_by_view!(NodeRec);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for NodeRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    node_id: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                    kind: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
-
-    /// `ComponentRec`.
+    /// `QueryNothing` (F030h).
+    ///
+    /// An empty body.
+    ///
+    /// Declared by `urn:example:Composites 1.0`.
     #[derive(Debug, Clone, Default, PartialEq)]
-    pub struct ComponentRec {
-        /// `ComponentID`.
-        pub component_id: u8,
-        /// `Name`: up to 255 octets of text.
-        pub name: codec::Text,
-    }
+    pub struct QueryNothing;
 
-    impl codec::Composite for ComponentRec {
-        const MIN_LEN: usize = 2;
+    impl codec::Message for QueryNothing {
+        const CODE: u16 = 0xF030;
+        const NAME: &'static str = "QueryNothing";
+        fn encoded_len(&self) -> usize { 2 }
 
-        fn encoded_len(&self) -> usize {
-            1
-            + 1 + self.name.len()
-        }
-
-        #[inline]
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-            output.fixed(self.component_id);
-            output.member("Name", |output| output.text::<u8>(&self.name, 0, 255))?;
+            output.fixed(<Self as codec::Message>::CODE);
             Ok(())
         }
 
-        #[inline]
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-            let component_id = input.member("ComponentID", codec::Reader::fixed)?;
-            let name = input.member("Name", |input| input.text::<u8>(0, 255))?;
-            Ok(Self {
-                component_id,
-                name,
-            })
+            input.code(Self::CODE)?;
+            Ok(Self)
         }
     }
 
-    codec::if_serde! {
-        impl codec::view::View for ComponentRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(2)
-                .with("ComponentID", codec::view::View::view(&self.component_id))
-                .with("Name", codec::view::View::view(&self.name))
-            }
+    codec::members!(QueryNothing {});
 
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["ComponentID", "Name"])?;
-                Ok(Self {
-                    component_id: object.member("ComponentID")?,
-                    name: object.member("Name")?,
-                })
-            }
-        }
-        codec::serde_by_view!(ComponentRec);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for ComponentRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    component_id: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                    name: codec::arbitrary::text(random, 0, 255)?,
-                })
-            }
-        }
-    }
-
-    /// `NodeSeq`.
+    /// `ReportTree` (F031h).
+    ///
+    /// Lists in lists.
+    ///
+    /// Declared by `urn:example:Composites 1.0`.
     #[derive(Debug, Clone, Default, PartialEq)]
-    pub struct NodeSeq {
+    pub struct ReportTree {
+        /// `RequestIDRec`.
+        pub request_id_rec: report_tree::RequestIdRec,
+        /// `Nodes`: up to 65535 elements.
+        pub nodes: codec::List<report_tree::NodeSeq>,
+    }
+
+    impl codec::Message for ReportTree {
+        const CODE: u16 = 0xF031;
+        const NAME: &'static str = "ReportTree";
+        fn encoded_len(&self) -> usize {
+            3 + 2 + self.nodes.iter().map(codec::Composite::encoded_len).sum::<usize>()
+        }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            let run = output.run::<3>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(self.request_id_rec, run, 2);
+            output.member("Nodes", |output| output.list::<u16, _>(&self.nodes, 0, 65535, |value, output| codec::Composite::write(value, output)))?;
+            Ok(())
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
+            let request_id_rec = input.member("RequestIDRec", codec::Reader::fixed)?;
+            let nodes = input.member("Nodes", |input| input.list::<u16, _>(0, 65535, 3, codec::Composite::read))?;
+            Ok(Self { request_id_rec, nodes })
+        }
+    }
+
+    codec::members!(ReportTree {
+        request_id_rec: "RequestIDRec",
+        nodes: "Nodes" = |random| codec::arbitrary::list(random, 0, 65535, codec::arbitrary::Arbitrary::arbitrary),
+    });
+
+    /// The types inside [`ReportTree`].
+    pub mod report_tree {
+        use super::codec;
+
+        /// `RequestIDRec`.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct RequestIdRec {
+            /// `RequestID`.
+            pub request_id: u8,
+        }
+
+        impl codec::Fixed for RequestIdRec {
+            const SIZE: usize = 1;
+
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    request_id: codec::Fixed::get(run, at),
+                }
+            }
+
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.request_id, run, at);
+            }
+        }
+
+        codec::members!(RequestIdRec { request_id: "RequestID" });
+
         /// `NodeRec`.
-        pub node_rec: NodeRec,
-        /// `Components`: up to 255 elements.
-        pub components: Vec<ComponentRec>,
-    }
-
-    impl codec::Composite for NodeSeq {
-        const MIN_LEN: usize = 3;
-
-        fn encoded_len(&self) -> usize {
-            2
-            + 1 + self.components.iter().map(codec::Composite::encoded_len).sum::<usize>()
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct NodeRec {
+            /// `NodeID`.
+            pub node_id: u8,
+            /// `Kind`.
+            pub kind: u8,
         }
 
-        #[inline]
-        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-            output.fixed(self.node_rec);
-            output.member("Components", |output| output.list::<u8, _>(&self.components, 0, 255, |value, output| codec::Composite::write(value, output)))?;
-            Ok(())
-        }
+        impl codec::Fixed for NodeRec {
+            const SIZE: usize = 2;
 
-        #[inline]
-        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-            let node_rec = input.member("NodeRec", codec::Reader::fixed)?;
-            let components = input.member("Components", |input| input.list::<u8, _>(0, 255, 2, codec::Composite::read))?;
-            Ok(Self {
-                node_rec,
-                components,
-            })
-        }
-    }
-
-    codec::if_serde! {
-        impl codec::view::View for NodeSeq {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(2)
-                .with("NodeRec", codec::view::View::view(&self.node_rec))
-                .with("Components", codec::view::View::view(&self.components))
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    node_id: codec::Fixed::get(run, at),
+                    kind: codec::Fixed::get(run, at + 1),
+                }
             }
 
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["NodeRec", "Components"])?;
-                Ok(Self {
-                    node_rec: object.member("NodeRec")?,
-                    components: object.member("Components")?,
-                })
-            }
-        }
-        codec::serde_by_view!(NodeSeq);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for NodeSeq {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    node_rec: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                    components: codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary)?,
-                })
-            }
-        }
-    }
-}
-
-/// `ReportListOfLists` (F032h).
-///
-/// A list directly in a list.
-///
-/// Declared by `urn:example:Composites 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportListOfLists {
-    /// `Outer`: at most 100 elements.
-    pub outer: Vec<Vec<report_list_of_lists::PointRec>>,
-}
-
-impl codec::Message for ReportListOfLists {
-    const CODE: u16 = 0xF032;
-    const NAME: &'static str = "ReportListOfLists";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        2
-        + 2 + self.outer.iter().map(|value| 1 + 4 * value.len()).sum::<usize>()
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(<Self as codec::Message>::CODE);
-        output.member("Outer", |output| output.list::<u16, _>(&self.outer, 0, 100, |value, output| output.list::<u8, _>(value, 1, 4, |value, output| { output.fixed(*value); Ok(()) })))?;
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let outer = input.member("Outer", |input| input.list::<u16, _>(0, 100, 5, |input| input.list::<u8, _>(1, 4, 4, codec::Reader::fixed)))?;
-        Ok(Self {
-            outer,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportListOfLists {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::View::view(&self.outer)
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            Ok(Self { outer: codec::view::View::from_view(value)? })
-        }
-    }
-    codec::serde_by_view!(ReportListOfLists);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportListOfLists {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                outer: codec::arbitrary::list(random, 0, 100, |random| codec::arbitrary::list(random, 1, 4, codec::arbitrary::Arbitrary::arbitrary))?,
-            })
-        }
-    }
-}
-
-/// The types inside [`ReportListOfLists`].
-pub mod report_list_of_lists {
-    use super::codec;
-
-    /// `PointRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct PointRec {
-        /// `X`.
-        pub x: u16,
-        /// `Y`.
-        pub y: u16,
-    }
-
-    impl codec::Fixed for PointRec {
-        const SIZE: usize = 4;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                x: codec::Fixed::get(run, at),
-                y: codec::Fixed::get(run, at + 2),
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.node_id, run, at);
+                codec::Fixed::put(self.kind, run, at + 1);
             }
         }
 
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.x, run, at);
-            codec::Fixed::put(self.y, run, at + 2);
-        }
-    }
+        codec::members!(NodeRec { node_id: "NodeID", kind: "Kind" });
 
-    codec::if_serde! {
-        impl codec::view::View for PointRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(2)
-                .with("X", codec::view::View::view(&self.x))
-                .with("Y", codec::view::View::view(&self.y))
+        /// `ComponentRec`.
+        #[derive(Debug, Clone, Default, PartialEq)]
+        pub struct ComponentRec {
+            /// `ComponentID`.
+            pub component_id: u8,
+            /// `Name`: up to 255 octets of text.
+            pub name: codec::Text,
+        }
+
+        impl codec::Composite for ComponentRec {
+            const MIN_LEN: usize = 2;
+            fn encoded_len(&self) -> usize {
+                1 + 1 + self.name.len()
             }
 
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["X", "Y"])?;
-                Ok(Self {
-                    x: object.member("X")?,
-                    y: object.member("Y")?,
-                })
+            #[inline]
+            fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+                output.fixed(self.component_id);
+                output.member("Name", |output| output.text::<u8>(&self.name, 0, 255))?;
+                Ok(())
             }
-        }
-        codec::serde_by_view!(PointRec);
-    }
 
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for PointRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    x: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                    y: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
-}
-
-/// `SetChoice` (F033h).
-///
-/// A variant as the body.
-///
-/// Declared by `urn:example:Composites 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct SetChoice {
-    /// `Choice`.
-    pub choice: set_choice::Choice,
-}
-
-impl codec::Message for SetChoice {
-    const CODE: u16 = 0xF033;
-    const NAME: &'static str = "SetChoice";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        2
-        + codec::Composite::encoded_len(&self.choice)
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(<Self as codec::Message>::CODE);
-        output.member("Choice", |output| codec::Composite::write(&self.choice, output))?;
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let choice = input.member("Choice", codec::Composite::read)?;
-        Ok(Self {
-            choice,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for SetChoice {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::View::view(&self.choice)
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            Ok(Self { choice: codec::view::View::from_view(value)? })
-        }
-    }
-    codec::serde_by_view!(SetChoice);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for SetChoice {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                choice: codec::arbitrary::Arbitrary::arbitrary(random)?,
-            })
-        }
-    }
-}
-
-/// The types inside [`SetChoice`].
-pub mod set_choice {
-    use super::codec;
-
-    /// `NumberRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct NumberRec {
-        /// `Number`.
-        pub number: u32,
-    }
-
-    impl codec::Fixed for NumberRec {
-        const SIZE: usize = 4;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                number: codec::Fixed::get(run, at),
+            #[inline]
+            fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+                let component_id = input.member("ComponentID", codec::Reader::fixed)?;
+                let name = input.member("Name", |input| input.text::<u8>(0, 255))?;
+                Ok(Self { component_id, name })
             }
         }
 
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.number, run, at);
-        }
-    }
+        codec::members!(ComponentRec {
+            component_id: "ComponentID",
+            name: "Name" = |random| codec::arbitrary::text(random, 0, 255),
+        });
 
-    codec::if_serde! {
-        impl codec::view::View for NumberRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("Number", codec::view::View::view(&self.number))
+        /// `NodeSeq`.
+        #[derive(Debug, Clone, Default, PartialEq)]
+        pub struct NodeSeq {
+            /// `NodeRec`.
+            pub node_rec: NodeRec,
+            /// `Components`: up to 255 elements.
+            pub components: codec::List<ComponentRec>,
+        }
+
+        impl codec::Composite for NodeSeq {
+            const MIN_LEN: usize = 3;
+            fn encoded_len(&self) -> usize {
+                2 + 1 + self.components.iter().map(codec::Composite::encoded_len).sum::<usize>()
             }
 
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["Number"])?;
-                Ok(Self {
-                    number: object.member("Number")?,
-                })
+            #[inline]
+            fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+                output.fixed(self.node_rec);
+                output.member("Components", |output| output.list::<u8, _>(&self.components, 0, 255, |value, output| codec::Composite::write(value, output)))?;
+                Ok(())
+            }
+
+            #[inline]
+            fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+                let node_rec = input.member("NodeRec", codec::Reader::fixed)?;
+                let components = input.member("Components", |input| input.list::<u8, _>(0, 255, 2, codec::Composite::read))?;
+                Ok(Self { node_rec, components })
             }
         }
-        codec::serde_by_view!(NumberRec);
+
+        codec::members!(NodeSeq {
+            node_rec: "NodeRec",
+            components: "Components" = |random| codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary),
+        });
     }
 
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for NumberRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    number: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
-
-    /// `TextRec`.
+    /// `ReportListOfLists` (F032h).
+    ///
+    /// A list directly in a list.
+    ///
+    /// Declared by `urn:example:Composites 1.0`.
     #[derive(Debug, Clone, Default, PartialEq)]
-    pub struct TextRec {
-        /// `Text`: up to 255 octets of text.
-        pub text: codec::Text,
+    pub struct ReportListOfLists {
+        /// `Outer`: at most 100 elements.
+        pub outer: codec::List<codec::List<report_list_of_lists::PointRec>>,
     }
 
-    impl codec::Composite for TextRec {
-        const MIN_LEN: usize = 1;
-
+    impl codec::Message for ReportListOfLists {
+        const CODE: u16 = 0xF032;
+        const NAME: &'static str = "ReportListOfLists";
         fn encoded_len(&self) -> usize {
-            1 + self.text.len()
+            2 + 2 + self.outer.iter().map(|value| 1 + 4 * value.len()).sum::<usize>()
         }
 
-        #[inline]
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-            output.member("Text", |output| output.text::<u8>(&self.text, 0, 255))?;
+            output.fixed(<Self as codec::Message>::CODE);
+            output.member("Outer", |output| output.list::<u16, _>(&self.outer, 0, 100, |value, output| output.list::<u8, _>(value, 1, 4, |value, output| { output.fixed(*value); Ok(()) })))?;
             Ok(())
         }
 
-        #[inline]
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-            let text = input.member("Text", |input| input.text::<u8>(0, 255))?;
-            Ok(Self {
-                text,
-            })
+            input.code(Self::CODE)?;
+            let outer = input.member("Outer", |input| input.list::<u16, _>(0, 100, 5, |input| input.list::<u8, _>(1, 4, 4, codec::Reader::fixed)))?;
+            Ok(Self { outer })
         }
     }
 
-    codec::if_serde! {
-        impl codec::view::View for TextRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("Text", codec::view::View::view(&self.text))
+    codec::members!(ReportListOfLists is outer = |random| codec::arbitrary::list(random, 0, 100, |random| codec::arbitrary::list(random, 1, 4, codec::arbitrary::Arbitrary::arbitrary)));
+
+    /// The types inside [`ReportListOfLists`].
+    pub mod report_list_of_lists {
+        use super::codec;
+
+        /// `PointRec`.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct PointRec {
+            /// `X`.
+            pub x: u16,
+            /// `Y`.
+            pub y: u16,
+        }
+
+        impl codec::Fixed for PointRec {
+            const SIZE: usize = 4;
+
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    x: codec::Fixed::get(run, at),
+                    y: codec::Fixed::get(run, at + 2),
+                }
             }
 
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["Text"])?;
-                Ok(Self {
-                    text: object.member("Text")?,
-                })
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.x, run, at);
+                codec::Fixed::put(self.y, run, at + 2);
             }
         }
-        codec::serde_by_view!(TextRec);
+
+        codec::members!(PointRec { x: "X", y: "Y" });
     }
 
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for TextRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    text: codec::arbitrary::text(random, 0, 255)?,
-                })
-            }
-        }
-    }
-
-    /// `EmptyPresenceRec`.
+    /// `SetChoice` (F033h).
+    ///
+    /// A variant as the body.
+    ///
+    /// Declared by `urn:example:Composites 1.0`.
     #[derive(Debug, Clone, Default, PartialEq)]
-    pub struct EmptyPresenceRec {
-        /// `Maybe`: bit 0 of the presence vector.
-        pub maybe: Option<u8>,
+    pub struct SetChoice {
+        /// `Choice`.
+        pub choice: set_choice::Choice,
     }
 
-    impl codec::Composite for EmptyPresenceRec {
-        const MIN_LEN: usize = 1;
-
+    impl codec::Message for SetChoice {
+        const CODE: u16 = 0xF033;
+        const NAME: &'static str = "SetChoice";
         fn encoded_len(&self) -> usize {
-            1
-            + usize::from(self.maybe.is_some())
+            2 + codec::Composite::encoded_len(&self.choice)
         }
 
-        #[inline]
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-            if let Self {
-                maybe: Some(maybe),
-            } = self
-            {
-                let run = output.run::<2>();
-                codec::Fixed::put(0x1_u8, run, 0);
-                codec::Fixed::put(*maybe, run, 1);
-                return Ok(());
-            }
-            self.write_some(output);
+            output.fixed(<Self as codec::Message>::CODE);
+            output.member("Choice", |output| codec::Composite::write(&self.choice, output))?;
             Ok(())
         }
 
-        #[inline]
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-            let present = input.presence::<u8>(0x1)?;
-            if present == 0x1 {
-                let run = input.run::<1>(&[
-                    ("Maybe", 1),
-                ])?;
-                return Ok(Self {
-                    maybe: Some(codec::Fixed::get(run, 0)),
-                });
-            }
-            Self::read_some(input, present)
+            input.code(Self::CODE)?;
+            let choice = input.member("Choice", codec::Composite::read)?;
+            Ok(Self { choice })
         }
     }
 
-    impl EmptyPresenceRec {
-        #[inline(never)]
-        fn write_some(&self, output: &mut codec::Writer<'_>) {
-            let present =
-            u8::from(self.maybe.is_some());
-            output.fixed(present);
-            output.optional(self.maybe);
+    codec::members!(SetChoice is choice);
+
+    /// The types inside [`SetChoice`].
+    pub mod set_choice {
+        use super::codec;
+
+        /// `NumberRec`.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct NumberRec {
+            /// `Number`.
+            pub number: u32,
         }
 
-        #[inline(never)]
-        fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
-            let mut input = place.clone();
-            let maybe = input.optional(present & 0x1 != 0, "Maybe", codec::Reader::fixed)?;
-            *place = input;
-            Ok(Self {
-                maybe,
-            })
-        }
-    }
+        impl codec::Fixed for NumberRec {
+            const SIZE: usize = 4;
 
-    codec::if_serde! {
-        impl codec::view::View for EmptyPresenceRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("Maybe", codec::view::View::view(&self.maybe))
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    number: codec::Fixed::get(run, at),
+                }
             }
 
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["Maybe"])?;
-                Ok(Self {
-                    maybe: object.member("Maybe")?,
-                })
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.number, run, at);
             }
         }
-        codec::serde_by_view!(EmptyPresenceRec);
-    }
 
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for EmptyPresenceRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    maybe: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                })
-            }
-        }
-    }
+        codec::members!(NumberRec { number: "Number" });
 
-    /// `Again`: one of its alternatives.
-    #[derive(Debug, Clone, PartialEq)]
-    pub enum Again {
         /// `TextRec`.
-        TextRec(TextRec),
+        #[derive(Debug, Clone, Default, PartialEq)]
+        pub struct TextRec {
+            /// `Text`: up to 255 octets of text.
+            pub text: codec::Text,
+        }
+
+        impl codec::Composite for TextRec {
+            const MIN_LEN: usize = 1;
+            fn encoded_len(&self) -> usize { 1 + self.text.len() }
+
+            #[inline]
+            fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+                output.member("Text", |output| output.text::<u8>(&self.text, 0, 255))?;
+                Ok(())
+            }
+
+            #[inline]
+            fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+                let text = input.member("Text", |input| input.text::<u8>(0, 255))?;
+                Ok(Self { text })
+            }
+        }
+
+        codec::members!(TextRec { text: "Text" = |random| codec::arbitrary::text(random, 0, 255) });
+
         /// `EmptyPresenceRec`.
-        EmptyPresenceRec(EmptyPresenceRec),
-    }
-
-    impl Default for Again {
-        fn default() -> Self {
-            Self::TextRec(Default::default())
+        #[derive(Debug, Clone, Default, PartialEq)]
+        pub struct EmptyPresenceRec {
+            /// `Maybe`: bit 0 of the presence vector.
+            pub maybe: Option<u8>,
         }
-    }
 
-    impl codec::Composite for Again {
-        const MIN_LEN: usize = 2;
-
-        fn encoded_len(&self) -> usize {
-            match self {
-                Self::TextRec(value) => 1 + codec::Composite::encoded_len(value),
-                Self::EmptyPresenceRec(value) => 1 + codec::Composite::encoded_len(value),
+        impl codec::Composite for EmptyPresenceRec {
+            const MIN_LEN: usize = 1;
+            fn encoded_len(&self) -> usize {
+                1 + usize::from(self.maybe.is_some())
             }
-        }
 
-        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-            match self {
-                Self::TextRec(value) => {
-                    output.fixed(0_u8);
-                    output.member("TextRec", |output| codec::Composite::write(value, output))
+            #[inline]
+            fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+                if let Self { maybe: Some(maybe) } = self {
+                    let run = output.run::<2>();
+                    codec::Fixed::put(0x1_u8, run, 0);
+                    codec::Fixed::put(*maybe, run, 1);
+                    return Ok(());
                 }
-                Self::EmptyPresenceRec(value) => {
-                    output.fixed(1_u8);
-                    output.member("EmptyPresenceRec", |output| codec::Composite::write(value, output))
+                self.write_some(output);
+                Ok(())
+            }
+
+            #[inline]
+            fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+                let present = input.presence::<u8>(0x1)?;
+                if present == 0x1 {
+                    let run = input.run::<1>(&[("Maybe", 1)])?;
+                    return Ok(Self { maybe: Some(codec::Fixed::get(run, 0)) });
+                }
+                Self::read_some(input, present)
+            }
+        }
+
+        impl EmptyPresenceRec {
+            #[inline(never)]
+            fn write_some(&self, output: &mut codec::Writer<'_>) {
+                let present = u8::from(self.maybe.is_some());
+                output.fixed(present);
+                output.optional(self.maybe);
+            }
+
+            #[inline(never)]
+            fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
+                let mut input = place.clone();
+                let maybe = input.optional(present & 0x1 != 0, "Maybe", codec::Reader::fixed)?;
+                *place = input;
+                Ok(Self { maybe })
+            }
+        }
+
+        codec::members!(EmptyPresenceRec { maybe: "Maybe" });
+
+        /// `Again`: one of its alternatives.
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum Again {
+            /// `TextRec`.
+            TextRec(TextRec),
+            /// `EmptyPresenceRec`.
+            EmptyPresenceRec(EmptyPresenceRec),
+        }
+
+        impl Default for Again {
+            fn default() -> Self {
+                Self::TextRec(Default::default())
+            }
+        }
+
+        impl codec::Composite for Again {
+            const MIN_LEN: usize = 2;
+
+            fn encoded_len(&self) -> usize {
+                match self {
+                    Self::TextRec(value) => 1 + codec::Composite::encoded_len(value),
+                    Self::EmptyPresenceRec(value) => 1 + codec::Composite::encoded_len(value),
                 }
             }
-        }
 
-        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-            match input.tag::<u8>(2)? {
-                0 => input.member("TextRec", codec::Composite::read).map(Self::TextRec),
-                _ => input.member("EmptyPresenceRec", codec::Composite::read).map(Self::EmptyPresenceRec),
-            }
-        }
-    }
-
-    codec::if_serde! {
-        impl codec::view::View for Again {
-            fn view(&self) -> codec::view::Value {
+            fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
                 match self {
                     Self::TextRec(value) => {
-                        codec::view::Value::alternative("TextRec", codec::view::View::view(value))
+                        output.fixed(0_u8);
+                        output.member("TextRec", |output| codec::Composite::write(value, output))
                     }
                     Self::EmptyPresenceRec(value) => {
-                        codec::view::Value::alternative("EmptyPresenceRec", codec::view::View::view(value))
+                        output.fixed(1_u8);
+                        output.member("EmptyPresenceRec", |output| codec::Composite::write(value, output))
                     }
                 }
             }
 
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let (name, value) = value.chosen()?;
-                let read = match name {
-                    "TextRec" => codec::view::View::from_view(value).map(Self::TextRec),
-                    "EmptyPresenceRec" => codec::view::View::from_view(value).map(Self::EmptyPresenceRec),
-                    _ => return Err(codec::view::Error::unknown_key(name, &["TextRec", "EmptyPresenceRec"])),
-                };
-                read.map_err(|error| error.within(name))
-            }
-        }
-        codec::serde_by_view!(Again);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for Again {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                match random.int_in_range(0..=1)? {
-                    0 => codec::arbitrary::Arbitrary::arbitrary(random).map(Self::TextRec),
-                    _ => codec::arbitrary::Arbitrary::arbitrary(random).map(Self::EmptyPresenceRec),
+            fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+                match input.tag::<u8>(2)? {
+                    0 => input.member("TextRec", codec::Composite::read).map(Self::TextRec),
+                    _ => input.member("EmptyPresenceRec", codec::Composite::read).map(Self::EmptyPresenceRec),
                 }
             }
         }
-    }
 
-    /// `FirstRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct FirstRec {
-        /// `A`.
-        pub a: u8,
-    }
+        codec::alternatives!(Again { TextRec: "TextRec", EmptyPresenceRec: "EmptyPresenceRec" });
 
-    impl codec::Fixed for FirstRec {
-        const SIZE: usize = 1;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                a: codec::Fixed::get(run, at),
-            }
-        }
-
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.a, run, at);
-        }
-    }
-
-    codec::if_serde! {
-        impl codec::view::View for FirstRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("A", codec::view::View::view(&self.a))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["A"])?;
-                Ok(Self {
-                    a: object.member("A")?,
-                })
-            }
-        }
-        codec::serde_by_view!(FirstRec);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for FirstRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    a: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
-
-    /// `SecondRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct SecondRec {
-        /// `B`.
-        pub b: u16,
-    }
-
-    impl codec::Fixed for SecondRec {
-        const SIZE: usize = 2;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                b: codec::Fixed::get(run, at),
-            }
-        }
-
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.b, run, at);
-        }
-    }
-
-    codec::if_serde! {
-        impl codec::view::View for SecondRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("B", codec::view::View::view(&self.b))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["B"])?;
-                Ok(Self {
-                    b: object.member("B")?,
-                })
-            }
-        }
-        codec::serde_by_view!(SecondRec);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for SecondRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    b: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
-
-    /// `PairSeq`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct PairSeq {
         /// `FirstRec`.
-        pub first_rec: FirstRec,
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct FirstRec {
+            /// `A`.
+            pub a: u8,
+        }
+
+        impl codec::Fixed for FirstRec {
+            const SIZE: usize = 1;
+
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    a: codec::Fixed::get(run, at),
+                }
+            }
+
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.a, run, at);
+            }
+        }
+
+        codec::members!(FirstRec { a: "A" });
+
         /// `SecondRec`.
-        pub second_rec: SecondRec,
-    }
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct SecondRec {
+            /// `B`.
+            pub b: u16,
+        }
 
-    impl codec::Fixed for PairSeq {
-        const SIZE: usize = 3;
+        impl codec::Fixed for SecondRec {
+            const SIZE: usize = 2;
 
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                first_rec: codec::Fixed::get(run, at),
-                second_rec: codec::Fixed::get(run, at + 1),
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    b: codec::Fixed::get(run, at),
+                }
+            }
+
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.b, run, at);
             }
         }
 
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.first_rec, run, at);
-            codec::Fixed::put(self.second_rec, run, at + 1);
-        }
-    }
+        codec::members!(SecondRec { b: "B" });
 
-    codec::if_serde! {
-        impl codec::view::View for PairSeq {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(2)
-                .with("FirstRec", codec::view::View::view(&self.first_rec))
-                .with("SecondRec", codec::view::View::view(&self.second_rec))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["FirstRec", "SecondRec"])?;
-                Ok(Self {
-                    first_rec: object.member("FirstRec")?,
-                    second_rec: object.member("SecondRec")?,
-                })
-            }
-        }
-        codec::serde_by_view!(PairSeq);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for PairSeq {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    first_rec: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                    second_rec: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
-
-    /// `Choice`: one of its alternatives.
-    #[derive(Debug, Clone, PartialEq)]
-    pub enum Choice {
-        /// `NumberRec`.
-        NumberRec(NumberRec),
-        /// `Numbers`: up to 255 elements.
-        Numbers(Vec<NumberRec>),
-        /// `Again`.
-        Again(Again),
         /// `PairSeq`.
-        PairSeq(PairSeq),
-    }
-
-    impl Default for Choice {
-        fn default() -> Self {
-            Self::NumberRec(Default::default())
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct PairSeq {
+            /// `FirstRec`.
+            pub first_rec: FirstRec,
+            /// `SecondRec`.
+            pub second_rec: SecondRec,
         }
-    }
 
-    impl codec::Composite for Choice {
-        const MIN_LEN: usize = 2;
+        impl codec::Fixed for PairSeq {
+            const SIZE: usize = 3;
 
-        fn encoded_len(&self) -> usize {
-            match self {
-                Self::NumberRec(_) => 1 + 4,
-                Self::Numbers(value) => 1 + 1 + 4 * value.len(),
-                Self::Again(value) => 1 + codec::Composite::encoded_len(value),
-                Self::PairSeq(_) => 1 + 3,
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    first_rec: codec::Fixed::get(run, at),
+                    second_rec: codec::Fixed::get(run, at + 1),
+                }
+            }
+
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.first_rec, run, at);
+                codec::Fixed::put(self.second_rec, run, at + 1);
             }
         }
 
-        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-            match self {
-                Self::NumberRec(value) => {
-                    output.fixed(0_u8);
-                    output.member("NumberRec", |output| { output.fixed(*value); Ok(()) })
-                }
-                Self::Numbers(value) => {
-                    output.fixed(1_u8);
-                    output.member("Numbers", |output| output.list::<u8, _>(value, 0, 255, |value, output| { output.fixed(*value); Ok(()) }))
-                }
-                Self::Again(value) => {
-                    output.fixed(2_u8);
-                    output.member("Again", |output| codec::Composite::write(value, output))
-                }
-                Self::PairSeq(value) => {
-                    output.fixed(3_u8);
-                    output.member("PairSeq", |output| { output.fixed(*value); Ok(()) })
-                }
+        codec::members!(PairSeq { first_rec: "FirstRec", second_rec: "SecondRec" });
+
+        /// `Choice`: one of its alternatives.
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum Choice {
+            /// `NumberRec`.
+            NumberRec(NumberRec),
+            /// `Numbers`: up to 255 elements.
+            Numbers(codec::List<NumberRec>),
+            /// `Again`.
+            Again(Again),
+            /// `PairSeq`.
+            PairSeq(PairSeq),
+        }
+
+        impl Default for Choice {
+            fn default() -> Self {
+                Self::NumberRec(Default::default())
             }
         }
 
-        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-            match input.tag::<u8>(4)? {
-                0 => input.member("NumberRec", codec::Reader::fixed).map(Self::NumberRec),
-                1 => input.member("Numbers", |input| input.list::<u8, _>(0, 255, 4, codec::Reader::fixed)).map(Self::Numbers),
-                2 => input.member("Again", codec::Composite::read).map(Self::Again),
-                _ => input.member("PairSeq", codec::Reader::fixed).map(Self::PairSeq),
-            }
-        }
-    }
+        impl codec::Composite for Choice {
+            const MIN_LEN: usize = 2;
 
-    codec::if_serde! {
-        impl codec::view::View for Choice {
-            fn view(&self) -> codec::view::Value {
+            fn encoded_len(&self) -> usize {
+                match self {
+                    Self::NumberRec(_) => 1 + 4,
+                    Self::Numbers(value) => 1 + 1 + 4 * value.len(),
+                    Self::Again(value) => 1 + codec::Composite::encoded_len(value),
+                    Self::PairSeq(_) => 1 + 3,
+                }
+            }
+
+            fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
                 match self {
                     Self::NumberRec(value) => {
-                        codec::view::Value::alternative("NumberRec", codec::view::View::view(value))
+                        output.fixed(0_u8);
+                        output.member("NumberRec", |output| { output.fixed(*value); Ok(()) })
                     }
                     Self::Numbers(value) => {
-                        codec::view::Value::alternative("Numbers", codec::view::View::view(value))
+                        output.fixed(1_u8);
+                        output.member("Numbers", |output| output.list::<u8, _>(value, 0, 255, |value, output| { output.fixed(*value); Ok(()) }))
                     }
                     Self::Again(value) => {
-                        codec::view::Value::alternative("Again", codec::view::View::view(value))
+                        output.fixed(2_u8);
+                        output.member("Again", |output| codec::Composite::write(value, output))
                     }
                     Self::PairSeq(value) => {
-                        codec::view::Value::alternative("PairSeq", codec::view::View::view(value))
+                        output.fixed(3_u8);
+                        output.member("PairSeq", |output| { output.fixed(*value); Ok(()) })
                     }
                 }
             }
 
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let (name, value) = value.chosen()?;
-                let read = match name {
-                    "NumberRec" => codec::view::View::from_view(value).map(Self::NumberRec),
-                    "Numbers" => codec::view::View::from_view(value).map(Self::Numbers),
-                    "Again" => codec::view::View::from_view(value).map(Self::Again),
-                    "PairSeq" => codec::view::View::from_view(value).map(Self::PairSeq),
-                    _ => return Err(codec::view::Error::unknown_key(name, &["NumberRec", "Numbers", "Again", "PairSeq"])),
-                };
-                read.map_err(|error| error.within(name))
-            }
-        }
-        codec::serde_by_view!(Choice);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for Choice {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                match random.int_in_range(0..=3)? {
-                    0 => codec::arbitrary::Arbitrary::arbitrary(random).map(Self::NumberRec),
-                    1 => codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary).map(Self::Numbers),
-                    2 => codec::arbitrary::Arbitrary::arbitrary(random).map(Self::Again),
-                    _ => codec::arbitrary::Arbitrary::arbitrary(random).map(Self::PairSeq),
+            fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+                match input.tag::<u8>(4)? {
+                    0 => input.member("NumberRec", codec::Reader::fixed).map(Self::NumberRec),
+                    1 => input.member("Numbers", |input| input.list::<u8, _>(0, 255, 4, codec::Reader::fixed)).map(Self::Numbers),
+                    2 => input.member("Again", codec::Composite::read).map(Self::Again),
+                    _ => input.member("PairSeq", codec::Reader::fixed).map(Self::PairSeq),
                 }
             }
         }
-    }
-}
 
-/// `ReportEmptyVariant` (F034h).
-///
-/// A variant without alternatives.
-///
-/// Declared by `urn:example:Composites 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportEmptyVariant {
-    /// `Nothing`.
-    pub nothing: report_empty_variant::Nothing,
-    /// `AfterRec`.
-    pub after_rec: report_empty_variant::AfterRec,
-}
-
-impl codec::Message for ReportEmptyVariant {
-    const CODE: u16 = 0xF034;
-    const NAME: &'static str = "ReportEmptyVariant";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        3
-        + codec::Composite::encoded_len(&self.nothing)
+        codec::alternatives!(Choice {
+            NumberRec: "NumberRec",
+            Numbers: "Numbers" = |random| codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary),
+            Again: "Again", PairSeq: "PairSeq",
+        });
     }
 
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(<Self as codec::Message>::CODE);
-        output.member("Nothing", |output| codec::Composite::write(&self.nothing, output))?;
-        output.fixed(self.after_rec);
-        Ok(())
+    /// `ReportEmptyVariant` (F034h).
+    ///
+    /// A variant without alternatives.
+    ///
+    /// Declared by `urn:example:Composites 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ReportEmptyVariant {
+        /// `Nothing`.
+        pub nothing: report_empty_variant::Nothing,
+        /// `AfterRec`.
+        pub after_rec: report_empty_variant::AfterRec,
     }
 
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let nothing = input.member("Nothing", codec::Composite::read)?;
-        let after_rec = input.member("AfterRec", codec::Reader::fixed)?;
-        Ok(Self {
-            nothing,
-            after_rec,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportEmptyVariant {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(2)
-            .with("Nothing", codec::view::View::view(&self.nothing))
-            .with("AfterRec", codec::view::View::view(&self.after_rec))
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            let object = codec::view::Object::new(value, &["Nothing", "AfterRec"])?;
-            Ok(Self {
-                nothing: object.member("Nothing")?,
-                after_rec: object.member("AfterRec")?,
-            })
-        }
-    }
-    codec::serde_by_view!(ReportEmptyVariant);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportEmptyVariant {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                nothing: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                after_rec: codec::arbitrary::Arbitrary::arbitrary(random)?,
-            })
-        }
-    }
-}
-
-/// The types inside [`ReportEmptyVariant`].
-pub mod report_empty_variant {
-    use super::codec;
-
-    /// `Nothing`: one of its alternatives.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct Nothing;
-
-    impl codec::Composite for Nothing {
-        const MIN_LEN: usize = 1;
-
+    impl codec::Message for ReportEmptyVariant {
+        const CODE: u16 = 0xF034;
+        const NAME: &'static str = "ReportEmptyVariant";
         fn encoded_len(&self) -> usize {
-            1
+            3 + codec::Composite::encoded_len(&self.nothing)
         }
 
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-            output.fixed(0_u8);
+            output.fixed(<Self as codec::Message>::CODE);
+            output.member("Nothing", |output| codec::Composite::write(&self.nothing, output))?;
+            output.fixed(self.after_rec);
             Ok(())
         }
 
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-            input.tag::<u8>(0)?;
-            Ok(Self)
+            input.code(Self::CODE)?;
+            let nothing = input.member("Nothing", codec::Composite::read)?;
+            let after_rec = input.member("AfterRec", codec::Reader::fixed)?;
+            Ok(Self { nothing, after_rec })
         }
     }
 
-    codec::if_serde! {
-        impl codec::view::View for Nothing {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(0)
+    codec::members!(ReportEmptyVariant { nothing: "Nothing", after_rec: "AfterRec" });
+
+    /// The types inside [`ReportEmptyVariant`].
+    pub mod report_empty_variant {
+        use super::codec;
+
+        /// `Nothing`: one of its alternatives.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct Nothing;
+
+        impl codec::Composite for Nothing {
+            const MIN_LEN: usize = 1;
+
+            fn encoded_len(&self) -> usize {
+                1
             }
 
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                codec::view::Object::new(value, &[])?;
+            fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+                output.fixed(0_u8);
+                Ok(())
+            }
+
+            fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+                input.tag::<u8>(0)?;
                 Ok(Self)
             }
         }
-        codec::serde_by_view!(Nothing);
-    }
 
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for Nothing {
-            fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self)
-            }
-        }
-    }
+        codec::members!(Nothing {});
 
-    /// `AfterRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct AfterRec {
-        /// `After`.
-        pub after: u8,
-    }
-
-    impl codec::Fixed for AfterRec {
-        const SIZE: usize = 1;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                after: codec::Fixed::get(run, at),
-            }
+        /// `AfterRec`.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct AfterRec {
+            /// `After`.
+            pub after: u8,
         }
 
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.after, run, at);
-        }
-    }
+        impl codec::Fixed for AfterRec {
+            const SIZE: usize = 1;
 
-    codec::if_serde! {
-        impl codec::view::View for AfterRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("After", codec::view::View::view(&self.after))
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    after: codec::Fixed::get(run, at),
+                }
             }
 
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["After"])?;
-                Ok(Self {
-                    after: object.member("After")?,
-                })
-            }
-        }
-        codec::serde_by_view!(AfterRec);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for AfterRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    after: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
-}
-
-/// `ReportOptional` (F035h).
-///
-/// Optional composites.
-///
-/// Declared by `urn:example:Composites 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportOptional {
-    /// `AlwaysRec`.
-    pub always_rec: report_optional::AlwaysRec,
-    /// `MaybeRec`: bit 0 of the presence vector.
-    pub maybe_rec: Option<report_optional::MaybeRec>,
-    /// `MaybeList`: up to 255 elements, bit 1 of the presence vector.
-    pub maybe_list: Option<Vec<report_optional::ItemRec>>,
-    /// `MaybeVariant`: bit 2 of the presence vector.
-    pub maybe_variant: Option<report_optional::MaybeVariant>,
-}
-
-impl codec::Message for ReportOptional {
-    const CODE: u16 = 0xF035;
-    const NAME: &'static str = "ReportOptional";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        8
-        + self.maybe_rec.as_ref().map_or(0, codec::Composite::encoded_len)
-        + self.maybe_list.as_ref().map_or(0, |value| 1 + value.len())
-        + self.maybe_variant.as_ref().map_or(0, codec::Composite::encoded_len)
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let present =
-        u32::from(self.maybe_rec.is_some())
-        | u32::from(self.maybe_list.is_some()) << 1
-        | u32::from(self.maybe_variant.is_some()) << 2;
-        let run = output.run::<8>();
-        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
-        codec::Fixed::put(present, run, 2);
-        codec::Fixed::put(self.always_rec, run, 6);
-        if let Some(value) = &self.maybe_rec {
-            output.member("MaybeRec", |output| codec::Composite::write(value, output))?;
-        }
-        if let Some(value) = &self.maybe_list {
-            output.member("MaybeList", |output| output.list::<u8, _>(value, 0, 255, |value, output| { output.fixed(*value); Ok(()) }))?;
-        }
-        if let Some(value) = &self.maybe_variant {
-            output.member("MaybeVariant", |output| codec::Composite::write(value, output))?;
-        }
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let present = input.presence::<u32>(0x7)?;
-        let always_rec = input.member("AlwaysRec", codec::Reader::fixed)?;
-        let maybe_rec = input.optional(present & 0x1 != 0, "MaybeRec", codec::Composite::read)?;
-        let maybe_list = input.optional(present & 0x2 != 0, "MaybeList", |input| input.list::<u8, _>(0, 255, 1, codec::Reader::fixed))?;
-        let maybe_variant = input.optional(present & 0x4 != 0, "MaybeVariant", codec::Composite::read)?;
-        Ok(Self {
-            always_rec,
-            maybe_rec,
-            maybe_list,
-            maybe_variant,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportOptional {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(4)
-            .with("AlwaysRec", codec::view::View::view(&self.always_rec))
-            .with("MaybeRec", codec::view::View::view(&self.maybe_rec))
-            .with("MaybeList", codec::view::View::view(&self.maybe_list))
-            .with("MaybeVariant", codec::view::View::view(&self.maybe_variant))
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            let object = codec::view::Object::new(value, &["AlwaysRec", "MaybeRec", "MaybeList", "MaybeVariant"])?;
-            Ok(Self {
-                always_rec: object.member("AlwaysRec")?,
-                maybe_rec: object.member("MaybeRec")?,
-                maybe_list: object.member("MaybeList")?,
-                maybe_variant: object.member("MaybeVariant")?,
-            })
-        }
-    }
-    codec::serde_by_view!(ReportOptional);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportOptional {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                always_rec: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                maybe_rec: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                maybe_list: codec::arbitrary::optional(random, |random| codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary))?,
-                maybe_variant: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-            })
-        }
-    }
-}
-
-/// The types inside [`ReportOptional`].
-pub mod report_optional {
-    use super::codec;
-
-    /// `AlwaysRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct AlwaysRec {
-        /// `A`.
-        pub a: u16,
-    }
-
-    impl codec::Fixed for AlwaysRec {
-        const SIZE: usize = 2;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                a: codec::Fixed::get(run, at),
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.after, run, at);
             }
         }
 
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.a, run, at);
-        }
+        codec::members!(AfterRec { after: "After" });
     }
 
-    codec::if_serde! {
-        impl codec::view::View for AlwaysRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("A", codec::view::View::view(&self.a))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["A"])?;
-                Ok(Self {
-                    a: object.member("A")?,
-                })
-            }
-        }
-        codec::serde_by_view!(AlwaysRec);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for AlwaysRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    a: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
-
-    /// `MaybeRec`.
+    /// `ReportOptional` (F035h).
+    ///
+    /// Optional composites.
+    ///
+    /// Declared by `urn:example:Composites 1.0`.
     #[derive(Debug, Clone, Default, PartialEq)]
-    pub struct MaybeRec {
-        /// `B`.
-        pub b: u16,
-        /// `C`: bit 0 of the presence vector.
-        pub c: Option<u8>,
+    pub struct ReportOptional {
+        /// `AlwaysRec`.
+        pub always_rec: report_optional::AlwaysRec,
+        /// `MaybeRec`: bit 0 of the presence vector.
+        pub maybe_rec: Option<report_optional::MaybeRec>,
+        /// `MaybeList`: up to 255 elements, bit 1 of the presence vector.
+        pub maybe_list: Option<codec::List<report_optional::ItemRec>>,
+        /// `MaybeVariant`: bit 2 of the presence vector.
+        pub maybe_variant: Option<report_optional::MaybeVariant>,
     }
 
-    impl codec::Composite for MaybeRec {
-        const MIN_LEN: usize = 3;
-
+    impl codec::Message for ReportOptional {
+        const CODE: u16 = 0xF035;
+        const NAME: &'static str = "ReportOptional";
         fn encoded_len(&self) -> usize {
-            3
-            + usize::from(self.c.is_some())
+            8 + self.maybe_rec.as_ref().map_or(0, codec::Composite::encoded_len)
+            + self.maybe_list.as_ref().map_or(0, |value| 1 + value.len())
+            + self.maybe_variant.as_ref().map_or(0, codec::Composite::encoded_len)
+        }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            let present = u32::from(self.maybe_rec.is_some())
+            | u32::from(self.maybe_list.is_some()) << 1
+            | u32::from(self.maybe_variant.is_some()) << 2;
+            let run = output.run::<8>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(present, run, 2);
+            codec::Fixed::put(self.always_rec, run, 6);
+            if let Some(value) = &self.maybe_rec {
+                output.member("MaybeRec", |output| codec::Composite::write(value, output))?;
+            }
+            if let Some(value) = &self.maybe_list {
+                output.member("MaybeList", |output| output.list::<u8, _>(value, 0, 255, |value, output| { output.fixed(*value); Ok(()) }))?;
+            }
+            if let Some(value) = &self.maybe_variant {
+                output.member("MaybeVariant", |output| codec::Composite::write(value, output))?;
+            }
+            Ok(())
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
+            let present = input.presence::<u32>(0x7)?;
+            let always_rec = input.member("AlwaysRec", codec::Reader::fixed)?;
+            let maybe_rec = input.optional(present & 0x1 != 0, "MaybeRec", codec::Composite::read)?;
+            let maybe_list = input.optional(present & 0x2 != 0, "MaybeList", |input| input.list::<u8, _>(0, 255, 1, codec::Reader::fixed))?;
+            let maybe_variant = input.optional(present & 0x4 != 0, "MaybeVariant", codec::Composite::read)?;
+            Ok(Self { always_rec, maybe_rec, maybe_list, maybe_variant })
+        }
+    }
+
+    codec::members!(ReportOptional {
+        always_rec: "AlwaysRec", maybe_rec: "MaybeRec",
+        maybe_list: "MaybeList" = |random| codec::arbitrary::optional(random, |random| codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary)),
+        maybe_variant: "MaybeVariant",
+    });
+
+    /// The types inside [`ReportOptional`].
+    pub mod report_optional {
+        use super::codec;
+
+        /// `AlwaysRec`.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct AlwaysRec {
+            /// `A`.
+            pub a: u16,
+        }
+
+        impl codec::Fixed for AlwaysRec {
+            const SIZE: usize = 2;
+
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    a: codec::Fixed::get(run, at),
+                }
+            }
+
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.a, run, at);
+            }
+        }
+
+        codec::members!(AlwaysRec { a: "A" });
+
+        /// `MaybeRec`.
+        #[derive(Debug, Clone, Default, PartialEq)]
+        pub struct MaybeRec {
+            /// `B`.
+            pub b: u16,
+            /// `C`: bit 0 of the presence vector.
+            pub c: Option<u8>,
+        }
+
+        impl codec::Composite for MaybeRec {
+            const MIN_LEN: usize = 3;
+            fn encoded_len(&self) -> usize {
+                3 + usize::from(self.c.is_some())
+            }
+
+            #[inline]
+            fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+                if let Self { b, c: Some(c) } = self {
+                    let run = output.run::<4>();
+                    codec::Fixed::put(0x1_u8, run, 0);
+                    codec::Fixed::put(*b, run, 1);
+                    codec::Fixed::put(*c, run, 3);
+                    return Ok(());
+                }
+                self.write_some(output);
+                Ok(())
+            }
+
+            #[inline]
+            fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+                let present = input.presence::<u8>(0x1)?;
+                if present == 0x1 {
+                    let run = input.run::<3>(&[("B", 2), ("C", 1)])?;
+                    return Ok(Self {
+                        b: codec::Fixed::get(run, 0), c: Some(codec::Fixed::get(run, 2)),
+                    });
+                }
+                Self::read_some(input, present)
+            }
+        }
+
+        impl MaybeRec {
+            #[inline(never)]
+            fn write_some(&self, output: &mut codec::Writer<'_>) {
+                let present = u8::from(self.c.is_some());
+                let run = output.run::<3>();
+                codec::Fixed::put(present, run, 0);
+                codec::Fixed::put(self.b, run, 1);
+                output.optional(self.c);
+            }
+
+            #[inline(never)]
+            fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
+                let mut input = place.clone();
+                let b = input.member("B", codec::Reader::fixed)?;
+                let c = input.optional(present & 0x1 != 0, "C", codec::Reader::fixed)?;
+                *place = input;
+                Ok(Self { b, c })
+            }
+        }
+
+        codec::members!(MaybeRec { b: "B", c: "C" });
+
+        /// `ItemRec`.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct ItemRec {
+            /// `D`.
+            pub d: u8,
+        }
+
+        impl codec::Fixed for ItemRec {
+            const SIZE: usize = 1;
+
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    d: codec::Fixed::get(run, at),
+                }
+            }
+
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.d, run, at);
+            }
+        }
+
+        codec::members!(ItemRec { d: "D" });
+
+        /// `LeftRec`.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct LeftRec {
+            /// `E`.
+            pub e: u8,
+        }
+
+        impl codec::Fixed for LeftRec {
+            const SIZE: usize = 1;
+
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    e: codec::Fixed::get(run, at),
+                }
+            }
+
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.e, run, at);
+            }
+        }
+
+        codec::members!(LeftRec { e: "E" });
+
+        /// `RightRec`.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct RightRec {
+            /// `F`.
+            pub f: f32,
+        }
+
+        impl codec::Fixed for RightRec {
+            const SIZE: usize = 4;
+
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    f: codec::Fixed::get(run, at),
+                }
+            }
+
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.f, run, at);
+            }
+        }
+
+        codec::members!(RightRec { f: "F" = codec::arbitrary::f32 });
+
+        /// `MaybeVariant`: one of its alternatives.
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum MaybeVariant {
+            /// `LeftRec`.
+            LeftRec(LeftRec),
+            /// `RightRec`.
+            RightRec(RightRec),
+        }
+
+        impl Default for MaybeVariant {
+            fn default() -> Self {
+                Self::LeftRec(Default::default())
+            }
+        }
+
+        impl codec::Composite for MaybeVariant {
+            const MIN_LEN: usize = 3;
+
+            fn encoded_len(&self) -> usize {
+                match self {
+                    Self::LeftRec(_) => 2 + 1,
+                    Self::RightRec(_) => 2 + 4,
+                }
+            }
+
+            fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+                match self {
+                    Self::LeftRec(value) => {
+                        output.fixed(0_u16);
+                        output.member("LeftRec", |output| { output.fixed(*value); Ok(()) })
+                    }
+                    Self::RightRec(value) => {
+                        output.fixed(1_u16);
+                        output.member("RightRec", |output| { output.fixed(*value); Ok(()) })
+                    }
+                }
+            }
+
+            fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+                match input.tag::<u16>(2)? {
+                    0 => input.member("LeftRec", codec::Reader::fixed).map(Self::LeftRec),
+                    _ => input.member("RightRec", codec::Reader::fixed).map(Self::RightRec),
+                }
+            }
+        }
+
+        codec::alternatives!(MaybeVariant { LeftRec: "LeftRec", RightRec: "RightRec" });
+    }
+
+    /// `ReportManyOptional` (F036h).
+    ///
+    /// A wide presence vector.
+    ///
+    /// Declared by `urn:example:Composites 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ReportManyOptional {
+        /// `M0`: bit 0 of the presence vector.
+        pub m0: Option<u16>,
+        /// `M1`: bit 1 of the presence vector.
+        pub m1: Option<u8>,
+        /// `M2`: bit 2 of the presence vector.
+        pub m2: Option<u16>,
+        /// `M3`: bit 3 of the presence vector.
+        pub m3: Option<u8>,
+        /// `M4`: bit 4 of the presence vector.
+        pub m4: Option<u16>,
+        /// `M5`: bit 5 of the presence vector.
+        pub m5: Option<u8>,
+        /// `M6`: bit 6 of the presence vector.
+        pub m6: Option<u16>,
+        /// `M7`: bit 7 of the presence vector.
+        pub m7: Option<u8>,
+        /// `M8`: bit 8 of the presence vector.
+        pub m8: Option<u16>,
+        /// `M9`: bit 9 of the presence vector.
+        pub m9: Option<u8>,
+        /// `M10`: bit 10 of the presence vector.
+        pub m10: Option<u16>,
+        /// `M11`: bit 11 of the presence vector.
+        pub m11: Option<u8>,
+    }
+
+    impl codec::Message for ReportManyOptional {
+        const CODE: u16 = 0xF036;
+        const NAME: &'static str = "ReportManyOptional";
+        fn encoded_len(&self) -> usize {
+            4 + 2 * usize::from(self.m0.is_some()) + usize::from(self.m1.is_some())
+            + 2 * usize::from(self.m2.is_some()) + usize::from(self.m3.is_some())
+            + 2 * usize::from(self.m4.is_some()) + usize::from(self.m5.is_some())
+            + 2 * usize::from(self.m6.is_some()) + usize::from(self.m7.is_some())
+            + 2 * usize::from(self.m8.is_some()) + usize::from(self.m9.is_some())
+            + 2 * usize::from(self.m10.is_some()) + usize::from(self.m11.is_some())
         }
 
         #[inline]
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
             if let Self {
-                b,
-                c: Some(c),
-            } = self
-            {
-                let run = output.run::<4>();
-                codec::Fixed::put(0x1_u8, run, 0);
-                codec::Fixed::put(*b, run, 1);
-                codec::Fixed::put(*c, run, 3);
+                m0: Some(m0), m1: Some(m1), m2: Some(m2), m3: Some(m3), m4: Some(m4), m5: Some(m5),
+                m6: Some(m6), m7: Some(m7), m8: Some(m8), m9: Some(m9), m10: Some(m10),
+                m11: Some(m11),
+            } = self {
+                let run = output.run::<22>();
+                codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+                codec::Fixed::put(0xfff_u16, run, 2);
+                codec::Fixed::put(*m0, run, 4);
+                codec::Fixed::put(*m1, run, 6);
+                codec::Fixed::put(*m2, run, 7);
+                codec::Fixed::put(*m3, run, 9);
+                codec::Fixed::put(*m4, run, 10);
+                codec::Fixed::put(*m5, run, 12);
+                codec::Fixed::put(*m6, run, 13);
+                codec::Fixed::put(*m7, run, 15);
+                codec::Fixed::put(*m8, run, 16);
+                codec::Fixed::put(*m9, run, 18);
+                codec::Fixed::put(*m10, run, 19);
+                codec::Fixed::put(*m11, run, 21);
                 return Ok(());
             }
             self.write_some(output);
@@ -1617,572 +1147,82 @@ pub mod report_optional {
 
         #[inline]
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-            let present = input.presence::<u8>(0x1)?;
-            if present == 0x1 {
-                let run = input.run::<3>(&[
-                    ("B", 2),
-                    ("C", 1),
+            input.code(Self::CODE)?;
+            let present = input.presence::<u16>(0xfff)?;
+            if present == 0xfff {
+                let run = input.run::<18>(&[
+                    ("M0", 2), ("M1", 1), ("M2", 2), ("M3", 1), ("M4", 2), ("M5", 1), ("M6", 2),
+                    ("M7", 1), ("M8", 2), ("M9", 1), ("M10", 2), ("M11", 1),
                 ])?;
                 return Ok(Self {
-                    b: codec::Fixed::get(run, 0),
-                    c: Some(codec::Fixed::get(run, 2)),
+                    m0: Some(codec::Fixed::get(run, 0)), m1: Some(codec::Fixed::get(run, 2)),
+                    m2: Some(codec::Fixed::get(run, 3)), m3: Some(codec::Fixed::get(run, 5)),
+                    m4: Some(codec::Fixed::get(run, 6)), m5: Some(codec::Fixed::get(run, 8)),
+                    m6: Some(codec::Fixed::get(run, 9)), m7: Some(codec::Fixed::get(run, 11)),
+                    m8: Some(codec::Fixed::get(run, 12)), m9: Some(codec::Fixed::get(run, 14)),
+                    m10: Some(codec::Fixed::get(run, 15)), m11: Some(codec::Fixed::get(run, 17)),
                 });
             }
             Self::read_some(input, present)
         }
     }
 
-    impl MaybeRec {
+    impl ReportManyOptional {
         #[inline(never)]
         fn write_some(&self, output: &mut codec::Writer<'_>) {
-            let present =
-            u8::from(self.c.is_some());
-            let run = output.run::<3>();
-            codec::Fixed::put(present, run, 0);
-            codec::Fixed::put(self.b, run, 1);
-            output.optional(self.c);
+            let present = u16::from(self.m0.is_some()) | u16::from(self.m1.is_some()) << 1
+            | u16::from(self.m2.is_some()) << 2 | u16::from(self.m3.is_some()) << 3
+            | u16::from(self.m4.is_some()) << 4 | u16::from(self.m5.is_some()) << 5
+            | u16::from(self.m6.is_some()) << 6 | u16::from(self.m7.is_some()) << 7
+            | u16::from(self.m8.is_some()) << 8 | u16::from(self.m9.is_some()) << 9
+            | u16::from(self.m10.is_some()) << 10 | u16::from(self.m11.is_some()) << 11;
+            let run = output.run::<4>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(present, run, 2);
+            output.optional(self.m0);
+            output.optional(self.m1);
+            output.optional(self.m2);
+            output.optional(self.m3);
+            output.optional(self.m4);
+            output.optional(self.m5);
+            output.optional(self.m6);
+            output.optional(self.m7);
+            output.optional(self.m8);
+            output.optional(self.m9);
+            output.optional(self.m10);
+            output.optional(self.m11);
         }
 
         #[inline(never)]
         fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
             let mut input = place.clone();
-            let b = input.member("B", codec::Reader::fixed)?;
-            let c = input.optional(present & 0x1 != 0, "C", codec::Reader::fixed)?;
+            let m0 = input.optional(present & 0x1 != 0, "M0", codec::Reader::fixed)?;
+            let m1 = input.optional(present & 0x2 != 0, "M1", codec::Reader::fixed)?;
+            let m2 = input.optional(present & 0x4 != 0, "M2", codec::Reader::fixed)?;
+            let m3 = input.optional(present & 0x8 != 0, "M3", codec::Reader::fixed)?;
+            let m4 = input.optional(present & 0x10 != 0, "M4", codec::Reader::fixed)?;
+            let m5 = input.optional(present & 0x20 != 0, "M5", codec::Reader::fixed)?;
+            let m6 = input.optional(present & 0x40 != 0, "M6", codec::Reader::fixed)?;
+            let m7 = input.optional(present & 0x80 != 0, "M7", codec::Reader::fixed)?;
+            let m8 = input.optional(present & 0x100 != 0, "M8", codec::Reader::fixed)?;
+            let m9 = input.optional(present & 0x200 != 0, "M9", codec::Reader::fixed)?;
+            let m10 = input.optional(present & 0x400 != 0, "M10", codec::Reader::fixed)?;
+            let m11 = input.optional(present & 0x800 != 0, "M11", codec::Reader::fixed)?;
             *place = input;
-            Ok(Self {
-                b,
-                c,
-            })
+            Ok(Self { m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11 })
         }
     }
 
-    codec::if_serde! {
-        impl codec::view::View for MaybeRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(2)
-                .with("B", codec::view::View::view(&self.b))
-                .with("C", codec::view::View::view(&self.c))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["B", "C"])?;
-                Ok(Self {
-                    b: object.member("B")?,
-                    c: object.member("C")?,
-                })
-            }
-        }
-        codec::serde_by_view!(MaybeRec);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for MaybeRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    b: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                    c: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                })
-            }
-        }
-    }
-
-    /// `ItemRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct ItemRec {
-        /// `D`.
-        pub d: u8,
-    }
-
-    impl codec::Fixed for ItemRec {
-        const SIZE: usize = 1;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                d: codec::Fixed::get(run, at),
-            }
-        }
-
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.d, run, at);
-        }
-    }
-
-    codec::if_serde! {
-        impl codec::view::View for ItemRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("D", codec::view::View::view(&self.d))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["D"])?;
-                Ok(Self {
-                    d: object.member("D")?,
-                })
-            }
-        }
-        codec::serde_by_view!(ItemRec);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for ItemRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    d: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
-
-    /// `LeftRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct LeftRec {
-        /// `E`.
-        pub e: u8,
-    }
-
-    impl codec::Fixed for LeftRec {
-        const SIZE: usize = 1;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                e: codec::Fixed::get(run, at),
-            }
-        }
-
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.e, run, at);
-        }
-    }
-
-    codec::if_serde! {
-        impl codec::view::View for LeftRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("E", codec::view::View::view(&self.e))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["E"])?;
-                Ok(Self {
-                    e: object.member("E")?,
-                })
-            }
-        }
-        codec::serde_by_view!(LeftRec);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for LeftRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    e: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
-
-    /// `RightRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct RightRec {
-        /// `F`.
-        pub f: f32,
-    }
-
-    impl codec::Fixed for RightRec {
-        const SIZE: usize = 4;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                f: codec::Fixed::get(run, at),
-            }
-        }
-
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.f, run, at);
-        }
-    }
-
-    codec::if_serde! {
-        impl codec::view::View for RightRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("F", codec::view::View::view(&self.f))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["F"])?;
-                Ok(Self {
-                    f: object.member("F")?,
-                })
-            }
-        }
-        codec::serde_by_view!(RightRec);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for RightRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    f: codec::arbitrary::f32(random)?,
-                })
-            }
-        }
-    }
-
-    /// `MaybeVariant`: one of its alternatives.
-    #[derive(Debug, Clone, PartialEq)]
-    pub enum MaybeVariant {
-        /// `LeftRec`.
-        LeftRec(LeftRec),
-        /// `RightRec`.
-        RightRec(RightRec),
-    }
-
-    impl Default for MaybeVariant {
-        fn default() -> Self {
-            Self::LeftRec(Default::default())
-        }
-    }
-
-    impl codec::Composite for MaybeVariant {
-        const MIN_LEN: usize = 3;
-
-        fn encoded_len(&self) -> usize {
-            match self {
-                Self::LeftRec(_) => 2 + 1,
-                Self::RightRec(_) => 2 + 4,
-            }
-        }
-
-        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-            match self {
-                Self::LeftRec(value) => {
-                    output.fixed(0_u16);
-                    output.member("LeftRec", |output| { output.fixed(*value); Ok(()) })
-                }
-                Self::RightRec(value) => {
-                    output.fixed(1_u16);
-                    output.member("RightRec", |output| { output.fixed(*value); Ok(()) })
-                }
-            }
-        }
-
-        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-            match input.tag::<u16>(2)? {
-                0 => input.member("LeftRec", codec::Reader::fixed).map(Self::LeftRec),
-                _ => input.member("RightRec", codec::Reader::fixed).map(Self::RightRec),
-            }
-        }
-    }
-
-    codec::if_serde! {
-        impl codec::view::View for MaybeVariant {
-            fn view(&self) -> codec::view::Value {
-                match self {
-                    Self::LeftRec(value) => {
-                        codec::view::Value::alternative("LeftRec", codec::view::View::view(value))
-                    }
-                    Self::RightRec(value) => {
-                        codec::view::Value::alternative("RightRec", codec::view::View::view(value))
-                    }
-                }
-            }
-
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let (name, value) = value.chosen()?;
-                let read = match name {
-                    "LeftRec" => codec::view::View::from_view(value).map(Self::LeftRec),
-                    "RightRec" => codec::view::View::from_view(value).map(Self::RightRec),
-                    _ => return Err(codec::view::Error::unknown_key(name, &["LeftRec", "RightRec"])),
-                };
-                read.map_err(|error| error.within(name))
-            }
-        }
-        codec::serde_by_view!(MaybeVariant);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for MaybeVariant {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                match random.int_in_range(0..=1)? {
-                    0 => codec::arbitrary::Arbitrary::arbitrary(random).map(Self::LeftRec),
-                    _ => codec::arbitrary::Arbitrary::arbitrary(random).map(Self::RightRec),
-                }
-            }
-        }
-    }
+    codec::members!(ReportManyOptional {
+        m0: "M0", m1: "M1", m2: "M2", m3: "M3", m4: "M4", m5: "M5", m6: "M6", m7: "M7", m8: "M8",
+        m9: "M9", m10: "M10", m11: "M11",
+    });
 }
 
-/// `ReportManyOptional` (F036h).
-///
-/// A wide presence vector.
-///
-/// Declared by `urn:example:Composites 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportManyOptional {
-    /// `M0`: bit 0 of the presence vector.
-    pub m0: Option<u16>,
-    /// `M1`: bit 1 of the presence vector.
-    pub m1: Option<u8>,
-    /// `M2`: bit 2 of the presence vector.
-    pub m2: Option<u16>,
-    /// `M3`: bit 3 of the presence vector.
-    pub m3: Option<u8>,
-    /// `M4`: bit 4 of the presence vector.
-    pub m4: Option<u16>,
-    /// `M5`: bit 5 of the presence vector.
-    pub m5: Option<u8>,
-    /// `M6`: bit 6 of the presence vector.
-    pub m6: Option<u16>,
-    /// `M7`: bit 7 of the presence vector.
-    pub m7: Option<u8>,
-    /// `M8`: bit 8 of the presence vector.
-    pub m8: Option<u16>,
-    /// `M9`: bit 9 of the presence vector.
-    pub m9: Option<u8>,
-    /// `M10`: bit 10 of the presence vector.
-    pub m10: Option<u16>,
-    /// `M11`: bit 11 of the presence vector.
-    pub m11: Option<u8>,
-}
-
-impl codec::Message for ReportManyOptional {
-    const CODE: u16 = 0xF036;
-    const NAME: &'static str = "ReportManyOptional";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        4
-        + 2 * usize::from(self.m0.is_some())
-        + usize::from(self.m1.is_some())
-        + 2 * usize::from(self.m2.is_some())
-        + usize::from(self.m3.is_some())
-        + 2 * usize::from(self.m4.is_some())
-        + usize::from(self.m5.is_some())
-        + 2 * usize::from(self.m6.is_some())
-        + usize::from(self.m7.is_some())
-        + 2 * usize::from(self.m8.is_some())
-        + usize::from(self.m9.is_some())
-        + 2 * usize::from(self.m10.is_some())
-        + usize::from(self.m11.is_some())
-    }
-
-    #[inline]
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        if let Self {
-            m0: Some(m0),
-            m1: Some(m1),
-            m2: Some(m2),
-            m3: Some(m3),
-            m4: Some(m4),
-            m5: Some(m5),
-            m6: Some(m6),
-            m7: Some(m7),
-            m8: Some(m8),
-            m9: Some(m9),
-            m10: Some(m10),
-            m11: Some(m11),
-        } = self
-        {
-            let run = output.run::<22>();
-            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
-            codec::Fixed::put(0xfff_u16, run, 2);
-            codec::Fixed::put(*m0, run, 4);
-            codec::Fixed::put(*m1, run, 6);
-            codec::Fixed::put(*m2, run, 7);
-            codec::Fixed::put(*m3, run, 9);
-            codec::Fixed::put(*m4, run, 10);
-            codec::Fixed::put(*m5, run, 12);
-            codec::Fixed::put(*m6, run, 13);
-            codec::Fixed::put(*m7, run, 15);
-            codec::Fixed::put(*m8, run, 16);
-            codec::Fixed::put(*m9, run, 18);
-            codec::Fixed::put(*m10, run, 19);
-            codec::Fixed::put(*m11, run, 21);
-            return Ok(());
-        }
-        self.write_some(output);
-        Ok(())
-    }
-
-    #[inline]
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let present = input.presence::<u16>(0xfff)?;
-        if present == 0xfff {
-            let run = input.run::<18>(&[
-                ("M0", 2),
-                ("M1", 1),
-                ("M2", 2),
-                ("M3", 1),
-                ("M4", 2),
-                ("M5", 1),
-                ("M6", 2),
-                ("M7", 1),
-                ("M8", 2),
-                ("M9", 1),
-                ("M10", 2),
-                ("M11", 1),
-            ])?;
-            return Ok(Self {
-                m0: Some(codec::Fixed::get(run, 0)),
-                m1: Some(codec::Fixed::get(run, 2)),
-                m2: Some(codec::Fixed::get(run, 3)),
-                m3: Some(codec::Fixed::get(run, 5)),
-                m4: Some(codec::Fixed::get(run, 6)),
-                m5: Some(codec::Fixed::get(run, 8)),
-                m6: Some(codec::Fixed::get(run, 9)),
-                m7: Some(codec::Fixed::get(run, 11)),
-                m8: Some(codec::Fixed::get(run, 12)),
-                m9: Some(codec::Fixed::get(run, 14)),
-                m10: Some(codec::Fixed::get(run, 15)),
-                m11: Some(codec::Fixed::get(run, 17)),
-            });
-        }
-        Self::read_some(input, present)
-    }
-}
-
-impl ReportManyOptional {
-    #[inline(never)]
-    fn write_some(&self, output: &mut codec::Writer<'_>) {
-        let present =
-        u16::from(self.m0.is_some())
-        | u16::from(self.m1.is_some()) << 1
-        | u16::from(self.m2.is_some()) << 2
-        | u16::from(self.m3.is_some()) << 3
-        | u16::from(self.m4.is_some()) << 4
-        | u16::from(self.m5.is_some()) << 5
-        | u16::from(self.m6.is_some()) << 6
-        | u16::from(self.m7.is_some()) << 7
-        | u16::from(self.m8.is_some()) << 8
-        | u16::from(self.m9.is_some()) << 9
-        | u16::from(self.m10.is_some()) << 10
-        | u16::from(self.m11.is_some()) << 11;
-        let run = output.run::<4>();
-        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
-        codec::Fixed::put(present, run, 2);
-        output.optional(self.m0);
-        output.optional(self.m1);
-        output.optional(self.m2);
-        output.optional(self.m3);
-        output.optional(self.m4);
-        output.optional(self.m5);
-        output.optional(self.m6);
-        output.optional(self.m7);
-        output.optional(self.m8);
-        output.optional(self.m9);
-        output.optional(self.m10);
-        output.optional(self.m11);
-    }
-
-    #[inline(never)]
-    fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
-        let mut input = place.clone();
-        let m0 = input.optional(present & 0x1 != 0, "M0", codec::Reader::fixed)?;
-        let m1 = input.optional(present & 0x2 != 0, "M1", codec::Reader::fixed)?;
-        let m2 = input.optional(present & 0x4 != 0, "M2", codec::Reader::fixed)?;
-        let m3 = input.optional(present & 0x8 != 0, "M3", codec::Reader::fixed)?;
-        let m4 = input.optional(present & 0x10 != 0, "M4", codec::Reader::fixed)?;
-        let m5 = input.optional(present & 0x20 != 0, "M5", codec::Reader::fixed)?;
-        let m6 = input.optional(present & 0x40 != 0, "M6", codec::Reader::fixed)?;
-        let m7 = input.optional(present & 0x80 != 0, "M7", codec::Reader::fixed)?;
-        let m8 = input.optional(present & 0x100 != 0, "M8", codec::Reader::fixed)?;
-        let m9 = input.optional(present & 0x200 != 0, "M9", codec::Reader::fixed)?;
-        let m10 = input.optional(present & 0x400 != 0, "M10", codec::Reader::fixed)?;
-        let m11 = input.optional(present & 0x800 != 0, "M11", codec::Reader::fixed)?;
-        *place = input;
-        Ok(Self {
-            m0,
-            m1,
-            m2,
-            m3,
-            m4,
-            m5,
-            m6,
-            m7,
-            m8,
-            m9,
-            m10,
-            m11,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportManyOptional {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(12)
-            .with("M0", codec::view::View::view(&self.m0))
-            .with("M1", codec::view::View::view(&self.m1))
-            .with("M2", codec::view::View::view(&self.m2))
-            .with("M3", codec::view::View::view(&self.m3))
-            .with("M4", codec::view::View::view(&self.m4))
-            .with("M5", codec::view::View::view(&self.m5))
-            .with("M6", codec::view::View::view(&self.m6))
-            .with("M7", codec::view::View::view(&self.m7))
-            .with("M8", codec::view::View::view(&self.m8))
-            .with("M9", codec::view::View::view(&self.m9))
-            .with("M10", codec::view::View::view(&self.m10))
-            .with("M11", codec::view::View::view(&self.m11))
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            let object = codec::view::Object::new(value, &["M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9", "M10", "M11"])?;
-            Ok(Self {
-                m0: object.member("M0")?,
-                m1: object.member("M1")?,
-                m2: object.member("M2")?,
-                m3: object.member("M3")?,
-                m4: object.member("M4")?,
-                m5: object.member("M5")?,
-                m6: object.member("M6")?,
-                m7: object.member("M7")?,
-                m8: object.member("M8")?,
-                m9: object.member("M9")?,
-                m10: object.member("M10")?,
-                m11: object.member("M11")?,
-            })
-        }
-    }
-    codec::serde_by_view!(ReportManyOptional);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportManyOptional {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                m0: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                m1: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                m2: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                m3: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                m4: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                m5: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                m6: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                m7: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                m8: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                m9: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                m10: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-                m11: codec::arbitrary::optional(random, codec::arbitrary::Arbitrary::arbitrary)?,
-            })
-        }
-    }
-}
+#[doc(inline)]
+#[allow(unused_imports)]
+pub use v1_0::{
+    QueryNothing, ReportTree, report_tree, ReportListOfLists, report_list_of_lists, SetChoice,
+    set_choice, ReportEmptyVariant, report_empty_variant, ReportOptional, report_optional,
+    ReportManyOptional,
+};

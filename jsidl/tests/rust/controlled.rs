@@ -267,8 +267,8 @@ pub mod siren {
     }
 
     impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
-        fn offers(&self) -> Vec<codec::ServiceId> {
-            vec![V1_0]
+        fn offers(&self) -> codec::List<codec::ServiceId> {
+            codec::List::from([V1_0])
         }
 
         fn hazards(&self) -> codec::Hazards {
@@ -319,201 +319,114 @@ pub mod siren {
 /// The services of the set, by URN and version.
 pub static SERVICES: &[codec::ServiceInfo] = &[
     codec::ServiceInfo {
-        name: "Siren",
-        id: siren::V1_0,
+        name: "Siren", id: siren::V1_0,
         inherits_from: Some(codec::ServiceId { urn: "urn:jaus:jss:core:AccessControl", major: 1, minor: 1 }),
-        inputs: &[0xD011, 0xE011],
-        outputs: &[0xF011],
+        inputs: &[0xD011, 0xE011], outputs: &[0xF011],
     },
 ];
 
 /// The message types of the set, by code; of several with one code the newest first.
 pub static MESSAGES: &[codec::MessageInfo] = &[
-    codec::MessageInfo::of::<SoundSiren>(&[
-        siren::V1_0,
-    ]),
-    codec::MessageInfo::of::<QuerySiren>(&[
-        siren::V1_0,
-    ]),
-    codec::MessageInfo::of::<ReportSiren>(&[
-        siren::V1_0,
-    ]),
+    codec::MessageInfo::of::<SoundSiren>(&[siren::V1_0]),
+    codec::MessageInfo::of::<QuerySiren>(&[siren::V1_0]),
+    codec::MessageInfo::of::<ReportSiren>(&[siren::V1_0]),
 ];
 
-/// `SoundSiren` (D011h), a command.
-///
-/// Sounds it.
-///
-/// Declared by `urn:example:Siren 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct SoundSiren;
+/// The messages of services of version 1.0.
+pub mod v1_0 {
+    use super::codec;
 
-impl codec::Message for SoundSiren {
-    const CODE: u16 = 0xD011;
-    const NAME: &'static str = "SoundSiren";
-    const IS_COMMAND: bool = true;
-    const NEEDS_CONTROL: bool = true;
+    /// `SoundSiren` (D011h), a command.
+    ///
+    /// Sounds it.
+    ///
+    /// Declared by `urn:example:Siren 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct SoundSiren;
 
-    fn encoded_len(&self) -> usize {
-        2
-    }
+    impl codec::Message for SoundSiren {
+        const CODE: u16 = 0xD011;
+        const NAME: &'static str = "SoundSiren";
+        const IS_COMMAND: bool = true;
+        const NEEDS_CONTROL: bool = true;
+        fn encoded_len(&self) -> usize { 2 }
 
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(<Self as codec::Message>::CODE);
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        Ok(Self)
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for SoundSiren {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(0)
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            output.fixed(<Self as codec::Message>::CODE);
+            Ok(())
         }
 
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            codec::view::Object::new(value, &[])?;
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
             Ok(Self)
         }
     }
-    codec::serde_by_view!(SoundSiren);
-}
 
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for SoundSiren {
-        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+    codec::members!(SoundSiren {});
+
+    /// `QuerySiren` (E011h).
+    ///
+    /// Asks for the tones so far.
+    ///
+    /// Declared by `urn:example:Siren 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct QuerySiren;
+
+    impl codec::Message for QuerySiren {
+        const CODE: u16 = 0xE011;
+        const NAME: &'static str = "QuerySiren";
+        fn encoded_len(&self) -> usize { 2 }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            output.fixed(<Self as codec::Message>::CODE);
+            Ok(())
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
             Ok(Self)
         }
     }
-}
 
-/// `QuerySiren` (E011h).
-///
-/// Asks for the tones so far.
-///
-/// Declared by `urn:example:Siren 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct QuerySiren;
+    codec::members!(QuerySiren {});
 
-impl codec::Message for QuerySiren {
-    const CODE: u16 = 0xE011;
-    const NAME: &'static str = "QuerySiren";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
+    impl codec::Query for QuerySiren { type Report = ReportSiren; }
 
-    fn encoded_len(&self) -> usize {
-        2
+    /// `ReportSiren` (F011h).
+    ///
+    /// Reports the tones so far.
+    ///
+    /// Declared by `urn:example:Siren 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ReportSiren {
+        /// `Tones`.
+        pub tones: u8,
     }
 
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(<Self as codec::Message>::CODE);
-        Ok(())
-    }
+    impl codec::Message for ReportSiren {
+        const CODE: u16 = 0xF011;
+        const NAME: &'static str = "ReportSiren";
+        fn encoded_len(&self) -> usize { 3 }
 
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        Ok(Self)
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for QuerySiren {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(0)
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            let run = output.run::<3>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(self.tones, run, 2);
+            Ok(())
         }
 
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            codec::view::Object::new(value, &[])?;
-            Ok(Self)
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
+            let tones = input.member("Tones", codec::Reader::fixed)?;
+            Ok(Self { tones })
         }
     }
-    codec::serde_by_view!(QuerySiren);
+
+    codec::members!(ReportSiren { tones: "Tones" });
+
+    impl codec::Report for ReportSiren {}
 }
 
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for QuerySiren {
-        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self)
-        }
-    }
-}
-
-impl codec::Query for QuerySiren {
-    type Report = ReportSiren;
-}
-
-/// `ReportSiren` (F011h).
-///
-/// Reports the tones so far.
-///
-/// Declared by `urn:example:Siren 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportSiren {
-    /// `Tones`.
-    pub tones: u8,
-}
-
-impl codec::Message for ReportSiren {
-    const CODE: u16 = 0xF011;
-    const NAME: &'static str = "ReportSiren";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        3
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let run = output.run::<3>();
-        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
-        codec::Fixed::put(self.tones, run, 2);
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let tones = input.member("Tones", codec::Reader::fixed)?;
-        Ok(Self {
-            tones,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportSiren {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(1)
-            .with("Tones", codec::view::View::view(&self.tones))
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            let object = codec::view::Object::new(value, &["Tones"])?;
-            Ok(Self {
-                tones: object.member("Tones")?,
-            })
-        }
-    }
-    codec::serde_by_view!(ReportSiren);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportSiren {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                tones: codec::arbitrary::Arbitrary::arbitrary(random)?,
-            })
-        }
-    }
-}
-
-impl codec::Report for ReportSiren {}
+#[doc(inline)]
+#[allow(unused_imports)]
+pub use v1_0::{SoundSiren, QuerySiren, ReportSiren};

@@ -427,8 +427,8 @@ pub mod door {
     }
 
     impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
-        fn offers(&self) -> Vec<codec::ServiceId> {
-            vec![V1_0]
+        fn offers(&self) -> codec::List<codec::ServiceId> {
+            codec::List::from([V1_0])
         }
 
         fn hazards(&self) -> codec::Hazards {
@@ -483,238 +483,131 @@ pub mod door {
 /// The services of the set, by URN and version.
 pub static SERVICES: &[codec::ServiceInfo] = &[
     codec::ServiceInfo {
-        name: "Door",
-        id: door::V1_0,
-        inherits_from: None,
-        inputs: &[0xD001, 0xD002, 0xD003],
+        name: "Door", id: door::V1_0, inherits_from: None, inputs: &[0xD001, 0xD002, 0xD003],
         outputs: &[0xD004],
     },
 ];
 
 /// The message types of the set, by code; of several with one code the newest first.
 pub static MESSAGES: &[codec::MessageInfo] = &[
-    codec::MessageInfo::of::<Open>(&[
-        door::V1_0,
-    ]),
-    codec::MessageInfo::of::<Close>(&[
-        door::V1_0,
-    ]),
-    codec::MessageInfo::of::<Stop>(&[
-        door::V1_0,
-    ]),
-    codec::MessageInfo::of::<ReportDoor>(&[
-        door::V1_0,
-    ]),
+    codec::MessageInfo::of::<Open>(&[door::V1_0]),
+    codec::MessageInfo::of::<Close>(&[door::V1_0]),
+    codec::MessageInfo::of::<Stop>(&[door::V1_0]),
+    codec::MessageInfo::of::<ReportDoor>(&[door::V1_0]),
 ];
 
-/// `Open` (D001h), a command.
-///
-/// Opens it.
-///
-/// Declared by `urn:example:Door 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Open;
+/// The messages of services of version 1.0.
+pub mod v1_0 {
+    use super::codec;
 
-impl codec::Message for Open {
-    const CODE: u16 = 0xD001;
-    const NAME: &'static str = "Open";
-    const IS_COMMAND: bool = true;
-    const NEEDS_CONTROL: bool = false;
+    /// `Open` (D001h), a command.
+    ///
+    /// Opens it.
+    ///
+    /// Declared by `urn:example:Door 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct Open;
 
-    fn encoded_len(&self) -> usize {
-        2
-    }
+    impl codec::Message for Open {
+        const CODE: u16 = 0xD001;
+        const NAME: &'static str = "Open";
+        const IS_COMMAND: bool = true;
+        fn encoded_len(&self) -> usize { 2 }
 
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(<Self as codec::Message>::CODE);
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        Ok(Self)
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for Open {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(0)
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            output.fixed(<Self as codec::Message>::CODE);
+            Ok(())
         }
 
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            codec::view::Object::new(value, &[])?;
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
             Ok(Self)
         }
     }
-    codec::serde_by_view!(Open);
-}
 
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for Open {
-        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+    codec::members!(Open {});
+
+    /// `Close` (D002h), a command.
+    ///
+    /// Closes it.
+    ///
+    /// Declared by `urn:example:Door 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct Close;
+
+    impl codec::Message for Close {
+        const CODE: u16 = 0xD002;
+        const NAME: &'static str = "Close";
+        const IS_COMMAND: bool = true;
+        fn encoded_len(&self) -> usize { 2 }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            output.fixed(<Self as codec::Message>::CODE);
+            Ok(())
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
             Ok(Self)
         }
     }
-}
 
-/// `Close` (D002h), a command.
-///
-/// Closes it.
-///
-/// Declared by `urn:example:Door 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Close;
+    codec::members!(Close {});
 
-impl codec::Message for Close {
-    const CODE: u16 = 0xD002;
-    const NAME: &'static str = "Close";
-    const IS_COMMAND: bool = true;
-    const NEEDS_CONTROL: bool = false;
+    /// `Stop` (D003h), a command.
+    ///
+    /// Stops it.
+    ///
+    /// Declared by `urn:example:Door 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct Stop;
 
-    fn encoded_len(&self) -> usize {
-        2
-    }
+    impl codec::Message for Stop {
+        const CODE: u16 = 0xD003;
+        const NAME: &'static str = "Stop";
+        const IS_COMMAND: bool = true;
+        fn encoded_len(&self) -> usize { 2 }
 
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(<Self as codec::Message>::CODE);
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        Ok(Self)
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for Close {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(0)
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            output.fixed(<Self as codec::Message>::CODE);
+            Ok(())
         }
 
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            codec::view::Object::new(value, &[])?;
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
             Ok(Self)
         }
     }
-    codec::serde_by_view!(Close);
-}
 
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for Close {
-        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+    codec::members!(Stop {});
+
+    /// `ReportDoor` (D004h).
+    ///
+    /// Tells how it is.
+    ///
+    /// Declared by `urn:example:Door 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ReportDoor;
+
+    impl codec::Message for ReportDoor {
+        const CODE: u16 = 0xD004;
+        const NAME: &'static str = "ReportDoor";
+        fn encoded_len(&self) -> usize { 2 }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            output.fixed(<Self as codec::Message>::CODE);
+            Ok(())
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
             Ok(Self)
         }
     }
+
+    codec::members!(ReportDoor {});
 }
 
-/// `Stop` (D003h), a command.
-///
-/// Stops it.
-///
-/// Declared by `urn:example:Door 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Stop;
-
-impl codec::Message for Stop {
-    const CODE: u16 = 0xD003;
-    const NAME: &'static str = "Stop";
-    const IS_COMMAND: bool = true;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        2
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(<Self as codec::Message>::CODE);
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        Ok(Self)
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for Stop {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(0)
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            codec::view::Object::new(value, &[])?;
-            Ok(Self)
-        }
-    }
-    codec::serde_by_view!(Stop);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for Stop {
-        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self)
-        }
-    }
-}
-
-/// `ReportDoor` (D004h).
-///
-/// Tells how it is.
-///
-/// Declared by `urn:example:Door 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportDoor;
-
-impl codec::Message for ReportDoor {
-    const CODE: u16 = 0xD004;
-    const NAME: &'static str = "ReportDoor";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        2
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(<Self as codec::Message>::CODE);
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        Ok(Self)
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportDoor {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(0)
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            codec::view::Object::new(value, &[])?;
-            Ok(Self)
-        }
-    }
-    codec::serde_by_view!(ReportDoor);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportDoor {
-        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self)
-        }
-    }
-}
+#[doc(inline)]
+#[allow(unused_imports)]
+pub use v1_0::{Open, Close, Stop, ReportDoor};

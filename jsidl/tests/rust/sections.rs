@@ -40,8 +40,8 @@ pub mod sections {
     }
 
     impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
-        fn offers(&self) -> Vec<codec::ServiceId> {
-            vec![V1_0]
+        fn offers(&self) -> codec::List<codec::ServiceId> {
+            codec::List::from([V1_0])
         }
 
         fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
@@ -56,261 +56,146 @@ pub mod sections {
 /// The services of the set, by URN and version.
 pub static SERVICES: &[codec::ServiceInfo] = &[
     codec::ServiceInfo {
-        name: "Sections",
-        id: sections::V1_0,
-        inherits_from: None,
-        inputs: &[0xF071],
-        outputs: &[],
+        name: "Sections", id: sections::V1_0, inherits_from: None, inputs: &[0xF071], outputs: &[],
     },
 ];
 
 /// The message types of the set, by code; of several with one code the newest first.
 pub static MESSAGES: &[codec::MessageInfo] = &[
-    codec::MessageInfo::of::<ReportSections>(&[
-        sections::V1_0,
-    ]),
+    codec::MessageInfo::of::<ReportSections>(&[sections::V1_0]),
 ];
 
-/// `ReportSections` (F071h).
-///
-/// A message with its own header and footer.
-///
-/// Declared by `urn:example:Sections 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportSections {
-    /// `header`.
-    pub header: report_sections::Header,
-    /// `body`: up to 255 elements.
-    pub body: Vec<report_sections::ItemRec>,
-    /// `footer`.
-    pub footer: report_sections::Footer,
-}
-
-impl codec::Message for ReportSections {
-    const CODE: u16 = 0xF071;
-    const NAME: &'static str = "ReportSections";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        5
-        + 1 + self.body.len()
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let run = output.run::<3>();
-        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
-        codec::Fixed::put(self.header, run, 2);
-        output.member("body", |output| output.list::<u8, _>(&self.body, 0, 255, |value, output| { output.fixed(*value); Ok(()) }))?;
-        output.fixed(self.footer);
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let header = input.member("header", codec::Reader::fixed)?;
-        let body = input.member("body", |input| input.list::<u8, _>(0, 255, 1, codec::Reader::fixed))?;
-        let footer = input.member("footer", codec::Reader::fixed)?;
-        Ok(Self {
-            header,
-            body,
-            footer,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportSections {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(3)
-            .with("header", codec::view::View::view(&self.header))
-            .with("body", codec::view::View::view(&self.body))
-            .with("footer", codec::view::View::view(&self.footer))
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            let object = codec::view::Object::new(value, &["header", "body", "footer"])?;
-            Ok(Self {
-                header: object.member("header")?,
-                body: object.member("body")?,
-                footer: object.member("footer")?,
-            })
-        }
-    }
-    codec::serde_by_view!(ReportSections);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportSections {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                header: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                body: codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary)?,
-                footer: codec::arbitrary::Arbitrary::arbitrary(random)?,
-            })
-        }
-    }
-}
-
-/// The types inside [`ReportSections`].
-pub mod report_sections {
+/// The messages of services of version 1.0.
+pub mod v1_0 {
     use super::codec;
 
-    /// `header`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct Header {
-        /// `Priority`.
-        pub priority: u8,
+    /// `ReportSections` (F071h).
+    ///
+    /// A message with its own header and footer.
+    ///
+    /// Declared by `urn:example:Sections 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ReportSections {
+        /// `header`.
+        pub header: report_sections::Header,
+        /// `body`: up to 255 elements.
+        pub body: codec::List<report_sections::ItemRec>,
+        /// `footer`.
+        pub footer: report_sections::Footer,
     }
 
-    impl codec::Fixed for Header {
-        const SIZE: usize = 1;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                priority: codec::Fixed::get(run, at),
-            }
+    impl codec::Message for ReportSections {
+        const CODE: u16 = 0xF071;
+        const NAME: &'static str = "ReportSections";
+        fn encoded_len(&self) -> usize {
+            5 + 1 + self.body.len()
         }
 
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.priority, run, at);
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            let run = output.run::<3>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(self.header, run, 2);
+            output.member("body", |output| output.list::<u8, _>(&self.body, 0, 255, |value, output| { output.fixed(*value); Ok(()) }))?;
+            output.fixed(self.footer);
+            Ok(())
         }
-    }
 
-    codec::if_serde! {
-        impl codec::view::View for Header {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("Priority", codec::view::View::view(&self.priority))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["Priority"])?;
-                Ok(Self {
-                    priority: object.member("Priority")?,
-                })
-            }
-        }
-        codec::serde_by_view!(Header);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for Header {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    priority: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
+            let header = input.member("header", codec::Reader::fixed)?;
+            let body = input.member("body", |input| input.list::<u8, _>(0, 255, 1, codec::Reader::fixed))?;
+            let footer = input.member("footer", codec::Reader::fixed)?;
+            Ok(Self { header, body, footer })
         }
     }
 
-    /// `ItemRec`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct ItemRec {
-        /// `Item`.
-        pub item: u8,
-    }
+    codec::members!(ReportSections {
+        header: "header",
+        body: "body" = |random| codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary),
+        footer: "footer",
+    });
 
-    impl codec::Fixed for ItemRec {
-        const SIZE: usize = 1;
+    /// The types inside [`ReportSections`].
+    pub mod report_sections {
+        use super::codec;
 
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                item: codec::Fixed::get(run, at),
+        /// `header`.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct Header {
+            /// `Priority`.
+            pub priority: u8,
+        }
+
+        impl codec::Fixed for Header {
+            const SIZE: usize = 1;
+
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    priority: codec::Fixed::get(run, at),
+                }
+            }
+
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.priority, run, at);
             }
         }
 
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.item, run, at);
-        }
-    }
+        codec::members!(Header { priority: "Priority" });
 
-    codec::if_serde! {
-        impl codec::view::View for ItemRec {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("Item", codec::view::View::view(&self.item))
+        /// `ItemRec`.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct ItemRec {
+            /// `Item`.
+            pub item: u8,
+        }
+
+        impl codec::Fixed for ItemRec {
+            const SIZE: usize = 1;
+
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    item: codec::Fixed::get(run, at),
+                }
             }
 
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["Item"])?;
-                Ok(Self {
-                    item: object.member("Item")?,
-                })
-            }
-        }
-        codec::serde_by_view!(ItemRec);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for ItemRec {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    item: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
-
-    /// `footer`.
-    #[derive(Debug, Clone, Copy, Default, PartialEq)]
-    pub struct Footer {
-        /// `Checksum`.
-        pub checksum: u16,
-    }
-
-    impl codec::Fixed for Footer {
-        const SIZE: usize = 2;
-
-        #[inline]
-        fn get(run: &[u8], at: usize) -> Self {
-            Self {
-                checksum: codec::Fixed::get(run, at),
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.item, run, at);
             }
         }
 
-        #[inline]
-        fn put(self, run: &mut [u8], at: usize) {
-            codec::Fixed::put(self.checksum, run, at);
-        }
-    }
+        codec::members!(ItemRec { item: "Item" });
 
-    codec::if_serde! {
-        impl codec::view::View for Footer {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(1)
-                .with("Checksum", codec::view::View::view(&self.checksum))
+        /// `footer`.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct Footer {
+            /// `Checksum`.
+            pub checksum: u16,
+        }
+
+        impl codec::Fixed for Footer {
+            const SIZE: usize = 2;
+
+            #[inline]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self {
+                    checksum: codec::Fixed::get(run, at),
+                }
             }
 
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["Checksum"])?;
-                Ok(Self {
-                    checksum: object.member("Checksum")?,
-                })
+            #[inline]
+            fn put(self, run: &mut [u8], at: usize) {
+                codec::Fixed::put(self.checksum, run, at);
             }
         }
-        codec::serde_by_view!(Footer);
-    }
 
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for Footer {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    checksum: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
+        codec::members!(Footer { checksum: "Checksum" });
     }
 }
+
+#[doc(inline)]
+#[allow(unused_imports)]
+pub use v1_0::{ReportSections, report_sections};

@@ -56,8 +56,8 @@ pub mod versions {
     }
 
     impl<T: Service<C>, C: codec::Call> codec::Provider<C> for Server<T> {
-        fn offers(&self) -> Vec<codec::ServiceId> {
-            vec![V1_1]
+        fn offers(&self) -> codec::List<codec::ServiceId> {
+            codec::List::from([V1_1])
         }
 
         fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
@@ -75,372 +75,26 @@ pub mod versions {
 /// The services of the set, by URN and version.
 pub static SERVICES: &[codec::ServiceInfo] = &[
     codec::ServiceInfo {
-        name: "Versions",
-        id: versions::V1_0,
-        inherits_from: None,
-        inputs: &[0xF081, 0xF082, 0xE081, 0xE082],
-        outputs: &[],
+        name: "Versions", id: versions::V1_0, inherits_from: None,
+        inputs: &[0xF081, 0xF082, 0xE081, 0xE082], outputs: &[],
     },
     codec::ServiceInfo {
-        name: "Versions",
-        id: versions::V1_1,
-        inherits_from: None,
-        inputs: &[0xF081, 0xF082, 0xE081, 0xE082],
-        outputs: &[],
+        name: "Versions", id: versions::V1_1, inherits_from: None,
+        inputs: &[0xF081, 0xF082, 0xE081, 0xE082], outputs: &[],
     },
 ];
 
 /// The message types of the set, by code; of several with one code the newest first.
 pub static MESSAGES: &[codec::MessageInfo] = &[
-    codec::MessageInfo::of::<QueryState>(&[
-        versions::V1_1,
-    ]),
-    codec::MessageInfo::of::<v1_0::QueryState>(&[
-        versions::V1_0,
-    ]),
-    codec::MessageInfo::of::<QueryMode>(&[
-        versions::V1_1,
-        versions::V1_0,
-    ]),
-    codec::MessageInfo::of::<ReportState>(&[
-        versions::V1_1,
-    ]),
-    codec::MessageInfo::of::<v1_0::ReportState>(&[
-        versions::V1_0,
-    ]),
-    codec::MessageInfo::of::<ReportMode>(&[
-        versions::V1_1,
-        versions::V1_0,
-    ]),
+    codec::MessageInfo::of::<QueryState>(&[versions::V1_1]),
+    codec::MessageInfo::of::<v1_0::QueryState>(&[versions::V1_0]),
+    codec::MessageInfo::of::<QueryMode>(&[versions::V1_1, versions::V1_0]),
+    codec::MessageInfo::of::<ReportState>(&[versions::V1_1]),
+    codec::MessageInfo::of::<v1_0::ReportState>(&[versions::V1_0]),
+    codec::MessageInfo::of::<ReportMode>(&[versions::V1_1, versions::V1_0]),
 ];
 
-/// `QueryState` (E081h).
-///
-/// Asks for the state.
-///
-/// Declared by `urn:example:Versions 1.1`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct QueryState {
-    /// `Detail`.
-    pub detail: u8,
-}
-
-impl codec::Message for QueryState {
-    const CODE: u16 = 0xE081;
-    const NAME: &'static str = "QueryState";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-    const OTHER_LAYOUTS: &'static [codec::ServiceId] = &[versions::V1_0];
-
-    fn encoded_len(&self) -> usize {
-        3
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let run = output.run::<3>();
-        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
-        codec::Fixed::put(self.detail, run, 2);
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let detail = input.member("Detail", codec::Reader::fixed)?;
-        Ok(Self {
-            detail,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for QueryState {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(1)
-            .with("Detail", codec::view::View::view(&self.detail))
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            let object = codec::view::Object::new(value, &["Detail"])?;
-            Ok(Self {
-                detail: object.member("Detail")?,
-            })
-        }
-    }
-    codec::serde_by_view!(QueryState);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for QueryState {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                detail: codec::arbitrary::Arbitrary::arbitrary(random)?,
-            })
-        }
-    }
-}
-
-impl codec::Query for QueryState {
-    type Report = ReportState;
-}
-
-/// `QueryMode` (E082h).
-///
-/// Asks for the mode.
-///
-/// Declared by `urn:example:Versions 1.1`, `urn:example:Versions 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct QueryMode;
-
-impl codec::Message for QueryMode {
-    const CODE: u16 = 0xE082;
-    const NAME: &'static str = "QueryMode";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        2
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(<Self as codec::Message>::CODE);
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        Ok(Self)
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for QueryMode {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(0)
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            codec::view::Object::new(value, &[])?;
-            Ok(Self)
-        }
-    }
-    codec::serde_by_view!(QueryMode);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for QueryMode {
-        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self)
-        }
-    }
-}
-
-impl codec::Query for QueryMode {
-    type Report = ReportMode;
-}
-
-/// `ReportState` (F081h).
-///
-/// The state, finer.
-///
-/// Declared by `urn:example:Versions 1.1`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportState {
-    /// `Speed`: meter per second, 0 to 327.67.
-    pub speed: report_state::Speed,
-    /// `Mode`.
-    pub mode: report_state::Mode,
-}
-
-impl ReportState {
-    /// `Speed` in meter per second.
-    pub fn speed_m_per_s(&self) -> f64 {
-        self.speed.value()
-    }
-
-    /// Sets `Speed` in meter per second to the nearest value that the field can hold.
-    ///
-    /// # Errors
-    /// If the value is not in 0 to 327.67.
-    pub fn set_speed_m_per_s(&mut self, value: f64) -> Result<(), codec::OutOfRange> {
-        self.speed = report_state::Speed::new(value)?;
-        Ok(())
-    }
-}
-
-impl codec::Message for ReportState {
-    const CODE: u16 = 0xF081;
-    const NAME: &'static str = "ReportState";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-    const OTHER_LAYOUTS: &'static [codec::ServiceId] = &[versions::V1_0];
-
-    fn encoded_len(&self) -> usize {
-        7
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let run = output.run::<7>();
-        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
-        codec::Fixed::put(self.speed, run, 2);
-        codec::Fixed::put(self.mode, run, 6);
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let run = input.run::<5>(&[
-            ("Speed", 4),
-            ("Mode", 1),
-        ])?;
-        let speed = codec::Fixed::get(run, 0);
-        let mode = codec::Fixed::get(run, 4);
-        Ok(Self {
-            speed,
-            mode,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportState {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(2)
-            .with("Speed", codec::view::View::view(&self.speed))
-            .with("Mode", codec::view::View::view(&self.mode))
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            let object = codec::view::Object::new(value, &["Speed", "Mode"])?;
-            Ok(Self {
-                speed: object.member("Speed")?,
-                mode: object.member("Mode")?,
-            })
-        }
-    }
-    codec::serde_by_view!(ReportState);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportState {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                speed: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                mode: codec::arbitrary::Arbitrary::arbitrary(random)?,
-            })
-        }
-    }
-}
-
-/// The types inside [`ReportState`].
-pub mod report_state {
-    use super::codec;
-
-    /// `Speed` in meter per second: 0 to 327.67 in steps of 7.629e-8, carried as `u32`.
-    #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-    pub struct Speed(u32);
-
-    codec::scaled!(Speed(u32), "Speed", 0.0_f64 to 327.67_f64 "meter per second", Round);
-
-    /// `Mode`: a number with named values. Others are kept as they come.
-    #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-    pub struct Mode(pub u8);
-
-    impl Mode {
-        /// `Off` = 0.
-        pub const OFF: Self = Self(0);
-        /// `On` = 1.
-        pub const ON: Self = Self(1);
-    }
-
-    codec::enumeration!(Mode(u8), [
-        (0, "Off"),
-        (1, "On"),
-    ]);
-}
-
-impl codec::Report for ReportState {}
-
-/// `ReportMode` (F082h).
-///
-/// The mode; only names were added.
-///
-/// Declared by `urn:example:Versions 1.1`, `urn:example:Versions 1.0`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportMode {
-    /// `Mode`.
-    pub mode: report_mode::Mode,
-}
-
-impl codec::Message for ReportMode {
-    const CODE: u16 = 0xF082;
-    const NAME: &'static str = "ReportMode";
-    const IS_COMMAND: bool = false;
-    const NEEDS_CONTROL: bool = false;
-
-    fn encoded_len(&self) -> usize {
-        3
-    }
-
-    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let run = output.run::<3>();
-        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
-        codec::Fixed::put(self.mode, run, 2);
-        Ok(())
-    }
-
-    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
-        input.code(Self::CODE)?;
-        let mode = input.member("Mode", codec::Reader::fixed)?;
-        Ok(Self {
-            mode,
-        })
-    }
-}
-
-codec::if_serde! {
-    impl codec::view::View for ReportMode {
-        #[inline(never)]
-        fn view(&self) -> codec::view::Value {
-            codec::view::Value::object(1)
-            .with("Mode", codec::view::View::view(&self.mode))
-        }
-
-        #[inline(never)]
-        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-            let object = codec::view::Object::new(value, &["Mode"])?;
-            Ok(Self {
-                mode: object.member("Mode")?,
-            })
-        }
-    }
-    codec::serde_by_view!(ReportMode);
-}
-
-codec::if_arbitrary! {
-    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportMode {
-        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-            Ok(Self {
-                mode: codec::arbitrary::Arbitrary::arbitrary(random)?,
-            })
-        }
-    }
-}
-
-/// The types inside [`ReportMode`].
-pub mod report_mode {
-    #[doc(inline)]
-    pub use super::report_state::Mode;
-}
-
-impl codec::Report for ReportMode {}
-
-/// Messages as services of version 1.0 had them, where newer ones differ.
+/// The messages of services of version 1.0.
 pub mod v1_0 {
     use super::codec;
 
@@ -455,13 +109,8 @@ pub mod v1_0 {
     impl codec::Message for QueryState {
         const CODE: u16 = 0xE081;
         const NAME: &'static str = "QueryState";
-        const IS_COMMAND: bool = false;
-        const NEEDS_CONTROL: bool = false;
         const OTHER_LAYOUTS: &'static [codec::ServiceId] = &[super::versions::V1_1];
-
-        fn encoded_len(&self) -> usize {
-            2
-        }
+        fn encoded_len(&self) -> usize { 2 }
 
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
             output.fixed(<Self as codec::Message>::CODE);
@@ -474,33 +123,37 @@ pub mod v1_0 {
         }
     }
 
-    codec::if_serde! {
-        impl codec::view::View for QueryState {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(0)
-            }
+    codec::members!(QueryState {});
 
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                codec::view::Object::new(value, &[])?;
-                Ok(Self)
-            }
+    impl codec::Query for QueryState { type Report = ReportState; }
+
+    /// `QueryMode` (E082h).
+    ///
+    /// Asks for the mode.
+    ///
+    /// Declared by `urn:example:Versions 1.1`, `urn:example:Versions 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct QueryMode;
+
+    impl codec::Message for QueryMode {
+        const CODE: u16 = 0xE082;
+        const NAME: &'static str = "QueryMode";
+        fn encoded_len(&self) -> usize { 2 }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            output.fixed(<Self as codec::Message>::CODE);
+            Ok(())
         }
-        codec::serde_by_view!(QueryState);
-    }
 
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for QueryState {
-            fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self)
-            }
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
+            Ok(Self)
         }
     }
 
-    impl codec::Query for QueryState {
-        type Report = ReportState;
-    }
+    codec::members!(QueryMode {});
+
+    impl codec::Query for QueryMode { type Report = ReportMode; }
 
     /// `ReportState` (F081h).
     ///
@@ -515,32 +168,15 @@ pub mod v1_0 {
         pub mode: report_state::Mode,
     }
 
-    impl ReportState {
-        /// `Speed` in meter per second.
-        pub fn speed_m_per_s(&self) -> f64 {
-            self.speed.value()
-        }
-
-        /// Sets `Speed` in meter per second to the nearest value that the field can hold.
-        ///
-        /// # Errors
-        /// If the value is not in 0 to 327.67.
-        pub fn set_speed_m_per_s(&mut self, value: f64) -> Result<(), codec::OutOfRange> {
-            self.speed = report_state::Speed::new(value)?;
-            Ok(())
-        }
-    }
+    codec::accessors!(ReportState {
+        speed: report_state::Speed => speed_m_per_s, set_speed_m_per_s, "`Speed` in meter per second", "0 to 327.67";
+    });
 
     impl codec::Message for ReportState {
         const CODE: u16 = 0xF081;
         const NAME: &'static str = "ReportState";
-        const IS_COMMAND: bool = false;
-        const NEEDS_CONTROL: bool = false;
         const OTHER_LAYOUTS: &'static [codec::ServiceId] = &[super::versions::V1_1];
-
-        fn encoded_len(&self) -> usize {
-            5
-        }
+        fn encoded_len(&self) -> usize { 5 }
 
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
             let run = output.run::<5>();
@@ -552,50 +188,14 @@ pub mod v1_0 {
 
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
             input.code(Self::CODE)?;
-            let run = input.run::<3>(&[
-                ("Speed", 2),
-                ("Mode", 1),
-            ])?;
+            let run = input.run::<3>(&[("Speed", 2), ("Mode", 1)])?;
             let speed = codec::Fixed::get(run, 0);
             let mode = codec::Fixed::get(run, 2);
-            Ok(Self {
-                speed,
-                mode,
-            })
+            Ok(Self { speed, mode })
         }
     }
 
-    codec::if_serde! {
-        impl codec::view::View for ReportState {
-            #[inline(never)]
-            fn view(&self) -> codec::view::Value {
-                codec::view::Value::object(2)
-                .with("Speed", codec::view::View::view(&self.speed))
-                .with("Mode", codec::view::View::view(&self.mode))
-            }
-
-            #[inline(never)]
-            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
-                let object = codec::view::Object::new(value, &["Speed", "Mode"])?;
-                Ok(Self {
-                    speed: object.member("Speed")?,
-                    mode: object.member("Mode")?,
-                })
-            }
-        }
-        codec::serde_by_view!(ReportState);
-    }
-
-    codec::if_arbitrary! {
-        impl<'a> codec::arbitrary::Arbitrary<'a> for ReportState {
-            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
-                Ok(Self {
-                    speed: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                    mode: codec::arbitrary::Arbitrary::arbitrary(random)?,
-                })
-            }
-        }
-    }
+    codec::members!(ReportState { speed: "Speed", mode: "Mode" });
 
     /// The types inside [`ReportState`].
     pub mod report_state {
@@ -616,10 +216,170 @@ pub mod v1_0 {
             pub const OFF: Self = Self(0);
         }
 
-        codec::enumeration!(Mode(u8), [
-            (0, "Off"),
-        ]);
+        codec::enumeration!(Mode(u8), [(0, "Off")]);
+    }
+
+    impl codec::Report for ReportState {}
+
+    /// `ReportMode` (F082h).
+    ///
+    /// The mode; only names were added.
+    ///
+    /// Declared by `urn:example:Versions 1.1`, `urn:example:Versions 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ReportMode {
+        /// `Mode`.
+        pub mode: report_mode::Mode,
+    }
+
+    impl codec::Message for ReportMode {
+        const CODE: u16 = 0xF082;
+        const NAME: &'static str = "ReportMode";
+        fn encoded_len(&self) -> usize { 3 }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            let run = output.run::<3>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(self.mode, run, 2);
+            Ok(())
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
+            let mode = input.member("Mode", codec::Reader::fixed)?;
+            Ok(Self { mode })
+        }
+    }
+
+    codec::members!(ReportMode { mode: "Mode" });
+
+    /// The types inside [`ReportMode`].
+    pub mod report_mode {
+        use super::codec;
+
+        /// `Mode`: a number with named values. Others are kept as they come.
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct Mode(pub u8);
+
+        impl Mode {
+            /// `Off` = 0.
+            pub const OFF: Self = Self(0);
+            /// `On` = 1.
+            pub const ON: Self = Self(1);
+        }
+
+        codec::enumeration!(Mode(u8), [(0, "Off"), (1, "On")]);
+    }
+
+    impl codec::Report for ReportMode {}
+}
+
+/// The messages of services of version 1.1.
+pub mod v1_1 {
+    use super::codec;
+
+    #[doc(inline)]
+    #[allow(unused_imports)]
+    pub use super::v1_0::{QueryMode, ReportMode, report_mode};
+
+    /// `QueryState` (E081h).
+    ///
+    /// Asks for the state.
+    ///
+    /// Declared by `urn:example:Versions 1.1`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct QueryState {
+        /// `Detail`.
+        pub detail: u8,
+    }
+
+    impl codec::Message for QueryState {
+        const CODE: u16 = 0xE081;
+        const NAME: &'static str = "QueryState";
+        const OTHER_LAYOUTS: &'static [codec::ServiceId] = &[super::versions::V1_0];
+        fn encoded_len(&self) -> usize { 3 }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            let run = output.run::<3>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(self.detail, run, 2);
+            Ok(())
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
+            let detail = input.member("Detail", codec::Reader::fixed)?;
+            Ok(Self { detail })
+        }
+    }
+
+    codec::members!(QueryState { detail: "Detail" });
+
+    impl codec::Query for QueryState { type Report = ReportState; }
+
+    /// `ReportState` (F081h).
+    ///
+    /// The state, finer.
+    ///
+    /// Declared by `urn:example:Versions 1.1`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ReportState {
+        /// `Speed`: meter per second, 0 to 327.67.
+        pub speed: report_state::Speed,
+        /// `Mode`.
+        pub mode: report_state::Mode,
+    }
+
+    codec::accessors!(ReportState {
+        speed: report_state::Speed => speed_m_per_s, set_speed_m_per_s, "`Speed` in meter per second", "0 to 327.67";
+    });
+
+    impl codec::Message for ReportState {
+        const CODE: u16 = 0xF081;
+        const NAME: &'static str = "ReportState";
+        const OTHER_LAYOUTS: &'static [codec::ServiceId] = &[super::versions::V1_0];
+        fn encoded_len(&self) -> usize { 7 }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            let run = output.run::<7>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(self.speed, run, 2);
+            codec::Fixed::put(self.mode, run, 6);
+            Ok(())
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
+            let run = input.run::<5>(&[("Speed", 4), ("Mode", 1)])?;
+            let speed = codec::Fixed::get(run, 0);
+            let mode = codec::Fixed::get(run, 4);
+            Ok(Self { speed, mode })
+        }
+    }
+
+    codec::members!(ReportState { speed: "Speed", mode: "Mode" });
+
+    /// The types inside [`ReportState`].
+    pub mod report_state {
+        use super::codec;
+        #[doc(inline)]
+        #[allow(unused_imports)]
+        pub use super::super::v1_0::report_mode::Mode;
+
+        /// `Speed` in meter per second: 0 to 327.67 in steps of 7.629e-8, carried as `u32`.
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct Speed(u32);
+
+        codec::scaled!(Speed(u32), "Speed", 0.0_f64 to 327.67_f64 "meter per second", Round);
     }
 
     impl codec::Report for ReportState {}
 }
+
+#[doc(inline)]
+#[allow(unused_imports)]
+pub use v1_0::{QueryMode, ReportMode, report_mode};
+
+#[doc(inline)]
+#[allow(unused_imports)]
+pub use v1_1::{QueryState, ReportState, report_state};

@@ -1,6 +1,10 @@
 //! Views of the field types that generated messages consist of.
 
-use std::fmt::Write;
+use alloc::borrow::ToOwned;
+use alloc::format;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+use core::fmt::Write;
 
 use bytes::Bytes;
 
@@ -9,6 +13,7 @@ use crate::bits;
 use crate::bits::Bits;
 use crate::blob::FormattedBlob;
 use crate::enumeration::Enumeration;
+use crate::large_array::LargeArray;
 use crate::scale::{OutOfRange, Scale};
 use crate::text::Text;
 
@@ -108,6 +113,19 @@ impl<T: View, const N: usize> View for [T; N] {
         let elements: Vec<T> = value.elements()?;
         let found = elements.len();
         let wrong = |_| Error::new(format!("expected {N} elements, found {found}"));
+        Self::try_from(elements).map_err(wrong)
+    }
+}
+
+impl<T: View, const N: usize> View for LargeArray<T, N> {
+    fn view(&self) -> Value {
+        Value::list(self)
+    }
+
+    fn from_view(value: &Value) -> Result<Self, Error> {
+        let elements: Vec<T> = value.elements()?;
+        let wrong =
+            |found: Vec<T>| Error::new(format!("expected {N} elements, found {}", found.len()));
         Self::try_from(elements).map_err(wrong)
     }
 }

@@ -1,7 +1,11 @@
 //! The tree of plain values between messages and text formats.
 
-use std::borrow::Cow;
-use std::fmt;
+use alloc::borrow::Cow;
+use alloc::borrow::ToOwned;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::fmt;
 
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -56,7 +60,7 @@ impl Value {
 
     /// Creates an object whose only key is the name of the selected alternative.
     pub fn alternative(name: &'static str, value: Self) -> Self {
-        Self::Object(vec![(Cow::Borrowed(name), value)])
+        Self::Object(Vec::from([(Cow::Borrowed(name), value)]))
     }
 
     /// The name and value of the selected alternative.

@@ -2,7 +2,7 @@
 //! messages, and the machine's actions and guards are methods of the trait.
 
 use super::super::ident::Names;
-use super::{Emitter, Event, Kind, Messages, Method, Writer, machines_of, queries};
+use super::{Emitter, Event, Kind, Messages, Method, Plan, Writer, queries};
 use crate::machine::Machine;
 use crate::model::{Message, Service};
 
@@ -13,41 +13,27 @@ const IS_CONTROLLING_CLIENT: &str = "isControllingClient";
 pub(in super::super) struct Connection<'a> {
     service: &'a Service,
     messages: Messages<'a>,
-    machine: Machine<'a>,
+    emitter: Emitter<'a>,
 }
 
-/// A service with several machines, which have no common trait.
-pub(in super::super) struct SeveralMachines;
-
 impl<'a> Connection<'a> {
-    /// The connection of a service that defines behaviour of its own.
+    /// The connection of a service with its machine.
     pub(in super::super) fn of(
         service: &'a Service,
         messages: Messages<'a>,
-    ) -> Result<Option<Self>, SeveralMachines> {
-        if service.behaviour.is_empty() {
-            return Ok(None);
-        }
-        let mut machines = machines_of(messages.library, service);
-        let machine = machines.pop();
-        if !machines.is_empty() {
-            return Err(SeveralMachines);
-        }
-        Ok(machine.map(|machine| Self {
+        machine: &'a Machine<'a>,
+    ) -> Self {
+        Self {
             service,
             messages,
-            machine,
-        }))
-    }
-
-    fn emitter(&self) -> Emitter<'_> {
-        Emitter::new(&self.machine, self.service, self.messages, "super")
+            emitter: Emitter::new(machine, service, messages, "super"),
+        }
     }
 
     /// Whether the machine handles a message.
     pub(in super::super) fn handles(&self, message: &Message) -> bool {
         let name = &message.name;
-        let emitter = self.emitter();
+        let emitter = &self.emitter;
         let mut events = emitter.vocabulary.events.iter().filter(|it| is_input(it));
         events.any(|event| {
             event
@@ -59,27 +45,27 @@ impl<'a> Connection<'a> {
 
     /// Reserves the names of its methods in the trait.
     pub(in super::super) fn reserve(&self, names: &mut Names) {
-        for method in &self.emitter().vocabulary.methods {
+        for method in &self.emitter.vocabulary.methods {
             names.snake(&method.ident);
         }
     }
 
     /// Writes the methods of the trait: guards and actions.
     pub(in super::super) fn methods(&self, out: &mut Writer) {
-        let emitter = self.emitter();
+        let emitter = &self.emitter;
         for method in emitter
             .vocabulary
             .methods
             .iter()
             .filter(|it| !is_answered(it))
         {
-            let (mut parameters, texts) = self.parameters(&emitter, method);
+            let (mut parameters, texts) = self.parameters(emitter, method);
             if !method.asks() {
                 parameters.push("call: &mut C".to_owned());
             }
             let receiver = if method.asks() { "&self" } else { "&mut self" };
             parameters.insert(0, receiver.to_owned());
-            let sent = self.sent(method).map(|path| format!(" -> super::{path}"));
+            let sent = self.sent(method).map(|path| format!(" -> {path}"));
             let result = match sent {
                 Some(sent) => sent,
                 None if method.asks() => " -> bool".to_owned(),
@@ -116,13 +102,13 @@ impl<'a> Connection<'a> {
     /// The type of the message that an action sends.
     fn sent(&self, method: &Method) -> Option<String> {
         let name = method.name.strip_prefix("Send ")?;
-        self.messages.path(self.service, name)
+        self.messages.path("super", self.service, name)
     }
 
     /// Writes the implementation of `Behaviour` by a service and a call.
     pub(in super::super) fn bridge(&self, out: &mut Writer) {
-        let emitter = self.emitter();
-        self.internal(out, &emitter);
+        let emitter = &self.emitter;
+        self.internal(out, emitter);
         out.gap();
         out.push("/// A service and a call, as the state machine sees them.");
         out.push("struct Step<'a, T, C> {\nservice: &'a mut T,\ncall: &'a mut C,\n}");
@@ -132,7 +118,7 @@ impl<'a> Connection<'a> {
             out.push("type Envelope = ();");
         }
         for method in &emitter.vocabulary.methods {
-            self.bridged(out, &emitter, method);
+            self.bridged(out, emitter, method);
         }
         out.push("}");
     }
@@ -172,7 +158,8 @@ impl<'a> Connection<'a> {
         match self.sent(method) {
             Some(path) => {
                 out.push(format!("let message = {call};"));
-                let plan = self.messages.plans.iter().find(|plan| plan.path() == path);
+                let of_path = |plan: &&Plan<'_>| format!("super::{}", plan.path()) == path;
+                let plan = self.messages.plans.iter().find(of_path);
                 let query = plan.and_then(|plan| queries::query_of(plan, self.messages.plans));
                 match query {
                     Some(query) => out.push(format!(
@@ -211,43 +198,31 @@ impl<'a> Connection<'a> {
         out.push("fn number(self) -> u16 {\nself as u16\n}\n}");
     }
 
-    /// Writes the check that the machine has started.
-    pub(in super::super) fn started(&self, out: &mut Writer) {
-        out.push("let machine = self.machine.as_mut()?;\nlet service = &mut self.service;");
+    /// The cases of the messages that the machine handles.
+    pub(in super::super) fn arms(&self) -> Vec<String> {
+        let inputs = self.service.inputs.iter();
+        inputs.filter_map(|message| self.arm(message)).collect()
     }
 
-    /// Writes the cases of the messages that the machine handles.
-    pub(in super::super) fn arms(&self, out: &mut Writer) {
-        let emitter = self.emitter();
-        for message in &self.service.inputs {
-            let named = |event: &&Event| {
-                is_input(event)
-                    && event
-                        .message
-                        .as_ref()
-                        .is_some_and(|it| it.eq_ignore_ascii_case(&message.name))
-            };
-            let event = emitter.vocabulary.events.iter().find(named);
-            let path = self.messages.declared(self.service, message);
-            let (Some(event), Some(path)) = (event, path) else {
-                continue;
-            };
-            let envelope = if event.envelope { ", &()" } else { "" };
-            out.push(format!(
-                "0x{:04X} => call.step(|message: super::{path}, call| {{",
-                message.code
-            ));
-            out.push(format!(
-                "let event = machine::Event::{}(&message{envelope});",
-                event.ident
-            ));
-            out.push("machine.step(event, &mut Step { service, call })\n}),");
-        }
+    fn arm(&self, message: &Message) -> Option<String> {
+        let named = |event: &&Event| {
+            let name = event.message.as_ref().filter(|_| is_input(event));
+            name.is_some_and(|it| it.eq_ignore_ascii_case(&message.name))
+        };
+        let event = self.emitter.vocabulary.events.iter().find(named)?;
+        let path = self.messages.declared(self.service, message)?;
+        let envelope = if event.envelope { ", &()" } else { "" };
+        Some(format!(
+            "0x{:04X} => call.step(|message: super::{path}, call| {{\n\
+             let event = machine::Event::{}(&message{envelope});\n\
+             machine.step(event, &mut Step {{ service, call }})\n}}),",
+            message.code, event.ident
+        ))
     }
 
     /// Writes the functions for the service's own events and for the component's control.
     pub(in super::super) fn events(&self, out: &mut Writer) {
-        let emitter = self.emitter();
+        let emitter = &self.emitter;
         let internal: Vec<_> = emitter
             .vocabulary
             .events

@@ -19,7 +19,7 @@ use self::steps::Steps;
 use self::vocabulary::{Choice, Event, Kind, Method, Vocabulary};
 use super::docs;
 use super::ident::{Names, version_module};
-use super::messages::Plan;
+use super::plan::{Plan, plan};
 use super::queries;
 use super::writer::Writer;
 use crate::behaviour::TransitionKind;
@@ -32,18 +32,46 @@ use crate::model::{Message, Service};
 pub(super) struct Messages<'m> {
     pub(super) library: &'m Library,
     pub(super) plans: &'m [Plan<'m>],
+    pub(super) externs: &'m [Extern<'m>],
+}
+
+/// A module of other services.
+pub(super) struct Extern<'m> {
+    path: String,
+    plans: Vec<Plan<'m>>,
+}
+
+impl<'m> Extern<'m> {
+    /// The module of the services whose URNs have these beginnings.
+    pub(super) fn of(library: &'m Library, path: &str, urns: &[String]) -> Self {
+        let services = library.services().map(AsRef::<Service>::as_ref);
+        let services = services.filter(|it| urns.iter().any(|urn| it.id.urn.starts_with(&**urn)));
+        let mut services: Vec<_> = services.collect();
+        services.sort_by_key(|service| &service.id);
+        Self {
+            path: path.to_owned(),
+            plans: plan(library, &services, &mut Names::default()),
+        }
+    }
 }
 
 impl Messages<'_> {
-    /// The path of a message type of a service's vocabulary from the root of the set; `None` for a
-    /// message of another set.
-    fn path(&self, service: &Service, name: &str) -> Option<String> {
+    /// The path of a message type of a service's vocabulary from a module where the root of the set is
+    /// `root`; `None` for a message of another set.
+    fn path(&self, root: &str, service: &Service, name: &str) -> Option<String> {
         let clients = self.library.lineage(service).flat_map(|it| &it.client_of);
         let servers = clients.filter_map(|server| self.library.service(&server.id));
         let servers = servers.flat_map(|server| self.library.vocabulary(server));
         let mut all = self.library.vocabulary(service).chain(servers);
         let (declaring, message) = all.find(|(_, it)| it.name.eq_ignore_ascii_case(name))?;
-        self.declared(declaring, message)
+        if let Some(path) = self.declared(declaring, message) {
+            return Some(format!("{root}::{path}"));
+        }
+        let mut externs = self.externs.iter();
+        externs.find_map(|Extern { path, plans }| {
+            let plan = of_service(plans, declaring, message)?;
+            Some(format!("{path}::{}", plan.definition()))
+        })
     }
 
     fn declared(&self, service: &Service, message: &Message) -> Option<String> {
@@ -54,13 +82,19 @@ impl Messages<'_> {
 impl<'m> Messages<'m> {
     /// The type of a message that a service declares.
     pub(super) fn plan(&self, service: &Service, message: &Message) -> Option<&'m Plan<'m>> {
-        let same = |plan: &&Plan<'_>| {
-            plan.message.code == message.code
-                && plan.message.name == message.name
-                && plan.services.contains(&&service.id)
-        };
-        self.plans.iter().find(same)
+        of_service(self.plans, service, message)
     }
+}
+
+/// The type of a message that a service declares.
+fn of_service<'p, 'm>(
+    plans: &'p [Plan<'m>],
+    service: &Service,
+    message: &Message,
+) -> Option<&'p Plan<'m>> {
+    let same =
+        |plan: &&Plan<'_>| plan.is_layout_of(message) && plan.services.contains(&&service.id);
+    plans.iter().find(same)
 }
 
 /// Writes the machines of all versions of a service, the newest first.
@@ -78,16 +112,36 @@ pub(super) fn machines(out: &mut Writer, messages: Messages<'_>, versions: &[&Se
         } else {
             "super::super"
         };
-        of_service(out, messages, service, root);
+        machines_in(out, messages, service, root);
         if version.is_some() {
             out.push("}");
         }
     }
 }
 
+/// States times events of the largest machine that is generated.
+const MOST_STEPS: usize = 1 << 16;
+
+/// Whether the code of a machine would be too long, and why.
+pub(super) fn excess(machine: &Machine<'_>) -> Option<String> {
+    let states = machine.states().filter(|(_, it)| it.children.is_empty());
+    let states = states.count();
+    let events = machine
+        .transitions()
+        .map(|it| vocabulary::event_key(&it.item.trigger));
+    let events = events.collect::<BTreeSet<_>>().len();
+    (states.saturating_mul(events) > MOST_STEPS).then(|| {
+        format!(
+            "the state machine {} has {states} states and {events} events, more than {MOST_STEPS} \
+             reactions: divide it",
+            machine.name()
+        )
+    })
+}
+
 /// The machines of a service. Those of other services than the core ones are without the parts of
 /// the core services, which the component itself handles.
-fn machines_of<'a>(library: &'a Library, service: &'a Service) -> Vec<Machine<'a>> {
+pub(super) fn machines_of<'a>(library: &'a Library, service: &'a Service) -> Vec<Machine<'a>> {
     let machines = library.machines(service);
     if service.is_core() {
         return machines;
@@ -96,7 +150,7 @@ fn machines_of<'a>(library: &'a Library, service: &'a Service) -> Vec<Machine<'a
     own.filter(Machine::has_transitions).collect()
 }
 
-fn of_service(out: &mut Writer, messages: Messages<'_>, service: &Service, root: &str) {
+fn machines_in(out: &mut Writer, messages: Messages<'_>, service: &Service, root: &str) {
     let machines = machines_of(messages.library, service);
     let mut modules = Names::reserving(&["codec"]);
     for machine in &machines {
@@ -105,6 +159,10 @@ fn of_service(out: &mut Writer, messages: Messages<'_>, service: &Service, root:
             _ => machine.name().last(),
         };
         let module = modules.snake(name);
+        if let Some(reason) = excess(machine) {
+            out.push(format!("compile_error!({reason:?});"));
+            continue;
+        }
         Emitter::new(machine, service, messages, root).write(out, &module);
     }
 }
@@ -265,7 +323,7 @@ impl<'a> Emitter<'a> {
         let Some(message) = &event.message else {
             return format!("`{}`.", event.name);
         };
-        let what = match self.messages.path(self.service, message) {
+        let what = match self.messages.path(self.root, self.service, message) {
             Some(_) => format!("`{message}`"),
             None => format!("`{message}`, whose type is in another set: its octets"),
         };
@@ -282,8 +340,8 @@ impl<'a> Emitter<'a> {
 
     /// A reference to a message, or to its octets if its type is in another set.
     fn message_type(&self, message: &str, lifetime: &str) -> String {
-        match self.messages.path(self.service, message) {
-            Some(path) => format!("&{lifetime}{}::{path}", self.root),
+        match self.messages.path(self.root, self.service, message) {
+            Some(path) => format!("&{lifetime}{path}"),
             None => format!("&{lifetime}[u8]"),
         }
     }

@@ -1,10 +1,12 @@
 //! Step functions of a generated machine: the reaction of each state to each event.
 
+use std::collections::{HashMap, HashSet};
+
 use super::super::writer::Writer;
 use super::states::States;
 use super::vocabulary::{Event, Kind, Method, Value, Vocabulary};
 use crate::behaviour::{Action, Guard, Transition, TransitionKind, Trigger};
-use crate::machine::{Declared, Machine, StateIndex, Stimulus};
+use crate::machine::{Declared, Machine, MachineState, StateIndex, Stimulus};
 
 /// Input of the generator.
 pub(super) struct Steps<'a> {
@@ -13,22 +15,75 @@ pub(super) struct Steps<'a> {
     pub(super) vocabulary: &'a Vocabulary,
 }
 
-/// States with the same reaction, and the reaction.
-type Group = (Vec<StateIndex>, String);
+/// States by their reaction.
+#[derive(Default)]
+struct Groups {
+    /// In the order of their first states.
+    all: Vec<(Vec<StateIndex>, String)>,
+    places: HashMap<String, usize>,
+}
+
+impl Groups {
+    fn add(&mut self, state: StateIndex, reaction: String) {
+        let place = *self.places.entry(reaction).or_insert_with_key(|reaction| {
+            self.all.push((Vec::new(), reaction.clone()));
+            self.all.len() - 1
+        });
+        self.all[place].0.push(state);
+    }
+}
+
+/// The transitions that a machine can take on a stimulus. They are looked up once for all states
+/// inside the same one.
+struct Reactions<'a> {
+    machine: &'a Machine<'a>,
+    stimulus: Stimulus<'a>,
+    /// The states with a transition of their own.
+    concerned: HashSet<StateIndex>,
+    known: HashMap<StateIndex, Vec<Declared<'a, Transition>>>,
+}
+
+impl<'a> Reactions<'a> {
+    fn to(machine: &'a Machine<'a>, stimulus: Stimulus<'a>) -> Self {
+        let reacts = |state: &MachineState<'_>| {
+            let mut all = state.transitions.iter().chain(&state.default_transitions);
+            all.any(|it| stimulus.triggers(it.item))
+        };
+        let concerned = machine.states().filter(|(_, state)| reacts(state));
+        Self {
+            machine,
+            stimulus,
+            concerned: concerned.map(|(index, _)| index).collect(),
+            known: HashMap::new(),
+        }
+    }
+
+    /// Those of a state and the states around it; `None` if there are none.
+    fn of(&mut self, state: StateIndex) -> Option<&[Declared<'a, Transition>]> {
+        let outwards = |index: &StateIndex| self.machine.state(*index).parent;
+        let mut around = std::iter::successors(Some(state), outwards);
+        let innermost = around.find(|index| self.concerned.contains(index))?;
+        let candidates = || self.machine.candidates(innermost, self.stimulus);
+        Some(self.known.entry(innermost).or_insert_with(candidates))
+    }
+}
 
 impl Steps<'_> {
     /// Writes the function that handles an event.
     pub(super) fn handler(&self, out: &mut Writer, event: &Event, signature: &str) {
         out.gap();
         out.push(signature);
-        let mut groups: Vec<Group> = Vec::new();
+        let mut groups = Groups::default();
+        let stimulus = event.stimulus();
+        let mut reactions = Reactions::to(self.machine, stimulus);
         for &leaf in self.states.leaves() {
-            let body = self.body(event, leaf);
-            match groups.iter_mut().find(|(_, known)| *known == body) {
-                Some((states, _)) => states.push(leaf),
-                None => groups.push((vec![leaf], body)),
-            }
+            let body = match reactions.of(leaf) {
+                Some(candidates) => self.body(leaf, candidates),
+                None => "Outcome::Ignored".into(),
+            };
+            groups.add(leaf, body);
         }
+        let mut groups = groups.all;
         if let [(_, body)] = groups.as_slice() {
             out.push(body);
         } else {
@@ -75,7 +130,7 @@ impl Steps<'_> {
     fn entrance(&self, state: StateIndex) -> String {
         let to = self.machine.leaf(state);
         let mut inside = Vec::new();
-        let mut groups: Vec<Group> = Vec::new();
+        let mut groups = Groups::default();
         for &leaf in self.states.leaves() {
             let mut around = std::iter::successors(Some(leaf), |it| self.machine.state(*it).parent);
             if around.any(|it| it == state) {
@@ -84,13 +139,9 @@ impl Steps<'_> {
             }
             let leaving = self.actions(None, self.machine.leaving(leaf, to));
             let entering = self.actions(None, self.machine.entering(Some(leaf), to));
-            let done = leaving + &entering;
-            match groups.iter_mut().find(|(_, known)| *known == done) {
-                Some((states, _)) => states.push(leaf),
-                None => groups.push((vec![leaf], done)),
-            }
+            groups.add(leaf, leaving + &entering);
         }
-        let arms = groups.iter().filter(|(_, done)| !done.is_empty());
+        let arms = groups.all.iter().filter(|(_, done)| !done.is_empty());
         let arms = arms.map(|(states, done)| format!("{} => {{\n{done}}}\n", self.pattern(states)));
         let arms: String = arms.collect();
         let actions = match arms.as_str() {
@@ -114,15 +165,7 @@ impl Steps<'_> {
     }
 
     /// The reaction of a state to an event, as an expression of type `Outcome`.
-    fn body(&self, event: &Event, leaf: StateIndex) -> String {
-        let stimulus = Stimulus {
-            event: &event.name,
-            message: event.message.as_deref(),
-        };
-        let candidates = self.machine.candidates(leaf, stimulus);
-        if candidates.is_empty() {
-            return "Outcome::Ignored".into();
-        }
+    fn body(&self, leaf: StateIndex, candidates: &[Declared<'_, Transition>]) -> String {
         let mut text = String::new();
         for Declared { item, .. } in candidates {
             let Some(effect) = self.effect(leaf, item) else {

@@ -1,18 +1,21 @@
 //! Vocabulary of a machine: its events, and the methods of its trait.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 use heck::ToSnakeCase;
 
 use super::super::ident::Names;
 use crate::behaviour::{Action, Argument, Guard, Transition, Trigger};
-use crate::machine::Machine;
+use crate::machine::{Machine, Stimulus};
 
 /// All names in the generated types of one machine.
 pub(super) struct Vocabulary {
     pub(super) events: Vec<Event>,
     pub(super) methods: Vec<Method>,
     pub(super) choices: Vec<Choice>,
+    /// The places of events and methods.
+    known_events: HashMap<(String, Option<String>), usize>,
+    known_methods: HashMap<Key, usize>,
 }
 
 /// Several message types for one parameter.
@@ -59,7 +62,7 @@ pub(super) struct Given {
 }
 
 /// Methods with the same key are merged.
-#[derive(PartialEq, Eq, Clone)]
+#[derive(PartialEq, Eq, Clone, Hash)]
 struct Key {
     base: String,
     asks: bool,
@@ -67,7 +70,7 @@ struct Key {
 }
 
 /// Kind of a method's parameter.
-#[derive(PartialEq, Eq, Clone, Copy)]
+#[derive(PartialEq, Eq, Clone, Copy, Hash)]
 pub(super) enum Kind {
     Message,
     Envelope,
@@ -103,15 +106,19 @@ struct Spoken {
 }
 
 impl Event {
-    fn is(&self, trigger: &Trigger) -> bool {
-        let same = |own: &str, other: &str| own.eq_ignore_ascii_case(other);
-        let message = match (&self.message, trigger.message()) {
-            (Some(own), Some(other)) => same(own, other),
-            (None, None) => true,
-            _ => false,
-        };
-        message && same(&self.name, trigger.event.last())
+    /// What the machine reacts to.
+    pub(super) fn stimulus(&self) -> Stimulus<'_> {
+        Stimulus {
+            event: &self.name,
+            message: self.message.as_deref(),
+        }
     }
+}
+
+/// What triggers with the same event have in common.
+pub(super) fn event_key(trigger: &Trigger) -> (String, Option<String>) {
+    let message = trigger.message().map(str::to_ascii_lowercase);
+    (trigger.event.last().to_ascii_lowercase(), message)
 }
 
 impl Method {
@@ -131,6 +138,8 @@ impl Vocabulary {
             events: Vec::new(),
             methods: Vec::new(),
             choices: Vec::new(),
+            known_events: HashMap::new(),
+            known_methods: HashMap::new(),
         };
         for (_, state) in machine.states() {
             for effect in state.entry.iter().chain(&state.exit) {
@@ -150,7 +159,7 @@ impl Vocabulary {
     }
 
     pub(super) fn event_of(&self, trigger: &Trigger) -> Option<usize> {
-        self.events.iter().position(|event| event.is(trigger))
+        self.known_events.get(&event_key(trigger)).copied()
     }
 
     fn add_transition(&mut self, transition: &Transition) {
@@ -164,7 +173,9 @@ impl Vocabulary {
                 envelope: false,
                 numbers: 0,
             });
-            self.events.len() - 1
+            let event = self.events.len() - 1;
+            self.known_events.insert(event_key(trigger), event);
+            event
         });
         let numbers = numbers(trigger).count();
         let known = &mut self.events[event];
@@ -195,8 +206,10 @@ impl Vocabulary {
     }
 
     fn add(&mut self, event: Option<usize>, spoken: Spoken) {
-        let known = self.methods.iter().position(|it| it.key == spoken.key);
+        let known = self.known_methods.get(&spoken.key).copied();
         let method = known.unwrap_or_else(|| {
+            self.known_methods
+                .insert(spoken.key.clone(), self.methods.len());
             self.methods.push(Method {
                 ident: String::new(),
                 name: spoken.name,
@@ -276,8 +289,8 @@ impl Vocabulary {
     }
 
     fn find(&self, spoken: Spoken) -> Option<(&Method, Vec<Value>)> {
-        let method = self.methods.iter().find(|it| it.key == spoken.key)?;
-        Some((method, spoken.values))
+        let method = *self.known_methods.get(&spoken.key)?;
+        Some((&self.methods[method], spoken.values))
     }
 }
 

@@ -198,6 +198,20 @@ fn sizes_are_positive_and_sane() {
             r#"<array name="A"><dimension name="D" size="1024"/><dimension name="E" size="1025"/>
 <fixed_field name="F" field_type="unsigned byte" field_units="one"/></array>"#,
         ),
-        "t.xml:3:1: error: the array has more than 1048576 elements: use a `list` or a `variable_length_field` for bulk data",
+        "t.xml:3:1: error: the array has at least 1049600 octets, but must not have more than 1048576: use a `list` or a `variable_length_field` for bulk data",
+    );
+    check(
+        &types(
+            r#"<array name="A"><dimension name="D" size="131073"/>
+<fixed_field name="F" field_type="long float" field_units="one"/></array>"#,
+        ),
+        "t.xml:3:1: error: the array has at least 1048584 octets, but must not have more than 1048576: use a `list` or a `variable_length_field` for bulk data",
+    );
+    check(
+        &types(
+            r#"<array name="A"><dimension name="D" size="1024"/>
+<fixed_length_string name="F" string_length="1025"/></array>"#,
+        ),
+        "t.xml:3:1: error: the array has at least 1049600 octets, but must not have more than 1048576: use a `list` or a `variable_length_field` for bulk data",
     );
 }

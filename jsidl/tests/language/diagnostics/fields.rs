@@ -174,14 +174,39 @@ t.xml:6:1: error: no value lies between 3 and 3: the lower limit must be less th
         ),
         "t.xml:4:1: error: a field has a `scale_range` or a `value_set`, not both: remove one",
     );
-    check(
-        &types(
+}
+
+#[test]
+fn values_are_not_counted_from_another_one_than_0() {
+    let set = |values: &str| {
+        types(&format!(
             r#"<fixed_field name="F" field_type="unsigned byte" field_units="one">
-<value_set offset_to_lower_limit="true">
-<value_enum enum_index="1000" enum_const="a"/>
-<value_enum enum_index="1255" enum_const="b"/>
-</value_set>
-</fixed_field>"#,
+<value_set offset_to_lower_limit="true">{values}</value_set>
+</fixed_field>"#
+        ))
+    };
+    let refused = |lowest: u32| {
+        format!(
+            "t.xml:4:1: error: `offset_to_lower_limit` would count the values from {lowest} on the wire, \
+             but the code of the JAUS Tool Set sends them as they are, so that peers disagree: set it to \
+             `false`, and state the numbers that are on the wire"
+        )
+    };
+    check(
+        &set(
+            r#"<value_enum enum_index="1000" enum_const="a"/><value_enum enum_index="1255" enum_const="b"/>"#,
+        ),
+        &refused(1000),
+    );
+    check(
+        &set(
+            r#"<value_range lower_limit="10" lower_limit_type="inclusive" upper_limit="20" upper_limit_type="inclusive" interpretation=""/>"#,
+        ),
+        &refused(10),
+    );
+    check(
+        &set(
+            r#"<value_enum enum_index="0" enum_const="a"/><value_enum enum_index="255" enum_const="b"/>"#,
         ),
         "",
     );

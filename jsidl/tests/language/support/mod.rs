@@ -20,6 +20,7 @@ pub(crate) fn message(code: u16, name: &str, body: Option<Item>) -> Message {
         name: name.to_owned(),
         code,
         is_command: false,
+        is_deprecated: false,
         description: String::new(),
         header: None,
         body,

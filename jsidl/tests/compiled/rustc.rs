@@ -1,0 +1,77 @@
+//! The compiler that built this test, on generated modules.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Checks modules in one crate, which has no other dependency than the codec, and no standard library.
+///
+/// # Errors
+/// The compiler's errors and warnings.
+pub(crate) fn check(modules: &[String]) -> Result<(), String> {
+    let mut text = String::from("#![no_std]\n#![deny(warnings)]\n");
+    for (number, module) in modules.iter().enumerate() {
+        text += &format!("pub mod case_{number} {{\n{module}\n}}\n");
+    }
+    static CODEC: OnceLock<PathBuf> = OnceLock::new();
+    run(&text, CODEC.get_or_init(codec))
+}
+
+/// The library of the codec that was built with this test: the newest that a crate can use with the
+/// dependencies beside it.
+fn codec() -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    let libraries = fs::read_dir(test.parent().unwrap()).unwrap();
+    let libraries = libraries.map(|entry| entry.unwrap().path()).filter(|path| {
+        let name = path.file_name().unwrap().to_string_lossy();
+        name.starts_with("libjaus_codec-") && name.ends_with(".rlib")
+    });
+    let mut libraries: Vec<_> = libraries.collect();
+    libraries.sort_by_key(|path| std::cmp::Reverse(path.metadata().unwrap().modified().unwrap()));
+    let uses_features = "#![no_std]\npub use jaus_codec::{arbitrary, view, LargeArray};";
+    let found = libraries.iter().find(|it| run(uses_features, it).is_ok());
+    found
+        .cloned()
+        .expect("the codec's library is a dependency of this test")
+}
+
+fn run(text: &str, codec: &Path) -> Result<(), String> {
+    static RUNS: AtomicU32 = AtomicU32::new(0);
+    let run = RUNS.fetch_add(1, Ordering::Relaxed);
+    let directory = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let name = format!("generated_{}_{run}", std::process::id());
+    let (source, metadata) = (
+        directory.join(format!("{name}.rs")),
+        directory.join(format!("lib{name}.rmeta")),
+    );
+    fs::write(&source, text).unwrap();
+    let mut codec_is = std::ffi::OsString::from("jaus_codec=");
+    codec_is.push(codec);
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let output = Command::new(rustc)
+        .args([
+            "--edition",
+            "2024",
+            "--crate-type",
+            "lib",
+            "--emit",
+            "metadata",
+        ])
+        .args(["--error-format", "short"])
+        .arg("-o")
+        .arg(&metadata)
+        .arg("--extern")
+        .arg(codec_is)
+        .arg("-L")
+        .arg(format!("dependency={}", codec.parent().unwrap().display()))
+        .arg(&source)
+        .output()
+        .unwrap();
+    let _ = (fs::remove_file(&source), fs::remove_file(&metadata));
+    match output.status.success() {
+        true => Ok(()),
+        false => Err(String::from_utf8_lossy(&output.stderr).into_owned()),
+    }
+}
