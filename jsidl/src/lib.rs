@@ -32,6 +32,7 @@ pub mod explain;
 mod expr;
 mod fingerprint;
 pub mod format;
+mod grammar;
 mod library;
 mod listing;
 mod loader;
@@ -44,6 +45,7 @@ pub mod rust;
 #[cfg(feature = "json")]
 pub mod schema;
 mod source;
+mod spelling;
 mod syntax;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Note, Severity};

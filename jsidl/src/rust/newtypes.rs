@@ -213,7 +213,10 @@ fn limits(sub: &SubType<'_>) -> (u64, u64) {
     let field = sub.field;
     let most = u64::MAX >> (63 - (field.to - field.from));
     let set = &field.values;
-    let named = set.values.iter().map(|value| (value.index, value.index));
+    let named = set.values.iter().map(|value| {
+        let index = u64::try_from(value.index).unwrap_or(0);
+        (index, index)
+    });
     let ranges = set.ranges.iter().map(|range| {
         (
             range.lower.max(0.0).ceil() as u64,

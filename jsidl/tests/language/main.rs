@@ -18,6 +18,7 @@ mod excerpts;
 mod explain;
 mod format;
 mod golden;
+mod grammar;
 mod loading;
 mod lua;
 mod machines;

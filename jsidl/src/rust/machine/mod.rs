@@ -137,8 +137,12 @@ impl<'a> Emitter<'a> {
             "Memory",
         ]);
         let mut transitions = machine.transitions();
-        let remembers = transitions
-            .any(|it| matches!(it.item.kind, TransitionKind::Push(_) | TransitionKind::Pop));
+        let remembers = transitions.any(|it| {
+            matches!(
+                it.item.kind,
+                TransitionKind::Push(_) | TransitionKind::Pop(_)
+            )
+        });
         Self {
             machine,
             service,

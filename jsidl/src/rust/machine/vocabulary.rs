@@ -7,6 +7,7 @@ use heck::ToSnakeCase;
 use super::super::ident::Names;
 use crate::behaviour::{Action, Argument, Guard, Transition, Trigger};
 use crate::machine::Machine;
+use crate::model::Service;
 
 /// All names in the generated types of one machine.
 pub(super) struct Vocabulary {
@@ -110,7 +111,7 @@ impl Event {
             (None, None) => true,
             _ => false,
         };
-        message && same(&self.name, trigger.event.last())
+        message && trigger.name().is_some_and(|name| same(&self.name, name))
     }
 }
 
@@ -139,6 +140,10 @@ impl Vocabulary {
             let all = state.transitions.iter().chain(&state.default_transitions);
             for declared in all {
                 collected.add_transition(declared.item);
+                // Also what has no transition of its own triggers a default transition.
+                if declared.item.trigger.event.is_none() {
+                    collected.add_inputs(declared.service);
+                }
             }
         }
         collected.name_all(types);
@@ -153,39 +158,63 @@ impl Vocabulary {
         self.events.iter().position(|event| event.is(trigger))
     }
 
+    /// The arrival of each message that a service receives.
+    fn add_inputs(&mut self, service: &Service) {
+        for message in &service.inputs {
+            let arrives = |event: &Event| {
+                let name = event.message.as_deref();
+                name.is_some_and(|name| name.eq_ignore_ascii_case(&message.name))
+            };
+            if !self.events.iter().any(arrives) {
+                self.add_event("Receive", Some(&message.name));
+            }
+        }
+    }
+
+    fn add_event(&mut self, name: &str, message: Option<&str>) -> usize {
+        self.events.push(Event {
+            name: name.to_owned(),
+            message: message.map(str::to_owned),
+            ident: String::new(),
+            handler: String::new(),
+            envelope: false,
+            numbers: 0,
+        });
+        self.events.len() - 1
+    }
+
     fn add_transition(&mut self, transition: &Transition) {
         let trigger = &transition.trigger;
-        let event = self.event_of(trigger).unwrap_or_else(|| {
-            self.events.push(Event {
-                name: trigger.event.last().to_owned(),
-                message: trigger.message().map(str::to_owned),
-                ident: String::new(),
-                handler: String::new(),
-                envelope: false,
-                numbers: 0,
-            });
-            self.events.len() - 1
-        });
+        let Some(name) = trigger.name() else {
+            let actions = transition.actions.iter();
+            actions.for_each(|action| self.add_action(None, action));
+            if let Some(guard) = &transition.guard {
+                self.add_guard(None, trigger, guard);
+            }
+            return;
+        };
+        let known = self.event_of(trigger);
+        let event = known.unwrap_or_else(|| self.add_event(name, trigger.message()));
         let numbers = numbers(trigger).count();
         let known = &mut self.events[event];
         known.envelope |= trigger.has_envelope();
         known.numbers = known.numbers.max(numbers);
         if let Some(guard) = &transition.guard {
-            self.add_guard(event, trigger, guard);
+            self.add_guard(Some(event), trigger, guard);
         }
         for action in &transition.actions {
             self.add_action(Some((event, trigger)), action);
         }
     }
 
-    fn add_guard(&mut self, event: usize, trigger: &Trigger, guard: &Guard) {
+    fn add_guard(&mut self, event: Option<usize>, trigger: &Trigger, guard: &Guard) {
         match guard {
             Guard::Not(inner) => self.add_guard(event, trigger, inner),
             Guard::And(left, right) | Guard::Or(left, right) => {
                 self.add_guard(event, trigger, left);
                 self.add_guard(event, trigger, right);
             }
-            question => self.add(Some(event), question_of(Some(trigger), question)),
+            question => self.add(event, question_of(Some(trigger), question)),
         }
     }
 
@@ -326,7 +355,7 @@ fn spoken(trigger: Option<&Trigger>, name: String, arguments: &[Argument], asks:
 }
 
 /// An argument that is no parameter of the event is a text.
-fn value(trigger: Option<&Trigger>, argument: &Argument) -> Value {
+pub(super) fn value(trigger: Option<&Trigger>, argument: &Argument) -> Value {
     let Argument::Variable(name) = argument else {
         return Value::Text(match argument {
             Argument::Text(text) | Argument::Integer(text) => text.clone(),
