@@ -81,7 +81,8 @@ pub(super) fn enumeration(
     out.gap();
     out.push(format!("codec::enumeration!({ident}({ty}), ["));
     for (_, value) in values {
-        out.push(format!("({}, {:?}),", value.index, value.name));
+        // A negative index is in two's complement, as the codec compares it.
+        out.push(format!("({}, {:?}),", value.index as u64, value.name));
     }
     out.push("]);");
 }
