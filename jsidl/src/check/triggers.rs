@@ -7,7 +7,7 @@ use std::collections::{HashMap, HashSet};
 
 use crate::behaviour::{Name, StateMachine};
 use crate::library::Library;
-use crate::model::{Id, Item, Service};
+use crate::model::{Id, Item, Message, Service};
 
 /// Internal events of services.
 pub(crate) type Events<'a> = HashMap<&'a Id, Vec<InternalEvent<'a>>>;
@@ -24,14 +24,15 @@ pub(super) struct Triggers<'a> {
     /// From the service itself to its outermost base, each with its alias and the names known from
     /// there.
     lineage: Vec<(&'a str, HashSet<String>)>,
-    /// By event or message: the names of what is in it. Without an entry they are not known.
-    members: HashMap<String, HashSet<String>>,
+    /// The services of the lineage, and those that they are clients of with their lineages.
+    services: Vec<&'a Service>,
+    events: &'a Events<'a>,
     /// Whether unknown names are permitted.
     open: bool,
 }
 
 impl<'a> Triggers<'a> {
-    pub(super) fn of(library: &'a Library, service: &'a Service, events: &Events<'_>) -> Self {
+    pub(super) fn of(library: &'a Library, service: &'a Service, events: &'a Events<'a>) -> Self {
         let chain: Vec<_> = library.lineage(service).collect();
         // A base may use an event of a base of its own that declares none, as the core services do
         // with `Receive`.
@@ -46,20 +47,22 @@ impl<'a> Triggers<'a> {
         lineage.reverse();
         let silent = |service: &&Service| events.get(&service.id).is_none_or(Vec::is_empty);
         let mut open = chain.iter().all(silent);
+        let mut services = chain.clone();
         for client in chain.iter().flat_map(|service| &service.client_of) {
             match library.service(&client.id) {
                 Some(server) => {
-                    let servers = library.lineage(server);
-                    let known = servers.flat_map(|server| declared(server, events));
-                    lineage[0].1.extend(known);
+                    for server in library.lineage(server) {
+                        lineage[0].1.extend(declared(server, events));
+                        services.push(server);
+                    }
                 }
                 None => open = true,
             }
         }
-        let members = members(library, &chain, events);
         Self {
             lineage,
-            members,
+            services,
+            events,
             open,
         }
     }
@@ -69,18 +72,28 @@ impl<'a> Triggers<'a> {
         let Some(path) = Name::parse(path) else {
             return self.open;
         };
+        // The name may follow aliases, and the path of a member may follow the name. The aliases of
+        // published definitions do not say reliably whose it is.
         let parts = path.parts();
-        let whole = self.know(&path);
-        // The name may follow aliases, and the path of a member may follow the name.
-        let known = |(position, name): (usize, &String)| {
-            let members = self.members.get(&name.to_ascii_lowercase());
-            members.is_some_and(|members| {
-                let inner = &parts[position + 1..];
-                let has = |it: &String| members.contains(&it.to_ascii_lowercase());
-                members.is_empty() || inner.iter().all(has)
-            })
+        let mut names = parts.iter().enumerate();
+        self.know(&path) || names.any(|(position, name)| self.holds(name, &parts[position + 1..]))
+    }
+
+    /// Whether an event or message with this name has members with all these names.
+    fn holds(&self, name: &str, inner: &[String]) -> bool {
+        let is_named = |other: &str| other.eq_ignore_ascii_case(name);
+        let in_event = |event: &InternalEvent<'_>| {
+            let has = |it: &String| event.members.iter().any(|m| m.eq_ignore_ascii_case(it));
+            is_named(event.name) && (event.members.is_empty() || inner.iter().all(has))
         };
-        whole || parts.iter().enumerate().any(known)
+        let in_message = |message: &Message| {
+            is_named(&message.name) && inner.iter().all(|it| has_member(message, it))
+        };
+        self.services.iter().any(|service| {
+            let mut events = self.events.get(&service.id).into_iter().flatten();
+            let mut messages = service.messages();
+            events.any(in_event) || messages.any(|message| in_message(message))
+        })
     }
 
     /// Whether an event or message exists. An alias before the name selects its service; an unknown
@@ -113,39 +126,18 @@ fn used(service: &Service) -> impl Iterator<Item = String> {
     names.map(str::to_ascii_lowercase)
 }
 
-/// What is in the events and messages of a lineage. The aliases of published definitions do not say
-/// reliably whose they are, so the names of all are collected.
-fn members(
-    library: &Library,
-    chain: &[&Service],
-    events: &Events<'_>,
-) -> HashMap<String, HashSet<String>> {
-    let clients = chain.iter().flat_map(|service| &service.client_of);
-    let servers = clients.filter_map(|client| library.service(&client.id));
-    let servers = servers.flat_map(|server| library.lineage(server));
-    let mut members: HashMap<String, HashSet<String>> = HashMap::new();
-    for service in chain.iter().copied().chain(servers) {
-        for event in events.get(&service.id).into_iter().flatten() {
-            let inner = event.members.iter().map(|name| name.to_ascii_lowercase());
-            let known = members.entry(event.name.to_ascii_lowercase());
-            known.or_default().extend(inner);
-        }
-        for message in service.messages() {
-            let known = members.entry(message.name.to_ascii_lowercase());
-            let known = known.or_default();
-            known.extend(["header", "body", "footer"].map(str::to_owned));
-            let sections = [&message.header, &message.body, &message.footer];
-            for item in sections.into_iter().flatten() {
-                names(item, known);
-            }
-        }
+/// Whether a message has a section or an item with this name.
+fn has_member(message: &Message, name: &str) -> bool {
+    fn is_within(item: &Item, name: &str) -> bool {
+        item.name.eq_ignore_ascii_case(name) || item.shape.items().any(|it| is_within(it, name))
     }
-    members
-}
-
-fn names(item: &Item, known: &mut HashSet<String>) {
-    known.insert(item.name.to_ascii_lowercase());
-    for inner in item.shape.items() {
-        names(inner, known);
-    }
+    let sections = [&message.header, &message.body, &message.footer];
+    let named = ["header", "body", "footer"];
+    named
+        .iter()
+        .any(|section| section.eq_ignore_ascii_case(name))
+        || sections
+            .into_iter()
+            .flatten()
+            .any(|item| is_within(item, name))
 }

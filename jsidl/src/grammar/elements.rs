@@ -1,9 +1,7 @@
 //! The table of elements: files, constants, types and messages.
 
+use super::notation::{INTERPRETATION, NAME, beyond, element, empty, one, opt, part, text};
 use super::values::{CONSTANTS, NUMBERS, UNSIGNED};
-use super::notation::{
-    INTERPRETATION, NAME, beyond, element, empty, one, opt, part, text,
-};
 use super::{Attribute, Element, Occurs, Part, Value};
 
 const ID: Attribute = one("id", Value::Text);

@@ -79,7 +79,6 @@ impl Attribute {
     pub(crate) const fn occurs(&self, edition: Edition) -> Occurs {
         self.occurs[edition as usize]
     }
-
 }
 
 /// Children of an element at one position of its content: one element, or a choice of several.

@@ -74,6 +74,17 @@ fn every_definition_of_ffi_resolves() {
     );
 }
 
+/// Their transitions use events of the core services, which the built-in ones declare as well.
+#[test]
+fn published_services_resolve_beside_the_built_in_core() {
+    let Some(corpus) = corpus() else { return };
+    let mut loader = Loader::new();
+    loader.path(corpus.join("ffi/urn.jaus.jss.mobility"));
+    loader.catalogue();
+    let loaded = loader.load();
+    assert_eq!(findings(&loaded, Severity::Error), Vec::<String>::new());
+}
+
 /// One example inherits from `Management`, which the examples do not include.
 #[test]
 fn every_example_resolves_beside_the_core_services() {
