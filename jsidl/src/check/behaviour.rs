@@ -146,14 +146,21 @@ impl Check<'_> {
                 known.any(Parameter::is_number)
             }
         };
-        let message = match all.find(named) {
+        let found = all.find(named);
+        let takes_numbers =
+            |it: &Transition| it.trigger.parameters.iter().all(Parameter::is_number);
+        if found.is_some_and(|other| !takes_numbers(other)) {
+            let message = format!(
+                "the `pop` only returns: `{name}`, which should follow, takes a message, and only \
+                 an event without one can follow; add the actions to this transition"
+            );
+            self.report.warning(transition.span, message);
+            return;
+        }
+        let message = match found {
             None => format!(
                 "the `pop` is followed by `{name}`, but no state of the machine has that \
                  transition: add one, or remove the attribute `transition`"
-            ),
-            Some(other) if !other.trigger.parameters.iter().all(Parameter::is_number) => format!(
-                "the `pop` is followed by `{name}`, which takes a message: only an event without \
-                 one can follow"
             ),
             Some(other) if other.trigger.parameters.len() != given => format!(
                 "`{name}` has {} parameters, but the `pop` has {given} `argument`s: give it one for \

@@ -242,7 +242,10 @@ impl Steps<'_> {
                 Value::Message | Value::Envelope => String::new(),
             });
             let numbers: String = numbers.collect();
-            Some(format!("self.{}({numbers}behaviour);\n", event.handler))
+            Some(format!(
+                "let _ = self.{}({numbers}behaviour);\n",
+                event.handler
+            ))
         });
         call.unwrap_or_default()
     }
