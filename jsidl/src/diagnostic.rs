@@ -1,7 +1,6 @@
 //! Diagnostics of a load: every finding with its location and a sentence that says what to do.
 
-use std::collections::BTreeMap;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
@@ -204,6 +203,10 @@ impl Report {
     /// Orders the findings and turns offsets into lines and columns.
     pub(crate) fn finish(mut self, sources: &Sources) -> Diagnostics {
         self.findings.sort_by_key(|finding| finding.span);
+        // The strict check repeats findings of the reader.
+        let mut seen = HashSet::new();
+        self.findings
+            .retain(|finding| seen.insert((finding.span, finding.message.clone())));
         let spans = |finding: &Finding| {
             let notes = finding.notes.iter().map(|(span, _)| *span);
             std::iter::once(finding.span)

@@ -33,6 +33,7 @@ pub mod explain;
 mod expr;
 mod fingerprint;
 pub mod format;
+mod grammar;
 mod library;
 mod listing;
 mod loader;
@@ -45,6 +46,7 @@ pub mod rust;
 #[cfg(feature = "json")]
 pub mod schema;
 mod source;
+mod spelling;
 mod syntax;
 mod typed;
 pub mod typescript;

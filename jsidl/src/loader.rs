@@ -9,7 +9,7 @@ use crate::library::Library;
 use crate::listing::Listing;
 use crate::resolve::resolve;
 use crate::source::Sources;
-use crate::syntax::{Program, Strictness, read};
+use crate::syntax::{Program, Strictness, check_strictly, read};
 
 /// Collects definitions; [`load`](Self::load) compiles them.
 ///
@@ -22,6 +22,7 @@ pub struct Loader {
     report: Report,
     with_catalogue: bool,
     with_reference_architecture: bool,
+    is_strict: bool,
 }
 
 /// Result of a load.
@@ -37,6 +38,14 @@ impl Loader {
     /// A loader without definitions.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// Holds the definitions that are added from now on against the letter of AS5684 as well, as a
+    /// schema validator does: order of elements, mandatory parts, values of attributes. What it
+    /// does not permit is an error, but does not make a definition unusable.
+    pub fn strict(&mut self) -> &mut Self {
+        self.is_strict = true;
+        self
     }
 
     /// Adds a file, or all `.xml` files below a directory. An unreadable file becomes a diagnostic.
@@ -83,6 +92,7 @@ impl Loader {
 
     /// Compiles everything that was added.
     pub fn load(mut self) -> Loaded {
+        self.is_strict = false;
         for entry in catalogue::entries() {
             let wanted = if entry.of_reference_architecture() {
                 self.with_reference_architecture
@@ -103,6 +113,9 @@ impl Loader {
     fn add(&mut self, name: &Path, text: &str, strictness: Strictness) {
         let source = self.sources.add(name, text);
         read(source, strictness, &mut self.program, &mut self.report);
+        if self.is_strict {
+            check_strictly(source, &mut self.report);
+        }
     }
 
     fn file(&mut self, path: &Path, strictness: Strictness) {

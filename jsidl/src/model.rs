@@ -175,6 +175,20 @@ pub enum Shape {
     Array(Array),
 }
 
+impl Shape {
+    /// The items directly in a composite or an array; none in a field.
+    pub(crate) fn items(&self) -> impl Iterator<Item = &Item> {
+        let (several, one) = match self {
+            Self::Group(group) => (group.members.as_slice(), None),
+            Self::Variant(variant) => (variant.alternatives.as_slice(), None),
+            Self::List(list) => (&[][..], Some(list.element.as_ref())),
+            Self::Array(array) => (&[][..], Some(array.element.as_ref())),
+            _ => (&[][..], None),
+        };
+        several.iter().chain(one)
+    }
+}
+
 /// `record` (members are fields) or `sequence` (members are composites): one layout.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
@@ -314,8 +328,8 @@ pub(crate) fn shortened(value: f64, places: usize) -> f64 {
 /// `value_enum`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedValue {
-    /// Value on the wire.
-    pub index: u64,
+    /// Value on the wire: an integer of at most eight octets.
+    pub index: i128,
     /// `enum_const`: the author's text, which need not be an identifier.
     pub name: String,
     /// The author's text.

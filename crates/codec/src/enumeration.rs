@@ -2,10 +2,11 @@
 
 /// An integer with named values. Unnamed values from peers are preserved.
 pub trait Enumeration: Copy {
-    /// The values named in the definition, in definition order.
+    /// The values named in the definition, in definition order; negative ones as in
+    /// [`raw`](Self::raw).
     const VALUES: &'static [(u64, &'static str)];
 
-    /// The integer on the wire.
+    /// The integer on the wire; a negative one in two's complement of eight octets.
     fn raw(self) -> u64;
 
     /// The name of the value in the definition, if it has one.
@@ -57,7 +58,13 @@ macro_rules! __codec_enumeration {
                     value: &$crate::view::Value,
                 ) -> Result<Self, $crate::view::Error> {
                     let named = value.named(<Self as $crate::Enumeration>::VALUES)?;
-                    $crate::view::View::from_view(&named).map(Self)
+                    match (value, &named) {
+                        // A negative value is in two's complement, as in `raw`.
+                        ($crate::view::Value::Text(_), $crate::view::Value::Unsigned(raw)) => {
+                            Ok(Self(*raw as $raw))
+                        }
+                        _ => $crate::view::View::from_view(&named).map(Self),
+                    }
                 }
             }
         }

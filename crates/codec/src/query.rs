@@ -42,20 +42,6 @@ pub const fn report_code(query: u16) -> Option<u16> {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_query_has_its_report_and_others_have_none() {
-        assert_eq!(report_code(0x2B00), Some(0x4B00));
-        assert_eq!(report_code(0xE702), Some(0xF702));
-        for other in [0x0405, 0x4B00, 0xD110, 0xF702] {
-            assert_eq!(report_code(other), None, "{other:04X}");
-        }
-    }
-}
-
 /// Drops the content of an optional field that is not requested.
 #[doc(hidden)]
 pub fn keep_if<T>(is_requested: bool, field: &mut Option<T>) {
@@ -92,4 +78,18 @@ macro_rules! __codec_requests {
             )*
         }
     };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_query_has_its_report_and_others_have_none() {
+        assert_eq!(report_code(0x2B00), Some(0x4B00));
+        assert_eq!(report_code(0xE702), Some(0xF702));
+        for other in [0x0405, 0x4B00, 0xD110, 0xF702] {
+            assert_eq!(report_code(other), None, "{other:04X}");
+        }
+    }
 }

@@ -37,14 +37,16 @@ pub(super) fn name_values(message: &Message, view: &mut Json) {
             Leaf::SubField(field) => &field.values,
             _ => return,
         };
-        if let Some(name) = number.as_u64().and_then(|it| name(values, it)) {
+        let raw = number.as_u64().map(i128::from);
+        let raw = raw.or_else(|| number.as_i64().map(i128::from));
+        if let Some(name) = raw.and_then(|it| name(values, it)) {
             *number = name.into();
         }
     });
 }
 
 /// The name of a value, unless the name also stands for an earlier value.
-fn name(values: &ValueSet, number: u64) -> Option<&str> {
+fn name(values: &ValueSet, number: i128) -> Option<&str> {
     let values = || values.values.iter();
     let name = &*values().find(|it| it.index == number)?.name;
     let first = values().find(|it| it.name == name)?;

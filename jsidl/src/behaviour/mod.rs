@@ -66,12 +66,31 @@ pub struct StateMachine {
     pub start: Name,
     /// The outermost states.
     pub states: Vec<State>,
+    /// Transitions of its own `default_state`, tried in every state when no other can be taken.
+    pub default_transitions: Vec<Transition>,
     /// Position of the declaration.
     pub location: Location,
     pub(crate) span: Span,
 }
 
 impl StateMachine {
+    /// All transitions: those of all states, then its own default ones.
+    pub fn transitions(&self) -> impl Iterator<Item = &Transition> {
+        let of_states = self.all_states().flat_map(State::all_transitions);
+        of_states.chain(&self.default_transitions)
+    }
+
+    /// Whether it has one state, in which nothing happens.
+    pub(crate) fn is_silent(&self) -> bool {
+        let [state] = self.states.as_slice() else {
+            return false;
+        };
+        state.children.is_empty()
+            && state.entry.is_empty()
+            && state.exit.is_empty()
+            && self.transitions().next().is_none()
+    }
+
     /// All states with their substates, each before its substates.
     pub fn all_states(&self) -> impl Iterator<Item = &State> {
         let mut waiting: Vec<_> = self.states.iter().rev().collect();
@@ -96,7 +115,8 @@ pub struct State {
     pub exit: Vec<Action>,
     /// Transitions that can be taken while it is active, in trial order.
     pub transitions: Vec<Transition>,
-    /// Transitions of its `default_state`, tried when no other can be taken.
+    /// Transitions that are tried when no other can be taken: those of its `default_state`, and
+    /// `default_transition`s, which have no trigger.
     pub default_transitions: Vec<Transition>,
     /// The substates.
     pub children: Vec<Self>,
@@ -105,7 +125,14 @@ pub struct State {
     pub(crate) span: Span,
 }
 
-/// A `transition`.
+impl State {
+    /// Its transitions, then the default ones; not those of its substates.
+    pub fn all_transitions(&self) -> impl Iterator<Item = &Transition> {
+        self.transitions.iter().chain(&self.default_transitions)
+    }
+}
+
+/// A `transition` or a `default_transition`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     /// The triggering event.
@@ -131,18 +158,25 @@ impl Transition {
 /// The event that triggers a transition.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Trigger {
-    /// The event's name, qualified, for example `events.transport.Receive`.
-    pub event: Name,
+    /// The event's name, qualified, for example `events.transport.Receive`. `None` in a
+    /// `default_transition`, which every event triggers that triggers nothing else.
+    pub event: Option<Name>,
     /// Parameters of the event.
     pub parameters: Vec<Parameter>,
 }
 
 impl Trigger {
+    /// The event's unqualified name; `None` in a `default_transition`.
+    pub fn name(&self) -> Option<&str> {
+        self.event.as_ref().map(Name::last)
+    }
+
     /// The name of the message that must be received, if the trigger has one.
     pub fn message(&self) -> Option<&str> {
-        let kind = &self.parameters.first()?.kind;
-        // Types of numbers have two words.
-        let is_message = !kind.contains(' ') && !self.parameters[0].is_envelope();
+        let first = self.parameters.first()?;
+        let kind = &first.kind;
+        // Unknown types of two words are numbers of a kind, too.
+        let is_message = !first.is_number() && !kind.contains(' ') && !first.is_envelope();
         is_message.then(|| kind.rsplit('.').next().unwrap_or(kind))
     }
 
@@ -151,6 +185,18 @@ impl Trigger {
         self.parameters.iter().any(Parameter::is_envelope)
     }
 }
+
+/// Types of numeric parameters: those of the parameters' own rule, and those of fields.
+const NUMBERS: [&str; 8] = [
+    "unsigned byte",
+    "unsigned short",
+    "unsigned int",
+    "unsigned long",
+    "unsigned short integer",
+    "unsigned integer",
+    "unsigned long integer",
+    "byte",
+];
 
 /// A `parameter` of a trigger.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -162,6 +208,11 @@ pub struct Parameter {
 }
 
 impl Parameter {
+    /// Whether it is a number, not a message or a part of one.
+    pub(crate) fn is_number(&self) -> bool {
+        NUMBERS.contains(&self.kind.as_str())
+    }
+
     /// Whether it is the record of the event `Receive` that describes the message's transport.
     pub(crate) fn is_envelope(&self) -> bool {
         self.kind.ends_with(".ReceiveRec")
@@ -177,19 +228,40 @@ pub enum TransitionKind {
     To(Name),
     /// `simple` without an `end_state`: the same state, which is left and entered again.
     Again,
-    /// `push`: the state with this path; the current one is remembered.
-    Push(Name),
-    /// `pop`: the state that was remembered last.
-    Pop,
+    /// `push`: to a state, with another one remembered for the next `pop`.
+    Push(Push),
+    /// `pop`: the state that was remembered last. If it names a transition, that event follows
+    /// when the state is entered.
+    Pop(Option<Call>),
 }
 
-/// An `action`.
+/// A `push`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Push {
+    /// Path of the state that is entered.
+    pub to: Name,
+    /// Path of the remembered state, from its `simple`; `None` for the current one.
+    pub back: Option<Name>,
+}
+
+/// An `action` or a `send_action`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Action {
+    /// Whether it calls a function or sends an event.
+    pub kind: ActionKind,
     /// Qualified by the aliases of the services up to the one that implements it.
     pub name: Name,
     /// Arguments of the action.
     pub arguments: Vec<Argument>,
+}
+
+/// The two kinds of actions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ActionKind {
+    /// `action`: a function of the service.
+    Call,
+    /// `send_action`: sends an event or a message.
+    Send,
 }
 
 impl Action {

@@ -1,28 +1,30 @@
 //! Rules for numbers, value sets and bit fields.
 
 use crate::diagnostic::Report;
+use crate::grammar::{self, Edition};
 use crate::model::{Number, Scale, SubField, Unsigned, ValueRange, ValueSet};
-use crate::source::Span;
-use crate::syntax::{self, ScalarField, ScaleRange};
+use crate::source::{Span, Spanned};
+use crate::spelling::{nearest, shortened};
+use crate::syntax::{self, ScaleRange};
 
 use super::unique_indices;
 
-/// A number is scaled or enumerated, not both.
-pub(crate) fn one_meaning(report: &mut Report, field: &ScalarField) -> Option<()> {
-    match (&field.scale, &field.values) {
-        (Some(scale), Some(_)) => {
-            report.error(
-                scale.span,
-                "a field has a `scale_range` or a `value_set`, not both: remove one",
-            );
-            None
-        }
-        _ => Some(()),
+/// Units are those of the standard.
+pub(crate) fn units(report: &mut Report, units: &Spanned<String>) {
+    if grammar::is_unit(&units.value) {
+        return;
     }
+    let known = grammar::units(Edition::V1_1);
+    let advice = match nearest(&units.value, known) {
+        Some(unit) => format!("did you mean `{unit}`?"),
+        None => "write one of the standard, or `one`".to_owned(),
+    };
+    let message = format!("`{}` is not a unit: {advice}", shortened(&units.value));
+    report.error(units.span, message);
 }
 
-/// Scales need an unsigned integer, or one with its zero at the centre of the range, and two
-/// different limits in order.
+/// Scales need an integer of at most four octets, and two different limits in order. A signed one
+/// has its zero at the centre of the range.
 pub(crate) fn scale(
     report: &mut Report,
     range: &ScaleRange,
@@ -30,25 +32,26 @@ pub(crate) fn scale(
     number: Number,
 ) -> Option<()> {
     let span = range.span;
-    match number {
-        Number::Unsigned(_) if range.centred => {
-            report.error(
-                span,
-                "only a signed integer's range is centred on zero: change the `field_type`, or \
-                 remove the attribute `bias`",
-            );
-            return None;
+    let advice = match number {
+        Number::Unsigned(_) if range.centred => Some(
+            "only a signed integer's range is centred on zero: change the `field_type`, or \
+             remove the attribute `bias`",
+        ),
+        Number::F32 | Number::F64 => {
+            Some("a `scale_range` needs an integer: change the `field_type`, or remove the range")
         }
-        Number::Unsigned(_) => {}
-        Number::Signed(_) if range.centred => {}
-        Number::Signed(_) | Number::F32 | Number::F64 => {
-            report.error(
-                span,
-                "a `scale_range` needs an unsigned integer: change the `field_type`, or remove \
-                 the range",
-            );
-            return None;
-        }
+        Number::Unsigned(_) | Number::Signed(_) => None,
+    };
+    if let Some(message) = advice {
+        report.error(span, message);
+        return None;
+    }
+    if matches!(number, Number::Signed(_)) && !range.centred {
+        report.warning(
+            span,
+            "the standard has no rule for a `scale_range` of a signed integer: 0 is taken as the \
+             centre of the range, but other tools may differ; use an unsigned `field_type`",
+        );
     }
     if number.size() == 8 {
         let name = number.name();
@@ -90,16 +93,16 @@ pub(crate) fn value_range(report: &mut Report, span: Span, range: &ValueRange) -
     !empty
 }
 
-/// The index of a named value is not negative.
-pub(crate) fn enum_index(report: &mut Report, span: Span, index: i128) -> Option<u64> {
-    let sound = u64::try_from(index).ok();
-    if sound.is_none() {
+/// The index of a named value fits eight octets.
+pub(crate) fn enum_index(report: &mut Report, span: Span, index: i128) -> Option<i128> {
+    let sound = (i64::MIN.into()..=u64::MAX.into()).contains(&index);
+    if !sound {
         report.error(
             span,
-            format!("`enum_index` is {index}, but must not be negative"),
+            format!("`enum_index` is {index}, which no number of eight octets holds"),
         );
     }
-    sound
+    sound.then_some(index)
 }
 
 /// The index of a format or unit fits one octet.
@@ -152,67 +155,64 @@ fn not_shifted(report: &mut Report, set: &syntax::ValueSet, resolved: &ValueSet)
     !shifted
 }
 
+/// A resolved value set, and the places of its values.
+#[derive(Debug, Clone)]
+pub(crate) struct Rated {
+    pub(crate) set: ValueSet,
+    /// Positions of the ranges, then of the values.
+    places: Vec<Span>,
+}
+
+impl Rated {
+    pub(crate) fn new(written: &syntax::ValueSet, set: ValueSet) -> Self {
+        let ranges = written.ranges.iter().map(|range| range.span);
+        let values = written.values.iter().map(|value| value.span);
+        Self {
+            places: ranges.chain(values).collect(),
+            set,
+        }
+    }
+
+    /// The same, for a field that refers to it from another position.
+    pub(crate) fn at(&self, span: Span) -> Self {
+        Self {
+            places: vec![span; self.places.len()],
+            ..self.clone()
+        }
+    }
+}
+
 /// The values fit the type of the field.
-pub(crate) fn values_of_number(
-    report: &mut Report,
-    set: &syntax::ValueSet,
-    resolved: &ValueSet,
-    number: Number,
-) -> bool {
+pub(crate) fn values_of_number(report: &mut Report, values: &Rated, number: Number) -> bool {
     let Some((least, greatest)) = number.integers() else {
         return true;
     };
-    within(report, set, resolved, least, greatest, "the `field_type`")
+    within(report, values, least, greatest, "the `field_type`")
 }
 
 /// The values fit the bits of a sub-field.
-pub(crate) fn values_of_bits(
-    report: &mut Report,
-    set: &syntax::ValueSet,
-    resolved: &ValueSet,
-    bits: u8,
-) -> bool {
+pub(crate) fn values_of_bits(report: &mut Report, values: &Rated, bits: u8) -> bool {
     let greatest = (1_i128 << bits) - 1;
-    within(
-        report,
-        set,
-        resolved,
-        0,
-        greatest,
-        &format!("a sub-field of {bits} bits"),
-    )
+    let holder = format!("a sub-field of {bits} bits");
+    within(report, values, 0, greatest, &holder)
 }
-fn within(
-    report: &mut Report,
-    set: &syntax::ValueSet,
-    resolved: &ValueSet,
-    least: i128,
-    greatest: i128,
-    holder: &str,
-) -> bool {
+
+fn within(report: &mut Report, values: &Rated, least: i128, greatest: i128, holder: &str) -> bool {
     let holds = |value: f64| (least as f64..=greatest as f64).contains(&value);
+    let ranges = values.set.ranges.iter().map(|range| {
+        let fits = holds(range.lower) && holds(range.upper);
+        (!fits).then(|| format!("the range is {} to {}", range.lower, range.upper))
+    });
+    let named = values.set.values.iter().map(|value| {
+        let fits = holds(value.index as f64);
+        (!fits).then(|| format!("the value `{}` is {}", value.name, value.index))
+    });
     let mut sound = true;
-    let mut complain = |span: Span, text: String| {
-        report.error(
-            span,
-            format!("{text}, but {holder} holds {least} to {greatest}"),
-        );
-        sound = false;
-    };
-    for (range, written) in resolved.ranges.iter().zip(&set.ranges) {
-        if !holds(range.lower) || !holds(range.upper) {
-            complain(
-                written.span,
-                format!("the range is {} to {}", range.lower, range.upper),
-            );
-        }
-    }
-    for (value, written) in resolved.values.iter().zip(&set.values) {
-        if !holds(value.index as f64) {
-            complain(
-                written.span,
-                format!("the value `{}` is {}", value.name, value.index),
-            );
+    for (text, place) in ranges.chain(named).zip(&values.places) {
+        if let Some(text) = text {
+            let message = format!("{text}, but {holder} holds {least} to {greatest}");
+            report.error(*place, message);
+            sound = false;
         }
     }
     sound

@@ -19,11 +19,13 @@ use crate::syntax::Node;
 pub(crate) use behaviour::behaviour;
 pub(crate) use composite::{array, count, count_limit, group, header, required, size, tag};
 pub(crate) use field::{
-    bits, enum_index, octet_index, one_meaning, overlap, scale, value_range, value_set,
+    Rated, bits, enum_index, octet_index, overlap, scale, units, value_range, value_set,
     values_of_bits, values_of_number,
 };
-pub(crate) use service::{ambiguous_codes, ambiguous_names, left_out, same_service};
-pub(crate) use triggers::Events;
+pub(crate) use service::{
+    ambiguous_codes, ambiguous_names, declared_again, left_out, same_service,
+};
+pub(crate) use triggers::{Events, InternalEvent};
 
 /// As [`Report::unique`], for fields and composites.
 pub(crate) fn unique_names(report: &mut Report, what: &str, nodes: &[Node]) -> bool {
@@ -34,7 +36,7 @@ pub(crate) fn unique_names(report: &mut Report, what: &str, nodes: &[Node]) -> b
 pub(crate) fn unique_indices(
     report: &mut Report,
     what: &str,
-    indices: impl Iterator<Item = (u64, Span)>,
+    indices: impl Iterator<Item = (i128, Span)>,
 ) -> bool {
     let mut seen = HashMap::new();
     let mut sound = true;

@@ -77,6 +77,31 @@ pub(crate) fn ambiguous_codes(
     }
 }
 
+/// A service inherits the messages of its bases, so it should not declare them again.
+pub(crate) fn declared_again(
+    report: &mut Report,
+    library: &Library,
+    service: &Service,
+    places: &[Span],
+) {
+    let mut inherited: HashMap<&str, &Service> = HashMap::new();
+    for base in library.lineage(service).skip(1) {
+        for message in base.messages() {
+            inherited.entry(&message.name).or_insert(base);
+        }
+    }
+    for (message, &place) in service.messages().zip(places) {
+        if let Some(base) = inherited.get(message.name.as_str()) {
+            let name = &message.name;
+            let message = format!(
+                "`{name}` is declared again: the service inherits it from `{}`, so remove it here",
+                base.id
+            );
+            report.warning(place, message);
+        }
+    }
+}
+
 /// A name should identify one message in a service.
 pub(crate) fn ambiguous_names(report: &mut Report, service: &Service, places: &[Span]) {
     let mut codes: HashMap<&str, u16> = HashMap::new();

@@ -5,24 +5,34 @@
 
 use std::collections::{HashMap, HashSet};
 
-use crate::behaviour::Name;
+use crate::behaviour::{Name, StateMachine};
 use crate::library::Library;
-use crate::model::{Id, Service};
+use crate::model::{Id, Item, Message, Service};
 
-/// Internal events of services, by name.
-pub(crate) type Events<'a> = HashMap<&'a Id, Vec<&'a str>>;
+/// Internal events of services.
+pub(crate) type Events<'a> = HashMap<&'a Id, Vec<InternalEvent<'a>>>;
+
+/// An internal event.
+pub(crate) struct InternalEvent<'a> {
+    pub(crate) name: &'a str,
+    /// The names of its sections and of everything in them; empty if they are declared elsewhere.
+    pub(crate) members: Vec<&'a str>,
+}
 
 /// Names of events and messages, in lower case, because published definitions differ in it.
 pub(super) struct Triggers<'a> {
     /// From the service itself to its outermost base, each with its alias and the names known from
     /// there.
     lineage: Vec<(&'a str, HashSet<String>)>,
+    /// The services of the lineage, and those that they are clients of with their lineages.
+    services: Vec<&'a Service>,
+    events: &'a Events<'a>,
     /// Whether unknown names are permitted.
     open: bool,
 }
 
 impl<'a> Triggers<'a> {
-    pub(super) fn of(library: &'a Library, service: &'a Service, events: &Events<'_>) -> Self {
+    pub(super) fn of(library: &'a Library, service: &'a Service, events: &'a Events<'a>) -> Self {
         let chain: Vec<_> = library.lineage(service).collect();
         // A base may use an event of a base of its own that declares none, as the core services do
         // with `Receive`.
@@ -37,17 +47,53 @@ impl<'a> Triggers<'a> {
         lineage.reverse();
         let silent = |service: &&Service| events.get(&service.id).is_none_or(Vec::is_empty);
         let mut open = chain.iter().all(silent);
+        let mut services = chain.clone();
         for client in chain.iter().flat_map(|service| &service.client_of) {
             match library.service(&client.id) {
                 Some(server) => {
-                    let servers = library.lineage(server);
-                    let known = servers.flat_map(|server| declared(server, events));
-                    lineage[0].1.extend(known);
+                    for server in library.lineage(server) {
+                        lineage[0].1.extend(declared(server, events));
+                        services.push(server);
+                    }
                 }
                 None => open = true,
             }
         }
-        Self { lineage, open }
+        Self {
+            lineage,
+            services,
+            events,
+            open,
+        }
+    }
+
+    /// Whether a type of a parameter exists: a message or event, or the path of something in it.
+    pub(super) fn have(&self, path: &str) -> bool {
+        let Some(path) = Name::parse(path) else {
+            return self.open;
+        };
+        // The name may follow aliases, and the path of a member may follow the name. The aliases of
+        // published definitions do not say reliably whose it is.
+        let parts = path.parts();
+        let mut names = parts.iter().enumerate();
+        self.know(&path) || names.any(|(position, name)| self.holds(name, &parts[position + 1..]))
+    }
+
+    /// Whether an event or message with this name has members with all these names.
+    fn holds(&self, name: &str, inner: &[String]) -> bool {
+        let is_named = |other: &str| other.eq_ignore_ascii_case(name);
+        let in_event = |event: &InternalEvent<'_>| {
+            let has = |it: &String| event.members.iter().any(|m| m.eq_ignore_ascii_case(it));
+            is_named(event.name) && (event.members.is_empty() || inner.iter().all(has))
+        };
+        let in_message = |message: &Message| {
+            is_named(&message.name) && inner.iter().all(|it| has_member(message, it))
+        };
+        self.services.iter().any(|service| {
+            let mut events = self.events.get(&service.id).into_iter().flatten();
+            let mut messages = service.messages();
+            events.any(in_event) || messages.any(|message| in_message(message))
+        })
     }
 
     /// Whether an event or message exists. An alias before the name selects its service; an unknown
@@ -67,14 +113,31 @@ impl<'a> Triggers<'a> {
 }
 
 fn declared(service: &Service, events: &Events<'_>) -> Vec<String> {
-    let own = events.get(&service.id).into_iter().flatten().copied();
+    let own = events.get(&service.id).into_iter().flatten();
+    let own = own.map(|event| event.name);
     let messages = service.messages().map(|message| message.name.as_str());
     own.chain(messages).map(str::to_ascii_lowercase).collect()
 }
 
 fn used(service: &Service) -> impl Iterator<Item = String> {
     let machines = service.behaviour.iter();
-    let states = machines.flat_map(|machine| machine.all_states());
-    let transitions = states.flat_map(|s| s.transitions.iter().chain(&s.default_transitions));
-    transitions.map(|transition| transition.trigger.event.last().to_ascii_lowercase())
+    let transitions = machines.flat_map(StateMachine::transitions);
+    let names = transitions.filter_map(|transition| transition.trigger.name());
+    names.map(str::to_ascii_lowercase)
+}
+
+/// Whether a message has a section or an item with this name.
+fn has_member(message: &Message, name: &str) -> bool {
+    fn is_within(item: &Item, name: &str) -> bool {
+        item.name.eq_ignore_ascii_case(name) || item.shape.items().any(|it| is_within(it, name))
+    }
+    let sections = [&message.header, &message.body, &message.footer];
+    let named = ["header", "body", "footer"];
+    named
+        .iter()
+        .any(|section| section.eq_ignore_ascii_case(name))
+        || sections
+            .into_iter()
+            .flatten()
+            .any(|item| is_within(item, name))
 }

@@ -1,9 +1,10 @@
 //! Compares two sets of definitions, and determines which changes affect the wire.
 //!
 //! A change affects the wire if two parties built from different sides would misinterpret a message
-//! or miss one that was known. New messages and services do not. Descriptions and state machines
-//! are not compared.
+//! or miss one that was known. New messages and services do not, nor does a change of behaviour.
+//! Descriptions are not compared.
 
+mod behaviour;
 mod item;
 mod service;
 mod shape;
@@ -19,7 +20,8 @@ pub struct Change {
     /// The service, as named on the new side, or on the old side if it was removed.
     pub service: Id,
     /// The message with its hexadecimal code, and the members down to the change, for example
-    /// `["ReportLights D101", "LightsRec", "Brightness"]`.
+    /// `["ReportLights D101", "LightsRec", "Brightness"]`; or the state machine, the states and the
+    /// transition.
     pub path: Vec<String>,
     /// The difference, for example "the type is `unsigned byte`, was `byte`".
     pub message: String,

@@ -1,4 +1,4 @@
-//! Compares two services message by message.
+//! Compares two services message by message, and their state machines.
 
 use std::sync::Arc;
 
@@ -22,6 +22,7 @@ pub(super) fn compare(old: &Service, new: &Service, changes: &mut Vec<Change>) {
     walk.value(false, "the version", &old.id.version, &new.id.version);
     walk.base(old.inherits_from.as_ref(), new.inherits_from.as_ref());
     walk.vocabulary(&vocabulary(old), &vocabulary(new));
+    walk.machines(&old.behaviour, &new.behaviour);
 }
 
 fn vocabulary(service: &Service) -> Vocabulary<'_> {

@@ -1,7 +1,7 @@
 //! State machines as nested boxes: each state with its transitions and actions.
 
 use super::block::{Block, Inline, Line, StateBox, code, heading, muted, text};
-use crate::behaviour::{Action, Transition, TransitionKind};
+use crate::behaviour::{Action, ActionKind, Transition, TransitionKind};
 use crate::library::Library;
 use crate::machine::{Declared, Machine, StateIndex, dot, mermaid};
 use crate::model::{Id, Service};
@@ -85,7 +85,10 @@ fn transition(
 ) -> Line {
     let transition = declared.item;
     let trigger = &transition.trigger;
-    let mut line = vec![code(trigger.message().unwrap_or(trigger.event.last()))];
+    let mut line = vec![match trigger.message().or(trigger.name()) {
+        Some(event) => code(event),
+        None => text("any other event"),
+    }];
     if let Some(guard) = &transition.guard {
         line.extend([muted(" if "), code(guard.to_string())]);
     }
@@ -95,8 +98,15 @@ fn transition(
         TransitionKind::Internal => {}
         TransitionKind::To(_) => line.push(text(format!(" → {target}"))),
         TransitionKind::Again => line.push(text(" → again")),
-        TransitionKind::Push(_) => line.push(text(format!(" → {target}, with return"))),
-        TransitionKind::Pop => line.push(text(" → back")),
+        TransitionKind::Push(push) => {
+            let back = push.back.as_ref().map(|back| format!(" to {back}"));
+            let back = back.unwrap_or_default();
+            line.push(text(format!(" → {target}, with return{back}")));
+        }
+        TransitionKind::Pop(None) => line.push(text(" → back")),
+        TransitionKind::Pop(Some(then)) => {
+            line.extend([text(" → back, then "), code(then.name.last())]);
+        }
     }
     let actions: Vec<_> = transition.actions.iter().map(shown).collect();
     if !actions.is_empty() {
@@ -123,9 +133,8 @@ fn inherited(service: &Service) -> Inline {
 
 /// An action without qualification and without the parameters common to all.
 fn shown(action: &Action) -> String {
-    let texts: Vec<_> = action.arguments.iter().filter_map(|a| a.text()).collect();
-    match texts[..] {
-        [] => action.name.last().to_owned(),
-        _ => format!("{} {}", action.name.last(), texts.join(" ")),
-    }
+    let texts = action.arguments.iter().filter_map(|a| a.text());
+    let sends = (action.kind == ActionKind::Send).then_some("send");
+    let words = sends.into_iter().chain([action.name.last()]).chain(texts);
+    words.collect::<Vec<_>>().join(" ")
 }

@@ -223,8 +223,8 @@ fn number(mut row: Row, scalar: &Scalar, raw: Raw) -> Row {
 /// The name of an enumerated value, or a note that it has none.
 fn named(row: Row, values: &ValueSet, raw: Raw) -> Row {
     let index = match raw {
-        Raw::Unsigned(n) => Some(n),
-        Raw::Signed(n) => u64::try_from(n).ok(),
+        Raw::Unsigned(n) => Some(n.into()),
+        Raw::Signed(n) => Some(n.into()),
         Raw::F32(_) | Raw::F64(_) => None,
     };
     let known = values.values.iter().find(|v| Some(v.index) == index);

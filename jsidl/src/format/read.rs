@@ -3,6 +3,8 @@
 //!
 //! The text is known to be well-formed, so nothing is validated here.
 
+use std::borrow::Cow;
+
 /// A child of an element or of the document.
 #[derive(Debug)]
 pub(super) struct Node<'t> {
@@ -25,9 +27,22 @@ pub(super) enum Kind<'t> {
 #[derive(Debug)]
 pub(super) struct Element<'t> {
     /// With its prefix.
-    pub(super) name: &'t str,
+    pub(super) name: Cow<'t, str>,
     pub(super) attributes: Vec<Attribute<'t>>,
     pub(super) content: Content<'t>,
+}
+
+impl Element<'_> {
+    /// The name without its prefix.
+    pub(super) fn local_name(&self) -> &str {
+        self.name.rsplit(':').next().unwrap_or(&self.name)
+    }
+
+    /// The prefix with its colon; empty if there is none.
+    pub(super) fn prefix(&self) -> String {
+        let length = self.name.len() - self.local_name().len();
+        self.name[..length].to_owned()
+    }
 }
 
 /// As written: character references are not expanded.
@@ -137,7 +152,7 @@ impl<'t> Reader<'t> {
             self.content()
         };
         Element {
-            name,
+            name: Cow::Borrowed(name),
             attributes,
             content,
         }

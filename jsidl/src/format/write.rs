@@ -121,7 +121,7 @@ impl Writer {
 
     fn element(&mut self, element: &Element<'_>, indent: usize) {
         let lines = tag(element, indent);
-        let name = element.name;
+        let name = &element.name;
         match &element.content {
             Content::Nodes(nodes) if nodes.is_empty() => self.tag(&lines, indent, "/>"),
             Content::Nodes(nodes) => {
@@ -240,7 +240,7 @@ fn attribute_text(attribute: &Attribute<'_>) -> String {
 /// An element with only small children, on one line.
 fn in_line(element: &Element<'_>, start: &[String], nodes: &[Node<'_>]) -> Option<String> {
     let [start] = start else { return None };
-    if !INLINE.contains(&element.name) {
+    if !INLINE.contains(&&*element.name) {
         return None;
     }
     let mut line = format!("{start}>");
@@ -257,7 +257,7 @@ fn in_line(element: &Element<'_>, start: &[String], nodes: &[Node<'_>]) -> Optio
         }
     }
     line.push_str("</");
-    line.push_str(element.name);
+    line.push_str(&element.name);
     line.push('>');
     Some(line)
 }

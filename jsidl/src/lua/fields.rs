@@ -200,8 +200,11 @@ impl Fields {
     /// Registers a table of named values; returns its number (from 1), or `None` without names.
     pub(super) fn names(&mut self, kind: Kind, values: &[NamedValue]) -> Option<usize> {
         let mut named: BTreeMap<u64, &str> = BTreeMap::new();
-        for value in values.iter().filter(|v| v.index <= kind.greatest()) {
-            named.entry(value.index).or_insert(&value.name);
+        for value in values {
+            let index = u64::try_from(value.index).ok();
+            if let Some(index) = index.filter(|index| *index <= kind.greatest()) {
+                named.entry(index).or_insert(&value.name);
+            }
         }
         self.names_of(named)
     }

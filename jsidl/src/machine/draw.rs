@@ -8,7 +8,12 @@
 use std::fmt::Write;
 
 use super::{Declared, Machine, StateIndex, Stimulus};
-use crate::behaviour::{Action, Argument, Call, Guard, Name, Transition, TransitionKind};
+use crate::behaviour::{
+    Action, ActionKind, Argument, Call, Guard, Name, Transition, TransitionKind,
+};
+
+/// The label of a transition that every event triggers.
+const ANY_OTHER: &str = "any other event";
 
 /// The machine as a graph in the language DOT, for `dot -Tsvg`. Composite states are clusters.
 pub fn dot(machine: &Machine<'_>) -> String {
@@ -117,7 +122,10 @@ fn tails(machine: &Machine<'_>, arrow: &Arrow<'_>) -> Vec<StateIndex> {
         return vec![arrow.from];
     }
     let taken = |index: StateIndex| {
-        let candidates = machine.candidates(index, Stimulus::of(arrow.transition));
+        let Some(stimulus) = Stimulus::of(arrow.transition) else {
+            return true;
+        };
+        let candidates = machine.candidates(index, stimulus);
         let first = candidates.iter().map(|declared| declared.item);
         let mut first = first.take_while(|other| !std::ptr::eq(*other, arrow.transition));
         first.all(|other| other.guard.is_some())
@@ -166,7 +174,7 @@ fn arrows<'a>(machine: &Machine<'a>) -> Vec<Arrow<'a>> {
     for (from, _) in machine.states() {
         for transition in transitions(machine, from) {
             let to = match &transition.kind {
-                TransitionKind::Internal | TransitionKind::Pop => None,
+                TransitionKind::Internal | TransitionKind::Pop(_) => None,
                 TransitionKind::Again => Some(machine.leaf(from)),
                 TransitionKind::To(_) | TransitionKind::Push(_) => machine.target(from, transition),
             };
@@ -193,7 +201,7 @@ fn inside(machine: &Machine<'_>, index: StateIndex) -> Vec<String> {
     for transition in transitions(machine, index) {
         if matches!(
             transition.kind,
-            TransitionKind::Internal | TransitionKind::Pop
+            TransitionKind::Internal | TransitionKind::Pop(_)
         ) {
             lines.push(label(transition));
         }
@@ -213,7 +221,8 @@ fn transitions<'a>(
 /// `event [guard] / actions`.
 fn label(transition: &Transition) -> String {
     let trigger = &transition.trigger;
-    let mut label = trigger.message().unwrap_or(trigger.event.last()).to_owned();
+    let event = trigger.message().or(trigger.name());
+    let mut label = event.unwrap_or(ANY_OTHER).to_owned();
     if let Some(guard) = &transition.guard {
         let _ = write!(label, " [{}]", short(guard));
     }
@@ -221,11 +230,17 @@ fn label(transition: &Transition) -> String {
     if !actions.is_empty() {
         let _ = write!(label, " / {}", actions.join(", "));
     }
-    label.push_str(match transition.kind {
-        TransitionKind::Push(_) => ", with return",
-        TransitionKind::Pop => ", then return",
-        _ => "",
-    });
+    match &transition.kind {
+        TransitionKind::Push(push) => match &push.back {
+            Some(back) => _ = write!(label, ", with return to {back}"),
+            None => label.push_str(", with return"),
+        },
+        TransitionKind::Pop(Some(then)) => {
+            let _ = write!(label, ", then return and {}", shortened(then));
+        }
+        TransitionKind::Pop(None) => label.push_str(", then return"),
+        TransitionKind::Internal | TransitionKind::To(_) | TransitionKind::Again => {}
+    }
     label
 }
 
@@ -234,7 +249,11 @@ fn action(action: &Action) -> String {
         name: action.name.clone(),
         arguments: action.arguments.clone(),
     };
-    shortened(&call).to_string()
+    let sends = match action.kind {
+        ActionKind::Call => "",
+        ActionKind::Send => "send ",
+    };
+    format!("{sends}{}", shortened(&call))
 }
 
 /// A guard with shortened calls.

@@ -12,7 +12,9 @@ mod run;
 
 use std::collections::HashMap;
 
-use crate::behaviour::{Action, Guard, Name, State, StateMachine, Transition, TransitionKind};
+use crate::behaviour::{
+    Action, Guard, Name, Push, State, StateMachine, Transition, TransitionKind,
+};
 use crate::library::Library;
 use crate::model::Service;
 
@@ -109,23 +111,27 @@ impl<'s> Stimulus<'s> {
         }
     }
 
-    /// The stimulus that triggers a transition.
-    pub fn of(transition: &'s Transition) -> Self {
-        Self {
-            event: transition.trigger.event.last(),
+    /// The stimulus that triggers a transition; `None` for a default transition, which every
+    /// stimulus triggers.
+    pub fn of(transition: &'s Transition) -> Option<Self> {
+        Some(Self {
+            event: transition.trigger.name()?,
             message: transition.trigger.message(),
-        }
+        })
     }
 
     pub(crate) fn triggers(&self, transition: &Transition) -> bool {
         let trigger = &transition.trigger;
+        let Some(event) = trigger.name() else {
+            return true;
+        };
         let same_message = match (self.message, trigger.message()) {
             (Some(message), Some(named)) => named.eq_ignore_ascii_case(message),
             (None, None) => true,
             // The transport's own machine accepts every envelope; that is no reaction to a message.
             _ => false,
         };
-        same_message && trigger.event.last().eq_ignore_ascii_case(self.event)
+        same_message && event.eq_ignore_ascii_case(self.event)
     }
 }
 
@@ -211,7 +217,8 @@ impl<'a> Machine<'a> {
         let mut own: Vec<_> = own.filter(triggered).copied().collect();
         let mut default: Vec<_> = default.filter(triggered).copied().collect();
         own.sort_by_key(|declared| declared.distance);
-        default.sort_by_key(|declared| declared.distance);
+        // Those without a trigger come last.
+        default.sort_by_key(|it| (it.item.trigger.event.is_none(), it.distance));
         own.append(&mut default);
         own
     }
@@ -278,10 +285,34 @@ impl<'a> Machine<'a> {
     pub fn target(&self, from: StateIndex, transition: &Transition) -> Option<StateIndex> {
         match &transition.kind {
             TransitionKind::Internal | TransitionKind::Again => Some(from),
-            TransitionKind::To(path) | TransitionKind::Push(path) => {
+            TransitionKind::To(path) | TransitionKind::Push(Push { to: path, .. }) => {
                 self.find(path).map(|index| self.leaf(index))
             }
-            TransitionKind::Pop => None,
+            TransitionKind::Pop(_) => None,
+        }
+    }
+
+    /// Whether some transition within or around a state returns to the remembered one.
+    pub(crate) fn returns(&self, index: StateIndex) -> bool {
+        let is_within = |inner: StateIndex, outer: StateIndex| {
+            let around = |index: &StateIndex| self.state(*index).parent;
+            std::iter::successors(Some(inner), around).any(|index| index == outer)
+        };
+        let related = self
+            .states()
+            .filter(|(other, _)| is_within(*other, index) || is_within(index, *other));
+        let mut transitions = related.flat_map(|(_, state)| {
+            let all = state.transitions.iter().chain(&state.default_transitions);
+            all.map(|declared| &declared.item.kind)
+        });
+        transitions.any(|kind| matches!(kind, TransitionKind::Pop(_)))
+    }
+
+    /// The leaf state that a `push` remembers; `None` if it does not exist.
+    pub fn remembered(&self, from: StateIndex, push: &Push) -> Option<StateIndex> {
+        match &push.back {
+            Some(path) => self.find(path).map(|index| self.leaf(index)),
+            None => Some(from),
         }
     }
 }
@@ -351,6 +382,7 @@ impl<'a> Merge<'a> {
                 self.add(part, None, state);
             }
         }
+        self.add_defaults(parts);
         self.choose_initial_states();
         let first = parts.first()?;
         let mut starts = parts.iter().map(|part| key(&part.machine.start));
@@ -363,6 +395,18 @@ impl<'a> Merge<'a> {
             states: self.states,
             paths: self.paths,
         })
+    }
+
+    /// The default transitions of a whole machine are default transitions of its outermost states.
+    fn add_defaults(&mut self, parts: &[Part<'a>]) {
+        let outermost = self.states.iter_mut();
+        for state in outermost.filter(|state| state.parent.is_none()) {
+            for part in parts {
+                let default = part.machine.default_transitions.iter();
+                let default = default.map(|item| part.declared(item));
+                state.default_transitions.extend(default);
+            }
+        }
     }
 
     /// Runs after all states exist: a derived service may name an initial state of its base.

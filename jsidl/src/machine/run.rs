@@ -4,7 +4,7 @@
 //! one.
 
 use super::{Machine, StateIndex, Stimulus};
-use crate::behaviour::{Action, Guard, Transition, TransitionKind};
+use crate::behaviour::{Action, Call, Guard, Transition, TransitionKind};
 
 /// Maximum number of remembered states (`push`). Published machines need one.
 pub const MOST_REMEMBERED: usize = 8;
@@ -54,6 +54,7 @@ impl<'m, 'a> Run<'m, 'a> {
 
     /// Takes the first transition whose guard holds; `ask` evaluates the guards. `act` receives the
     /// actions in order: exit actions from the innermost state, transition actions, entry actions.
+    /// If a `pop` names a transition, that event follows at once.
     pub fn step(
         &mut self,
         stimulus: Stimulus<'_>,
@@ -76,14 +77,23 @@ impl<'m, 'a> Run<'m, 'a> {
             return nothing;
         };
         self.take(transition, to, act);
+        // Every `pop` forgets a state, so this ends.
+        if let TransitionKind::Pop(Some(Call { name, .. })) = &transition.kind {
+            self.step(Stimulus::event(name.last()), ask, act);
+        }
         Outcome::Handled
     }
 
     /// The current target of a transition; `None` if it cannot be taken.
     fn destination(&self, transition: &Transition) -> Option<StateIndex> {
-        match transition.kind {
-            TransitionKind::Pop => self.remembered.last().copied(),
-            TransitionKind::Push(_) if self.remembered.len() >= MOST_REMEMBERED => None,
+        match &transition.kind {
+            TransitionKind::Pop(_) => self.remembered.last().copied(),
+            TransitionKind::Push(push) => {
+                let has_room = self.remembered.len() < MOST_REMEMBERED;
+                let remembered = self.machine.remembered(self.state, push);
+                remembered.filter(|_| has_room)?;
+                self.machine.target(self.state, transition)
+            }
             _ => self.machine.target(self.state, transition),
         }
     }
@@ -95,10 +105,12 @@ impl<'m, 'a> Run<'m, 'a> {
         act: &mut impl FnMut(&'a Action),
     ) {
         let from = self.state;
-        match transition.kind {
+        match &transition.kind {
             TransitionKind::Internal => return transition.actions.iter().for_each(act),
-            TransitionKind::Push(_) => self.remembered.push(from),
-            TransitionKind::Pop => _ = self.remembered.pop(),
+            TransitionKind::Push(push) => {
+                self.remembered.extend(self.machine.remembered(from, push));
+            }
+            TransitionKind::Pop(_) => _ = self.remembered.pop(),
             TransitionKind::To(_) | TransitionKind::Again => {}
         }
         self.machine.leaving(from, to).for_each(&mut *act);

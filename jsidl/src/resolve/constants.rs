@@ -1,10 +1,11 @@
 //! Computes constant expressions.
 
 use super::{Memo, Resolver};
+use crate::check;
 use crate::expr::Value;
 use crate::model::Number;
 use crate::source::Span;
-use crate::syntax::{ConstSet, Expr, SetRef, TypeSetIndex};
+use crate::syntax::{ConstSet, Constant, Expr, SetRef, TypeSetIndex};
 
 /// The constant sets visible to an expression.
 #[derive(Debug, Clone, Copy)]
@@ -40,8 +41,13 @@ impl Resolver<'_> {
     /// Computes all constants of a set, used or not.
     pub(super) fn const_set(&mut self, set: usize) {
         let definitions = &self.program.const_sets[set].definitions;
-        let names = definitions.iter().map(|d| (d.name.as_str(), d.value.span));
+        let names = definitions.iter().map(|d| (d.name.as_str(), d.span));
         self.report.unique("constants", names);
+        for definition in definitions {
+            if let Some(units) = &definition.units {
+                check::units(self.report, units);
+            }
+        }
         for position in 0..definitions.len() {
             // The faulty constant is already reported.
             let _ = self.constant(set, position);
@@ -80,6 +86,15 @@ impl Resolver<'_> {
             );
             return None;
         };
+        let definition = &self.program.const_sets[set].definitions[position];
+        if matches!(definition.value, Constant::Text) {
+            let path = path.join(".");
+            let message = format!("the constant `{path}` is a text: use a number here");
+            self.report
+                .error(span, message)
+                .note(definition.span, "declared here");
+            return None;
+        }
         if matches!(self.constants.get(&(set, position)), Some(Memo::Active)) {
             let path = path.join(".");
             self.report
@@ -123,7 +138,7 @@ impl Resolver<'_> {
             .const_sets
             .nearest(&reference.id, reference.span, self.sources);
         if found.is_none() {
-            let advice = self.index.const_sets.advice(&reference.id);
+            let advice = self.index.const_sets.advice(&reference.id.urn);
             self.missing_set(reference, "constant set", &advice);
         }
         found.map(Some)
@@ -138,9 +153,12 @@ impl Resolver<'_> {
         self.constants.insert((set, position), Memo::Active);
         let const_set: &ConstSet = &self.program.const_sets[set];
         let definition = &const_set.definitions[position];
-        let value = self
-            .evaluate(Scope::ConstSet(set), &definition.value)
-            .filter(|value| self.fits(*value, definition.number, definition.value.span));
+        let value = match &definition.value {
+            Constant::Number(number, expression) => self
+                .evaluate(Scope::ConstSet(set), expression)
+                .filter(|value| self.fits(*value, *number, expression.span)),
+            Constant::Text => None,
+        };
         let memo = value.map_or(Memo::Faulty, Memo::Done);
         self.constants.insert((set, position), memo);
         value

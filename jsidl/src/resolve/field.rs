@@ -1,12 +1,13 @@
 //! Resolves fields: computes their limits and collects their values.
 
-use super::Resolver;
-use crate::check;
+use super::item::values as entries;
+use super::{Resolved, Resolver};
+use crate::check::{self, Rated};
 use crate::model::{
     BitField, Choice, Count, Format, Meaning, NamedValue, Scalar, Scale, Shape, SubField, Unsigned,
     ValueRange, ValueSet,
 };
-use crate::syntax::{self, CountField, Expr, ScalarField, ScaleRange, TypeSetIndex};
+use crate::syntax::{self, CountField, Expr, ScalarField, ScaleRange, TypeSetIndex, Values};
 
 impl Resolver<'_> {
     /// Resolves a `count_field` or `vtag_field`.
@@ -39,26 +40,37 @@ impl Resolver<'_> {
 
     /// Resolves the value of a `fixed_field` or `type_and_units_enum`.
     pub(super) fn scalar(&mut self, scope: TypeSetIndex, field: &ScalarField) -> Option<Scalar> {
-        let scale = field.scale.as_ref().map(|scale| self.scale(scope, scale));
-        let values = field.values.as_ref().map(|values| {
-            let set = self.value_set(scope, values)?;
-            check::values_of_number(self.report, values, &set, field.number).then_some(set)
-        });
-        check::one_meaning(self.report, field)?;
-        let meaning = match (scale, values) {
-            (Some(scale), _) => {
-                let scale = scale?;
-                check::scale(self.report, field.scale.as_ref()?, scale, field.number)?;
-                Meaning::Scaled(scale)
-            }
-            (None, Some(values)) => Meaning::Values(values?),
-            (None, None) => Meaning::Plain,
+        check::units(self.report, &field.units);
+        let meaning = if let Some(range) = &field.scale {
+            let scale = self.scale(scope, range)?;
+            check::scale(self.report, range, scale, field.number)?;
+            Meaning::Scaled(scale)
+        } else if let Some(values) = &field.values {
+            let set = self.values(scope, values)?;
+            check::values_of_number(self.report, &set, field.number)
+                .then_some(Meaning::Values(set.set))?
+        } else {
+            Meaning::Plain
         };
         Some(Scalar {
             number: field.number,
-            units: field.units.clone(),
+            units: field.units.value.clone(),
             meaning,
         })
+    }
+
+    /// Resolves the value set of a field, declared there or in a type set.
+    fn values(&mut self, scope: TypeSetIndex, values: &Values) -> Option<Rated> {
+        match values {
+            Values::Here(written) => self.value_set(scope, written),
+            Values::Declared(target) => match self.follow(scope, target)? {
+                Resolved::Values(rated) => {
+                    self.spend(1 + entries(&rated.set), target.path.span)?;
+                    Some(rated.at(target.path.span))
+                }
+                _ => None,
+            },
+        }
     }
 
     fn scale(&mut self, scope: TypeSetIndex, range: &ScaleRange) -> Option<Scale> {
@@ -71,7 +83,12 @@ impl Resolver<'_> {
         })
     }
 
-    fn value_set(&mut self, scope: TypeSetIndex, set: &syntax::ValueSet) -> Option<ValueSet> {
+    /// Resolves a `value_set`.
+    pub(super) fn value_set(
+        &mut self,
+        scope: TypeSetIndex,
+        set: &syntax::ValueSet,
+    ) -> Option<Rated> {
         let ranges: Vec<_> = set
             .ranges
             .iter()
@@ -93,7 +110,7 @@ impl Resolver<'_> {
             ranges: ranges.into_iter().collect::<Option<_>>()?,
             values: values.into_iter().collect::<Option<_>>()?,
         };
-        check::value_set(self.report, set, &resolved).then_some(resolved)
+        check::value_set(self.report, set, &resolved).then(|| Rated::new(set, resolved))
     }
 
     fn value_range(
@@ -142,17 +159,15 @@ impl Resolver<'_> {
     ) -> Option<SubField> {
         let from = self.integer(scope, &field.from, "from_index");
         let to = self.integer(scope, &field.to, "to_index");
-        let values = self.value_set(scope, &field.values);
+        let values = self.values(scope, &field.values);
         let (from, to) = check::bits(self.report, field, base, from?, to?)?;
         let values = values?;
-        check::values_of_bits(self.report, &field.values, &values, to - from + 1).then(|| {
-            SubField {
-                name: field.name.clone(),
-                from,
-                to,
-                values,
-                interpretation: field.interpretation.clone(),
-            }
+        check::values_of_bits(self.report, &values, to - from + 1).then(|| SubField {
+            name: field.name.clone(),
+            from,
+            to,
+            values: values.set,
+            interpretation: field.interpretation.clone(),
         })
     }
 

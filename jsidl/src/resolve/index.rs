@@ -9,10 +9,14 @@ use std::path::Path;
 use crate::diagnostic::Report;
 use crate::model::{Id, Version};
 use crate::source::{Sources, Span};
-use crate::syntax::{ConstSet, Program, TypeSet, TypeSetIndex};
+use crate::spelling::nearest;
+use crate::syntax::{ConstSet, Program, ServiceRef, TypeSet, TypeSetIndex};
 
 /// Maximum number of copies of a set that are compared.
 const MOST_COPIES: usize = 64;
+
+/// Maximum number of URNs that are compared with an unknown one.
+const MOST_COMPARED: usize = 1000;
 
 /// Everything with an identity, by position in the [`Program`]; declarations of the sets by name.
 pub(super) struct Index<'a> {
@@ -91,6 +95,32 @@ impl<'a> Identities<'a> {
         self.copies(id).first().map(|(position, _)| *position)
     }
 
+    /// The service that a reference means: of several versions the newest.
+    pub(super) fn service(&self, reference: &ServiceRef) -> Option<usize> {
+        let id = self.newest(reference)?;
+        self.first(&id)
+    }
+
+    /// The identity that a reference means: of several versions the newest.
+    pub(super) fn newest(&self, reference: &ServiceRef) -> Option<Id> {
+        let ids = self.versions(&reference.urn).map(|version| Id {
+            urn: reference.urn.clone(),
+            version,
+        });
+        ids.filter(|id| reference.admits(id)).last()
+    }
+
+    /// All versions of a URN, the oldest first.
+    fn versions<'s>(&'s self, urn: &'s str) -> impl Iterator<Item = Version> + 's {
+        let least = Version { major: 0, minor: 0 };
+        let greatest = Version {
+            major: u8::MAX,
+            minor: u8::MAX,
+        };
+        let versions = self.0.range((urn, least)..=(urn, greatest));
+        versions.map(|((_, version), _)| *version)
+    }
+
     /// The declaration nearest to the referring file; the first of equally near ones.
     pub(super) fn nearest(&self, id: &Id, from: Span, sources: &Sources) -> Option<usize> {
         let copies = self.copies(id);
@@ -106,21 +136,16 @@ impl<'a> Identities<'a> {
     }
 
     /// Advice for a reference to a missing declaration.
-    pub(super) fn advice(&self, id: &Id) -> String {
-        let urn = &*id.urn;
-        let least = Version { major: 0, minor: 0 };
-        let greatest = Version {
-            major: u8::MAX,
-            minor: u8::MAX,
-        };
-        let others = self.0.range((urn, least)..=(urn, greatest));
-        let versions: Vec<_> = others
-            .map(|((_, version), _)| version.to_string())
-            .collect();
-        if versions.is_empty() {
-            "load the file that declares it as well".into()
-        } else {
-            format!("only its version {} is loaded", versions.join(", "))
+    pub(super) fn advice(&self, urn: &str) -> String {
+        let versions: Vec<_> = self.versions(urn).map(|it| it.to_string()).collect();
+        if !versions.is_empty() {
+            return format!("only its version {} is loaded", versions.join(", "));
+        }
+        let known = self.0.keys().map(|(known, _)| *known);
+        // Limits the time spent on a hint.
+        match nearest(urn, known.take(MOST_COMPARED)) {
+            Some(urn) => format!("did you mean `{urn}`?"),
+            None => "load the file that declares it as well".into(),
         }
     }
 

@@ -216,15 +216,10 @@ impl Resolver<'_> {
 
 /// Copy cost of an item, in fields of usual size, and its nesting depth.
 pub(super) fn measure(item: &Item) -> (usize, usize) {
-    let inner: &mut dyn Iterator<Item = &Item> = match &item.shape {
-        Shape::Group(group) => &mut group.members.iter(),
-        Shape::Variant(variant) => &mut variant.alternatives.iter(),
-        Shape::List(list) => &mut std::iter::once(list.element.as_ref()),
-        Shape::Array(array) => &mut std::iter::once(array.element.as_ref()),
-        _ => &mut std::iter::empty(),
-    };
     let own = 1 + text(&item.interpretation) + entries(&item.shape);
-    let (items, height) = inner
+    let (items, height) = item
+        .shape
+        .items()
         .map(measure)
         .fold((own, 0), |(items, height), (i, h)| {
             (items + i, height.max(h))
@@ -260,7 +255,8 @@ fn scalar_entries(scalar: &Scalar) -> usize {
     text(&scalar.units) + values
 }
 
-fn values(set: &ValueSet) -> usize {
+/// Copy cost of a value set.
+pub(super) fn values(set: &ValueSet) -> usize {
     let ranges = set.ranges.iter().map(|r| 1 + text(&r.interpretation));
     let values = set.values.iter();
     let values = values.map(|v| 1 + text(&v.name) + text(&v.interpretation));

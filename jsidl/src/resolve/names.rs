@@ -1,6 +1,8 @@
 //! Walks dotted names: every part but the last is a local alias of a set; the last one is a
 //! declaration in that set.
 
+use std::rc::Rc;
+
 use super::{Memo, Resolved, Resolver};
 use crate::source::Span;
 use crate::syntax::{Construct, DeclarationKind, SetRef, Target, TypeSetIndex};
@@ -66,6 +68,9 @@ impl<'a> Resolver<'a> {
                 self.section(set, section).map(Resolved::Section)
             }
             DeclarationKind::Node(node) => self.whole(set, node).map(Resolved::Node),
+            DeclarationKind::Values(values) => self
+                .value_set(set, values)
+                .map(|values| Resolved::Values(Rc::new(values))),
             DeclarationKind::Reference(target) => self.follow(set, target),
             DeclarationKind::Faulty => None,
         };
@@ -124,7 +129,7 @@ impl<'a> Resolver<'a> {
         };
         let found = self.referenced(reference);
         if found.is_none() {
-            let advice = self.index.type_sets.advice(&reference.id);
+            let advice = self.index.type_sets.advice(&reference.id.urn);
             self.missing_set(reference, "type set", &advice);
         }
         found

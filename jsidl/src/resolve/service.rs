@@ -6,10 +6,10 @@ use std::sync::Arc;
 use super::{LONGEST_LINEAGE, Resolved, Resolver};
 use crate::check;
 use crate::library::Library;
-use crate::model::{Message, Reference, Service};
+use crate::model::{Id, Message, Reference, Service, Version};
 use crate::source::Span;
 use crate::syntax::{
-    Declaration, DeclarationKind, Program, ServiceDef, SetRef, Target, TypeSetIndex,
+    Content, Declaration, DeclarationKind, Program, ServiceDef, ServiceRef, Target, TypeSetIndex,
 };
 
 /// Maximum number of states of all services, inherited ones counted again: a long lineage must not
@@ -40,6 +40,7 @@ impl Resolver<'_> {
         for (service, places) in &kept {
             check::ambiguous_codes(self.report, &library, service, places);
             check::ambiguous_names(self.report, service, places);
+            check::declared_again(self.report, &library, service, places);
         }
         let events = internal_events(self.program);
         let mut states_left = MOST_STATES;
@@ -73,12 +74,28 @@ impl Resolver<'_> {
         (service, [input_places, output_places].concat())
     }
 
-    fn reference(&self, reference: &SetRef) -> Reference {
+    fn reference(&self, reference: &ServiceRef) -> Reference {
         Reference {
             name: reference.name.clone(),
-            id: reference.id.clone(),
+            id: self.meant(reference),
             location: self.location(reference.span),
         }
+    }
+
+    /// The identity that a reference means. One that is not loaded has 0 in place of a wildcard.
+    fn meant(&self, reference: &ServiceRef) -> Id {
+        let services = &self.index.services;
+        services.newest(reference).unwrap_or_else(|| Id {
+            urn: reference.urn.clone(),
+            version: Version {
+                major: reference.version.major.unwrap_or(0),
+                minor: reference.version.minor.unwrap_or(0),
+            },
+        })
+    }
+
+    fn is_lost(&self, reference: &ServiceRef) -> bool {
+        self.lost.iter().any(|id| reference.admits(id))
     }
 
     /// The sound messages of an input or output set.
@@ -147,13 +164,13 @@ impl Resolver<'_> {
         let names = references.map(|r| (r.name.as_str(), r.span));
         self.report.unique("references", names);
         for client in &definition.client_of {
-            if !self.lost.contains(&client.id) && self.index.services.first(&client.id).is_none() {
-                let id = &client.id;
-                self.report.warning(
-                    client.span,
-                    format!("this service is a client of `{id}`, which is not loaded"),
-                );
+            if self.is_lost(client) || self.index.services.service(client).is_some() {
+                continue;
             }
+            let advice = self.index.services.advice(&client.urn);
+            let message =
+                format!("this service is a client of `{client}`, which is not loaded: {advice}");
+            self.report.warning(client.span, message);
         }
     }
 
@@ -168,12 +185,12 @@ impl Resolver<'_> {
             let Some(base) = &service.inherits_from else {
                 return true;
             };
-            if base.id == heir.id {
+            if base.admits(&heir.id) {
                 let message = format!("`{}` inherits from itself: break the cycle", heir.id);
                 self.report.error(own.span, message);
                 return false;
             }
-            let Some(position) = self.index.services.first(&base.id) else {
+            let Some(position) = self.index.services.service(base) else {
                 self.missing_base(heir, own, service, base);
                 return false;
             };
@@ -194,34 +211,56 @@ impl Resolver<'_> {
     fn missing_base(
         &mut self,
         heir: &ServiceDef,
-        own: &SetRef,
+        own: &ServiceRef,
         service: &ServiceDef,
-        base: &SetRef,
+        base: &ServiceRef,
     ) {
-        let message = if self.lost.contains(&base.id) {
+        let message = if self.is_lost(base) {
             format!(
-                "`{}` is omitted: it inherits from `{}`, which has errors",
-                heir.id, base.id
+                "`{}` is omitted: it inherits from `{base}`, which has errors",
+                heir.id
             )
         } else if heir.id == service.id {
-            let advice = self.index.services.advice(&base.id);
-            format!("the base service `{}` is not loaded: {advice}", base.id)
+            let advice = self.index.services.advice(&base.urn);
+            format!("the base service `{base}` is not loaded: {advice}")
         } else {
             format!(
-                "`{}` is omitted: it inherits from `{}`, which needs `{}`, which is not loaded",
-                heir.id, service.id, base.id
+                "`{}` is omitted: it inherits from `{}`, which needs `{base}`, which is not loaded",
+                heir.id, service.id
             )
         };
         self.report.error(own.span, message);
     }
 }
 
-/// Names of the events that each service declares; the first of two with one identity counts.
+/// The events that each service declares; the first of two services with one identity counts.
 fn internal_events(program: &Program) -> check::Events<'_> {
     let mut events = check::Events::new();
     for service in program.services.iter().filter(|s| s.sound) {
-        let names = service.events.iter().map(|event| event.name.as_str());
-        events.entry(&service.id).or_insert_with(|| names.collect());
+        let declared = service.events.iter().map(|event| check::InternalEvent {
+            name: &event.name,
+            members: members(event),
+        });
+        events
+            .entry(&service.id)
+            .or_insert_with(|| declared.collect());
     }
     events
+}
+
+/// The names of an event's sections and of their content; none if a part is declared elsewhere.
+fn members(event: &Declaration) -> Vec<&str> {
+    let DeclarationKind::Event(definition) = &event.kind else {
+        return Vec::new();
+    };
+    let mut names = vec!["header", "body", "footer"];
+    for section in &definition.sections {
+        names.push(&section.name);
+        match &section.content {
+            Content::Node(node) => node.names(&mut names),
+            Content::Empty => {}
+            Content::Reference(_) | Content::Faulty => return Vec::new(),
+        }
+    }
+    names
 }

@@ -80,7 +80,9 @@ pub(super) fn enumeration(
     }
     out.push("}");
     out.gap();
-    let entry = |(_, value): &(String, NamedValue)| format!("({}, {:?})", value.index, value.name);
+    // A negative index is in two's complement, as the codec compares it.
+    let entry =
+        |(_, value): &(String, NamedValue)| format!("({}, {:?})", value.index as u64, value.name);
     let entries: Vec<_> = values.iter().map(entry).collect();
     out.list(
         &format!("codec::enumeration!({ident}({ty}), ["),
@@ -181,7 +183,10 @@ fn limits(sub: &SubType<'_>) -> (u64, u64) {
     let field = sub.field;
     let most = u64::MAX >> (63 - (field.to - field.from));
     let set = &field.values;
-    let named = set.values.iter().map(|value| (value.index, value.index));
+    let named = set.values.iter().map(|value| {
+        let index = u64::try_from(value.index).unwrap_or(0);
+        (index, index)
+    });
     let ranges = set.ranges.iter().map(|range| {
         (
             range.lower.max(0.0).ceil() as u64,

@@ -4,12 +4,13 @@
 
 use roxmltree::Node as Xml;
 
-use super::element::{FLAGS, Faulty, Reader, shortened};
+use super::element::{Children, FLAGS, Reader};
 use crate::behaviour::{
-    Action, Argument, Guard, Name, Parameter, State, StateMachine, Transition, TransitionKind,
-    Trigger,
+    Action, ActionKind, Argument, Call, Guard, Name, Parameter, Push, State, StateMachine,
+    Transition, TransitionKind, Trigger,
 };
 use crate::source::{Span, Spanned};
+use crate::spelling::shortened;
 
 /// Maximum number of states of a service; published ones have up to 17.
 const MOST_STATES: usize = 500;
@@ -21,24 +22,9 @@ struct Start {
     state: Name,
 }
 
-/// Parts of a `transition` or `default_transition`.
-struct TransitionParts {
-    parameters: Vec<(Span, Parameter)>,
-    guard: Result<Option<Guard>, Faulty>,
-    /// `None` if it is missing or invalid.
-    kind: Option<TransitionKind>,
-    actions: Vec<Action>,
-}
-
 impl Reader<'_> {
     /// The machines without errors.
     pub(super) fn behaviour(&mut self, xml: Xml<'_, '_>) -> Vec<StateMachine> {
-        self.only(xml, &["is_stateless"]);
-        let stateless = self.attribute(xml, "is_stateless");
-        let stateless = stateless.filter(|text| {
-            let word = self.word(text, "is_stateless", &FLAGS);
-            word == Some(true)
-        });
         let states = xml.descendants().filter(|x| x.tag_name().name() == "state");
         if states.count() > MOST_STATES {
             let at = self.span(xml);
@@ -46,18 +32,17 @@ impl Reader<'_> {
             self.report.error(at, message);
             return Vec::new();
         }
-        let (mut starts, mut definitions) = (Vec::new(), Vec::new());
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "start" => self.add_start(&mut starts, child),
-                "state_machine" => definitions.push(child),
-                _ => self.misplaced(
-                    child,
-                    "protocol_behavior",
-                    "a `start` and a `state_machine` for each machine",
-                ),
-            }
+        let children = self.enter(xml);
+        let stateless = self.attribute(xml, "is_stateless");
+        let stateless = stateless.filter(|text| {
+            let word = self.word(text, "is_stateless", &FLAGS);
+            word == Some(true)
+        });
+        let mut starts = Vec::new();
+        for start in children.named("start") {
+            self.add_start(&mut starts, start);
         }
+        let definitions: Vec<_> = children.named("state_machine").collect();
         self.starts_of_nothing(&starts, &definitions);
         let names = definitions.iter().map(|&xml| {
             let name = xml.attribute("name").unwrap_or_default();
@@ -68,8 +53,12 @@ impl Reader<'_> {
         let machines: Vec<_> = machines
             .filter_map(|child| self.state_machine(child, &starts))
             .collect();
-        if let Some(flag) = stateless {
-            self.stateless(&flag, &machines);
+        if let Some(flag) = &stateless {
+            self.stateless(flag, &machines);
+        }
+        // The standard demands a machine even of a service without behaviour.
+        if stateless.is_some() && machines.iter().all(StateMachine::is_silent) {
+            return Vec::new();
         }
         machines
     }
@@ -93,7 +82,7 @@ impl Reader<'_> {
 
     /// Adds the start state of a machine; once per machine.
     fn add_start(&mut self, starts: &mut Vec<Start>, xml: Xml<'_, '_>) {
-        self.only(xml, &["state_machine_name", "state_name", "interpretation"]);
+        self.enter(xml);
         let machine = self.dotted(xml, "state_machine_name");
         let state = self.dotted(xml, "state_name");
         let (Some(machine), Some(state)) = (machine, state) else {
@@ -129,18 +118,12 @@ impl Reader<'_> {
     }
 
     fn state_machine(&mut self, xml: Xml<'_, '_>, starts: &[Start]) -> Option<StateMachine> {
-        self.only(xml, &["name", "interpretation"]);
         let before = self.report.errors();
+        let children = self.enter(xml);
         let name = self.dotted(xml, "name");
-        let mut states = Vec::new();
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "state" => self.add_state(&mut states, child),
-                // The position of the start arrow in a diagram editor.
-                "pseudo_start_state" => {}
-                _ => self.misplaced(child, "state_machine", "`state`s"),
-            }
-        }
+        let states = self.states(&children);
+        let default = children.find("default_state");
+        let default = default.map_or_else(Vec::new, |xml| self.default_state(xml));
         let name = name?.value;
         let start = starts.iter().find(|start| start.machine == name);
         let span = self.span(xml);
@@ -158,63 +141,60 @@ impl Reader<'_> {
             name,
             start: start.state.clone(),
             states,
+            default_transitions: default,
             location: self.location(xml),
             span,
         })
     }
 
-    /// Adds a named state to its siblings.
-    fn add_state(&mut self, states: &mut Vec<State>, xml: Xml<'_, '_>) {
-        let Some(state) = self.state(xml) else {
-            return;
-        };
-        if let Some(first) = states
-            .iter()
-            .find(|s| s.name.eq_ignore_ascii_case(&state.name))
-        {
-            let message = format!("there are two states `{}`: rename one", state.name);
-            self.report
-                .error(state.span, message)
-                .note(first.span, "the other one");
+    /// The named states of a machine or an enclosing state.
+    fn states(&mut self, children: &Children<'_, '_>) -> Vec<State> {
+        let mut states: Vec<State> = Vec::new();
+        for xml in children.named("state") {
+            let Some(state) = self.state(xml) else {
+                continue;
+            };
+            if let Some(first) = states
+                .iter()
+                .find(|s| s.name.eq_ignore_ascii_case(&state.name))
+            {
+                let message = format!("there are two states `{}`: rename one", state.name);
+                self.report
+                    .error(state.span, message)
+                    .note(first.span, "the other one");
+            }
+            states.push(state);
         }
-        states.push(state);
+        states
     }
 
     fn state(&mut self, xml: Xml<'_, '_>) -> Option<State> {
-        self.only(xml, &["name", "initial_state", "interpretation"]);
+        let children = self.enter(xml);
         let name = self.name(xml);
         let initial = self.initial_state(xml);
-        let mut state = State {
+        let [entry, exit] = ["entry", "exit"].map(|effect| {
+            let effect = children.find(effect);
+            effect.map_or_else(Vec::new, |xml| self.effects(xml))
+        });
+        let transitions = children.named("transition");
+        let transitions = transitions.filter_map(|it| self.transition(it)).collect();
+        let default = children.find("default_state");
+        let default = default.map_or_else(Vec::new, |xml| self.default_state(xml));
+        let otherwise = children.named("default_transition");
+        let otherwise: Vec<_> = otherwise
+            .filter_map(|it| self.default_transition(it))
+            .collect();
+        let state = State {
             name: name.unwrap_or_default(),
             initial,
-            entry: Vec::new(),
-            exit: Vec::new(),
-            transitions: Vec::new(),
-            default_transitions: Vec::new(),
-            children: Vec::new(),
+            entry,
+            exit,
+            transitions,
+            default_transitions: in_trial_order(otherwise, default),
+            children: self.states(&children),
             location: self.location(xml),
             span: self.span(xml),
         };
-        let mut once = [None, None, None];
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "state" => self.add_state(&mut state.children, child),
-                "transition" => state.transitions.extend(self.transition(child)),
-                "entry" => self.once(&mut once[0], child, xml),
-                "exit" => self.once(&mut once[1], child, xml),
-                "default_state" => self.once(&mut once[2], child, xml),
-                "default_transition" => self.default_transition(child),
-                _ => self.misplaced(
-                    child,
-                    "state",
-                    "`entry`, `exit`, `transition`s, `state`s and a `default_state`",
-                ),
-            }
-        }
-        let [entry, exit, default] = once;
-        state.entry = entry.map_or_else(Vec::new, |xml| self.effects(xml));
-        state.exit = exit.map_or_else(Vec::new, |xml| self.effects(xml));
-        state.default_transitions = default.map_or_else(Vec::new, |xml| self.default_state(xml));
         (!state.name.is_empty()).then_some(state)
     }
 
@@ -230,151 +210,132 @@ impl Reader<'_> {
     }
 
     fn default_state(&mut self, xml: Xml<'_, '_>) -> Vec<Transition> {
-        self.only(xml, &["interpretation"]);
-        let mut transitions = Vec::new();
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "transition" => transitions.extend(self.transition(child)),
-                "default_transition" => self.default_transition(child),
-                _ => self.misplaced(child, "default_state", "`transition`s"),
-            }
-        }
+        let children = self.enter(xml);
+        let transitions = children.named("transition");
+        let mut transitions: Vec<_> = transitions.filter_map(|it| self.transition(it)).collect();
+        let otherwise = children.named("default_transition");
+        transitions.extend(otherwise.filter_map(|it| self.default_transition(it)));
         transitions
     }
 
     /// The actions of an `entry` or `exit`.
     fn effects(&mut self, xml: Xml<'_, '_>) -> Vec<Action> {
-        self.only(xml, &["interpretation"]);
-        let parent = xml.tag_name().name().to_owned();
-        let mut actions = Vec::new();
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "action" => actions.extend(self.action(child)),
-                "send_action" => self.send_action(child),
-                _ => self.misplaced(child, &parent, "`action`s"),
-            }
-        }
-        actions
+        let children = self.enter(xml);
+        self.actions(&children)
     }
 
     fn transition(&mut self, xml: Xml<'_, '_>) -> Option<Transition> {
-        self.only(xml, &["name", "interpretation"]);
+        let children = self.enter(xml);
         let event = self.dotted(xml, "name");
-        let parts = self.transition_parts(xml, "transition");
-        let parameters = parts.parameters.into_iter();
+        let parameters = children.named("parameter");
+        let parameters = parameters.filter_map(|child| {
+            let at = self.span(child);
+            self.parameter(child).map(|parameter| (at, parameter))
+        });
+        let parameters: Vec<_> = parameters.collect();
+        let named = parameters.iter().map(|(at, p)| (p.name.as_str(), *at));
+        self.report.unique("parameters", named);
+        let parameters = parameters.into_iter().map(|(_, parameter)| parameter);
+        let trigger = event.map(|event| Trigger {
+            event: Some(event.value),
+            parameters: parameters.collect(),
+        });
+        self.reaction(xml, &children, trigger)
+    }
+
+    /// As a transition, but every event triggers it.
+    fn default_transition(&mut self, xml: Xml<'_, '_>) -> Option<Transition> {
+        let children = self.enter(xml);
+        let trigger = Trigger {
+            event: None,
+            parameters: Vec::new(),
+        };
+        self.reaction(xml, &children, Some(trigger))
+    }
+
+    /// The parts of a transition besides its trigger.
+    fn reaction(
+        &mut self,
+        xml: Xml<'_, '_>,
+        children: &Children<'_, '_>,
+        trigger: Option<Trigger>,
+    ) -> Option<Transition> {
+        let before = self.report.errors();
+        let guard = children.find("guard");
+        let guard = guard.and_then(|guard| self.guard(guard));
+        let targets = ["internal", "simple", "push", "pop"];
+        let target = targets.into_iter().find_map(|name| children.find(name));
+        let kind = target.and_then(|target| self.kind(target));
+        let guard_is_sound = self.report.errors() == before;
+        let actions = self.actions(children);
         Some(Transition {
-            trigger: Trigger {
-                event: event?.value,
-                parameters: parameters.map(|(_, parameter)| parameter).collect(),
-            },
-            guard: parts.guard.ok()?,
-            kind: parts.kind?,
-            actions: parts.actions,
+            trigger: trigger?,
+            guard,
+            kind: kind.filter(|_| guard_is_sound)?,
+            actions,
             location: self.location(xml),
             span: self.span(xml),
         })
     }
 
-    fn transition_parts(&mut self, xml: Xml<'_, '_>, parent: &str) -> TransitionParts {
-        let (mut parameters, mut actions) = (Vec::new(), Vec::new());
-        let (mut guard, mut kind) = (None, None);
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "parameter" => {
-                    let at = self.span(child);
-                    parameters.extend(self.parameter(child).map(|parameter| (at, parameter)));
-                }
-                "guard" => self.once(&mut guard, child, xml),
-                "internal" | "simple" | "push" | "pop" if kind.is_some() => {
-                    let at = self.span(child);
-                    let message = "a transition has one target: keep one of `internal`, `simple`, \
-                        `push` and `pop`";
-                    self.report.error(at, message);
-                }
-                "internal" | "simple" | "push" | "pop" => kind = Some(child),
-                "action" => actions.extend(self.action(child)),
-                "send_action" => self.send_action(child),
-                _ => self.misplaced(
-                    child,
-                    parent,
-                    "`parameter`s, a `guard`, one of `internal`, `simple`, `push` and `pop`, and \
-                     `action`s",
-                ),
-            }
-        }
-        let named = parameters.iter().map(|(at, p)| (p.name.as_str(), *at));
-        self.report.unique("parameters", named);
-        let guard = match guard {
-            Some(guard) => self.guard(guard).map(Some).ok_or(Faulty),
-            None => Ok(None),
-        };
-        let kind = match kind {
-            Some(kind) => self.kind(kind),
-            None => {
-                self.lacks(xml, "internal");
-                None
-            }
-        };
-        TransitionParts {
-            parameters,
-            guard,
-            kind,
-            actions,
-        }
-    }
-
     fn kind(&mut self, xml: Xml<'_, '_>) -> Option<TransitionKind> {
-        let element = xml.tag_name().name().to_owned();
-        if element == "pop" {
-            return Some(self.pop(xml));
-        }
-        self.only(xml, &["interpretation"]);
-        let leads = matches!(element.as_str(), "simple" | "push");
-        let mut end = None;
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "end_state" if leads => self.once(&mut end, child, xml),
-                _ if leads => self.misplaced(child, &element, "an `end_state`"),
-                _ => self.misplaced(child, &element, "nothing"),
+        match xml.tag_name().name() {
+            "simple" => Some(match self.simple(xml) {
+                Some(end) => TransitionKind::To(end?),
+                None => TransitionKind::Again,
+            }),
+            "push" => self.push(xml),
+            "pop" => self.pop(xml),
+            _ => {
+                self.enter(xml);
+                Some(TransitionKind::Internal)
             }
         }
-        let end = match end {
-            Some(end) => {
-                self.only(end, &["state", "interpretation"]);
-                Some(self.dotted(end, "state")?.value)
-            }
-            None => None,
-        };
-        Some(match (element.as_str(), end) {
-            ("simple", Some(end)) => TransitionKind::To(end),
-            ("simple", None) => TransitionKind::Again,
-            ("push", Some(end)) => TransitionKind::Push(end),
-            ("push", None) => {
-                self.lacks(xml, "end_state");
-                return None;
-            }
-            _ => TransitionKind::Internal,
-        })
     }
 
-    /// The standard permits a subsequent transition with arguments in a `pop`; published
-    /// definitions have none.
-    fn pop(&mut self, xml: Xml<'_, '_>) -> TransitionKind {
-        self.only(xml, &["transition", "interpretation"]);
-        if let Some(transition) = self.attribute(xml, "transition") {
-            let message = "ignored: the `transition` of a `pop` is not supported";
-            self.report.warning(transition.span, message);
-        }
-        for child in self.children(xml) {
-            if child.tag_name().name() != "argument" {
-                self.misplaced(child, "pop", "`argument`s");
+    /// The `end_state` of a `simple`: `None` without one, `Some(None)` if it is unreadable.
+    fn simple(&mut self, xml: Xml<'_, '_>) -> Option<Option<Name>> {
+        let end = self.enter(xml).find("end_state")?;
+        Some(self.end_state(end))
+    }
+
+    fn end_state(&mut self, xml: Xml<'_, '_>) -> Option<Name> {
+        self.enter(xml);
+        Some(self.dotted(xml, "state")?.value)
+    }
+
+    fn push(&mut self, xml: Xml<'_, '_>) -> Option<TransitionKind> {
+        let children = self.enter(xml);
+        let to = children.find("end_state");
+        let to = to.and_then(|end| self.end_state(end));
+        let back = match children.find("simple").map(|it| self.simple(it)) {
+            Some(Some(back)) => Some(back?),
+            Some(None) | None => None,
+        };
+        Some(TransitionKind::Push(Push { to: to?, back }))
+    }
+
+    fn pop(&mut self, xml: Xml<'_, '_>) -> Option<TransitionKind> {
+        let children = self.enter(xml);
+        let arguments = self.arguments(&children);
+        let Some(name) = self.attribute(xml, "transition") else {
+            if let Some(argument) = children.find("argument") {
+                let at = self.span(argument);
+                let message = "an `argument` of a `pop` belongs to the event that its attribute \
+                    `transition` names: add that, or remove the argument";
+                self.report.error(at, message);
             }
-        }
-        TransitionKind::Pop
+            return Some(TransitionKind::Pop(None));
+        };
+        let name = self.identifier(name)?;
+        Some(TransitionKind::Pop(Some(Call {
+            name: Name::of(vec![&name]),
+            arguments,
+        })))
     }
 
     fn parameter(&mut self, xml: Xml<'_, '_>) -> Option<Parameter> {
-        self.only(xml, &["type", "value", "interpretation"]);
+        self.enter(xml);
         let kind = self.required(xml, "type");
         let name = self.required(xml, "value");
         Some(Parameter {
@@ -384,7 +345,7 @@ impl Reader<'_> {
     }
 
     fn guard(&mut self, xml: Xml<'_, '_>) -> Option<Guard> {
-        self.only(xml, &["condition", "interpretation"]);
+        self.enter(xml);
         let text = self.required(xml, "condition")?;
         let read = Guard::parse(&text.value);
         self.understood(
@@ -394,24 +355,37 @@ impl Reader<'_> {
         )
     }
 
-    fn action(&mut self, xml: Xml<'_, '_>) -> Option<Action> {
-        self.only(xml, &["name", "interpretation"]);
-        let name = self.dotted(xml, "name");
-        let mut arguments = Vec::new();
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "argument" => arguments.extend(self.argument(child)),
-                _ => self.misplaced(child, "action", "`argument`s"),
-            }
+    /// The actions among the children of a transition, an `entry` or an `exit`.
+    fn actions(&mut self, children: &Children<'_, '_>) -> Vec<Action> {
+        let mut actions = Vec::new();
+        for child in children.all() {
+            actions.extend(match child.tag_name().name() {
+                "action" => self.action(child, ActionKind::Call),
+                "send_action" => self.action(child, ActionKind::Send),
+                _ => None,
+            });
         }
+        actions
+    }
+
+    fn action(&mut self, xml: Xml<'_, '_>, kind: ActionKind) -> Option<Action> {
+        let children = self.enter(xml);
+        let name = self.dotted(xml, "name");
+        let arguments = self.arguments(&children);
         Some(Action {
+            kind,
             name: name?.value,
             arguments,
         })
     }
 
+    fn arguments(&mut self, children: &Children<'_, '_>) -> Vec<Argument> {
+        let arguments = children.named("argument");
+        arguments.filter_map(|it| self.argument(it)).collect()
+    }
+
     fn argument(&mut self, xml: Xml<'_, '_>) -> Option<Argument> {
-        self.only(xml, &["value", "interpretation"]);
+        self.enter(xml);
         let mut text = self.required(xml, "value")?;
         let quotes = text.value.strip_prefix('‘');
         let curly = quotes.and_then(|rest| rest.strip_suffix('’'));
@@ -426,47 +400,6 @@ impl Reader<'_> {
             &text,
             "`value` must be a parameter's name or a text in `'`",
         )
-    }
-
-    /// As a transition, but without trigger parameters.
-    fn default_transition(&mut self, xml: Xml<'_, '_>) {
-        self.only(xml, &["interpretation"]);
-        let parts = self.transition_parts(xml, "default_transition");
-        if let Some(parameter) = parts.parameters.first() {
-            let at = parameter.0;
-            let message = "a `default_transition` matches every event, so it has no parameters: \
-                remove them, or write a `transition`";
-            self.report.error(at, message);
-        }
-        let variable = parts.actions.iter().flat_map(|action| &action.arguments);
-        let mut variables = variable.filter_map(|argument| match argument {
-            Argument::Variable(name) => Some(name),
-            Argument::Text(_) | Argument::Integer(_) => None,
-        });
-        if let Some(name) = variables.next() {
-            let at = self.span(xml);
-            let message = format!(
-                "`{name}` is not a text in `'`, and a `default_transition` has no parameters: \
-                 write a `transition`, or a text"
-            );
-            self.report.error(at, message);
-        }
-        self.not_understood(xml);
-    }
-
-    fn send_action(&mut self, xml: Xml<'_, '_>) {
-        // Its mistakes are reported nevertheless.
-        let _ = self.action(xml);
-        self.not_understood(xml);
-    }
-
-    /// Elements of the standard without support, as no published definition uses them.
-    fn not_understood(&mut self, xml: Xml<'_, '_>) {
-        let name = xml.tag_name().name();
-        let message =
-            format!("ignored: `{name}` is not supported; write a `transition` with `action`s");
-        let at = self.span(xml);
-        self.report.warning(at, message);
     }
 
     fn understood<T>(
@@ -498,4 +431,14 @@ impl Reader<'_> {
             span: text.span,
         })
     }
+}
+
+/// The default transitions of a state: those with a trigger before those without, as the public
+/// tool set tries them.
+fn in_trial_order(own: Vec<Transition>, default_state: Vec<Transition>) -> Vec<Transition> {
+    let split = |it: &Transition| it.trigger.event.is_some();
+    let (mut all, otherwise): (Vec<_>, Vec<_>) = default_state.into_iter().partition(split);
+    all.extend(own);
+    all.extend(otherwise);
+    all
 }

@@ -1,16 +1,17 @@
 //! Cursor over XML elements with the rules of JSIDL: two namespaces for the same elements, runs of
 //! white space in attributes, and reports of all mistakes at once.
 
+use std::sync::Arc;
+
 use roxmltree::{ExpandedName, Node as Xml};
 
-use super::Expr;
+use super::{Expr, VersionPattern};
 use crate::diagnostic::Report;
 use crate::expr::Expression;
-use crate::model::{Id, Location, Number, Signed, Unsigned, Version};
+use crate::grammar::{self, Edition, Element, Occurs, Part};
+use crate::model::{Id, Location, Number, Signed, Unsigned};
 use crate::source::{Source, Span, Spanned};
-
-/// AS5684 and AS5684A; files mix them.
-const NAMESPACES: [&str; 2] = ["urn:jaus:jsidl:1.0", "urn:jaus:jsidl:1.1"];
+use crate::spelling::shortened;
 
 /// JSIDL+: wraps several services into one file and adds data of a diagram editor.
 const PLUS: &str = "urn:jaus:jsidl:plus";
@@ -29,6 +30,35 @@ pub(super) struct Reader<'r> {
     pub(super) report: &'r mut Report,
 }
 
+/// The children of an element, as far as the grammar permits them.
+pub(super) struct Children<'a, 'x>(Vec<Xml<'a, 'x>>);
+
+impl<'a, 'x> Children<'a, 'x> {
+    /// The first child with this name.
+    pub(super) fn find(&self, name: &str) -> Option<Xml<'a, 'x>> {
+        self.named(name).next()
+    }
+
+    pub(super) fn all(&self) -> impl Iterator<Item = Xml<'a, 'x>> + '_ {
+        self.0.iter().copied()
+    }
+
+    /// The children with this name.
+    pub(super) fn named<'n>(&'n self, name: &'n str) -> impl Iterator<Item = Xml<'a, 'x>> + 'n {
+        let all = self.0.iter().copied();
+        all.filter(move |child| child.tag_name().name() == name)
+    }
+}
+
+impl<'a, 'x> IntoIterator for Children<'a, 'x> {
+    type Item = Xml<'a, 'x>;
+    type IntoIter = std::vec::IntoIter<Xml<'a, 'x>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.into_iter()
+    }
+}
+
 /// Namespace of an element.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Belongs {
@@ -39,7 +69,7 @@ pub(super) enum Belongs {
 
 pub(super) fn belongs(xml: Xml<'_, '_>) -> Belongs {
     match xml.tag_name().namespace() {
-        Some(uri) if NAMESPACES.contains(&uri) => Belongs::Jsidl,
+        Some(uri) if Edition::of_namespace(uri).is_some() => Belongs::Jsidl,
         Some(PLUS) => Belongs::Plus,
         _ => Belongs::Foreign,
     }
@@ -56,9 +86,41 @@ impl Reader<'_> {
         self.source.location(self.span(xml))
     }
 
+    /// Checks the attributes and children of an element against the grammar, and returns the
+    /// permitted children.
+    pub(super) fn enter<'a, 'x>(&mut self, xml: Xml<'a, 'x>) -> Children<'a, 'x> {
+        let mut children = self.elements(xml);
+        let Some(element) = grammar::element(xml.tag_name().name()) else {
+            return Children(children);
+        };
+        self.known_attributes(xml, element);
+        let mut taken = vec![None; element.parts.len()];
+        children.retain(|&child| {
+            let name = child.tag_name().name();
+            let Some((position, part)) = element.part(name) else {
+                self.misplaced(child, element);
+                return false;
+            };
+            let first = taken[position].replace(name);
+            let single = matches!(part.occurs(Edition::V1_1), Occurs::Once | Occurs::Optional);
+            match first.filter(|_| single) {
+                Some(first) => self.surplus(child, element, part, first),
+                None => return true,
+            }
+            false
+        });
+        for (part, taken) in element.parts.iter().zip(taken) {
+            let needed = part.occurs(Edition::V1_1).is_mandatory() && !part.dispensable;
+            if needed && taken.is_none() {
+                self.missing(xml, part);
+            }
+        }
+        Children(children)
+    }
+
     /// The child elements. Drawing data of JSIDL+ is skipped; other foreign elements and text are
     /// reported.
-    pub(super) fn children<'a, 'x>(&mut self, xml: Xml<'a, 'x>) -> Vec<Xml<'a, 'x>> {
+    fn elements<'a, 'x>(&mut self, xml: Xml<'a, 'x>) -> Vec<Xml<'a, 'x>> {
         let parent = xml.tag_name().name();
         let mut elements = Vec::new();
         for child in xml.children() {
@@ -72,10 +134,10 @@ impl Reader<'_> {
                     Belongs::Plus => {}
                     Belongs::Foreign => {
                         let name = child.tag_name().name();
+                        let [old, new] = [Edition::V1_0, Edition::V1_1].map(Edition::namespace);
                         self.report.error(at, format!(
-                            "`{name}` is not an element of JSIDL: its namespace must be `{}` or \
-                             `{}`",
-                            NAMESPACES[0], NAMESPACES[1],
+                            "`{name}` is not an element of JSIDL: its namespace must be `{old}` or \
+                             `{new}`",
                         ));
                     }
                 }
@@ -92,50 +154,57 @@ impl Reader<'_> {
     }
 
     /// Reports unknown attributes.
-    pub(super) fn only(&mut self, xml: Xml<'_, '_>, known: &[&str]) {
+    pub(super) fn known_attributes(&mut self, xml: Xml<'_, '_>, element: &Element) {
         for attribute in xml.attributes() {
             let name = attribute.name();
-            if attribute.namespace().is_some() || known.contains(&name) {
+            if attribute.namespace().is_some() || element.attribute(name).is_some() {
                 continue;
             }
-            let element = xml.tag_name().name();
-            let at = self.source.span(attribute.range().start);
-            let message = if known.is_empty() {
-                format!("`{element}` has no attribute `{name}`: remove it")
+            let known: Vec<_> = element.attributes.iter().map(|it| it.name).collect();
+            let advice = if known.is_empty() {
+                "remove it".to_owned()
             } else {
-                let known = known.join("`, `");
-                format!("`{element}` has no attribute `{name}`: it has `{known}`")
+                format!("it has `{}`", known.join("`, `"))
             };
+            let at = self.source.span(attribute.range().start);
+            let message = format!("`{}` has no attribute `{name}`: {advice}", element.name);
             self.report.error(at, message);
         }
     }
 
-    /// Reports a misplaced element.
-    pub(super) fn misplaced(&mut self, xml: Xml<'_, '_>, parent: &str, allowed: &str) {
-        let name = xml.tag_name().name();
-        let at = self.span(xml);
-        self.report.error(
-            at,
-            format!("`{name}` is not allowed in `{parent}`, which holds {allowed}"),
+    fn misplaced(&mut self, child: Xml<'_, '_>, parent: &Element) {
+        let name = child.tag_name().name();
+        let at = self.span(child);
+        let message = format!(
+            "`{name}` is not allowed in `{}`, which holds {}",
+            parent.name, parent.holds
         );
+        self.report.error(at, message);
     }
 
-    /// Reports a duplicate of an element that may occur once.
-    pub(super) fn repeated(&mut self, xml: Xml<'_, '_>, parent: &str) {
-        let name = xml.tag_name().name();
-        let at = self.span(xml);
-        self.report.error(
-            at,
-            format!("`{parent}` has more than one `{name}`: keep one"),
-        );
+    /// Reports a child after the `first` one of a part that occurs once.
+    fn surplus(&mut self, child: Xml<'_, '_>, parent: &Element, part: &Part, first: &str) {
+        let name = child.tag_name().name();
+        let at = self.span(child);
+        let message = match part.surplus {
+            Some(finding) => format!("`{}` {finding}", parent.name),
+            None if first == name => {
+                format!("`{}` has more than one `{name}`: keep one", parent.name)
+            }
+            None => format!("`{}` has `{first}` and `{name}`: keep one", parent.name),
+        };
+        self.report.error(at, message);
     }
 
-    /// Reports a missing child.
-    pub(super) fn lacks(&mut self, xml: Xml<'_, '_>, child: &str) {
-        let name = xml.tag_name().name();
-        let at = self.span(xml);
-        self.report
-            .error(at, format!("`{name}` lacks the element `{child}`: add it"));
+    fn missing(&mut self, parent: Xml<'_, '_>, part: &Part) {
+        let name = parent.tag_name().name();
+        let at = self.span(parent);
+        let child = part.elements(Edition::V1_1).next().unwrap_or_default();
+        let message = match part.missing {
+            Some(finding) => format!("`{name}` {finding}"),
+            None => format!("`{name}` lacks the element `{child}`: add it"),
+        };
+        self.report.error(at, message);
     }
 
     /// An attribute's text, white space folded.
@@ -283,26 +352,45 @@ impl Reader<'_> {
 
     /// The attributes `id` and `version`.
     pub(super) fn id(&mut self, xml: Xml<'_, '_>) -> Option<Id> {
-        let urn = self.required(xml, "id");
-        let version = self.required(xml, "version");
+        let urn = self.urn(xml);
+        let text = self.required(xml, "version")?;
+        let pattern = self.version(&text)?;
+        let version = pattern.exact();
+        if version.is_none() {
+            let message = format!(
+                "`{}` cannot be a version: a wildcard does not select a definition: write the version",
+                text.value
+            );
+            self.report.error(text.span, message);
+        }
+        Some(Id {
+            urn: urn?,
+            version: version?,
+        })
+    }
+
+    /// As [`id`](Self::id), for a reference to a service: the version may have wildcards.
+    pub(super) fn id_pattern(&mut self, xml: Xml<'_, '_>) -> Option<(Arc<str>, VersionPattern)> {
+        let urn = self.urn(xml);
+        let text = self.required(xml, "version")?;
+        let version = self.version(&text);
+        Some((urn?, version?))
+    }
+
+    fn urn(&mut self, xml: Xml<'_, '_>) -> Option<Arc<str>> {
+        let urn = self.required(xml, "id")?;
         if let Some(raw) = xml.attribute("id")
             && raw.trim() != raw
-            && let Some(urn) = &urn
         {
             self.report.warning(
                 urn.span,
                 format!("the id `{}` has surrounding spaces: remove them", urn.value),
             );
         }
-        let urn = urn.and_then(|urn| self.urn(urn));
-        let version = version.and_then(|version| self.version(&version));
-        Some(Id {
-            urn: urn?.into(),
-            version: version?,
-        })
+        self.sound_urn(urn).map(Into::into)
     }
 
-    fn urn(&mut self, urn: Spanned<String>) -> Option<String> {
+    fn sound_urn(&mut self, urn: Spanned<String>) -> Option<String> {
         let text = &urn.value;
         let sound = text.len() <= LONGEST_NAME
             && begins_like_a_name(text)
@@ -320,27 +408,26 @@ impl Reader<'_> {
         None
     }
 
-    fn version(&mut self, text: &Spanned<String>) -> Option<Version> {
-        let part = |part: &str| -> Option<u8> {
+    fn version(&mut self, text: &Spanned<String>) -> Option<VersionPattern> {
+        let part = |part: &str| -> Option<Option<u8>> {
+            if part == "*" {
+                return Some(None);
+            }
             let plain = part == "0" || !part.starts_with(['0', '+']);
-            part.parse().ok().filter(|_| plain)
+            part.parse().ok().filter(|_| plain).map(Some)
         };
         let parsed = text.value.split_once('.').and_then(|(major, minor)| {
-            Some(Version {
+            Some(VersionPattern {
                 major: part(major)?,
                 minor: part(minor)?,
             })
         });
         if parsed.is_none() {
-            let advice = if text.value.contains('*') {
-                "a wildcard does not select a definition: write the version"
-            } else {
-                "write two numbers from 0 to 255, for example `1.0`"
-            };
-            self.report.error(
-                text.span,
-                format!("`{}` cannot be a version: {advice}", text.value),
+            let message = format!(
+                "`{}` cannot be a version: write two numbers from 0 to 255, for example `1.0`",
+                text.value
             );
+            self.report.error(text.span, message);
         }
         parsed
     }
@@ -348,14 +435,6 @@ impl Reader<'_> {
 
 fn begins_like_a_name(text: &str) -> bool {
     text.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
-}
-
-/// The beginning of a text that is too long to be quoted.
-pub(super) fn shortened(text: &str) -> String {
-    match text.char_indices().nth(40) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text.to_owned(),
-    }
 }
 
 /// An error that is already reported.
@@ -373,7 +452,7 @@ const UNSIGNED: [(&str, Unsigned); 4] = [
     ("unsigned long integer", Unsigned::U64),
 ];
 
-const NUMBERS: [(&str, Number); 10] = [
+pub(super) const NUMBERS: [(&str, Number); 10] = [
     ("byte", Number::Signed(Signed::I8)),
     ("short integer", Number::Signed(Signed::I16)),
     ("integer", Number::Signed(Signed::I32)),

@@ -2,9 +2,11 @@
 
 use roxmltree::Node as Xml;
 
-use super::element::Reader;
-use super::{ChoiceEnum, FormatEnum, Kind, ScalarField, ScaleRange, SubField, ValueEnum};
-use super::{ValueRange, ValueSet};
+use super::element::{Children, Reader};
+use super::{
+    ChoiceEnum, Construct, FormatEnum, Kind, ScalarField, ScaleRange, SubField, ValueEnum,
+    ValueRange, ValueSet, Values,
+};
 use crate::model::Rounding;
 
 /// Namespace of our attributes beyond JSIDL.
@@ -13,27 +15,35 @@ const EXTENSION: &str = "urn:jaus-rs:jsidl";
 impl Reader<'_> {
     /// Reads type, units and meaning of a `fixed_field` or `type_and_units_enum`.
     pub(super) fn scalar(&mut self, xml: Xml<'_, '_>) -> Option<ScalarField> {
+        let before = self.report.errors();
+        let children = self.enter(xml);
         let number = self.number(xml, "field_type");
         let units = self.required(xml, "field_units");
-        let (mut scale, mut values) = (None, None);
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "scale_range" => self.once(&mut scale, child, xml),
-                "value_set" => self.once(&mut values, child, xml),
-                _ => {
-                    let parent = xml.tag_name().name().to_owned();
-                    self.misplaced(child, &parent, "a `scale_range` or a `value_set`");
-                }
-            }
-        }
+        let scale = children.find("scale_range");
         let scale = scale.map(|xml| self.scale_range(xml));
-        let values = values.map(|xml| self.value_set(xml));
+        let values = self.values(&children);
+        let units = units?;
+        // Further mistakes of the whole field are reported, but not its parts alone.
+        if self.report.errors() > before {
+            return None;
+        }
         Some(ScalarField {
             number: number?,
-            units: units?.value,
-            scale: transpose(scale)?,
-            values: transpose(values)?,
+            units,
+            scale: scale.flatten(),
+            values,
         })
+    }
+
+    /// Reads a `value_set` or `declared_value_set`.
+    fn values(&mut self, children: &Children<'_, '_>) -> Option<Values> {
+        if let Some(declared) = children.find("declared_value_set") {
+            self.name(declared);
+            let target = self.reference(declared, Construct::ValueSet);
+            return target.map(Values::Declared);
+        }
+        let set = children.find("value_set")?;
+        self.value_set(set).map(Values::Here)
     }
 
     fn scale_range(&mut self, xml: Xml<'_, '_>) -> Option<ScaleRange> {
@@ -42,15 +52,7 @@ impl Reader<'_> {
             ("floor", Rounding::Floor),
             ("ceiling", Rounding::Ceiling),
         ];
-        self.only(
-            xml,
-            &[
-                "real_lower_limit",
-                "real_upper_limit",
-                "integer_function",
-                "interpretation",
-            ],
-        );
+        self.enter(xml);
         let lower = self.expression(xml, "real_lower_limit");
         let upper = self.expression(xml, "real_upper_limit");
         let rounding = self
@@ -78,29 +80,18 @@ impl Reader<'_> {
 
     /// Reads a `value_set`.
     pub(super) fn value_set(&mut self, xml: Xml<'_, '_>) -> Option<ValueSet> {
-        self.only(xml, &["offset_to_lower_limit"]);
+        let before = self.report.errors();
+        let children = self.enter(xml);
         let offset = self.flag(xml, "offset_to_lower_limit");
-        let mut sound = offset.is_ok();
         let (mut ranges, mut values) = (Vec::new(), Vec::new());
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "value_range" => {
-                    let range = self.value_range(child);
-                    sound &= range.is_some();
-                    ranges.extend(range);
-                }
-                "value_enum" => {
-                    let value = self.value_enum(child);
-                    sound &= value.is_some();
-                    values.extend(value);
-                }
-                _ => {
-                    self.misplaced(child, "value_set", "`value_range` and `value_enum`");
-                    sound = false;
-                }
+        for child in children {
+            if child.tag_name().name() == "value_range" {
+                ranges.extend(self.value_range(child));
+            } else {
+                values.extend(self.value_enum(child));
             }
         }
-        sound.then(|| ValueSet {
+        (self.report.errors() == before).then(|| ValueSet {
             span: self.span(xml),
             offset_to_lower_limit: offset.ok().flatten().unwrap_or(false),
             ranges,
@@ -109,16 +100,7 @@ impl Reader<'_> {
     }
 
     fn value_range(&mut self, xml: Xml<'_, '_>) -> Option<ValueRange> {
-        self.only(
-            xml,
-            &[
-                "lower_limit",
-                "lower_limit_type",
-                "upper_limit",
-                "upper_limit_type",
-                "interpretation",
-            ],
-        );
+        self.enter(xml);
         let lower = self.expression(xml, "lower_limit");
         let upper = self.expression(xml, "upper_limit");
         let lower_exclusive = self.exclusive(xml, "lower_limit_type");
@@ -143,7 +125,7 @@ impl Reader<'_> {
     }
 
     fn value_enum(&mut self, xml: Xml<'_, '_>) -> Option<ValueEnum> {
-        self.only(xml, &["enum_index", "enum_const", "interpretation"]);
+        self.enter(xml);
         let index = self.expression(xml, "enum_index");
         let name = self.required(xml, "enum_const");
         Some(ValueEnum {
@@ -156,49 +138,20 @@ impl Reader<'_> {
 
     /// Reads a `bit_field`.
     pub(super) fn bit_field(&mut self, xml: Xml<'_, '_>) -> Option<Kind> {
+        let before = self.report.errors();
+        let children = self.enter(xml).into_iter();
         let base = self.unsigned(xml);
-        let mut sound = true;
-        let mut fields = Vec::new();
-        for child in self.children(xml) {
-            if child.tag_name().name() == "sub_field" {
-                let field = self.sub_field(child);
-                sound &= field.is_some();
-                fields.extend(field);
-            } else {
-                self.misplaced(child, "bit_field", "`sub_field`s");
-                sound = false;
-            }
-        }
-        if sound && fields.is_empty() {
-            self.lacks(xml, "sub_field");
-            sound = false;
-        }
-        Some(Kind::Bits {
-            base: base.filter(|_| sound)?,
-            fields,
-        })
+        let fields = children.filter_map(|child| self.sub_field(child)).collect();
+        let base = base.filter(|_| self.report.errors() == before)?;
+        Some(Kind::Bits { base, fields })
     }
 
     fn sub_field(&mut self, xml: Xml<'_, '_>) -> Option<SubField> {
-        self.only(xml, &["name", "interpretation"]);
+        let children = self.enter(xml);
         let name = self.name(xml);
-        let (mut range, mut values) = (None, None);
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "bit_range" => self.once(&mut range, child, xml),
-                "value_set" => self.once(&mut values, child, xml),
-                _ => self.misplaced(child, "sub_field", "a `bit_range` and a `value_set`"),
-            }
-        }
-        if range.is_none() {
-            self.lacks(xml, "bit_range");
-        }
-        if values.is_none() {
-            self.lacks(xml, "value_set");
-        }
-        let values = values.and_then(|xml| self.value_set(xml));
-        let range = range?;
-        self.only(range, &["from_index", "to_index", "interpretation"]);
+        let values = self.values(&children);
+        let range = children.find("bit_range")?;
+        self.enter(range);
         let from = self.expression(range, "from_index");
         let to = self.expression(range, "to_index");
         Some(SubField {
@@ -213,38 +166,14 @@ impl Reader<'_> {
 
     /// Reads a `variable_field`.
     pub(super) fn variable_field(&mut self, xml: Xml<'_, '_>) -> Option<Kind> {
-        let field = self.only_child(xml, "type_and_units_field")?;
-        self.only(field, &[]);
-        let mut sound = true;
-        let mut choices = Vec::new();
-        for child in self.children(field) {
-            if child.tag_name().name() == "type_and_units_enum" {
-                let choice = self.choice(child);
-                sound &= choice.is_some();
-                choices.extend(choice);
-            } else {
-                self.misplaced(child, "type_and_units_field", "`type_and_units_enum`s");
-                sound = false;
-            }
-        }
-        if sound && choices.is_empty() {
-            self.lacks(field, "type_and_units_enum");
-            sound = false;
-        }
-        sound.then_some(Kind::Measure { choices })
+        let before = self.report.errors();
+        let field = self.enter(xml).find("type_and_units_field")?;
+        let children = self.enter(field).into_iter();
+        let choices = children.filter_map(|child| self.choice(child)).collect();
+        (self.report.errors() == before).then_some(Kind::Measure { choices })
     }
 
     fn choice(&mut self, xml: Xml<'_, '_>) -> Option<ChoiceEnum> {
-        self.only(
-            xml,
-            &[
-                "name",
-                "index",
-                "field_type",
-                "field_units",
-                "interpretation",
-            ],
-        );
         let index = self.expression(xml, "index");
         let name = match self.attribute(xml, "name") {
             None => Some(None),
@@ -261,25 +190,23 @@ impl Reader<'_> {
 
     /// Reads a `fixed_length_string`.
     pub(super) fn fixed_string(&mut self, xml: Xml<'_, '_>) -> Option<Kind> {
-        for child in self.children(xml) {
-            self.misplaced(child, "fixed_length_string", "nothing");
-        }
+        self.enter(xml);
         let length = self.expression(xml, "string_length")?;
         Some(Kind::FixedString { length })
     }
 
     /// Reads a `variable_length_string`.
     pub(super) fn variable_string(&mut self, xml: Xml<'_, '_>) -> Option<Kind> {
-        let found = self.only_child(xml, "count_field")?;
-        let count = self.count(xml, "count_field", Some(found))?;
+        let found = self.enter(xml).find("count_field")?;
+        let count = self.count(found)?;
         Some(Kind::VariableString { count })
     }
 
     /// Reads a `variable_length_field`.
     pub(super) fn blob(&mut self, xml: Xml<'_, '_>) -> Option<Kind> {
+        let children = self.enter(xml);
         let format = self.required(xml, "field_format");
-        let found = self.only_child(xml, "count_field")?;
-        let count = self.count(xml, "count_field", Some(found));
+        let count = self.count(children.find("count_field")?);
         Some(Kind::Blob {
             count: count?,
             format: format?.value,
@@ -288,23 +215,11 @@ impl Reader<'_> {
 
     /// Reads a `variable_format_field`.
     pub(super) fn formatted_blob(&mut self, xml: Xml<'_, '_>) -> Option<Kind> {
-        let (mut format, mut count) = (None, None);
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "format_field" => self.once(&mut format, child, xml),
-                "count_field" => self.once(&mut count, child, xml),
-                _ => self.misplaced(
-                    child,
-                    "variable_format_field",
-                    "a `format_field` and a `count_field`",
-                ),
-            }
-        }
-        if format.is_none() {
-            self.lacks(xml, "format_field");
-        }
-        let count = self.count(xml, "count_field", count);
-        let formats = format.and_then(|xml| self.formats(xml));
+        let children = self.enter(xml);
+        let count = children.find("count_field");
+        let count = count.and_then(|xml| self.count(xml));
+        let formats = children.find("format_field");
+        let formats = formats.and_then(|xml| self.formats(xml));
         Some(Kind::FormattedBlob {
             formats: formats?,
             count: count?,
@@ -312,56 +227,20 @@ impl Reader<'_> {
     }
 
     fn formats(&mut self, xml: Xml<'_, '_>) -> Option<Vec<FormatEnum>> {
-        self.only(xml, &[]);
-        let mut sound = true;
+        let before = self.report.errors();
         let mut formats = Vec::new();
-        for child in self.children(xml) {
-            if child.tag_name().name() != "format_enum" {
-                self.misplaced(child, "format_field", "`format_enum`s");
-                sound = false;
-                continue;
-            }
-            self.only(child, &["index", "field_format", "interpretation"]);
+        for child in self.enter(xml) {
+            self.enter(child);
             let index = self.expression(child, "index");
             let name = self.required(child, "field_format");
-            match (index, name) {
-                (Some(index), Some(name)) => formats.push(FormatEnum {
+            if let (Some(index), Some(name)) = (index, name) {
+                formats.push(FormatEnum {
                     span: index.span,
                     index,
                     name: name.value,
-                }),
-                _ => sound = false,
+                });
             }
         }
-        if sound && formats.is_empty() {
-            self.lacks(xml, "format_enum");
-            sound = false;
-        }
-        sound.then_some(formats)
-    }
-
-    /// The only permitted, mandatory child of an element.
-    fn only_child<'a, 'x>(&mut self, xml: Xml<'a, 'x>, element: &str) -> Option<Xml<'a, 'x>> {
-        let mut found = None;
-        for child in self.children(xml) {
-            if child.tag_name().name() == element {
-                self.once(&mut found, child, xml);
-            } else {
-                let parent = xml.tag_name().name().to_owned();
-                self.misplaced(child, &parent, &format!("one `{element}`"));
-            }
-        }
-        if found.is_none() {
-            self.lacks(xml, element);
-        }
-        found
-    }
-}
-
-/// `None` if it was present but unreadable.
-fn transpose<T>(read: Option<Option<T>>) -> Option<Option<T>> {
-    match read {
-        None => Some(None),
-        Some(read) => read.map(Some),
+        (self.report.errors() == before).then_some(formats)
     }
 }

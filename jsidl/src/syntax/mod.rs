@@ -11,13 +11,16 @@ mod limits;
 mod message;
 mod root;
 
+use std::fmt;
+use std::sync::Arc;
+
 use crate::behaviour::StateMachine;
 use crate::expr::Expression;
-use crate::model::{GroupKind, Id, Number, Rounding, Unsigned};
+use crate::model::{GroupKind, Id, Number, Rounding, Unsigned, Version};
 use crate::source::{Span, Spanned};
 
 pub(crate) use limits::LARGEST;
-pub(crate) use root::{Strictness, is_definition, read};
+pub(crate) use root::{Strictness, check_strictly, is_definition, read};
 
 /// Declarations of all files.
 #[derive(Debug, Default)]
@@ -37,8 +40,8 @@ pub(crate) struct ServiceDef {
     pub(crate) name: String,
     pub(crate) id: Id,
     pub(crate) description: String,
-    pub(crate) inherits_from: Option<SetRef>,
-    pub(crate) client_of: Vec<SetRef>,
+    pub(crate) inherits_from: Option<ServiceRef>,
+    pub(crate) client_of: Vec<ServiceRef>,
     /// The `declared_type_set` inside the service; an empty one if it has none.
     pub(crate) types: TypeSetIndex,
     pub(crate) inputs: Vec<Declaration>,
@@ -51,8 +54,60 @@ pub(crate) struct ServiceDef {
     pub(crate) sound: bool,
 }
 
-/// A local alias of a set or service with URN and version: `inherits_from`, `client_of`,
-/// `declared_type_set_ref`, `declared_const_set_ref`.
+/// A local alias of a service: `inherits_from`, `client_of`.
+#[derive(Debug, Clone)]
+pub(crate) struct ServiceRef {
+    pub(crate) span: Span,
+    pub(crate) name: String,
+    pub(crate) urn: Arc<str>,
+    pub(crate) version: VersionPattern,
+}
+
+impl ServiceRef {
+    /// Whether it may mean a service with this identity.
+    pub(crate) fn admits(&self, id: &Id) -> bool {
+        self.urn == id.urn && self.version.admits(id.version)
+    }
+}
+
+/// The URN and the version as written.
+impl fmt::Display for ServiceRef {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.urn, self.version)
+    }
+}
+
+/// A version; `None` is `*`, any number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct VersionPattern {
+    pub(crate) major: Option<u8>,
+    pub(crate) minor: Option<u8>,
+}
+
+impl VersionPattern {
+    /// The version, without wildcards.
+    pub(crate) fn exact(self) -> Option<Version> {
+        Some(Version {
+            major: self.major?,
+            minor: self.minor?,
+        })
+    }
+
+    fn admits(self, version: Version) -> bool {
+        let same = |part: Option<u8>, number| part.is_none_or(|part| part == number);
+        same(self.major, version.major) && same(self.minor, version.minor)
+    }
+}
+
+impl fmt::Display for VersionPattern {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let part = |part: Option<u8>| part.map_or_else(|| "*".to_owned(), |it| it.to_string());
+        write!(f, "{}.{}", part(self.major), part(self.minor))
+    }
+}
+
+/// A local alias of a set with URN and version: `declared_type_set_ref`,
+/// `declared_const_set_ref`.
 #[derive(Debug, Clone)]
 pub(crate) struct SetRef {
     pub(crate) span: Span,
@@ -100,9 +155,19 @@ pub(crate) struct ConstSet {
 /// `const_def`
 #[derive(Debug)]
 pub(crate) struct ConstDef {
+    /// Position of the value.
+    pub(crate) span: Span,
     pub(crate) name: String,
-    pub(crate) number: Number,
-    pub(crate) value: Expr,
+    pub(crate) units: Option<Spanned<String>>,
+    pub(crate) value: Constant,
+}
+
+/// The value of a constant.
+#[derive(Debug)]
+pub(crate) enum Constant {
+    Number(Number, Expr),
+    /// A `string`: no number of a definition can refer to it.
+    Text,
 }
 
 /// A named item of a type set, a message set or an event set.
@@ -123,6 +188,7 @@ pub(crate) enum DeclarationKind {
     /// `header`, `body` or `footer`.
     Section(Construct, Section),
     Node(Node),
+    Values(ValueSet),
     /// `declared_message_def`, `declared_event_def`, `declared_header` …
     Reference(Target),
     /// Already reported.
@@ -144,6 +210,7 @@ impl DeclarationKind {
             Self::Event(_) => Some(Construct::EventDef),
             Self::Section(construct, _) => Some(*construct),
             Self::Node(node) => node.kind.construct(),
+            Self::Values(_) => Some(Construct::ValueSet),
             Self::Reference(target) => Some(target.construct),
             Self::Faulty => None,
         }
@@ -172,6 +239,7 @@ pub(crate) struct EventDef {
 #[derive(Debug)]
 pub(crate) struct Section {
     pub(crate) span: Span,
+    pub(crate) name: String,
     pub(crate) content: Content,
 }
 
@@ -198,6 +266,24 @@ pub(crate) struct Node {
     /// Whether it was read without findings. If not, it is checked for further mistakes and then
     /// left out.
     pub(crate) sound: bool,
+}
+
+impl Node {
+    /// Collects its name and those of everything in it, references included.
+    pub(crate) fn names<'n>(&'n self, names: &mut Vec<&'n str>) {
+        names.push(&self.name);
+        let (several, one) = match &self.kind {
+            Kind::Group { members, .. } => (members.as_slice(), None),
+            Kind::Variant { alternatives, .. } => (alternatives.as_slice(), None),
+            Kind::List { element, .. } | Kind::Array { element, .. } => {
+                (&[][..], Some(element.as_ref()))
+            }
+            _ => (&[][..], None),
+        };
+        for inner in several.iter().chain(one) {
+            inner.names(names);
+        }
+    }
 }
 
 /// The constructs, as written.
@@ -294,9 +380,16 @@ pub(crate) struct Dimension {
 #[derive(Debug)]
 pub(crate) struct ScalarField {
     pub(crate) number: Number,
-    pub(crate) units: String,
+    pub(crate) units: Spanned<String>,
     pub(crate) scale: Option<ScaleRange>,
-    pub(crate) values: Option<ValueSet>,
+    pub(crate) values: Option<Values>,
+}
+
+/// `value_set` or `declared_value_set` of a field
+#[derive(Debug)]
+pub(crate) enum Values {
+    Here(ValueSet),
+    Declared(Target),
 }
 
 /// `scale_range`
@@ -346,7 +439,7 @@ pub(crate) struct SubField {
     pub(crate) name: String,
     pub(crate) from: Expr,
     pub(crate) to: Expr,
-    pub(crate) values: ValueSet,
+    pub(crate) values: Values,
     pub(crate) interpretation: String,
 }
 
@@ -387,10 +480,11 @@ pub(crate) enum Construct {
     Footer,
     MessageDef,
     EventDef,
+    ValueSet,
 }
 
 impl Construct {
-    const ALL: [Self; 17] = [
+    const ALL: [Self; 18] = [
         Self::Record,
         Self::Sequence,
         Self::List,
@@ -408,6 +502,7 @@ impl Construct {
         Self::Footer,
         Self::MessageDef,
         Self::EventDef,
+        Self::ValueSet,
     ];
 
     /// The element's name.
@@ -430,6 +525,7 @@ impl Construct {
             Self::Footer => "footer",
             Self::MessageDef => "message_def",
             Self::EventDef => "event_def",
+            Self::ValueSet => "value_set",
         }
     }
 

@@ -2,11 +2,13 @@
 
 use roxmltree::{Document, Node as Xml, ParsingOptions};
 
-use super::element::{Belongs, Reader, belongs};
+use super::element::{Belongs, Children, NUMBERS, Reader, belongs};
 use super::limits;
-use super::message::DeclarationPlace;
-use super::{ConstDef, ConstSet, Construct, Declaration, Program, ServiceDef, SetRef, TypeSet};
+use super::{
+    ConstDef, ConstSet, Constant, Declaration, Program, ServiceDef, ServiceRef, SetRef, TypeSet,
+};
 use crate::diagnostic::Report;
+use crate::grammar::strict;
 use crate::model::{Id, Version};
 use crate::source::{Source, Span};
 
@@ -29,6 +31,14 @@ pub(crate) fn read(
     if let Some(document) = parse(source, report) {
         let mut reader = Reader { source, report };
         reader.root(document.root_element(), strictness, program);
+    }
+}
+
+/// Reports what the standard does not permit in a text; nothing if it is no definition.
+pub(crate) fn check_strictly(source: &Source, report: &mut Report) {
+    let mut known = Report::default();
+    if let Some(document) = parse(source, &mut known) {
+        strict::check(document.root_element(), source, report);
     }
 }
 
@@ -108,35 +118,12 @@ const ROOTS: [&str; 4] = [
 /// Maximum number of sets that one set refers to; published ones refer to at most 10.
 const MOST_REFERENCES: usize = 200;
 
-const TYPE_SET: DeclarationPlace = DeclarationPlace {
-    parent: "declared_type_set",
-    admits: |_| true,
-    allowed: "declarations of messages, sections, composites and fields",
-};
-
-const INPUT_SET: DeclarationPlace = DeclarationPlace {
-    parent: "input_set",
-    admits: |construct| matches!(construct, Construct::MessageDef),
-    allowed: "messages",
-};
-
-const OUTPUT_SET: DeclarationPlace = DeclarationPlace {
-    parent: "output_set",
-    ..INPUT_SET
-};
-
-const EVENT_SET: DeclarationPlace = DeclarationPlace {
-    parent: "internal_events_set",
-    admits: |construct| matches!(construct, Construct::EventDef),
-    allowed: "events",
-};
-
 impl Reader<'_> {
     fn root(&mut self, xml: Xml<'_, '_>, strictness: Strictness, program: &mut Program) {
         let name = xml.tag_name().name();
         match (belongs(xml), name) {
             (Belongs::Jsidl | Belongs::Plus, "service_set") => {
-                for child in self.children(xml) {
+                for child in self.enter(xml) {
                     if child.tag_name().name() != "description" {
                         self.root(child, strictness, program);
                     }
@@ -186,31 +173,29 @@ impl Reader<'_> {
     }
 
     fn service(&mut self, xml: Xml<'_, '_>, program: &mut Program) -> ServiceDef {
-        self.only(
-            xml,
-            &["name", "id", "version", "deprecated", "interpretation"],
-        );
         let before = self.report.errors();
+        let children = self.enter(xml);
         let name = self.name(xml);
         let id = self.id(xml);
-        let parts = self.service_parts(xml);
-        let (inherits_from, client_of) = match parts.references {
-            Some(references) => self.references(references),
-            None => (None, Vec::new()),
-        };
+        let references = children.find("references");
+        let (inherits_from, client_of) =
+            references.map_or_else(Default::default, |it| self.references(it));
         let sound = self.report.errors() == before;
-        let types = self.inner_types(xml, &parts, program);
-        let [inputs, outputs] = self.message_set(xml, parts.messages);
-        let events = parts.events.map(|events| {
-            self.only(events, &[]);
-            self.declarations(events, &EVENT_SET)
-        });
-        let behaviour = parts.behaviour.map(|behaviour| self.behaviour(behaviour));
+        let types = self.inner_types(xml, &children, program);
+        let messages = children.find("message_set");
+        let [inputs, outputs] = messages.map_or_else(Default::default, |it| self.message_set(it));
+        let events = children.find("internal_events_set");
+        let events = events.map(|events| self.declarations(events));
+        let behaviour = children.find("protocol_behavior");
+        let behaviour = behaviour.map(|behaviour| self.behaviour(behaviour));
+        let description = children.find("description");
         ServiceDef {
             span: self.span(xml),
             id: id.unwrap_or_else(stand_in),
             name: name.unwrap_or_default(),
-            description: parts.description,
+            description: description
+                .map(|it| self.description(it))
+                .unwrap_or_default(),
             inherits_from,
             client_of,
             types,
@@ -222,41 +207,18 @@ impl Reader<'_> {
         }
     }
 
-    fn service_parts<'a, 'x>(&mut self, xml: Xml<'a, 'x>) -> ServiceParts<'a, 'x> {
-        let mut parts = ServiceParts::default();
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "description" => parts.description = self.description(child),
-                "references" => self.once(&mut parts.references, child, xml),
-                "declared_type_set" => self.once(&mut parts.types, child, xml),
-                "declared_const_set" => self.once(&mut parts.constants, child, xml),
-                "message_set" => self.once(&mut parts.messages, child, xml),
-                "internal_events_set" => self.once(&mut parts.events, child, xml),
-                // Free text.
-                "assumptions" => {}
-                "protocol_behavior" => self.once(&mut parts.behaviour, child, xml),
-                _ => self.misplaced(
-                    child,
-                    "service_def",
-                    "`description`, `assumptions`, `references`, `declared_const_set`, \
-                     `declared_type_set`, `message_set`, `internal_events_set` and \
-                     `protocol_behavior`",
-                ),
-            }
-        }
-        parts
-    }
-
     /// Reads the sets inside a service; the type set uses the constants directly.
     fn inner_types(
         &mut self,
         xml: Xml<'_, '_>,
-        parts: &ServiceParts<'_, '_>,
+        children: &Children<'_, '_>,
         program: &mut Program,
     ) -> usize {
-        let read = parts.types.and_then(|xml| self.type_set(xml));
+        let types = children.find("declared_type_set");
+        let read = types.and_then(|xml| self.type_set(xml));
         let mut set = read.unwrap_or_else(|| TypeSet::empty(self.span(xml)));
-        if let Some(constants) = parts.constants.and_then(|xml| self.const_set(xml)) {
+        let constants = children.find("declared_const_set");
+        if let Some(constants) = constants.and_then(|xml| self.const_set(xml)) {
             set.constants = Some(program.const_sets.len());
             program.const_sets.push(constants);
         }
@@ -264,59 +226,46 @@ impl Reader<'_> {
         program.type_sets.len() - 1
     }
 
-    fn message_set(
-        &mut self,
-        service: Xml<'_, '_>,
-        messages: Option<Xml<'_, '_>>,
-    ) -> [Vec<Declaration>; 2] {
-        let Some(xml) = messages else {
-            self.lacks(service, "message_set");
-            return Default::default();
-        };
-        self.only(xml, &[]);
-        let (mut inputs, mut outputs) = (None, None);
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "input_set" => self.once(&mut inputs, child, xml),
-                "output_set" => self.once(&mut outputs, child, xml),
-                _ => self.misplaced(child, "message_set", "an `input_set` and an `output_set`"),
-            }
-        }
-        [(inputs, INPUT_SET), (outputs, OUTPUT_SET)].map(|(set, place)| match set {
-            Some(set) => {
-                self.only(set, &[]);
-                self.declarations(set, &place)
-            }
-            None => {
-                self.lacks(xml, place.parent);
-                Vec::new()
-            }
+    fn message_set(&mut self, xml: Xml<'_, '_>) -> [Vec<Declaration>; 2] {
+        let children = self.enter(xml);
+        ["input_set", "output_set"].map(|set| {
+            let set = children.find(set);
+            set.map_or_else(Vec::new, |set| self.declarations(set))
         })
     }
 
-    fn declarations(&mut self, xml: Xml<'_, '_>, place: &DeclarationPlace) -> Vec<Declaration> {
-        self.children(xml)
-            .into_iter()
-            .filter_map(|child| self.declaration(child, place))
+    fn declarations(&mut self, xml: Xml<'_, '_>) -> Vec<Declaration> {
+        let children = self.enter(xml).into_iter();
+        children
+            .filter_map(|child| self.declaration(child))
             .collect()
     }
 
-    fn references(&mut self, xml: Xml<'_, '_>) -> (Option<SetRef>, Vec<SetRef>) {
-        self.only(xml, &[]);
-        let mut base = None;
-        let mut clients = Vec::new();
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "inherits_from" => self.once(&mut base, child, xml),
-                "client_of" => clients.extend(self.set_ref(child)),
-                _ => self.misplaced(child, "references", "`inherits_from` and `client_of`"),
-            }
-        }
-        (base.and_then(|base| self.set_ref(base)), clients)
+    fn references(&mut self, xml: Xml<'_, '_>) -> (Option<ServiceRef>, Vec<ServiceRef>) {
+        let children = self.enter(xml);
+        let base = children.find("inherits_from");
+        let base = base.and_then(|base| self.service_ref(base));
+        let clients = children.named("client_of");
+        (
+            base,
+            clients.filter_map(|it| self.service_ref(it)).collect(),
+        )
+    }
+
+    fn service_ref(&mut self, xml: Xml<'_, '_>) -> Option<ServiceRef> {
+        self.enter(xml);
+        let name = self.name(xml);
+        let (urn, version) = self.id_pattern(xml)?;
+        Some(ServiceRef {
+            span: self.span(xml),
+            name: name?,
+            urn,
+            version,
+        })
     }
 
     fn set_ref(&mut self, xml: Xml<'_, '_>) -> Option<SetRef> {
-        self.only(xml, &["name", "id", "version", "interpretation"]);
+        self.enter(xml);
         let name = self.name(xml);
         let id = self.id(xml);
         Some(SetRef {
@@ -351,29 +300,29 @@ impl Reader<'_> {
     }
 
     fn type_set(&mut self, xml: Xml<'_, '_>) -> Option<TypeSet> {
-        self.only(xml, &["name", "id", "version", "interpretation"]);
+        let children = self.enter(xml);
         let name = self.name(xml);
         let mut set = TypeSet::empty(self.span(xml));
-        for child in self.children(xml) {
+        for child in children {
             match child.tag_name().name() {
                 "declared_type_set_ref" => self.another(child, &mut set.type_sets),
                 "declared_const_set_ref" => self.another(child, &mut set.const_sets),
-                _ => set.declarations.extend(self.declaration(child, &TYPE_SET)),
+                _ => set.declarations.extend(self.declaration(child)),
             }
         }
         name.map(|_| set)
     }
 
     fn const_set(&mut self, xml: Xml<'_, '_>) -> Option<ConstSet> {
-        self.only(xml, &["name", "id", "version", "interpretation"]);
+        let children = self.enter(xml);
         let name = self.name(xml);
         let mut const_sets = Vec::new();
         let mut definitions = Vec::new();
-        for child in self.children(xml) {
-            match child.tag_name().name() {
-                "declared_const_set_ref" => self.another(child, &mut const_sets),
-                "const_def" => definitions.extend(self.const_def(child)),
-                _ => self.misplaced(child, "declared_const_set", "`const_def`s"),
+        for child in children {
+            if child.tag_name().name() == "const_def" {
+                definitions.extend(self.const_def(child));
+            } else {
+                self.another(child, &mut const_sets);
             }
         }
         Some(ConstSet {
@@ -386,22 +335,24 @@ impl Reader<'_> {
     }
 
     fn const_def(&mut self, xml: Xml<'_, '_>) -> Option<ConstDef> {
-        self.only(
-            xml,
-            &[
-                "name",
-                "const_type",
-                "const_value",
-                "field_units",
-                "interpretation",
-            ],
-        );
+        self.enter(xml);
         let name = self.name(xml);
-        let number = self.number(xml, "const_type");
-        let value = self.expression(xml, "const_value");
+        let kind = self.required(xml, "const_type")?;
+        let span = self.span_of(xml, "const_value");
+        let value = if kind.value == "string" {
+            // A text may be empty.
+            Some(Constant::Text)
+        } else {
+            let number = self.word(&kind, "const_type", &NUMBERS);
+            let value = self.expression(xml, "const_value");
+            number
+                .zip(value)
+                .map(|(number, value)| Constant::Number(number, value))
+        };
         Some(ConstDef {
+            span,
             name: name?,
-            number: number?,
+            units: self.attribute(xml, "field_units"),
             value: value?,
         })
     }
@@ -413,16 +364,4 @@ fn stand_in() -> Id {
         urn: "(unreadable)".into(),
         version: Version { major: 0, minor: 0 },
     }
-}
-
-/// The children of a `service_def`, before they are read.
-#[derive(Default)]
-struct ServiceParts<'a, 'x> {
-    description: String,
-    references: Option<Xml<'a, 'x>>,
-    types: Option<Xml<'a, 'x>>,
-    constants: Option<Xml<'a, 'x>>,
-    messages: Option<Xml<'a, 'x>>,
-    events: Option<Xml<'a, 'x>>,
-    behaviour: Option<Xml<'a, 'x>>,
 }

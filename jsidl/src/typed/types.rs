@@ -296,7 +296,7 @@ impl<'m> Nested<'m> {
         let content = fingerprint::values(number, &values, set);
         values.retain(|value| {
             let (_, greatest) = number.integers().unwrap_or_default();
-            i128::from(value.index) <= greatest
+            value.index <= greatest
         });
         self.define(&name.clone(), &content, |nested| {
             let mut names = Names::new(nested.spelling);
@@ -351,7 +351,8 @@ const fn width(field: &SubField) -> Unsigned {
 fn limits(field: &SubField) -> (u64, u64) {
     let greatest = field.mask().checked_shr(field.from.into()).unwrap_or(0);
     let named = field.values.values.iter();
-    let named = named.map(|value| (value.index, value.index));
+    let named = named.map(|value| u64::try_from(value.index).unwrap_or(0));
+    let named = named.map(|index| (index, index));
     let ranges = field.values.ranges.iter().map(integers);
     let stated = named
         .chain(ranges)

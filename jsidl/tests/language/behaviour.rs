@@ -40,7 +40,7 @@ fn counts(library: &Library) -> ([usize; 4], BTreeMap<&'static str, usize>) {
             TransitionKind::To(_) => "to",
             TransitionKind::Again => "again",
             TransitionKind::Push(_) => "push",
-            TransitionKind::Pop => "pop",
+            TransitionKind::Pop(_) => "pop",
         };
         *kinds.entry(kind).or_default() += 1;
     }
@@ -418,6 +418,7 @@ fn what_is_wrong_in_a_machine_is_reported_and_leaves_the_service_as_it_is() {
             "1.xml:6:1: warning: `base.FSM` starts in `On.Busy.Deep`, but the machine it extends starts in `On.Idle`: start there, or in one of its inner states",
             "1.xml:6:49: warning: the state `On.Busy` has inner states, but no `initial_state`: `Deep` is assumed",
             "1.xml:9:9: warning: the `end_state` `on.idle` is spelled `On.Idle` elsewhere",
+            "1.xml:9:9: warning: nothing returns from `on.idle` after this `push`: add a transition with a `pop` to that state, or make this one `simple`",
         ]
     );
     let cases = [
@@ -444,7 +445,7 @@ fn what_is_wrong_in_a_machine_is_reported_and_leaves_the_service_as_it_is() {
         (
             "<simple/>",
             "",
-            "0.xml:9:16: error: `transition` lacks the element `internal`: add it",
+            "0.xml:9:16: error: `transition` lacks its target: add `internal`, `simple`, `push` or `pop`",
         ),
         (
             "<simple/>",

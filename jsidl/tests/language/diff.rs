@@ -210,3 +210,60 @@ fn our_definitions_do_not_differ_from_themselves() {
     let library = loader.load().library;
     assert!(compare(&library, &library, |_| true).is_empty());
 }
+
+const MACHINE: &str = r#"<service_def name="Lamp" id="urn:me:Lamp" version="1.0" xmlns="urn:jaus:jsidl:1.1">
+<message_set><input_set/><output_set/></message_set>
+<protocol_behavior><start state_machine_name="FSM" state_name="Off"/><state_machine name="FSM">
+<state name="Off"><entry><action name="dim"/></entry>
+<transition name="Switch"><guard condition="may()"/><simple><end_state state="On"/></simple></transition>
+<transition name="Switch"><internal/><action name="refuse"><argument value="'Off'"/></action></transition>
+</state>
+<state name="On"/>
+</state_machine></protocol_behavior></service_def>"#;
+
+#[test]
+fn a_change_of_behaviour_is_a_change_that_does_not_affect_the_wire() {
+    let cases = [
+        (
+            "state_name=\"Off\"",
+            "state_name=\"On\"",
+            "same FSM: the start state is On, was Off",
+        ),
+        (
+            "<state name=\"On\"/>",
+            "<state name=\"On\"/><state name=\"Broken\"/>",
+            "same FSM.Broken: the state was added",
+        ),
+        (
+            "<action name=\"dim\"/>",
+            "",
+            "same FSM.Off: the list of actions on entry is nothing, was `dim()`",
+        ),
+        (
+            "<simple><end_state state=\"On\"/></simple>",
+            "<internal/>",
+            "same FSM.Off.Switch [may()]: the target is the same state, without exit and entry, was `On`",
+        ),
+        (
+            "'Off'",
+            "'On'",
+            "same FSM.Off.Switch: the list of actions is `refuse('On')`, was `refuse('Off')`",
+        ),
+    ];
+    assert!(changes(MACHINE, MACHINE).is_empty());
+    for (from, to, expected) in cases {
+        assert_eq!(changes(MACHINE, &MACHINE.replacen(from, to, 1)), [expected]);
+    }
+    let unguarded = MACHINE.replacen(
+        "<guard condition=\"may()\"/>",
+        "<guard condition=\"must()\"/>",
+        1,
+    );
+    assert_eq!(
+        changes(MACHINE, &unguarded),
+        [
+            "same FSM.Off.Switch [may()]: the transition was removed",
+            "same FSM.Off.Switch [must()]: the transition was added",
+        ]
+    );
+}

@@ -167,3 +167,59 @@ fn what_is_no_definition_is_not_laid_out() {
         "t.xml:1:1: error: `project` is not the root element of a JSIDL file: expected one of `service_def`, `declared_type_set`, `declared_const_set`, `service_set`\n"
     );
 }
+
+/// Moves `assumptions` behind `message_set`, and removes what says nothing.
+#[test]
+fn the_strict_form_is_complete_and_in_order() {
+    let every = include_str!("grammar/every.xml");
+    let laid_out = jsidl::format::strict("every.xml", every).expect("it is a definition");
+    assert_eq!(
+        laid_out,
+        format("every.xml", every).expect("it is a definition")
+    );
+
+    let careless = r#"<service_def name="S" id="urn:s" version="1.0" xmlns="urn:jaus:jsidl:1.1">
+  <message_set>
+    <output_set/>
+    <!-- What it receives. -->
+    <input_set/> <!-- nothing -->
+  </message_set>
+  <declared_type_set name="T">
+    <record name="R"><fixed_field name="F" field_type="byte" field_units="one"/></record>
+  </declared_type_set>
+</service_def>"#;
+    let strict = jsidl::format::strict("s.xml", careless).expect("it is a definition");
+    assert_eq!(
+        strict,
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<service_def name="S" id="urn:s" version="1.0" xmlns="urn:jaus:jsidl:1.1">
+  <description/>
+  <assumptions/>
+  <declared_type_set name="T">
+    <record name="R" optional="false">
+      <fixed_field name="F" optional="false" field_type="byte" field_units="one"/>
+    </record>
+  </declared_type_set>
+  <message_set>
+    <!-- What it receives. -->
+    <input_set/> <!-- nothing -->
+    <output_set/>
+  </message_set>
+  <internal_events_set/>
+  <protocol_behavior is_stateless="true">
+    <start state_machine_name="Stateless" state_name="Ready"/>
+    <state_machine name="Stateless">
+      <state name="Ready"/>
+    </state_machine>
+  </protocol_behavior>
+</service_def>
+"#
+    );
+    let mut loader = jsidl::Loader::new();
+    loader.strict().text("s.xml", &strict);
+    let loaded = loader.load();
+    assert_eq!(loaded.diagnostics.to_string(), "");
+    // The machine that says nothing is none.
+    let service = loaded.library.services().next().expect("it is there");
+    assert!(service.behaviour.is_empty());
+}

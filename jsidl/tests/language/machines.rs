@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use jaus_test_kit::{evidence, snapshot};
-use jsidl::behaviour::{Name, Transition, TransitionKind};
+use jsidl::behaviour::{Name, Push, Transition, TransitionKind};
 use jsidl::machine::{Machine, Outcome, Run, Stimulus, dot, mermaid};
 use jsidl::model::Service;
 use jsidl::{Library, Loaded, Loader, rust};
@@ -78,7 +78,9 @@ fn ends<'a>(machine: &Machine<'a>) -> Vec<(&'a Transition, &'a Name)> {
     let transitions =
         states.flat_map(|state| state.transitions.iter().chain(&state.default_transitions));
     let end = |transition: &'a Transition| match &transition.kind {
-        TransitionKind::To(end) | TransitionKind::Push(end) => Some((transition, end)),
+        TransitionKind::To(end) | TransitionKind::Push(Push { to: end, .. }) => {
+            Some((transition, end))
+        }
         _ => None,
     };
     transitions

@@ -19,6 +19,7 @@ mod explain;
 mod foreign;
 mod format;
 mod golden;
+mod grammar;
 mod loading;
 mod lua;
 mod machines;

@@ -102,7 +102,7 @@ pub mod door {
             fn is_late(&self, text: &'static str, envelope: &Self::Envelope) -> bool;
 
             /// `steps == 0`.
-            fn steps_0(&self, number: i64) -> bool;
+            fn steps_is_0(&self, number: i64) -> bool;
 
             /// `lightOn`.
             fn light_on(&mut self);
@@ -265,7 +265,7 @@ pub mod door {
             fn on_moved<B: Behaviour + ?Sized>(&mut self, number_0: i64, behaviour: &mut B) -> Outcome {
                 match self.state {
                     State::WorkingOpened => {
-                        if behaviour.steps_0(number_0) {
+                        if behaviour.steps_is_0(number_0) {
                             behaviour.start_motor("down");
                             behaviour.count(number_0);
                             behaviour.start_motor("up");
@@ -327,7 +327,7 @@ pub mod door {
         fn start_motor(&mut self, text: &'static str, call: &mut C);
 
         /// `steps == 0`.
-        fn steps_0(&self, number: i64) -> bool;
+        fn steps_is_0(&self, number: i64) -> bool;
 
         /// `count`.
         fn count(&mut self, number: i64, call: &mut C);
@@ -413,8 +413,8 @@ pub mod door {
             self.service.start_motor(text, self.call);
         }
 
-        fn steps_0(&self, number: i64) -> bool {
-            self.service.steps_0(number)
+        fn steps_is_0(&self, number: i64) -> bool {
+            self.service.steps_is_0(number)
         }
 
         fn count(&mut self, number: i64) {

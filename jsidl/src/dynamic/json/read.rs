@@ -177,7 +177,10 @@ fn number(scalar: &Scalar, json: &Json) -> Read<Raw> {
     };
     let named = values.and_then(|values| named_value(values, json));
     match scalar.number {
-        Number::Unsigned(width) => match named.or(json.as_u64()) {
+        Number::Unsigned(width) => match named
+            .and_then(|raw| u64::try_from(raw).ok())
+            .or(json.as_u64())
+        {
             Some(raw) if raw <= width.max() => Ok(Raw::Unsigned(raw)),
             _ => Err(expected(integer(0, width.max(), values), json)),
         },
@@ -243,7 +246,7 @@ fn integer(
     format!("{integer} or one of {}", names.join(", "))
 }
 
-fn named_value(values: &ValueSet, json: &Json) -> Option<u64> {
+fn named_value(values: &ValueSet, json: &Json) -> Option<i128> {
     let text = json.as_str()?;
     values
         .values
@@ -288,7 +291,8 @@ fn bits(bits: &BitField, json: &Json) -> Read<u64> {
 /// The bits of a sub-field, in position.
 fn sub_field(field: &SubField, json: &Json) -> Read<u64> {
     let greatest = field.mask().checked_shr(field.from.into()).unwrap_or(0);
-    let value = named_value(&field.values, json).or(json.as_u64());
+    let named = named_value(&field.values, json).and_then(|it| u64::try_from(it).ok());
+    let value = named.or(json.as_u64());
     match value.filter(|value| *value <= greatest) {
         Some(value) => Ok(value.checked_shl(field.from.into()).unwrap_or(0)),
         None => Err(expected(integer(0, greatest, Some(&field.values)), json)),

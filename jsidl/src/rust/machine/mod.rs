@@ -126,9 +126,10 @@ const MOST_STEPS: usize = 1 << 16;
 pub(super) fn excess(machine: &Machine<'_>) -> Option<String> {
     let states = machine.states().filter(|(_, it)| it.children.is_empty());
     let states = states.count();
-    let events = machine
-        .transitions()
-        .map(|it| vocabulary::event_key(&it.item.trigger));
+    let events = machine.transitions().filter_map(|it| {
+        let trigger = &it.item.trigger;
+        Some(vocabulary::event_key(trigger.name()?, trigger.message()))
+    });
     let events = events.collect::<BTreeSet<_>>().len();
     (states.saturating_mul(events) > MOST_STEPS).then(|| {
         format!(
@@ -195,8 +196,12 @@ impl<'a> Emitter<'a> {
             "Memory",
         ]);
         let mut transitions = machine.transitions();
-        let remembers = transitions
-            .any(|it| matches!(it.item.kind, TransitionKind::Push(_) | TransitionKind::Pop));
+        let remembers = transitions.any(|it| {
+            matches!(
+                it.item.kind,
+                TransitionKind::Push(_) | TransitionKind::Pop(_)
+            )
+        });
         Self {
             machine,
             service,

@@ -4,8 +4,8 @@ use std::collections::{HashMap, HashSet};
 
 use super::super::writer::Writer;
 use super::states::States;
-use super::vocabulary::{Event, Kind, Method, Value, Vocabulary};
-use crate::behaviour::{Action, Guard, Transition, TransitionKind, Trigger};
+use super::vocabulary::{Event, Kind, Method, Value, Vocabulary, value};
+use crate::behaviour::{Action, Call, Guard, Transition, TransitionKind, Trigger};
 use crate::machine::{Declared, Machine, MachineState, StateIndex, Stimulus};
 
 /// Input of the generator.
@@ -196,7 +196,7 @@ impl Steps<'_> {
     fn condition(&self, transition: &Transition) -> Option<String> {
         let room = match transition.kind {
             TransitionKind::Push(_) => Some("self.remembered.has_room()"),
-            TransitionKind::Pop => Some("self.remembered.is_used()"),
+            TransitionKind::Pop(_) => Some("self.remembered.is_used()"),
             _ => None,
         };
         let trigger = &transition.trigger;
@@ -242,16 +242,23 @@ impl Steps<'_> {
     fn effect(&self, leaf: StateIndex, transition: &Transition) -> Option<String> {
         let trigger = Some(&transition.trigger);
         let own = self.actions(trigger, transition.actions.iter());
-        let text = match transition.kind {
+        let text = match &transition.kind {
             TransitionKind::Internal => own,
-            TransitionKind::Pop => self.back(leaf, &own),
+            TransitionKind::Pop(then) => self.back(leaf, &own) + &self.then(trigger, then.as_ref()),
             TransitionKind::To(_) | TransitionKind::Again | TransitionKind::Push(_) => {
                 let to = self.machine.target(leaf, transition)?;
                 let leaving = self.actions(None, self.machine.leaving(leaf, to));
                 let entering = self.actions(None, self.machine.entering(Some(leaf), to));
-                let remember = match transition.kind {
-                    TransitionKind::Push(_) => "self.remembered.push(self.state);\n",
-                    _ => "",
+                let remember = match &transition.kind {
+                    TransitionKind::Push(push) => {
+                        let back = self.machine.remembered(leaf, push)?;
+                        let back = match back == leaf {
+                            true => "self.state".to_owned(),
+                            false => self.state(back),
+                        };
+                        format!("self.remembered.push({back});\n")
+                    }
+                    _ => String::new(),
                 };
                 let state = self.state(to);
                 let stays = to == leaf && remember.is_empty();
@@ -264,6 +271,26 @@ impl Steps<'_> {
             }
         };
         Some(text)
+    }
+
+    /// The event that follows a return, with its numbers.
+    fn then(&self, trigger: Option<&Trigger>, then: Option<&Call>) -> String {
+        let events = &self.vocabulary.events;
+        let call = then.and_then(|then| {
+            let named = |it: &&Event| it.name.eq_ignore_ascii_case(then.name.last());
+            let event = events.iter().find(|it| it.message.is_none() && named(it))?;
+            let numbers = then.arguments.iter().map(|it| match value(trigger, it) {
+                Value::Number(number) => format!("number_{number}, "),
+                Value::Text(digits) => format!("{digits}, "),
+                Value::Message | Value::Envelope => String::new(),
+            });
+            let numbers: String = numbers.collect();
+            Some(format!(
+                "let _ = self.{}({numbers}behaviour);\n",
+                event.handler
+            ))
+        });
+        call.unwrap_or_default()
     }
 
     /// Returns to the state that was remembered last.

@@ -5,8 +5,9 @@ use std::collections::{BTreeSet, HashMap};
 use heck::ToSnakeCase;
 
 use super::super::ident::Names;
-use crate::behaviour::{Action, Argument, Guard, Transition, Trigger};
+use crate::behaviour::{Action, Argument, Comparison, Guard, Transition, Trigger};
 use crate::machine::{Machine, Stimulus};
+use crate::model::Service;
 
 /// All names in the generated types of one machine.
 pub(super) struct Vocabulary {
@@ -115,10 +116,12 @@ impl Event {
     }
 }
 
-/// What triggers with the same event have in common.
-pub(super) fn event_key(trigger: &Trigger) -> (String, Option<String>) {
-    let message = trigger.message().map(str::to_ascii_lowercase);
-    (trigger.event.last().to_ascii_lowercase(), message)
+/// What triggers with the same event have in common; not the case of its letters.
+pub(super) fn event_key(name: &str, message: Option<&str>) -> (String, Option<String>) {
+    (
+        name.to_ascii_lowercase(),
+        message.map(str::to_ascii_lowercase),
+    )
 }
 
 impl Method {
@@ -148,6 +151,10 @@ impl Vocabulary {
             let all = state.transitions.iter().chain(&state.default_transitions);
             for declared in all {
                 collected.add_transition(declared.item);
+                // Also what has no transition of its own triggers a default transition.
+                if declared.item.trigger.event.is_none() {
+                    collected.add_inputs(declared.service);
+                }
             }
         }
         collected.name_all(types);
@@ -159,44 +166,69 @@ impl Vocabulary {
     }
 
     pub(super) fn event_of(&self, trigger: &Trigger) -> Option<usize> {
-        self.known_events.get(&event_key(trigger)).copied()
+        let key = event_key(trigger.name()?, trigger.message());
+        self.known_events.get(&key).copied()
+    }
+
+    /// The arrival of each message that a service receives.
+    fn add_inputs(&mut self, service: &Service) {
+        for message in &service.inputs {
+            let arrives = |event: &Event| {
+                let name = event.message.as_deref();
+                name.is_some_and(|name| name.eq_ignore_ascii_case(&message.name))
+            };
+            if !self.events.iter().any(arrives) {
+                self.add_event("Receive", Some(&message.name));
+            }
+        }
+    }
+
+    fn add_event(&mut self, name: &str, message: Option<&str>) -> usize {
+        self.events.push(Event {
+            name: name.to_owned(),
+            message: message.map(str::to_owned),
+            ident: String::new(),
+            handler: String::new(),
+            envelope: false,
+            numbers: 0,
+        });
+        let event = self.events.len() - 1;
+        self.known_events.insert(event_key(name, message), event);
+        event
     }
 
     fn add_transition(&mut self, transition: &Transition) {
         let trigger = &transition.trigger;
-        let event = self.event_of(trigger).unwrap_or_else(|| {
-            self.events.push(Event {
-                name: trigger.event.last().to_owned(),
-                message: trigger.message().map(str::to_owned),
-                ident: String::new(),
-                handler: String::new(),
-                envelope: false,
-                numbers: 0,
-            });
-            let event = self.events.len() - 1;
-            self.known_events.insert(event_key(trigger), event);
-            event
-        });
+        let Some(name) = trigger.name() else {
+            let actions = transition.actions.iter();
+            actions.for_each(|action| self.add_action(None, action));
+            if let Some(guard) = &transition.guard {
+                self.add_guard(None, trigger, guard);
+            }
+            return;
+        };
+        let known = self.event_of(trigger);
+        let event = known.unwrap_or_else(|| self.add_event(name, trigger.message()));
         let numbers = numbers(trigger).count();
         let known = &mut self.events[event];
         known.envelope |= trigger.has_envelope();
         known.numbers = known.numbers.max(numbers);
         if let Some(guard) = &transition.guard {
-            self.add_guard(event, trigger, guard);
+            self.add_guard(Some(event), trigger, guard);
         }
         for action in &transition.actions {
             self.add_action(Some((event, trigger)), action);
         }
     }
 
-    fn add_guard(&mut self, event: usize, trigger: &Trigger, guard: &Guard) {
+    fn add_guard(&mut self, event: Option<usize>, trigger: &Trigger, guard: &Guard) {
         match guard {
             Guard::Not(inner) => self.add_guard(event, trigger, inner),
             Guard::And(left, right) | Guard::Or(left, right) => {
                 self.add_guard(event, trigger, left);
                 self.add_guard(event, trigger, right);
             }
-            question => self.add(Some(event), question_of(Some(trigger), question)),
+            question => self.add(event, question_of(Some(trigger), question)),
         }
     }
 
@@ -318,13 +350,32 @@ fn action_of(trigger: Option<&Trigger>, action: &Action) -> Spoken {
 fn question_of(trigger: Option<&Trigger>, question: &Guard) -> Spoken {
     match question {
         Guard::Call(call) => spoken(trigger, call.name.last().to_owned(), &call.arguments, true),
-        // A comparison or a bare name: its text is the method's name, and it gets all parameters.
+        // A comparison or a bare name: its words are the method's name, and it gets all parameters.
         other => {
-            let words = other.to_string();
+            let words = words(other);
             let all = trigger.into_iter().flat_map(|trigger| &trigger.parameters);
             let all = all.filter_map(|parameter| Argument::parse(&parameter.name).ok());
-            spoken(trigger, words, &all.collect::<Vec<_>>(), true)
+            Spoken {
+                name: other.to_string(),
+                ..spoken(trigger, words, &all.collect::<Vec<_>>(), true)
+            }
         }
+    }
+}
+
+/// A guard in words, so that different comparisons of the same operands have different names.
+fn words(guard: &Guard) -> String {
+    match guard {
+        Guard::Compare(comparison, left, right) => {
+            let verb = match comparison {
+                Comparison::Equal => "is",
+                Comparison::Unequal => "is not",
+                Comparison::Less => "is less than",
+                Comparison::Greater => "is greater than",
+            };
+            format!("{} {verb} {}", words(left), words(right))
+        }
+        other => other.to_string().replace('-', "minus "),
     }
 }
 
@@ -339,7 +390,7 @@ fn spoken(trigger: Option<&Trigger>, name: String, arguments: &[Argument], asks:
 }
 
 /// An argument that is no parameter of the event is a text.
-fn value(trigger: Option<&Trigger>, argument: &Argument) -> Value {
+pub(super) fn value(trigger: Option<&Trigger>, argument: &Argument) -> Value {
     let Argument::Variable(name) = argument else {
         return Value::Text(match argument {
             Argument::Text(text) | Argument::Integer(text) => text.clone(),
@@ -359,4 +410,22 @@ fn value(trigger: Option<&Trigger>, argument: &Argument) -> Value {
         Some(Value::Number(number))
     });
     known.unwrap_or(Value::Text(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn different_comparisons_have_methods_of_their_own() {
+        let guards = ["n == 0", "n != 0", "n < 3", "n > 3", "n == 3", "n == -3"];
+        let names: BTreeSet<_> = guards
+            .iter()
+            .map(|text| {
+                let guard = Guard::parse(text).unwrap();
+                question_of(None, &guard).key.base
+            })
+            .collect();
+        assert_eq!(names.len(), guards.len(), "{names:?}");
+    }
 }

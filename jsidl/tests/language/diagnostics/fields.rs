@@ -3,14 +3,14 @@
 use super::{check, types};
 
 #[test]
-fn scales_need_an_unsigned_integer_and_two_limits_in_order() {
+fn scales_need_an_integer_and_two_limits_in_order() {
     check(
         &types(
             r#"<fixed_field name="F" field_type="short integer" field_units="one">
 <scale_range real_lower_limit="0" real_upper_limit="1" integer_function="round"/>
 </fixed_field>"#,
         ),
-        "t.xml:4:1: error: a `scale_range` needs an unsigned integer: change the `field_type`, or remove the range",
+        "t.xml:4:1: warning: the standard has no rule for a `scale_range` of a signed integer: 0 is taken as the centre of the range, but other tools may differ; use an unsigned `field_type`",
     );
     check(
         &types(
@@ -18,7 +18,7 @@ fn scales_need_an_unsigned_integer_and_two_limits_in_order() {
 <scale_range real_lower_limit="0" real_upper_limit="1" integer_function="round"/>
 </fixed_field>"#,
         ),
-        "t.xml:4:1: error: a `scale_range` needs an unsigned integer: change the `field_type`, or remove the range",
+        "t.xml:4:1: error: a `scale_range` needs an integer: change the `field_type`, or remove the range",
     );
     check(
         &types(
@@ -94,7 +94,10 @@ fn values_fit_the_field_and_differ() {
 </value_set>
 </fixed_field>"#,
         ),
-        "t.xml:7:25: error: `enum_index` is -1, but must not be negative",
+        "
+t.xml:6:25: error: the value `b` is 256, but the `field_type` holds 0 to 255
+t.xml:7:25: error: the value `c` is -1, but the `field_type` holds 0 to 255
+",
     );
     check(
         &types(
@@ -172,7 +175,7 @@ t.xml:6:1: error: no value lies between 3 and 3: the lower limit must be less th
 </value_set>
 </fixed_field>"#,
         ),
-        "t.xml:4:1: error: a field has a `scale_range` or a `value_set`, not both: remove one",
+        "t.xml:4:82: error: `fixed_field` has a `scale_range` or a `value_set`, not both: remove one",
     );
 }
 
@@ -329,6 +332,39 @@ t.xml:5:21: error: there are two formats with the index 0: renumber one
         "
 t.xml:3:1: error: `variable_format_field` lacks the element `count_field`: add it
 t.xml:3:33: error: `format_field` lacks the element `format_enum`: add it
+",
+    );
+}
+
+#[test]
+fn units_are_those_of_the_standard() {
+    check(
+        &types(r#"<fixed_field name="F" field_type="float" field_units="meters"/>"#),
+        "t.xml:3:55: error: `meters` is not a unit: did you mean `meter`?",
+    );
+    check(
+        &types(r#"<fixed_field name="F" field_type="float" field_units="parsec"/>"#),
+        "t.xml:3:55: error: `parsec` is not a unit: write one of the standard, or `one`",
+    );
+    check(
+        &types(r#"<fixed_field name="F" field_type="float" field_units="rotations per minute"/>"#),
+        "",
+    );
+}
+
+#[test]
+fn a_named_value_set_fits_every_field_that_refers_to_it() {
+    check(
+        &types(
+            r#"<value_set name="Moods" offset_to_lower_limit="false"><value_enum enum_index="-1" enum_const="Low"/></value_set>
+<fixed_field name="A" field_type="byte" field_units="one"><declared_value_set name="Moods"/></fixed_field>
+<fixed_field name="B" field_type="unsigned byte" field_units="one"><declared_value_set name="M" declared_type_ref="Moods"/></fixed_field>
+<fixed_field name="C" field_type="byte" field_units="one"><declared_value_set name="M" declared_type_ref="A"/></fixed_field>"#,
+        ),
+        "
+t.xml:5:116: error: the value `Low` is -1, but the `field_type` holds 0 to 255
+t.xml:6:107: error: `A` is a `fixed_field`: refer to it with `declared_fixed_field`, or name a `value_set`
+  t.xml:4:1: note: declared here
 ",
     );
 }

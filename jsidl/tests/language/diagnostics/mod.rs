@@ -2,6 +2,7 @@
 
 mod composites;
 mod fields;
+mod machines;
 mod services;
 mod text;
 

@@ -16,7 +16,6 @@ fn a_message_has_an_id_of_two_octets_and_says_whether_it_is_a_command() {
         "
 t.xml:3:1: error: `message_def` lacks the attribute `message_id`: add it
 t.xml:3:35: error: `perhaps` is not a value of `is_command`: use `true`, `false`, `1`, `0`
-t.xml:6:1: error: `message_def` lacks the attribute `is_command`: add it
 ",
     );
     check(
@@ -283,8 +282,7 @@ t.xml:5:43: error: `01.0` cannot be a version: write two numbers from 0 to 255, 
 <message_set><input_set/><output_set/></message_set></service_def>
 </p:service_set>"#,
         ),
-        "t.xml:3:60: error: `*.*` cannot be a version: a wildcard does not select a definition: \
-         write the version",
+        "t.xml:3:13: error: the base service `urn:B *.*` is not loaded: load the file that declares it as well",
     );
     check(
         &text(
@@ -312,7 +310,7 @@ t.xml:5:43: error: `01.0` cannot be a version: write two numbers from 0 to 255, 
 </p:service_set>"#,
         ),
         "
-t.xml:3:13: warning: this service is a client of `urn:B 1.0`, which is not loaded
+t.xml:3:13: warning: this service is a client of `urn:B 1.0`, which is not loaded: load the file that declares it as well
 t.xml:4:1: error: there are two references named `x`: rename one
   t.xml:3:13: note: the other one
 ",
@@ -353,6 +351,46 @@ fn constants_hold_what_their_type_can() {
 t.xml:2:52: error: the value of the constant is not an integer from -128 to 127, as its `const_type` says
 t.xml:3:55: error: the value of the constant is not an integer from -2147483648 to 2147483647, as its `const_type` says
 t.xml:4:33: error: `word` is not a value of `const_type`: use `byte`, `short integer`, `integer`, `long integer`, `unsigned byte`, `unsigned short integer`, `unsigned integer`, `unsigned long integer`, `float`, `long float`
+",
+    );
+}
+
+#[test]
+fn the_nearest_urn_is_suggested_for_one_that_is_not_there() {
+    let service = |urn: &str| {
+        format!(
+            r#"<p:service_set xmlns:p="urn:jaus:jsidl:plus" xmlns="urn:jaus:jsidl:1.1" name="Set" id="urn:set" version="1.0">
+<service_def name="Discovery" id="urn:jaus:jss:core:Discovery" version="1.0"><message_set><input_set/><output_set/></message_set></service_def>
+<service_def name="B" id="urn:B" version="1.0"><references>
+<inherits_from name="base" id="{urn}"/></references><message_set><input_set/><output_set/></message_set></service_def>
+</p:service_set>"#
+        )
+    };
+    check(
+        &service("urn:jaus:jss:core:Discvery\" version=\"1.0"),
+        "t.xml:4:1: error: the base service `urn:jaus:jss:core:Discvery 1.0` is not loaded: did you mean `urn:jaus:jss:core:Discovery`?",
+    );
+    check(
+        &service("urn:jaus:jss:core:Discovery\" version=\"2.*"),
+        "t.xml:4:1: error: the base service `urn:jaus:jss:core:Discovery 2.*` is not loaded: only its version 1.0 is loaded",
+    );
+    check(&service("urn:jaus:jss:core:Discovery\" version=\"*.*"), "");
+}
+
+#[test]
+fn a_constant_that_is_a_text_is_no_number() {
+    check(
+        &text(
+            r#"<service_def name="S" id="urn:s" version="1.0" xmlns="urn:jaus:jsidl:1.1">
+<declared_const_set name="C">
+<const_def name="T" const_type="string" const_value="some text" field_units="one"/></declared_const_set>
+<declared_type_set name="T">
+<fixed_length_string name="F" string_length="T"/></declared_type_set>
+<message_set><input_set/><output_set/></message_set></service_def>"#,
+        ),
+        "
+t.xml:5:46: error: the constant `T` is a text: use a number here
+  t.xml:3:54: note: declared here
 ",
     );
 }

@@ -123,7 +123,7 @@ pub(crate) fn scaled(width: Unsigned, lower: f64, upper: f64, units: &str) -> Sc
 
 pub(crate) fn values(names: &[(u64, &str)]) -> ValueSet {
     let named = |&(index, name): &(u64, &str)| NamedValue {
-        index,
+        index: index.into(),
         name: name.to_owned(),
         interpretation: String::new(),
     };

@@ -10,7 +10,7 @@ use jsidl::model::Location;
 use jsidl::{Diagnostic, Loaded, Severity};
 use serde_json::{Value, json};
 
-use super::definitions::{load, own_findings, own_services, style};
+use super::definitions::{load, load_strictly, own_findings, own_services, style};
 
 /// Check service definitions: form, references, rules, state machines
 ///
@@ -21,6 +21,7 @@ use super::definitions::{load, own_findings, own_services, style};
 #[command(after_help = "Examples:\n  \
     jaus jsidl check my-services/\n  \
     jaus jsidl check --deny-warnings Lights.xml Types.xml\n  \
+    jaus jsidl check --strict my-services/\n  \
     jaus jsidl check --json my-services/ | jq .message\n  \
     git show HEAD:Lights.xml | jaus jsidl check -")]
 pub(crate) struct Arguments {
@@ -29,6 +30,13 @@ pub(crate) struct Arguments {
     /// They are checked together and may refer to each other, and to the built-in definitions.
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
+
+    /// Report also what a schema validator of the standard (AS5684) refuses
+    ///
+    /// That is the order of elements, missing mandatory elements and attributes, and values that
+    /// the standard does not permit. `jaus jsidl fmt --strict` corrects most of it.
+    #[arg(long)]
+    strict: bool,
 
     /// Print each finding as one JSON object a line, without a summary
     #[arg(long)]
@@ -40,7 +48,11 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let loaded = load(&arguments.paths)?;
+    let loaded = if arguments.strict {
+        load_strictly(&arguments.paths)?
+    } else {
+        load(&arguments.paths)?
+    };
     let findings = own_findings(&loaded);
     let mut output = Output::new();
     for finding in &findings {

@@ -14,7 +14,17 @@ pub(crate) const STANDARD_INPUT: &str = "-";
 
 /// Loads the definitions of these paths, which may refer to the built-in ones.
 pub(crate) fn load(paths: &[PathBuf]) -> Result<Loaded, Failure> {
+    load_with(Loader::new(), paths)
+}
+
+/// As [`load`], with a check against the letter of the standard.
+pub(crate) fn load_strictly(paths: &[PathBuf]) -> Result<Loaded, Failure> {
     let mut loader = Loader::new();
+    loader.strict();
+    load_with(loader, paths)
+}
+
+fn load_with(mut loader: Loader, paths: &[PathBuf]) -> Result<Loaded, Failure> {
     for path in paths {
         if path == Path::new(STANDARD_INPUT) {
             loader.text("standard input", &standard_input()?);

@@ -16,7 +16,7 @@ use super::definitions::{complain, load, own_findings};
 /// Compare two sets of service definitions and report wire incompatibilities
 ///
 /// A change affects the wire if two programs, one built from each side, would misread or miss a
-/// message. Such changes are marked with !. Descriptions and state machines are not compared. Exit
+/// message. Such changes are marked with !. State machines are compared, descriptions are not. Exit
 /// status: 0 the wire is unchanged; 1 it is affected; 2 a side cannot be read or has errors.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \

@@ -24,11 +24,19 @@ const NAMESPACE: &str = "urn:jaus:jsidl:";
 #[command(after_help = "Examples:\n  \
     jaus jsidl fmt my-services/\n  \
     jaus jsidl fmt --check my-services/\n  \
+    jaus jsidl fmt --strict my-services/\n  \
     jaus jsidl fmt - < Lights.xml")]
 pub(crate) struct Arguments {
     /// JSIDL files, and directories with `.xml` files; - formats standard input to standard output
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
+
+    /// Write what a schema validator of the standard (AS5684) accepts
+    ///
+    /// Adds mandatory attributes and elements that say nothing, and puts elements in order. What is
+    /// left to correct, `jaus jsidl check --strict` reports.
+    #[arg(long)]
+    strict: bool,
 
     /// Change nothing; list the files that would change
     #[arg(long)]
@@ -38,6 +46,11 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut run = Run {
         check: arguments.check,
+        layout: if arguments.strict {
+            |path, text| format::strict(path, text)
+        } else {
+            |path, text| format::format(path, text)
+        },
         output: Output::new(),
         changed: 0,
         same: 0,
@@ -65,6 +78,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 struct Run {
     check: bool,
+    layout: fn(&Path, &str) -> Result<String, Diagnostics>,
     output: Output,
     changed: usize,
     same: usize,
@@ -74,7 +88,7 @@ struct Run {
 impl Run {
     fn standard_input(&mut self) -> Result<(), Failure> {
         let text = standard_input()?;
-        match format::format("standard input", &text) {
+        match (self.layout)(Path::new("standard input"), &text) {
             Err(findings) => self.report(&findings),
             Ok(laid_out) if self.check => self.count(laid_out == text),
             Ok(laid_out) => self.output.part(&laid_out)?,
@@ -85,7 +99,7 @@ impl Run {
     /// Formats a file. One that was `found` in a directory and is no definition is skipped.
     fn file(&mut self, path: &Path, found: bool) -> Result<(), Failure> {
         let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
-        match format::format(path, &text) {
+        match (self.layout)(path, &text) {
             Err(_) if found && !text.contains(NAMESPACE) => {}
             Err(findings) => self.report(&findings),
             Ok(laid_out) if laid_out == text => self.count(true),

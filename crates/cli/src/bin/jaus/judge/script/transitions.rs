@@ -365,10 +365,10 @@ fn follow(
     speaker: Speaker,
 ) -> Option<Situation> {
     let mut after = from;
-    match transition.kind {
-        TransitionKind::Pop => after.state = after.pushed.take()?,
-        TransitionKind::Push(_) => {
-            after.pushed = Some(from.state);
+    match &transition.kind {
+        TransitionKind::Pop(_) => after.state = after.pushed.take()?,
+        TransitionKind::Push(push) => {
+            after.pushed = machine.remembered(from.state, push);
             after.state = machine.target(from.state, transition)?;
         }
         _ => after.state = machine.target(from.state, transition)?,
