@@ -33,8 +33,8 @@ pub(crate) struct Arguments {
 
     /// Write what a schema validator of the standard (AS5684) accepts
     ///
-    /// Adds mandatory attributes and elements that say nothing, and puts elements in order. What is
-    /// left to correct, `jaus jsidl check --strict` reports.
+    /// Adds mandatory attributes and elements that say nothing, and puts elements in order.
+    /// `jaus jsidl check --strict` reports what is left to correct.
     #[arg(long)]
     strict: bool,
 
