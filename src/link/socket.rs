@@ -1,5 +1,5 @@
-//! A UDP socket for links: registered with the runtime on Unix [for reading only](super::watch), and for
-//! writing only while its send buffer is full. This halves the wake-ups of a round trip.
+//! A UDP socket for links: on Unix it is registered with the runtime for reading only, and for writing only
+//! while its send buffer is full. This halves the wake-ups of a round trip.
 
 use std::io;
 use std::net::{SocketAddr, UdpSocket};

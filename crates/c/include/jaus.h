@@ -573,13 +573,6 @@ enum JausStatus jaus_component_use_management(struct JausComponent component,
 enum JausStatus jaus_component_start(struct JausComponent component);
 
 /**
- * Ends a component and frees it, with its subscriptions and control: it stops what it moves, and
- * releases what it controls. Not in a callback. Waits for callbacks that run, and 2 s at most for the
- * rest. When it returns, no callback of the component runs or will run.
- */
-enum JausStatus jaus_component_free(struct JausComponent component);
-
-/**
  * Requests control of a peer, and waits until it is granted. `authority` is 0 to 255; the higher one
  * wins. Control renews itself until it is freed. Not in a callback.
  *
@@ -648,6 +641,20 @@ enum JausStatus jaus_control_deliver(struct JausControl control,
  * Releases control and frees it. Waits for the peer's confirmation, but not in a callback.
  */
 enum JausStatus jaus_control_free(struct JausControl control);
+
+/**
+ * Ends a component and frees it, with its subscriptions and control: it stops what it moves, and
+ * releases what it controls. Not in a callback. Waits for callbacks that run, and 2 s at most for the
+ * rest. When it returns, no callback of the component runs or will run.
+ */
+enum JausStatus jaus_component_free(struct JausComponent component);
+
+/**
+ * Stops a node and frees it. Its components stop what they move and release what they control; they
+ * are freed, too, with their subscriptions and control. Not in a callback. Waits for callbacks that
+ * run, and 2 s at most for the rest. When it returns, no callback runs or will run.
+ */
+enum JausStatus jaus_node_free(struct JausNode node);
 
 /**
  * Writes the library's log to standard error from now on: 1 errors, 2 also warnings, 3 also the course of
@@ -723,13 +730,6 @@ enum JausStatus jaus_node_serve_host(struct JausNode node, const char *address);
 enum JausStatus jaus_node_start(struct JausNode node);
 
 /**
- * Stops a node and frees it. Its components stop what they move and release what they control; they
- * are freed, too, with their subscriptions and control. Not in a callback. Waits for callbacks that
- * run, and 2 s at most for the rest. When it returns, no callback runs or will run.
- */
-enum JausStatus jaus_node_free(struct JausNode node);
-
-/**
  * Reports each change of the component's own state and of its controller: `JausEventKind_Standing`.
  * Before the start. Without a callback they are events of the component.
  *
@@ -772,9 +772,8 @@ enum JausStatus jaus_component_standing(struct JausComponent component,
 /**
  * The next event of a component, or null after `timeout` milliseconds without one; a negative timeout
  * waits for ever. The event is valid until the next call, or until the component is freed, so one thread
- * at a time may call this. Fails
- * with `JausStatus_Stopped` when the component has ended and all events are fetched. Only with a
- * timeout of 0 in a callback.
+ * at a time may call this. Fails with `JausStatus_Stopped` when the component has ended and all events
+ * are fetched. Only with a timeout of 0 in a callback.
  *
  * Contract:
  * `event` is null, or can be written.

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 use crate::event::Event;
 use crate::status::{begin_callback, is_in_callback};
 use crate::types::{JausAnswer, JausEvent};
-use crate::watchdog::Watchdog;
+use crate::watchdog::{Stop, Watchdog};
 
 pub(crate) type EventFunction = unsafe extern "C" fn(*mut c_void, *const JausEvent);
 pub(crate) type AnswerFunction =
@@ -90,9 +90,11 @@ impl Callback<StopFunction> {
         // SAFETY: as promised to `new`.
         self.call(|function, user| unsafe { function(user) });
     }
+}
 
-    /// Calls the function on the watchdog's thread, unless it is what hangs.
-    pub(crate) fn stop_beside_a_hung_callback(&self) {
+impl Stop for Callback<StopFunction> {
+    /// Calls the function, unless it is what hangs.
+    fn stop_beside_a_hung_callback(&self) {
         let running = match self.running.try_lock() {
             Ok(running) => running,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),

@@ -1,4 +1,4 @@
-//! Components: description, start and end.
+//! Components: description and start.
 #![expect(clippy::disallowed_methods, reason = "an end has a time limit")]
 
 use std::ffi::{c_char, c_void};
@@ -17,16 +17,14 @@ use tokio::task::AbortHandle;
 use crate::argument::{check_out, put, text};
 use crate::attended::Attended;
 use crate::event::EventQueue;
+use crate::news;
 use crate::node::{NODES, NodeEntry, Stage as NodeStage, not_attached};
-use crate::notices;
 use crate::publications::Publications;
-use crate::service::ServiceDraft;
 use crate::sink::Sink;
 use crate::status::{Failure, JausStatus, check_may_wait, run};
 use crate::table::Table;
 use crate::types::{JausComponent, JausEventCallback, JausNode};
 use crate::watchdog::Watchdog;
-use crate::{control, subscription};
 
 pub(crate) static COMPONENTS: Table<ComponentEntry> = Table::new("component");
 
@@ -58,6 +56,14 @@ pub(crate) struct Draft {
     pub(crate) services: Vec<ServiceDraft>,
     pub(crate) on_standing: Option<Sink>,
     pub(crate) on_discovery: Option<Sink>,
+}
+
+/// A service that is being described.
+pub(crate) struct ServiceDraft {
+    /// `None` after a call that failed.
+    pub(crate) handlers: Option<Handlers<UndecodedFunctions>>,
+    /// Whether messages of it wait for the program in the queue of events.
+    pub(crate) is_polled: bool,
 }
 
 enum Guard {
@@ -136,7 +142,7 @@ impl ComponentEntry {
     }
 
     /// Ends the component and its callbacks.
-    fn end(&self) -> Result<(), Failure> {
+    pub(crate) fn end(&self) -> Result<(), Failure> {
         let stage = std::mem::replace(&mut *self.stage(), Stage::Ended);
         if let Stage::Runs(running) = stage {
             for notices in &running.notices {
@@ -187,8 +193,8 @@ impl Draft {
             }
         };
         let component = component.map_err(|error| refused(&error))?;
-        let standing = on_standing.map(|sink| notices::of_standing(&component, sink));
-        let discovery = on_discovery.map(|sink| notices::of_discovery(&component, sink));
+        let standing = on_standing.map(|sink| news::of_standing(&component, sink));
+        let discovery = on_discovery.map(|sink| news::of_discovery(&component, sink));
         Ok(Running {
             notices: standing.into_iter().chain(discovery).collect(),
             component,
@@ -204,7 +210,7 @@ impl Draft {
             Guard::Management(settings) => builder.management(settings),
         };
         for service in self.services {
-            let handlers: Handlers<UndecodedFunctions> = service.handlers.ok_or_else(|| {
+            let handlers = service.handlers.ok_or_else(|| {
                 let text = "a call for a service of the component has failed";
                 Failure::new(JausStatus::WrongState, text)
             })?;
@@ -297,21 +303,6 @@ pub(crate) fn running(
     let entry = COMPONENTS.get(component.id)?;
     let component = entry.running()?;
     Ok((entry, component))
-}
-
-/// Frees the components of a node.
-pub(crate) fn free_all_of(node: &Arc<NodeEntry>) -> Result<(), Failure> {
-    for id in COMPONENTS.select(|it| Arc::ptr_eq(&it.node, node)) {
-        free(id)?;
-    }
-    Ok(())
-}
-
-fn free(id: u64) -> Result<(), Failure> {
-    let entry = COMPONENTS.remove(id)?;
-    subscription::free_all_of(&entry)?;
-    control::free_all_of(&entry)?;
-    entry.end()
 }
 
 /// Describes a component of a node: its number within the node, 1 to 254, the kind and the name of its
@@ -411,15 +402,4 @@ const fn access(authority: u8, timeout: u8) -> AccessControl {
 #[unsafe(no_mangle)]
 pub extern "C" fn jaus_component_start(component: JausComponent) -> JausStatus {
     run(|| COMPONENTS.get(component.id)?.start())
-}
-
-/// Ends a component and frees it, with its subscriptions and control: it stops what it moves, and
-/// releases what it controls. Not in a callback. Waits for callbacks that run, and 2 s at most for the
-/// rest. When it returns, no callback of the component runs or will run.
-#[unsafe(no_mangle)]
-pub extern "C" fn jaus_component_free(component: JausComponent) -> JausStatus {
-    run(|| {
-        check_may_wait()?;
-        free(component.id)
-    })
 }

@@ -30,8 +30,10 @@ mod callback;
 mod client;
 mod component;
 mod control;
+mod ends;
 mod event;
 mod log;
+mod news;
 mod node;
 mod notices;
 mod publications;
@@ -50,18 +52,18 @@ pub use client::{
     jaus_component_set_emergency, jaus_message_free,
 };
 pub use component::{
-    jaus_component_create, jaus_component_free, jaus_component_start,
-    jaus_component_use_access_control, jaus_component_use_management,
+    jaus_component_create, jaus_component_start, jaus_component_use_access_control,
+    jaus_component_use_management,
 };
 pub use control::{
     jaus_component_control, jaus_control_check, jaus_control_deliver, jaus_control_free,
     jaus_control_resume, jaus_control_send, jaus_control_standby, jaus_control_watch_program,
 };
+pub use ends::{jaus_component_free, jaus_node_free};
 pub use log::jaus_log_to_stderr;
 pub use node::{
-    jaus_node_add_peer, jaus_node_create, jaus_node_free, jaus_node_of_host, jaus_node_serve_host,
-    jaus_node_start, jaus_node_use_group, jaus_node_use_interface, jaus_node_use_loopback,
-    jaus_node_use_port,
+    jaus_node_add_peer, jaus_node_create, jaus_node_of_host, jaus_node_serve_host, jaus_node_start,
+    jaus_node_use_group, jaus_node_use_interface, jaus_node_use_loopback, jaus_node_use_port,
 };
 pub use notices::{
     jaus_component_address, jaus_component_changed, jaus_component_descriptor,

@@ -1,13 +1,12 @@
-//! Nodes: settings, start and end; and the node of this host.
+//! Nodes: settings and start; and the node of this host.
 
 use std::ffi::c_char;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use jaus::link::Group;
 use jaus::node::{Address, Config, Host, HostError, Node, StartError};
 
 use crate::argument::{check_out, put, text};
-use crate::component;
 use crate::runtime::Runtime;
 use crate::status::{Failure, JausStatus, check_may_wait, run};
 use crate::table::Table;
@@ -80,6 +79,15 @@ impl NodeEntry {
         let config = (**config).clone();
         let started = self.runtime.wait(async { Node::start(config) })?;
         *stage = Stage::Runs(started.map_err(|error| not_started(&error))?);
+        Ok(())
+    }
+
+    /// Closes its links.
+    pub(crate) fn end(&self) -> Result<(), Failure> {
+        let stage = std::mem::replace(&mut *self.stage(), Stage::Ended);
+        if let Stage::Runs(node) = stage {
+            self.runtime.wait(node.shutdown())?;
+        }
         Ok(())
     }
 }
@@ -236,22 +244,4 @@ pub unsafe extern "C" fn jaus_node_serve_host(
 #[unsafe(no_mangle)]
 pub extern "C" fn jaus_node_start(node: JausNode) -> JausStatus {
     run(|| NODES.get(node.id)?.start())
-}
-
-/// Stops a node and frees it. Its components stop what they move and release what they control; they
-/// are freed, too, with their subscriptions and control. Not in a callback. Waits for callbacks that
-/// run, and 2 s at most for the rest. When it returns, no callback runs or will run.
-#[unsafe(no_mangle)]
-pub extern "C" fn jaus_node_free(node: JausNode) -> JausStatus {
-    run(|| {
-        check_may_wait()?;
-        let entry = NODES.remove(node.id)?;
-        component::free_all_of(&entry)?;
-        let stage = std::mem::replace(&mut *entry.stage(), Stage::Ended);
-        if let Stage::Runs(node) = stage {
-            entry.runtime.wait(node.shutdown())?;
-        }
-        drop::<Arc<NodeEntry>>(entry);
-        Ok(())
-    })
 }

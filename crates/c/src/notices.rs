@@ -3,52 +3,16 @@
 use std::ffi::{c_int, c_void};
 use std::time::Duration;
 
-use jaus::address::JausId;
-use jaus::component::{Change, Component, Condition};
-use tokio::task::AbortHandle;
+use jaus::component::Condition;
 
 use crate::argument::{check_out, code_of, message, put};
 use crate::component::{COMPONENTS, edit, running};
-use crate::event::Event;
-use crate::sink::Sink;
+use crate::news::NOBODY;
 use crate::status::{Failure, JausStatus, check_may_wait, run};
 use crate::types::{
     JAUS_CONDITION_FAILED, JAUS_CONDITION_INITIALIZED, JAUS_CONDITION_SAFE, JausAddress,
-    JausComponent, JausEvent, JausEventCallback, JausEventKind,
+    JausComponent, JausEvent, JausEventCallback,
 };
-
-const NOBODY: JausId = JausId::new(0, 0, 0);
-
-/// Tells a sink of each change of the component's standing. On the library's runtime.
-pub(crate) fn of_standing(component: &Component, sink: Sink) -> AbortHandle {
-    let mut standings = component.watch_standing();
-    let task = async move {
-        while standings.changed().await.is_ok() {
-            let standing = *standings.borrow_and_update();
-            let controller = standing.controller.map_or(NOBODY, |it| it.id);
-            sink.tell(Event {
-                value: standing.state as u8,
-                ..Event::new(JausEventKind::Standing, controller)
-            });
-        }
-    };
-    tokio::runtime::Handle::current().spawn(task).abort_handle()
-}
-
-/// Tells a sink of components that are found and lost. On the library's runtime.
-pub(crate) fn of_discovery(component: &Component, sink: Sink) -> AbortHandle {
-    let mut changes = component.watch();
-    let task = async move {
-        while let Some(change) = changes.next().await {
-            match change {
-                Change::Services(id) => sink.tell(Event::new(JausEventKind::Found, id)),
-                Change::Lost(id, _) => sink.tell(Event::new(JausEventKind::Lost, id)),
-                _ => {}
-            }
-        }
-    };
-    tokio::runtime::Handle::current().spawn(task).abort_handle()
-}
 
 /// Reports each change of the component's own state and of its controller: `JausEventKind_Standing`.
 /// Before the start. Without a callback they are events of the component.
@@ -130,9 +94,8 @@ pub unsafe extern "C" fn jaus_component_standing(
 
 /// The next event of a component, or null after `timeout` milliseconds without one; a negative timeout
 /// waits for ever. The event is valid until the next call, or until the component is freed, so one thread
-/// at a time may call this. Fails
-/// with `JausStatus_Stopped` when the component has ended and all events are fetched. Only with a
-/// timeout of 0 in a callback.
+/// at a time may call this. Fails with `JausStatus_Stopped` when the component has ended and all events
+/// are fetched. Only with a timeout of 0 in a callback.
 ///
 /// # Safety
 /// `event` is null, or can be written.

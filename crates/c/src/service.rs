@@ -11,7 +11,7 @@ use jaus::messages;
 
 use crate::argument::{check_out, message, put, text};
 use crate::callback::Callback;
-use crate::component::{ComponentEntry, edit};
+use crate::component::{ComponentEntry, ServiceDraft, edit};
 use crate::event::Event;
 use crate::status::{Failure, JausStatus, run};
 use crate::types::{
@@ -21,14 +21,6 @@ use crate::types::{
 };
 
 type ServiceHandlers = Handlers<UndecodedFunctions>;
-
-/// A service that is being described.
-pub(crate) struct ServiceDraft {
-    /// `None` after a call that failed.
-    pub(crate) handlers: Option<ServiceHandlers>,
-    /// Whether messages of it wait for the program in the queue of events.
-    pub(crate) is_polled: bool,
-}
 
 /// The id of a service that lives as long as the program: the library's own, or a copy that is made
 /// once for each URN.
@@ -309,7 +301,8 @@ pub unsafe extern "C" fn jaus_service_on_stop(
             let watchdog = component.watchdog();
             // SAFETY: as the caller guarantees.
             let stop = Arc::new(unsafe { Callback::new(function, user, watchdog.clone()) });
-            watchdog.add_stop(&stop);
+            let hung = Arc::downgrade(&stop);
+            watchdog.add_stop(hung);
             component.close_at_end({
                 let stop = stop.clone();
                 move || stop.close()

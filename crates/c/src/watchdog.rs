@@ -10,7 +10,11 @@ use std::time::{Duration, Instant};
 
 use jaus::node::now;
 
-use crate::callback::{Callback, StopFunction};
+/// What stops something that moves while a callback hangs.
+pub(crate) trait Stop: Send + Sync {
+    /// Stops it, on the watchdog's thread.
+    fn stop_beside_a_hung_callback(&self);
+}
 
 /// Watches the callbacks of one node.
 #[derive(Default)]
@@ -23,7 +27,7 @@ pub(crate) struct Watchdog {
 struct State {
     /// Since when a callback has been running, until it is found to hang.
     since: Option<Instant>,
-    stops: Vec<Weak<Callback<StopFunction>>>,
+    stops: Vec<Weak<dyn Stop>>,
     has_ended: bool,
 }
 
@@ -46,10 +50,10 @@ impl Watchdog {
     }
 
     /// Adds a stop callback, for as long as it exists.
-    pub(crate) fn add_stop(&self, stop: &Arc<Callback<StopFunction>>) {
+    pub(crate) fn add_stop(&self, stop: Weak<dyn Stop>) {
         let mut state = self.lock();
         state.stops.retain(|stop| stop.strong_count() > 0);
-        state.stops.push(Arc::downgrade(stop));
+        state.stops.push(stop);
     }
 
     /// Watches a callback until the result is dropped.
@@ -70,7 +74,7 @@ impl Watchdog {
     }
 
     /// Waits until a callback hangs; `None` at the end.
-    fn wait(&self) -> Option<Vec<Weak<Callback<StopFunction>>>> {
+    fn wait(&self) -> Option<Vec<Weak<dyn Stop>>> {
         let mut state = self.lock();
         loop {
             if state.has_ended {

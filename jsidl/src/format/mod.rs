@@ -35,12 +35,12 @@ pub fn format(name: impl AsRef<Path>, text: &str) -> Result<String, Diagnostics>
     laid_out(name.as_ref(), text, |_| {})
 }
 
-/// As [`format`], in the form that the standard prescribes: mandatory attributes and elements that
+/// As [`format()`], in the form that the standard prescribes: mandatory attributes and elements that
 /// say nothing are added, and elements are put in order. What remains for the author to correct, a
 /// [strict](crate::Loader::strict) check says.
 ///
 /// # Errors
-/// As [`format`].
+/// As [`format()`].
 ///
 /// ```
 /// let text = r#"<declared_type_set name="T" xmlns="urn:jaus:jsidl:1.1"><body name="B"/>

@@ -1,5 +1,6 @@
 //! Arrays in Rust: small ones within their struct, large ones on the heap.
 
+use super::dimension::Dimension;
 use super::types::Type;
 
 /// Arrays of more octets are on the heap.
@@ -7,38 +8,6 @@ const MOST_INLINE: usize = 1024;
 
 /// Octets of an array or a list on the heap within its struct.
 const POINTERS: usize = 16;
-
-/// One dimension of an array in Rust, from the outermost inwards.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Dimension {
-    pub(super) length: u32,
-    /// Whether its elements are on the heap.
-    pub(super) on_heap: bool,
-}
-
-impl Dimension {
-    /// The type of an array with these elements.
-    pub(super) fn of(self, element: &str) -> String {
-        let length = self.length;
-        match self.on_heap {
-            true => format!("codec::LargeArray<{element}, {length}>"),
-            false => format!("[{element}; {length}]"),
-        }
-    }
-
-    /// An array whose elements are all made by an expression.
-    pub(super) fn filled(self, element: &str) -> String {
-        match self.on_heap {
-            true => format!("codec::LargeArray::from_fn(|_| {element})"),
-            false => format!("::core::array::from_fn(|_| {element})"),
-        }
-    }
-
-    /// The function that makes random arrays of this kind.
-    pub(super) const fn random(self) -> &'static str {
-        if self.on_heap { "large_array" } else { "array" }
-    }
-}
 
 impl Type {
     /// The dimensions of an array, from the outermost inwards; none of another type.

@@ -12,6 +12,7 @@ mod arrays;
 mod choices;
 mod conversions;
 mod decode;
+mod dimension;
 mod docs;
 mod encode;
 mod ident;

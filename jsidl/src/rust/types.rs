@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 use heck::ToUpperCamelCase;
 
-use super::arrays::Dimension;
+use super::dimension::Dimension;
 use super::ident::Names;
 use crate::fingerprint;
 use crate::model::{
