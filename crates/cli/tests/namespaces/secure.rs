@@ -143,9 +143,10 @@ fn a_vehicle_and_an_operator_find_each_other_by_beacons_that_expose_no_ids() {
             captured
                 .wait_for(|line| Datagram::read(line).is_some_and(|it| it.is_beacon_of(source)));
         }
+        // Of the session itself; tshark prints what it has captured some time later.
+        captured.wait_for(|line| Datagram::read(line).is_some_and(|it| it.port != BEACONS));
         let lines = captured.lines.lock().unwrap();
         let datagrams: Vec<_> = lines.iter().flat_map(|it| Datagram::read(it)).collect();
-        assert!(datagrams.iter().any(|it| it.port != BEACONS), "the session");
         let readable = [&b"60.255.255"[..], b"101.255.255", b"operator", b"rover"].map(hex);
         for datagram in &datagrams {
             assert_ne!(datagram.port, PLAIN, "{datagram:?}");
