@@ -5,7 +5,7 @@
 use jaus_fuzz::{octets_come_back, with_code};
 use jsidl::docs::{self, Format};
 use jsidl::model::Service;
-use jsidl::{Library, Loader, diff, explain, format, lua, machine, rust, schema};
+use jsidl::{Library, Loader, cpp, diff, explain, format, lua, machine, rust, schema, typescript};
 use libfuzzer_sys::fuzz_target;
 
 /// Message bodies to try: zeros satisfy most fields, ones request large counts.
@@ -14,7 +14,7 @@ const BODIES: [[u8; 32]; 3] = [[0; 32], [1; 32], [0xFF; 32]];
 /// Most octets of text that is passed to the emitters: their output is many times as long.
 const LONGEST: usize = 16 << 10;
 
-/// Runs every emitter: for Rust, Wireshark, pages, JSON Schema, drawings of machines, explanations of
+/// Runs every emitter: for Rust, C++, TypeScript, Wireshark, pages, JSON Schema, drawings of machines, explanations of
 /// messages, and the comparison with nothing and with itself.
 fn emit(library: &Library) {
     let services: Vec<&Service> = library.services().map(AsRef::as_ref).collect();
@@ -36,6 +36,8 @@ fn emit(library: &Library) {
         let read = serde_json::from_str::<serde_json::Value>(&text).ok();
         assert_eq!(read, Some(schema), "{}", service.id);
     }
+    assert!(!cpp::files(library, |_| true).is_empty());
+    assert!(!typescript::files(library, |_| true).is_empty());
     for service in &services {
         for machine in library.machines(service) {
             assert!(!machine::dot(&machine).is_empty() && !machine::mermaid(&machine).is_empty());
@@ -59,6 +61,7 @@ fn format_twice(text: &str) {
     if let Ok(formatted) = format::format("fuzz.xml", text) {
         assert_eq!(format::format("fuzz.xml", &formatted), Ok(formatted));
     }
+    let _ = format::strict("fuzz.xml", text);
 }
 
 fuzz_target!(|text: &str| {

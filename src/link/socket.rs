@@ -28,15 +28,19 @@ pub struct Socket {
     full: Option<Watched>,
 }
 
-#[cfg(unix)]
 impl Socket {
     /// Registers a socket, which must be non-blocking.
     ///
     /// # Errors
     /// Those of the operating system.
     pub fn new(socket: UdpSocket) -> io::Result<Self> {
+        #[cfg(unix)]
+        let watched = super::watch::watch(socket, Interest::READABLE)?;
+        #[cfg(not(unix))]
+        let watched = Watched::from_std(socket)?;
         Ok(Self {
-            watched: super::watch::watch(socket, Interest::READABLE)?,
+            watched,
+            #[cfg(unix)]
             full: None,
         })
     }
@@ -44,7 +48,11 @@ impl Socket {
     /// The underlying socket.
     #[must_use]
     pub fn get(&self) -> &Inner {
-        self.watched.get_ref()
+        #[cfg(unix)]
+        let inner = self.watched.get_ref();
+        #[cfg(not(unix))]
+        let inner = &self.watched;
+        inner
     }
 
     /// Calls `read` if the socket is readable. If `read` returns `WouldBlock`, the socket counts as
@@ -54,11 +62,17 @@ impl Socket {
     /// # Errors
     /// Those of `read`; `WouldBlock` if the socket is not readable.
     pub fn try_read<R>(&self, read: impl FnOnce(&Inner) -> io::Result<R>) -> io::Result<R> {
+        #[cfg(not(unix))]
+        let read = || read(&self.watched);
         self.watched.try_io(Interest::READABLE, read)
     }
 
     pub(super) fn try_recv(&self, room: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
-        self.try_read(|socket| socket.recv_from(room))
+        #[cfg(unix)]
+        let received = self.try_read(|socket| socket.recv_from(room));
+        #[cfg(not(unix))]
+        let received = self.watched.try_recv_from(room);
+        received
     }
 
     /// Waits until something may have arrived.
@@ -66,13 +80,18 @@ impl Socket {
     /// # Errors
     /// If the runtime shuts down.
     pub fn poll_read_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        self.watched.poll_read_ready(cx).map_ok(drop)
+        #[cfg(unix)]
+        let ready = self.watched.poll_read_ready(cx).map_ok(drop);
+        #[cfg(not(unix))]
+        let ready = self.watched.poll_recv_ready(cx);
+        ready
     }
 
     /// Waits until a full socket may have room again.
     ///
     /// # Errors
     /// If the runtime shuts down.
+    #[cfg(unix)]
     pub fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         let full = match &mut self.full {
             Some(full) => full,
@@ -85,57 +104,11 @@ impl Socket {
             .map_ok(|mut ready| ready.clear_ready())
     }
 
-    /// Call this when nothing is left to send.
-    pub fn rest(&mut self) {
-        self.full = None;
-    }
-}
-
-#[cfg(not(unix))]
-impl Socket {
-    /// Registers a socket, which must be non-blocking.
-    ///
-    /// # Errors
-    /// Those of the operating system.
-    pub fn new(socket: UdpSocket) -> io::Result<Self> {
-        Ok(Self {
-            watched: Watched::from_std(socket)?,
-        })
-    }
-
-    /// The underlying socket.
-    #[must_use]
-    pub fn get(&self) -> &Inner {
-        &self.watched
-    }
-
-    /// Calls `read` if the socket is readable. If `read` returns `WouldBlock`, the socket counts as
-    /// empty until more arrives: so a `read` that has received fewer datagrams than it had room for
-    /// returns that, which spares a call that would only confirm it.
-    ///
-    /// # Errors
-    /// Those of `read`; `WouldBlock` if the socket is not readable.
-    pub fn try_read<R>(&self, read: impl FnOnce(&Inner) -> io::Result<R>) -> io::Result<R> {
-        self.watched
-            .try_io(Interest::READABLE, || read(&self.watched))
-    }
-
-    pub(super) fn try_recv(&self, room: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
-        self.watched.try_recv_from(room)
-    }
-
-    /// Waits until something may have arrived.
-    ///
-    /// # Errors
-    /// If the runtime shuts down.
-    pub fn poll_read_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        self.watched.poll_recv_ready(cx)
-    }
-
     /// Waits until a full socket may have room again.
     ///
     /// # Errors
     /// If the runtime shuts down.
+    #[cfg(not(unix))]
     pub fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         // The socket was full; the runtime does not know it yet.
         let full = || Err::<(), _>(io::ErrorKind::WouldBlock.into());
@@ -144,5 +117,8 @@ impl Socket {
     }
 
     /// Call this when nothing is left to send.
-    pub fn rest(&mut self) {}
+    pub fn rest(&mut self) {
+        #[cfg(unix)]
+        let _ = self.full.take();
+    }
 }

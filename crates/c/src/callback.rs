@@ -2,9 +2,10 @@
 
 use std::ffi::c_void;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, TryLockError};
 
 use crate::event::Event;
+use crate::lock::lock;
 use crate::status::{begin_callback, is_in_callback};
 use crate::types::{JausAnswer, JausEvent};
 use crate::watchdog::{Stop, Watchdog};
@@ -51,13 +52,13 @@ impl<F: Copy> Callback<F> {
     pub(crate) fn close(&self) {
         self.is_closed.store(true, Ordering::SeqCst);
         if !is_in_callback() {
-            drop(self.running.lock().unwrap_or_else(PoisonError::into_inner));
+            drop(lock(&self.running));
         }
     }
 
     /// Calls the function on the library's thread, under the eyes of the watchdog.
     fn call(&self, invoke: impl FnOnce(F, *mut c_void)) {
-        let _running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
+        let _running = lock(&self.running);
         if self.is_closed.load(Ordering::SeqCst) {
             return;
         }

@@ -2,7 +2,7 @@
 #![expect(clippy::disallowed_methods, reason = "an end has a time limit")]
 
 use std::ffi::{c_char, c_void};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use jaus::component::{
@@ -17,6 +17,7 @@ use tokio::task::AbortHandle;
 use crate::argument::{check_out, put, text};
 use crate::attended::Attended;
 use crate::event::EventQueue;
+use crate::lock::lock;
 use crate::news;
 use crate::node::{NODES, NodeEntry, Stage as NodeStage, not_attached};
 use crate::publications::Publications;
@@ -81,7 +82,7 @@ struct Running {
 
 impl ComponentEntry {
     fn stage(&self) -> MutexGuard<'_, Stage> {
-        self.stage.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.stage)
     }
 
     pub(crate) fn watchdog(&self) -> Arc<Watchdog> {
@@ -90,10 +91,7 @@ impl ComponentEntry {
 
     /// Calls `close` when the component has ended.
     pub(crate) fn close_at_end(&self, close: impl Fn() + Send + 'static) {
-        let closers = self.closers.lock();
-        closers
-            .unwrap_or_else(PoisonError::into_inner)
-            .push(Box::new(close));
+        lock(&self.closers).push(Box::new(close));
     }
 
     /// The receiver of events: a callback, which is closed with the component, or its queue.
@@ -164,8 +162,7 @@ impl ComponentEntry {
                 .wait(async { tokio::time::timeout(END, gone).await })?;
         }
         self.queue.end();
-        let closers = self.closers.lock();
-        let closers = std::mem::take(&mut *closers.unwrap_or_else(PoisonError::into_inner));
+        let closers = std::mem::take(&mut *lock(&self.closers));
         for close in closers {
             close();
         }

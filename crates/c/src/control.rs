@@ -5,7 +5,7 @@
 )]
 
 use std::ffi::c_void;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use jaus::component::Control;
@@ -16,8 +16,9 @@ use crate::argument::{check_out, message, one_component, priority, put};
 use crate::client::{not_sent, uncontrolled, undelivered, unmanaged};
 use crate::component::{ComponentEntry, running};
 use crate::event::Event;
+use crate::lock::lock;
 use crate::sink::Sink;
-use crate::status::{Failure, JausStatus, check_may_wait, run};
+use crate::status::{Failure, JausStatus, run};
 use crate::table::Table;
 use crate::types::{
     JAUS_STATE_UNKNOWN, JausAddress, JausComponent, JausControl, JausEventCallback, JausEventKind,
@@ -38,10 +39,6 @@ struct Held {
     control: Mutex<Option<Arc<Control>>>,
     /// When the program last showed that it runs.
     shown: Mutex<Instant>,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Held {
@@ -78,7 +75,7 @@ impl Held {
     }
 }
 
-/// Tells of the states that the peer reports, and of the loss of control.
+/// Passes on the states that the peer reports, and then why control was lost.
 async fn follow(held: Arc<Held>, event: impl Fn(JausEventKind) -> Event, sink: Sink) {
     /// How long it keeps a reference. Control is released with the last one.
     const MOMENT: Duration = Duration::from_millis(100);
@@ -107,11 +104,7 @@ impl ControlEntry {
     fn end(&self) {
         let control = lock(&self.held.control).take();
         for task in lock(&self.tasks).drain(..) {
-            task.abort();
-            if check_may_wait().is_ok() {
-                // Its end by the abort is what is waited for.
-                let _ = self.component.node.runtime.wait(task);
-            }
+            self.component.node.runtime.end(task);
         }
         if let Some(control) = control.and_then(Arc::into_inner) {
             // Without waiting, dropping it does the same.

@@ -12,6 +12,7 @@ use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::node::now;
 
+use crate::lock::lock;
 use crate::types::{JausEvent, JausEventKind};
 
 /// An event, as the library keeps it.
@@ -235,7 +236,7 @@ impl EventQueue {
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.state)
     }
 }
 

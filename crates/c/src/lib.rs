@@ -32,6 +32,7 @@ mod component;
 mod control;
 mod ends;
 mod event;
+mod lock;
 mod log;
 mod news;
 mod node;

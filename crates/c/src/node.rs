@@ -1,12 +1,13 @@
 //! Nodes: settings and start; and the node of this host.
 
 use std::ffi::c_char;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 
 use jaus::link::Group;
 use jaus::node::{Address, Config, Host, HostError, Node, StartError};
 
 use crate::argument::{check_out, put, text};
+use crate::lock::lock;
 use crate::runtime::Runtime;
 use crate::status::{Failure, JausStatus, check_may_wait, run};
 use crate::table::Table;
@@ -41,7 +42,7 @@ impl NodeEntry {
     }
 
     fn stage(&self) -> MutexGuard<'_, Stage> {
-        self.stage.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.stage)
     }
 
     /// A copy of what runs.

@@ -1,12 +1,13 @@
 //! The reports that a program has published, and the news of them for subscribers.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use bytes::Bytes;
 use jaus::component::Component;
 use tokio::runtime::Handle;
 
+use crate::lock::lock;
 use crate::status::{Failure, JausStatus};
 
 /// The published reports of a component.
@@ -65,6 +66,6 @@ impl Publications {
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0)
     }
 }

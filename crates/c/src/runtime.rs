@@ -56,6 +56,13 @@ impl Runtime {
         check_may_wait()?;
         Ok(self.handle.block_on(future))
     }
+
+    /// Ends a task. Waits until it runs no more, but not in a callback.
+    pub(crate) fn end(&self, task: tokio::task::JoinHandle<()>) {
+        task.abort();
+        // Its end by the abort is what is waited for.
+        let _ = self.wait(task);
+    }
 }
 
 impl Drop for Runtime {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::ffi::{c_char, c_void};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use jaus::codec::{ServiceId, report_code};
 use jaus::component::{Handlers, UndecodedFunctions, Validity};
@@ -13,6 +13,7 @@ use crate::argument::{check_out, message, put, text};
 use crate::callback::Callback;
 use crate::component::{ComponentEntry, ServiceDraft, edit};
 use crate::event::Event;
+use crate::lock::lock;
 use crate::status::{Failure, JausStatus, run};
 use crate::types::{
     JAUS_VALIDITY_BRIEF, JAUS_VALIDITY_BY_CODE, JAUS_VALIDITY_UNTIL_DONE,
@@ -33,7 +34,7 @@ fn service_id(urn: &str, major: u8, minor: u8) -> Result<ServiceId, Failure> {
         let urn = known.id.urn;
         return Ok(ServiceId { urn, major, minor });
     }
-    let mut own = OWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut own = lock(&OWN);
     let urn = match own.get(urn) {
         Some(urn) => urn,
         None if own.len() >= MOST => {

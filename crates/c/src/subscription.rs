@@ -1,7 +1,7 @@
 //! Subscriptions to the reports of peers.
 
 use std::ffi::c_void;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use jaus::component::{SubscribeError, Subscription, Undecoded, Update, When};
@@ -13,8 +13,9 @@ use crate::argument::{check_out, message, one_component, put};
 use crate::client::report_of;
 use crate::component::{ComponentEntry, running};
 use crate::event::Event;
+use crate::lock::lock;
 use crate::sink::Sink;
-use crate::status::{Failure, JausStatus, check_may_wait, run};
+use crate::status::{Failure, JausStatus, run};
 use crate::table::Table;
 use crate::types::{
     JausAddress, JausComponent, JausEventCallback, JausEventKind, JausSubscription,
@@ -48,10 +49,6 @@ impl Shown {
             self.arrived = reports.age().map(|age| now() - age);
         }
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn not_subscribed(error: &SubscribeError) -> Failure {
@@ -105,11 +102,7 @@ impl SubscriptionEntry {
     /// Ends the subscription. Waits for a callback that runs, but not in a callback.
     fn end(&self) {
         if let Some(task) = lock(&self.task).take() {
-            task.abort();
-            if check_may_wait().is_ok() {
-                // Its end by the abort is what is waited for.
-                let _ = self.component.node.runtime.wait(task);
-            }
+            self.component.node.runtime.end(task);
         }
         self.sink.close();
     }

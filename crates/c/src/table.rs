@@ -3,8 +3,9 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
+use crate::lock::lock;
 use crate::status::{Failure, JausStatus};
 
 /// All tables share it, so that no two objects have the same number.
@@ -74,7 +75,7 @@ impl<T> Table<T> {
     }
 
     fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Arc<T>>> {
-        self.objects.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.objects)
     }
 }
 

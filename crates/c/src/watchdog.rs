@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 
 use jaus::node::now;
 
+use crate::lock::lock;
+
 /// What stops something that moves while a callback hangs.
 pub(crate) trait Stop: Send + Sync {
     /// Stops it, on the watchdog's thread.
@@ -90,7 +92,7 @@ impl Watchdog {
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.state)
     }
 }
 

@@ -157,13 +157,13 @@ fn not_shifted(report: &mut Report, set: &syntax::ValueSet, resolved: &ValueSet)
 
 /// A resolved value set, and the places of its values.
 #[derive(Debug, Clone)]
-pub(crate) struct Rated {
+pub(crate) struct Placed {
     pub(crate) set: ValueSet,
     /// Positions of the ranges, then of the values.
     places: Vec<Span>,
 }
 
-impl Rated {
+impl Placed {
     pub(crate) fn new(written: &syntax::ValueSet, set: ValueSet) -> Self {
         let ranges = written.ranges.iter().map(|range| range.span);
         let values = written.values.iter().map(|value| value.span);
@@ -183,7 +183,7 @@ impl Rated {
 }
 
 /// The values fit the type of the field.
-pub(crate) fn values_of_number(report: &mut Report, values: &Rated, number: Number) -> bool {
+pub(crate) fn values_of_number(report: &mut Report, values: &Placed, number: Number) -> bool {
     let Some((least, greatest)) = number.integers() else {
         return true;
     };
@@ -191,13 +191,13 @@ pub(crate) fn values_of_number(report: &mut Report, values: &Rated, number: Numb
 }
 
 /// The values fit the bits of a sub-field.
-pub(crate) fn values_of_bits(report: &mut Report, values: &Rated, bits: u8) -> bool {
+pub(crate) fn values_of_bits(report: &mut Report, values: &Placed, bits: u8) -> bool {
     let greatest = (1_i128 << bits) - 1;
     let holder = format!("a sub-field of {bits} bits");
     within(report, values, 0, greatest, &holder)
 }
 
-fn within(report: &mut Report, values: &Rated, least: i128, greatest: i128, holder: &str) -> bool {
+fn within(report: &mut Report, values: &Placed, least: i128, greatest: i128, holder: &str) -> bool {
     let holds = |value: f64| (least as f64..=greatest as f64).contains(&value);
     let ranges = values.set.ranges.iter().map(|range| {
         let fits = holds(range.lower) && holds(range.upper);

@@ -19,7 +19,7 @@ use crate::syntax::Node;
 pub(crate) use behaviour::behaviour;
 pub(crate) use composite::{array, count, count_limit, group, header, required, size, tag};
 pub(crate) use field::{
-    Rated, bits, enum_index, octet_index, overlap, scale, units, value_range, value_set,
+    Placed, bits, enum_index, octet_index, overlap, scale, units, value_range, value_set,
     values_of_bits, values_of_number,
 };
 pub(crate) use service::{

@@ -2,7 +2,7 @@
 
 use super::item::values as entries;
 use super::{Resolved, Resolver};
-use crate::check::{self, Rated};
+use crate::check::{self, Placed};
 use crate::model::{
     BitField, Choice, Count, Format, Meaning, NamedValue, Scalar, Scale, Shape, SubField, Unsigned,
     ValueRange, ValueSet,
@@ -60,7 +60,7 @@ impl Resolver<'_> {
     }
 
     /// Resolves the value set of a field, declared there or in a type set.
-    fn values(&mut self, scope: TypeSetIndex, values: &Values) -> Option<Rated> {
+    fn values(&mut self, scope: TypeSetIndex, values: &Values) -> Option<Placed> {
         match values {
             Values::Here(written) => self.value_set(scope, written),
             Values::Declared(target) => match self.follow(scope, target)? {
@@ -88,7 +88,7 @@ impl Resolver<'_> {
         &mut self,
         scope: TypeSetIndex,
         set: &syntax::ValueSet,
-    ) -> Option<Rated> {
+    ) -> Option<Placed> {
         let ranges: Vec<_> = set
             .ranges
             .iter()
@@ -110,7 +110,7 @@ impl Resolver<'_> {
             ranges: ranges.into_iter().collect::<Option<_>>()?,
             values: values.into_iter().collect::<Option<_>>()?,
         };
-        check::value_set(self.report, set, &resolved).then(|| Rated::new(set, resolved))
+        check::value_set(self.report, set, &resolved).then(|| Placed::new(set, resolved))
     }
 
     fn value_range(

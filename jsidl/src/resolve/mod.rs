@@ -16,7 +16,7 @@ use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use std::sync::Arc;
 
-use crate::check::Rated;
+use crate::check::Placed;
 use crate::diagnostic::Report;
 use crate::expr::Value;
 use crate::library::Library;
@@ -96,7 +96,7 @@ enum Resolved {
     Section(Option<Rc<Whole>>),
     Message(Arc<Message>),
     Event,
-    Values(Rc<Rated>),
+    Values(Rc<Placed>),
 }
 
 /// An item with its copy cost, see [`item::measure`].

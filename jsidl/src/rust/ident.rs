@@ -4,6 +4,8 @@ use std::collections::{HashMap, HashSet};
 
 use heck::{ToShoutySnakeCase, ToSnakeCase, ToUpperCamelCase};
 
+use crate::typed::names::{self, leading};
+
 /// Keywords that can be raw identifiers.
 const KEYWORDS: &[&str] = &[
     "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "do", "dyn",
@@ -136,19 +138,6 @@ impl Names {
     }
 }
 
-/// Makes an identifier begin with a letter, and drops invalid characters.
-fn leading(ident: &str, letter: &str) -> String {
-    let ident: String = ident
-        .chars()
-        .filter(|c| c.is_ascii_alphanumeric() || *c == '_')
-        .collect();
-    if ident.starts_with(|c: char| c.is_ascii_alphabetic()) {
-        ident
-    } else {
-        format!("{letter}{ident}")
-    }
-}
-
 /// An identifier that differs from those taken, for a local variable beside fields.
 pub(super) fn local(base: &str, taken: &[&str]) -> String {
     let mut ident = base.to_owned();
@@ -158,40 +147,12 @@ pub(super) fn local(base: &str, taken: &[&str]) -> String {
     ident
 }
 
-/// A module of a version: `v1_0`.
-pub(super) fn version_module(version: crate::model::Version) -> String {
-    format!("v{}_{}", version.major, version.minor)
-}
-
 /// The constant of a version: `V1_0`.
 pub(super) fn version_constant(version: crate::model::Version) -> String {
-    version_module(version).to_uppercase()
+    names::version(version).to_uppercase()
 }
 
 /// The suffix of accessors in engineering units: `latitude_deg`.
 pub(super) fn unit_suffix(unit: &str) -> String {
-    let words = match unit {
-        "one" => "value",
-        "degree" => "deg",
-        "radian" => "rad",
-        "meter" => "m",
-        "second" => "s",
-        "percent" => "percent",
-        "meter per second" => "m_per_s",
-        "meter per second squared" => "m_per_s2",
-        "radian per second" => "rad_per_s",
-        "radian per second squared" => "rad_per_s2",
-        "newton" => "n",
-        "newton meter" => "nm",
-        "kilogram" => "kg",
-        "hertz" => "hz",
-        "volt" => "v",
-        "ampere" => "a",
-        "degree Celsius" => "celsius",
-        "pascal" => "pa",
-        "square meter" => "m2",
-        "cubic meter" => "m3",
-        other => return other.to_snake_case(),
-    };
-    words.to_owned()
+    names::unit(unit).to_snake_case()
 }

@@ -34,7 +34,7 @@ mod writer;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use self::ident::{Names, version_module};
+use self::ident::Names;
 use self::machine::{Extern, Messages};
 use self::messages::Written;
 use self::plan::Plan;
@@ -42,6 +42,7 @@ use self::registry::ServicePaths;
 use self::writer::Writer;
 use crate::library::Library;
 use crate::model::{Service, Version};
+use crate::typed::names;
 
 /// How generated code finds what it refers to.
 #[derive(Debug, Clone)]
@@ -147,7 +148,7 @@ fn write(out: &mut Writer, plans: &[Plan<'_>], paths: &ServicePaths<'_>) {
         out.push(format!(
             "/// The messages of services of version {version}."
         ));
-        out.push(format!("pub mod {} {{", version_module(version)));
+        out.push(format!("pub mod {} {{", names::version(version)));
         if plans.iter().any(|plan| plan.version == version) {
             out.push("use super::codec;");
         }
@@ -193,7 +194,7 @@ fn aliases<'p>(
     }
     for (version, items) in by_version {
         out.gap();
-        out.import(&format!("{root}{}", version_module(version)), &items);
+        out.import(&format!("{root}{}", names::version(version)), &items);
     }
 }
 

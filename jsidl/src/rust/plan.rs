@@ -6,10 +6,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::ident::{Names, version_module};
+use super::ident::Names;
 use crate::fingerprint;
 use crate::library::Library;
 use crate::model::{Id, Message, Service, Version};
+use crate::typed::names;
 
 /// A message type to generate.
 #[derive(Debug)]
@@ -43,12 +44,12 @@ impl Plan<'_> {
 
     /// The path of the definition from the root of the set.
     pub(super) fn definition(&self) -> String {
-        format!("{}::{}", version_module(self.version), self.ident)
+        format!("{}::{}", names::version(self.version), self.ident)
     }
 
     /// The path of the module with its nested types from the root of the set.
     pub(super) fn module_path(&self) -> String {
-        format!("{}::{}", version_module(self.version), self.module)
+        format!("{}::{}", names::version(self.version), self.module)
     }
 
     /// Its names in the module of a version that has it.
@@ -69,7 +70,7 @@ impl Plan<'_> {
 /// The modules of versions.
 pub(super) fn version_modules(services: &[&Service]) -> Vec<String> {
     let versions: BTreeSet<_> = services.iter().map(|service| service.id.version).collect();
-    versions.into_iter().map(version_module).collect()
+    versions.into_iter().map(names::version).collect()
 }
 
 /// Plans the types: one for every code, name and layout; sorted by code, the newest layout of a

@@ -93,7 +93,7 @@ impl Names {
 }
 
 /// An identifier of ASCII characters that begins with a letter.
-fn leading(ident: &str, letter: &str) -> String {
+pub(crate) fn leading(ident: &str, letter: &str) -> String {
     let is_valid = |c: &char| c.is_ascii_alphanumeric() || *c == '_';
     let ident: String = ident.chars().filter(is_valid).collect();
     if ident.starts_with(|c: char| c.is_ascii_alphabetic()) {

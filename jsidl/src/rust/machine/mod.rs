@@ -18,7 +18,7 @@ use self::states::States;
 use self::steps::Steps;
 use self::vocabulary::{Choice, Event, Kind, Method, Vocabulary};
 use super::docs;
-use super::ident::{Names, version_module};
+use super::ident::Names;
 use super::plan::{Plan, plan};
 use super::queries;
 use super::writer::Writer;
@@ -26,6 +26,7 @@ use crate::behaviour::TransitionKind;
 use crate::library::Library;
 use crate::machine::{MOST_REMEMBERED, Machine, StateIndex};
 use crate::model::{Message, Service};
+use crate::typed::names;
 
 /// Locations of the message types.
 #[derive(Clone, Copy)]
@@ -101,7 +102,7 @@ fn of_service<'p, 'm>(
 pub(super) fn machines(out: &mut Writer, messages: Messages<'_>, versions: &[&Service]) {
     let with = versions.iter().filter(|it| !it.behaviour.is_empty());
     for (age, service) in with.enumerate() {
-        let version = (age > 0).then(|| version_module(service.id.version));
+        let version = (age > 0).then(|| names::version(service.id.version));
         if let Some(version) = &version {
             out.gap();
             out.push(format!("/// Machines of version {}.", service.id.version));
