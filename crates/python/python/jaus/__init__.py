@@ -1,0 +1,1 @@
+"""SAE JAUS nodes, components and clients for asyncio."""
