@@ -10,8 +10,8 @@ use std::time::SystemTime;
 
 use clap::Args;
 use jaus::address::JausId;
-use jaus::link::Interfaces;
-use jaus::node::{Config, units};
+use jaus::link::{Interface, Interfaces, Ip, interface};
+use jaus::node::{Config, Tcp, units};
 use jaus_audit::{AuditLog, Limits};
 use jaus_secure::{Announce, Credentials, Key, Peer, SecureLink, TrustFile, edit};
 use serde::Deserialize;
@@ -311,15 +311,23 @@ impl Secure {
         self.peers.iter().map(|Address(peer)| *peer).collect()
     }
 
-    /// The node's settings beside the link: plain JUDP only on interfaces that they name.
+    /// The node's settings beside the link: plain JUDP and JTCP only on interfaces that they name.
     ///
     /// # Errors
-    /// Plain TCP connections.
+    /// Plain TCP connections that are not on these interfaces, or interfaces that cannot be listed.
     pub fn restrict(config: Config) -> Result<Config, Failure> {
-        if config.tcp != jaus::node::Tcp::default() {
-            return Err(Failure::new(
-                "plain TCP connections ([tcp]) and a secure link contradict each other: remove one",
-            ));
+        let named = match config.interfaces {
+            Interfaces::All => Vec::new(),
+            _ => {
+                let all = interface::list().map_err(Failure::of)?;
+                config.interfaces.present(&all, Ip::Both)
+            }
+        };
+        if let Some(address) = outside(&config.tcp, &named) {
+            return Err(Failure::new(format!(
+                "plain TCP at {address} and a secure link contradict each other: remove it from \
+                 [tcp], or name its interface by `interfaces`, which others must not share"
+            )));
         }
         match config.interfaces {
             Interfaces::All => Ok(config.without_udp()),
@@ -356,6 +364,15 @@ impl Secure {
         }
         Ok(link)
     }
+}
+
+/// The first address of these TCP settings that is not on one of the interfaces.
+fn outside(tcp: &Tcp, interfaces: &[Interface]) -> Option<SocketAddr> {
+    let is_own = |at: &SocketAddr| interfaces.iter().any(|i| i.address == at.ip());
+    let is_reached = |peer: &SocketAddr| interfaces.iter().any(|i| i.reaches(*peer));
+    let mut peers = tcp.connect.iter().map(|peer| peer.address());
+    let listen = tcp.listen.filter(|at| !is_own(at));
+    listen.or_else(|| peers.find(|peer| !is_reached(peer)))
 }
 
 /// Writes a trust file with these peers if there is none. An existing file must trust them: it is
@@ -464,6 +481,24 @@ mod tests {
     }
 
     #[test]
+    fn plain_tcp_remains_only_on_named_interfaces() {
+        let accepts = |config: Config, listen: &str| {
+            Secure::restrict(config.tcp_listen(listen.parse().unwrap())).is_ok()
+        };
+        let connects = |config: Config, peer: &str| {
+            Secure::restrict(config.tcp_connect(peer.parse().unwrap())).is_ok()
+        };
+        let named = || Config::new(101, 1).interfaces(["lo"]);
+        assert!(accepts(named(), "127.0.0.1:0") && connects(named(), "127.0.0.1:3794"));
+        assert!(accepts(Config::loopback(101, 1), "127.0.0.1:0"));
+        for elsewhere in ["0.0.0.0:3794", "192.0.2.1:3794"] {
+            assert!(!accepts(named(), elsewhere) && !connects(named(), elsewhere));
+        }
+        let unnamed = || Config::new(101, 1);
+        assert!(!accepts(unnamed(), "127.0.0.1:0") && !connects(unnamed(), "127.0.0.1:3794"));
+    }
+
+    #[test]
     fn plain_udp_remains_only_on_named_interfaces() {
         let restricted = |config| Secure::restrict(config).map(|it| it.interfaces);
         let none = Interfaces::Only(Vec::new());
@@ -474,7 +509,5 @@ mod tests {
             restricted(Config::loopback(101, 1)).unwrap(),
             Interfaces::Loopback
         );
-        let tcp = Config::new(101, 1).tcp_listen("127.0.0.1:0".parse().unwrap());
-        assert!(restricted(tcp).is_err());
     }
 }

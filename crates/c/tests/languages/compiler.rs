@@ -57,7 +57,7 @@ fn library() -> PathBuf {
 }
 
 /// Compiles a program once; returns its path.
-fn compile(source: &'static str) -> PathBuf {
+pub(crate) fn compile(source: &'static str) -> PathBuf {
     static COMPILED: Mutex<BTreeMap<&str, PathBuf>> = Mutex::new(BTreeMap::new());
     let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
     let program = compiled.entry(source).or_insert_with(|| {

@@ -1,5 +1,5 @@
-//! Programs in C and C++ over the interface: compiled by the system's compilers, against each other and
-//! against components in Rust. The compilers are gcc and g++.
+//! Programs in C and C++ over the interface, compiled by gcc and g++, against each other and against
+//! components in Rust and Python.
 #![allow(
     clippy::disallowed_methods,
     clippy::unwrap_used,
@@ -9,6 +9,7 @@
 )]
 
 mod compiler;
+mod mixes;
+mod parts;
 mod safety;
 mod scene;
-mod system;

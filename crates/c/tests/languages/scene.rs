@@ -1,19 +1,16 @@
 //! The parts of the tests in Rust: a node on loopback with a group of its own, drivers and operators.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use jaus::address::JausId;
 use jaus::component::{Component, Control, Handlers, Kind, Management};
-use jaus::link::Group;
 use jaus::messages::mobility::{
     QueryVelocityState, QueryVelocityStateExt, QueryWrenchEffort, ReportVelocityState,
     SetWrenchEffort, primitive_driver, velocity_state_sensor,
 };
-use jaus::node::{Config, Node};
+use jaus::node::{Config, Node, Port};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::within_limit;
+use tokio::sync::watch;
 
 /// A node and an operator on it.
 pub(crate) struct Scene {
@@ -25,12 +22,7 @@ pub(crate) struct Scene {
 impl Scene {
     pub(crate) fn new() -> Self {
         let group = own_group();
-        Self::on(Config::loopback(42, 1).group(group), group)
-    }
-
-    /// On a node with other settings.
-    pub(crate) fn on(config: Config, group: Group) -> Self {
-        let node = Node::start(config).unwrap();
+        let node = Node::start(Config::loopback(42, 1).group(group)).unwrap();
         let operator = Component::builder(Kind::OperatorControlUnit, "Operator");
         Self {
             group: group.to_string(),
@@ -48,34 +40,39 @@ impl Scene {
         control
     }
 
-    /// A driver in Rust. The flag is whether it drives.
-    pub(crate) fn driver(&self) -> (Component, Arc<AtomicBool>) {
-        let drives = Arc::<AtomicBool>::default();
-        let (driving, stopping) = (drives.clone(), drives.clone());
-        let handlers = Handlers::new(primitive_driver::LATEST)
-            .command(move |_: SetWrenchEffort, _, _| driving.store(true, Ordering::Relaxed))
-            .declines::<QueryWrenchEffort>()
-            .on_stop(move |_| stopping.store(false, Ordering::Relaxed));
-        let driver = Component::builder(Kind::Vehicle, "Rover")
-            .offer(handlers)
-            .management(Management::new());
-        (driver.attach(&self.node, 33).unwrap(), drives)
+    /// A driver in Rust on this node. The second is whether it drives.
+    pub(crate) fn driver(&self) -> (Component, watch::Receiver<bool>) {
+        driver_on(self.node.attach(33).unwrap())
     }
+}
 
-    /// A sensor in Rust.
-    pub(crate) fn sensor(&self) -> Component {
-        let mut speed = ReportVelocityState::default();
-        speed.set_velocity_x_m_per_s(1.5).unwrap();
-        let handlers = Handlers::new(velocity_state_sensor::LATEST)
-            .answer(move |_: QueryVelocityState| speed.clone())
-            .declines::<QueryVelocityStateExt>();
-        let sensor = Component::builder(Kind::Vehicle, "Rover").offer(handlers);
-        sensor.attach(&self.node, 44).unwrap()
-    }
+/// A primitive driver. The second is whether it drives.
+pub(crate) fn driver_on(port: Port) -> (Component, watch::Receiver<bool>) {
+    let (drives, watched) = watch::channel(false);
+    let stopped = drives.clone();
+    let handlers = Handlers::new(primitive_driver::LATEST)
+        .command(move |_: SetWrenchEffort, _, _| {
+            drives.send_replace(true);
+        })
+        .declines::<QueryWrenchEffort>()
+        .on_stop(move |_| {
+            stopped.send_replace(false);
+        });
+    let driver = Component::builder(Kind::Vehicle, "Rover")
+        .offer(handlers)
+        .management(Management::new());
+    (driver.live_on(port).unwrap(), watched)
+}
 
-    pub(crate) async fn find(&self, urn: &str) -> JausId {
-        within_limit(self.operator.find(urn)).await.unwrap()
-    }
+/// A velocity sensor, which reports 1.5 m/s.
+pub(crate) fn sensor_on(port: Port) -> Component {
+    let mut speed = ReportVelocityState::default();
+    speed.set_velocity_x_m_per_s(1.5).unwrap();
+    let handlers = Handlers::new(velocity_state_sensor::LATEST)
+        .answer(move |_: QueryVelocityState| speed.clone())
+        .declines::<QueryVelocityStateExt>();
+    let sensor = Component::builder(Kind::Vehicle, "Rover").offer(handlers);
+    sensor.live_on(port).unwrap()
 }
 
 /// Set Wrench Effort, forward.
