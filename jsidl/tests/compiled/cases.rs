@@ -184,6 +184,14 @@ fn a_machine_without_actions_compiles() {
 }
 
 #[test]
+fn a_guard_may_have_the_name_of_a_message_that_is_a_keyword() {
+    let messages =
+        message("Sample", 0xD001, &plain("A", false)) + &message("fn", 0xD002, &plain("A", false));
+    let machine = r#"<protocol_behavior is_stateless="false"><start state_machine_name="ReceiveFSM" state_name="S0"/><state_machine name="ReceiveFSM"><state name="S0"><transition name="Receive"><parameter type="Sample" value="msg"/><guard condition="fn(msg)"/><internal/></transition></state></state_machine></protocol_behavior>"#;
+    assert_compiles(&emitted(&[service(&messages, machine)]));
+}
+
+#[test]
 fn the_code_of_a_large_machine_grows_with_its_reactions() {
     let length = |events| emitted(&[service("", &machine(60, events))]).len();
     let (one, four) = (length(100), length(400));

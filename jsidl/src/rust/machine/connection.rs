@@ -45,9 +45,9 @@ impl<'a> Connection<'a> {
 
     /// Reserves the names of its methods in the trait.
     pub(in super::super) fn reserve(&self, names: &mut Names) {
-        for method in &self.emitter.vocabulary.methods {
-            names.snake(&method.ident);
-        }
+        let methods = self.emitter.vocabulary.methods.iter();
+        let taken = methods.map(|method| method.ident.trim_start_matches("r#").to_owned());
+        names.reserve(&taken.collect::<Vec<_>>());
     }
 
     /// Writes the methods of the trait: guards and actions.
