@@ -29,6 +29,8 @@ const SETS: &[(&str, &[(&str, &str)])] = &[
 fn main() {
     let mut build = jsidl::build::Build::new()
         .runtime("crate::codec")
+        // Peers of mobility 1.0 know no other messages than those that 1.1 calls deprecated.
+        .warn_of_deprecated(false)
         .module("core", "urn:jaus:jss:core:");
     for (feature, modules) in SETS {
         if std::env::var_os(format!("CARGO_FEATURE_{feature}")).is_some() {

@@ -99,6 +99,14 @@ impl Build {
         self
     }
 
+    /// Whether the compiler warns of uses of deprecated messages, as
+    /// [`rust::Settings::warn_of_deprecated`] describes.
+    #[must_use]
+    pub fn warn_of_deprecated(mut self, warns: bool) -> Self {
+        self.settings = self.settings.warn_of_deprecated(warns);
+        self
+    }
+
     /// Where to write; `OUT_DIR` if nothing is said.
     #[must_use]
     pub fn out_dir(mut self, path: impl Into<PathBuf>) -> Self {

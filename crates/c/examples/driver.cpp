@@ -1,10 +1,12 @@
 // A primitive driver: it obeys the client in control while it is ready. The operator's example drives it.
-#include "messages.hpp"
+#include "jaus/mobility.hpp"
 #include "place.hpp"
 
 #include <atomic>
 #include <iostream>
 #include <thread>
+
+using namespace jaus::mobility;
 
 // A motor that gets its effort every 50 ms. A real one stops by itself 200 ms after the last command, for
 // the case that this program dies.
@@ -38,11 +40,15 @@ int main(int count, char **arguments) try {
         std::cout << "state " << int(standing.value()) << std::endl;
     });
     driver.offer("urn:jaus:jss:mobility:PrimitiveDriver", 1, 1)
-        .command(messages::set_wrench_effort,
-                 [&](const jaus::Event &command) {
-                     motor.set(messages::first_field(command, -100, 100, 2).value_or(0));
+        .command(SetWrenchEffort::kCode,
+                 [&](const jaus::Event &event) {
+                     const auto command =
+                         jaus::codec::decode<SetWrenchEffort>({event.data(), event.size()});
+                     // A command that cannot be read stops the motor.
+                     motor.set(
+                         command ? command->propulsive_linear_effort_x_percent().value_or(0) : 0);
                  })
-        .decline(messages::query_wrench_effort)
+        .decline(QueryWrenchEffort::kCode)
         .on_stop([&] { motor.set(0); });
     driver.start();
     // ANCHOR_END: driver

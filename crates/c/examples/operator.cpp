@@ -1,18 +1,28 @@
 // An operator: shows the speed that a sensor reports, and drives for three seconds. It waits for events
 // with a loop of its own.
-#include "messages.hpp"
+#include "jaus/mobility.hpp"
 #include "place.hpp"
 
 #include <iostream>
 #include <poll.h>
 
+using namespace jaus::mobility;
+
 namespace {
+
+void show_report(const jaus::Event &event) {
+    const auto report = jaus::codec::decode<ReportVelocityState>({event.data(), event.size()});
+    if (!report) {
+        std::cout << report.error().text() << std::endl;
+    } else if (const auto speed = report->velocity_x_m_per_s()) {
+        std::cout << *speed << " m/s, " << event.lost() << " lost" << std::endl;
+    }
+}
 
 void show(const jaus::Event &event) {
     switch (event.kind()) {
     case JausEventKind_Report:
-        std::cout << messages::first_field(event, -327.68, 327.67, 4).value_or(0) << " m/s, "
-                  << event.lost() << " lost" << std::endl;
+        show_report(event);
         break;
     case JausEventKind_SubscriptionDown:
         std::cout << "no speed: " << event.text() << std::endl;
@@ -33,16 +43,22 @@ int main(int count, char **arguments) try {
     jaus::Component console(node, 1, JAUS_KIND_OPERATOR_CONTROL_UNIT, "Operator");
     console.start();
     const auto sensor = console.find("urn:jaus:jss:mobility:VelocityStateSensor");
-    const auto query = messages::message(messages::query_velocity_state, 1);
-    auto speeds = console.subscribe(sensor, query, 10);
+    QueryVelocityState query;
+    query.presence_vector = 1; // Bit 0 of the report: Velocity_X.
+    auto speeds = console.subscribe(sensor, *jaus::codec::encode(query), 10);
 
     const auto driver = console.find("urn:jaus:jss:mobility:PrimitiveDriver");
     auto control = console.control(driver, 127);
     control.watch_program(std::chrono::milliseconds(1000));
     control.resume();
+    SetWrenchEffort effort;
+    if (const auto set = effort.set_propulsive_linear_effort_x_percent(40); !set) {
+        std::cerr << set.error().text() << std::endl;
+    }
+    const auto command = *jaus::codec::encode(effort);
     pollfd wait{console.descriptor(), POLLIN, 0};
     for (int turn = 0; turn < 30; ++turn) {
-        control.send(messages::effort(40));
+        control.send(command);
         poll(&wait, 1, 100);
         while (const auto event = console.next_event()) {
             show(*event);

@@ -2,7 +2,8 @@
 // callbacks as functions. Header only. SPDX-License-Identifier: MIT OR Apache-2.0
 //
 // Messages are octets, from their message code. Callbacks run on the library's thread, must return
-// within 500 ms, and must not throw: an exception that leaves a callback ends the program.
+// within 500 ms, and must not throw: an exception that leaves a callback ends the program. So does a
+// callback that destroys its component or node. It may destroy its subscription or control.
 #ifndef JAUS_HPP
 #define JAUS_HPP
 
@@ -12,7 +13,9 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -156,9 +159,10 @@ public:
 
     void reset() noexcept {
         const Handle handle = std::exchange(handle_, Handle{});
-        if (handle.id != 0) {
-            // Fails only if the owner was freed before, and this with it.
-            static_cast<void>(Free(handle));
+        // Otherwise it fails only if the owner was freed before, and this with it.
+        if (handle.id != 0 && Free(handle) == JausStatus_WrongThread) {
+            // A callback destroys its component or node, whose functions the library would still call.
+            std::terminate();
         }
     }
 
@@ -167,19 +171,34 @@ private:
     Handle handle_{};
 };
 
-using Handler = std::unique_ptr<EventHandler>;
+/// The function of a subscription or of control. A call shares it, because the function may destroy the
+/// object that owns it.
+using Handler = std::unique_ptr<std::shared_ptr<EventHandler>>;
+
+inline void call_shared(void *user, const JausEvent *event) noexcept {
+    const auto handler = *static_cast<const std::shared_ptr<EventHandler> *>(user);
+    (*handler)(Event(*event));
+}
 
 /// The callback for a handler, if there is one.
 inline JausEventCallback callback_of(const Handler &handler) {
-    return handler ? call_event : nullptr;
+    return handler ? call_shared : nullptr;
 }
 
 inline Handler keep(EventHandler handler) {
-    return handler ? std::make_unique<EventHandler>(std::move(handler)) : nullptr;
+    if (!handler) {
+        return nullptr;
+    }
+    auto shared = std::make_shared<EventHandler>(std::move(handler));
+    return std::make_unique<std::shared_ptr<EventHandler>>(std::move(shared));
 }
 
-inline std::uint32_t milliseconds(Milliseconds time) {
-    return static_cast<std::uint32_t>(time.count());
+/// A time limit of the C interface: the nearest that a type can hold.
+template <typename Number> Number milliseconds(Milliseconds time) {
+    using Limits = std::numeric_limits<Number>;
+    const auto count = static_cast<std::int64_t>(time.count());
+    return static_cast<Number>(
+        std::clamp<std::int64_t>(count, Limits::min(), Limits::max()));
 }
 
 } // namespace detail
@@ -237,8 +256,9 @@ public:
         : service_(service), kept_(std::move(kept)) {}
 
     Service &answer(std::uint16_t query, AnswerHandler handler) {
+        const auto callback = handler ? detail::call_answer : nullptr;
         auto *kept = kept_->keep(std::move(handler));
-        return then(jaus_service_answer(service_, query, detail::call_answer, kept));
+        return then(jaus_service_answer(service_, query, callback, kept));
     }
     Service &publish(std::uint16_t query) { return then(jaus_service_publish(service_, query)); }
     Service &decline(std::uint16_t query) { return then(jaus_service_decline(service_, query)); }
@@ -258,8 +278,9 @@ public:
     /// Stops everything that commands have started. Must not wait for anything that another handler
     /// holds: it also runs beside a handler that hangs.
     Service &on_stop(StopHandler handler) {
+        const auto callback = handler ? detail::call_stop : nullptr;
         auto *kept = kept_->keep(std::move(handler));
-        return then(jaus_service_on_stop(service_, detail::call_stop, kept));
+        return then(jaus_service_on_stop(service_, callback, kept));
     }
 
 private:
@@ -311,7 +332,8 @@ public:
     void check_ready() { check(jaus_control_check(control_.get())); }
     /// Releases control when this object is not used for so long.
     void watch_program(Milliseconds limit) {
-        check(jaus_control_watch_program(control_.get(), detail::milliseconds(limit)));
+        const auto within = detail::milliseconds<std::uint32_t>(limit);
+        check(jaus_control_watch_program(control_.get(), within));
     }
     void release() noexcept { control_.reset(); }
     std::uint64_t id() const noexcept { return control_.get().id; }
@@ -346,12 +368,14 @@ public:
         return Service(service, component_.handlers());
     }
     Component &on_standing(EventHandler handler) {
+        const auto callback = handler ? detail::call_event : nullptr;
         auto *handled = kept().keep(std::move(handler));
-        return then(jaus_component_on_standing(get(), detail::call_event, handled));
+        return then(jaus_component_on_standing(get(), callback, handled));
     }
     Component &on_discovery(EventHandler handler) {
+        const auto callback = handler ? detail::call_event : nullptr;
         auto *handled = kept().keep(std::move(handler));
-        return then(jaus_component_on_discovery(get(), detail::call_event, handled));
+        return then(jaus_component_on_discovery(get(), callback, handled));
     }
     Component &start() { return then(jaus_component_start(get())); }
 
@@ -384,21 +408,26 @@ public:
     /// The next event, if there is one in time. It is valid until the next call. One thread at a time.
     std::optional<Event> next_event(Milliseconds timeout = Milliseconds(0)) {
         const JausEvent *event = nullptr;
-        const auto limit = static_cast<std::int32_t>(timeout.count());
+        const auto limit = detail::milliseconds<std::int32_t>(timeout);
         check(jaus_component_next_event(get(), limit, &event));
         return event == nullptr ? std::nullopt : std::optional<Event>(Event(*event));
     }
 
     Address find(const std::string &urn, Milliseconds timeout = Milliseconds(10000)) const {
         JausAddress found{};
-        check(jaus_component_find(get(), urn.c_str(), detail::milliseconds(timeout), &found));
+        const auto limit = detail::milliseconds<std::uint32_t>(timeout);
+        check(jaus_component_find(get(), urn.c_str(), limit, &found));
         return found;
     }
     std::vector<Address> providers(const std::string &urn) const {
-        std::vector<JausAddress> found(256);
-        std::size_t count = 0;
-        check(jaus_component_providers(get(), urn.c_str(), found.data(), found.size(), &count));
-        found.resize(std::min(count, found.size()));
+        std::vector<JausAddress> found;
+        std::size_t count = 16;
+        // More may become known between two calls.
+        while (count > found.size()) {
+            found.resize(count);
+            check(jaus_component_providers(get(), urn.c_str(), found.data(), found.size(), &count));
+        }
+        found.resize(count);
         return std::vector<Address>(found.begin(), found.end());
     }
     /// The report that answers a query; its code is by the standard's numbers unless it is given.
@@ -406,7 +435,7 @@ public:
                  std::uint16_t report = 0) const {
         JausMessage answer{};
         check(jaus_component_query(get(), peer, query.data(), query.size(), report,
-                                   detail::milliseconds(timeout), &answer));
+                                   detail::milliseconds<std::uint32_t>(timeout), &answer));
         const std::unique_ptr<JausMessage, void (*)(JausMessage *)> owned(&answer,
                                                                          jaus_message_free);
         return Octets(answer.data, answer.data + answer.length);

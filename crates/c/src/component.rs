@@ -10,6 +10,7 @@ use jaus::component::{
     UndecodedFunctions,
 };
 use jaus::endpoint::Received;
+use jaus::node::{Node, Port};
 use jaus::service::{Context, Handled, UnsafeService};
 use tokio::sync::oneshot;
 use tokio::task::AbortHandle;
@@ -44,6 +45,8 @@ pub(crate) struct ComponentEntry {
 
 enum Stage {
     Draft(Box<Draft>),
+    /// Waits for the node of the host.
+    Starts,
     Runs(Running),
     Ended,
 }
@@ -115,28 +118,43 @@ impl ComponentEntry {
                 JausStatus::WrongState,
                 "the component does not run: call jaus_component_start first",
             )),
-            Stage::Ended => Err(Failure::new(
-                JausStatus::Stopped,
-                "the component has stopped",
+            Stage::Starts => Err(Failure::new(
+                JausStatus::WrongState,
+                "the component does not run yet: jaus_component_start has not returned",
             )),
+            Stage::Ended => Err(stopped()),
         }
     }
 
     fn start(&self) -> Result<(), Failure> {
         check_may_wait()?;
         let node = self.node.running()?;
+        let draft = self.begin()?;
+        let runtime = &self.node.runtime;
+        // Not under the lock: a callback that waits for it would hold up the runtime, and this with it.
+        let place = runtime.wait(place(node, draft.number))?;
         let mut stage = self.stage();
-        let draft = match std::mem::replace(&mut *stage, Stage::Ended) {
-            Stage::Draft(draft) => draft,
+        if !matches!(*stage, Stage::Starts) {
+            return Err(stopped());
+        }
+        *stage = Stage::Ended;
+        let place = place?;
+        let running = runtime.wait(async { draft.start(place, &self.queue) })??;
+        *stage = Stage::Runs(running);
+        Ok(())
+    }
+
+    /// Takes the description, for the start.
+    fn begin(&self) -> Result<Box<Draft>, Failure> {
+        let mut stage = self.stage();
+        match std::mem::replace(&mut *stage, Stage::Starts) {
+            Stage::Draft(draft) => Ok(draft),
             other => {
                 *stage = other;
                 let text = "the component was started before";
-                return Err(Failure::new(JausStatus::WrongState, text));
+                Err(Failure::new(JausStatus::WrongState, text))
             }
-        };
-        let running = self.node.runtime.wait(draft.start(node, &self.queue))?;
-        *stage = Stage::Runs(running?);
-        Ok(())
+        }
     }
 
     /// Ends the component and its callbacks.
@@ -170,24 +188,40 @@ impl ComponentEntry {
     }
 }
 
+fn stopped() -> Failure {
+    Failure::new(JausStatus::Stopped, "the component has stopped")
+}
+
+/// Where a component starts.
+enum Place {
+    Node(Node),
+    Host(Port),
+}
+
+/// The place on a node. Waits for the node of the host.
+async fn place(node: NodeStage, number: u8) -> Result<Place, Failure> {
+    match node {
+        NodeStage::Host(host) => {
+            let port = host.attach(number).await;
+            port.map(Place::Host).map_err(|error| not_attached(&error))
+        }
+        NodeStage::Runs(node) => Ok(Place::Node(node)),
+        NodeStage::Settings(_) | NodeStage::Ended => {
+            Err(Failure::new(JausStatus::Stopped, "the node has stopped"))
+        }
+    }
+}
+
 impl Draft {
-    async fn start(self, node: NodeStage, queue: &Arc<EventQueue>) -> Result<Running, Failure> {
+    /// On the library's runtime.
+    fn start(self, place: Place, queue: &Arc<EventQueue>) -> Result<Running, Failure> {
         let number = self.number;
         let (on_standing, on_discovery) = (self.on_standing.clone(), self.on_discovery.clone());
         let (alive, ended) = oneshot::channel();
         let builder = self.builder(queue)?.offer(Ending { _alive: alive });
-        let component = match node {
-            NodeStage::Host(host) => {
-                let port = host
-                    .attach(number)
-                    .await
-                    .map_err(|error| not_attached(&error))?;
-                builder.live_on(port)
-            }
-            NodeStage::Runs(node) => builder.attach(&node, number),
-            NodeStage::Settings(_) | NodeStage::Ended => {
-                return Err(Failure::new(JausStatus::Stopped, "the node has stopped"));
-            }
+        let component = match place {
+            Place::Host(port) => builder.live_on(port),
+            Place::Node(node) => builder.attach(&node, number),
         };
         let component = component.map_err(|error| refused(&error))?;
         let standing = on_standing.map(|sink| news::of_standing(&component, sink));
@@ -286,7 +320,7 @@ pub(crate) fn edit<T>(
     let entry = COMPONENTS.get(component)?;
     match &mut *entry.stage() {
         Stage::Draft(draft) => change(draft, &entry),
-        Stage::Runs(_) | Stage::Ended => Err(Failure::new(
+        Stage::Starts | Stage::Runs(_) | Stage::Ended => Err(Failure::new(
             JausStatus::WrongState,
             "the component was started: describe it before jaus_component_start",
         )),
@@ -300,6 +334,14 @@ pub(crate) fn running(
     let entry = COMPONENTS.get(component.id)?;
     let component = entry.running()?;
     Ok((entry, component))
+}
+
+/// Fails if the component was freed during the call.
+pub(crate) fn check_not_freed(component: JausComponent) -> Result<(), Failure> {
+    COMPONENTS.get(component.id).map(drop).map_err(|_| {
+        let text = "the component was freed during the call";
+        Failure::new(JausStatus::Stopped, text)
+    })
 }
 
 /// Describes a component of a node: its number within the node, 1 to 254, the kind and the name of its

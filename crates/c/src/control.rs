@@ -14,7 +14,7 @@ use tokio::task::JoinHandle;
 
 use crate::argument::{check_out, message, one_component, priority, put};
 use crate::client::{not_sent, uncontrolled, undelivered, unmanaged};
-use crate::component::{ComponentEntry, running};
+use crate::component::{ComponentEntry, check_not_freed, running};
 use crate::event::Event;
 use crate::lock::lock;
 use crate::sink::Sink;
@@ -103,7 +103,9 @@ impl ControlEntry {
     /// Releases control. Waits for the peer's confirmation, but not in a callback.
     fn end(&self) {
         let control = lock(&self.held.control).take();
-        for task in lock(&self.tasks).drain(..) {
+        // Not under the lock: a task can be in a callback that waits for it.
+        let tasks = std::mem::take(&mut *lock(&self.tasks));
+        for task in tasks {
             self.component.node.runtime.end(task);
         }
         if let Some(control) = control.and_then(Arc::into_inner) {
@@ -114,12 +116,11 @@ impl ControlEntry {
     }
 }
 
-/// Frees the control of a component over its peers.
-pub(crate) fn free_all_of(component: &Arc<ComponentEntry>) -> Result<(), Failure> {
-    for id in CONTROLS.select(|it| Arc::ptr_eq(&it.component, component)) {
-        CONTROLS.remove(id)?.end();
+/// Ends the control of a component over its peers, and frees it.
+pub(crate) fn end_all_of(component: &Arc<ComponentEntry>) {
+    for controlled in CONTROLS.remove_all(|it| Arc::ptr_eq(&it.component, component)) {
+        controlled.end();
     }
-    Ok(())
 }
 
 /// Requests control of a peer, and waits until it is granted. `authority` is 0 to 255; the higher one
@@ -144,11 +145,9 @@ pub unsafe extern "C" fn jaus_component_control(
         check_out(control, "control")?;
         let peer = one_component(peer)?;
         CONTROLS.check_room()?;
-        let (entry, component) = running(component)?;
-        let granted = entry
-            .node
-            .runtime
-            .wait(component.control(peer, authority))?;
+        let (entry, running) = running(component)?;
+        let runtime = entry.node.runtime.handle().clone();
+        let granted = entry.node.runtime.wait(running.control(peer, authority))?;
         let granted = granted.map_err(|error| uncontrolled(&error))?;
         // SAFETY: as the caller guarantees; it is closed with the control.
         let sink = unsafe { Sink::new(callback, user, &entry.queue, entry.watchdog()) };
@@ -165,14 +164,21 @@ pub unsafe extern "C" fn jaus_component_control(
             ..Event::new(kind, peer)
         };
         let following = follow(held.clone(), event, sink.clone());
-        let task = entry.node.runtime.handle().spawn(following);
         let controlled = ControlEntry {
             component: entry,
             sink,
             held,
-            tasks: Mutex::new(vec![task]),
+            tasks: Mutex::default(),
         };
-        CONTROLS.insert(id, controlled);
+        let controlled = CONTROLS.insert(id, controlled);
+        // From now on freeing the component ends this control, too, so that no callback follows.
+        if let Err(freed) = check_not_freed(component) {
+            if let Ok(controlled) = CONTROLS.remove(id) {
+                controlled.end();
+            }
+            return Err(freed);
+        }
+        lock(&controlled.tasks).push(runtime.spawn(following));
         Ok(())
     })
 }

@@ -2,17 +2,17 @@
 
 use std::sync::Arc;
 
-use crate::component::COMPONENTS;
+use crate::component::{COMPONENTS, ComponentEntry};
 use crate::node::NODES;
 use crate::status::{Failure, JausStatus, check_may_wait, run};
 use crate::types::{JausComponent, JausNode};
 use crate::{control, subscription};
 
-fn free(component: u64) -> Result<(), Failure> {
-    let entry = COMPONENTS.remove(component)?;
-    subscription::free_all_of(&entry)?;
-    control::free_all_of(&entry)?;
-    entry.end()
+/// Ends a component that was removed from its table, with all that belongs to it.
+fn end(component: &Arc<ComponentEntry>) -> Result<(), Failure> {
+    subscription::end_all_of(component);
+    control::end_all_of(component);
+    component.end()
 }
 
 /// Ends a component and frees it, with its subscriptions and control: it stops what it moves, and
@@ -22,7 +22,7 @@ fn free(component: u64) -> Result<(), Failure> {
 pub extern "C" fn jaus_component_free(component: JausComponent) -> JausStatus {
     run(|| {
         check_may_wait()?;
-        free(component.id)
+        end(&COMPONENTS.remove(component.id)?)
     })
 }
 
@@ -34,8 +34,8 @@ pub extern "C" fn jaus_node_free(node: JausNode) -> JausStatus {
     run(|| {
         check_may_wait()?;
         let entry = NODES.remove(node.id)?;
-        for id in COMPONENTS.select(|it| Arc::ptr_eq(&it.node, &entry)) {
-            free(id)?;
+        for component in COMPONENTS.remove_all(|it| Arc::ptr_eq(&it.node, &entry)) {
+            end(&component)?;
         }
         entry.end()
     })

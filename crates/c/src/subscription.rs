@@ -11,7 +11,7 @@ use tokio::task::JoinHandle;
 
 use crate::argument::{check_out, message, one_component, put};
 use crate::client::report_of;
-use crate::component::{ComponentEntry, running};
+use crate::component::{ComponentEntry, check_not_freed, running};
 use crate::event::Event;
 use crate::lock::lock;
 use crate::sink::Sink;
@@ -101,19 +101,19 @@ async fn follow(
 impl SubscriptionEntry {
     /// Ends the subscription. Waits for a callback that runs, but not in a callback.
     fn end(&self) {
-        if let Some(task) = lock(&self.task).take() {
+        let task = lock(&self.task).take();
+        if let Some(task) = task {
             self.component.node.runtime.end(task);
         }
         self.sink.close();
     }
 }
 
-/// Frees the subscriptions of a component.
-pub(crate) fn free_all_of(component: &Arc<ComponentEntry>) -> Result<(), Failure> {
-    for id in SUBSCRIPTIONS.select(|it| Arc::ptr_eq(&it.component, component)) {
-        SUBSCRIPTIONS.remove(id)?.end();
+/// Ends the subscriptions of a component, and frees them.
+pub(crate) fn end_all_of(component: &Arc<ComponentEntry>) {
+    for subscribed in SUBSCRIPTIONS.remove_all(|it| Arc::ptr_eq(&it.component, component)) {
+        subscribed.end();
     }
-    Ok(())
 }
 
 /// Subscribes to the answers to a query, `length` octets from its code, and waits until the peer
@@ -152,11 +152,14 @@ pub unsafe extern "C" fn jaus_component_subscribe(
             when: when(rate, least)?,
         };
         SUBSCRIPTIONS.check_room()?;
-        let (entry, component) = running(component)?;
-        let runtime = &entry.node.runtime;
-        let reports = runtime.wait(component.subscribe_undecoded(topic))?;
+        let (entry, running) = running(component)?;
+        let runtime = entry.node.runtime.handle().clone();
+        let reports = entry
+            .node
+            .runtime
+            .wait(running.subscribe_undecoded(topic))?;
         let reports = reports.map_err(|error| not_subscribed(&error))?;
-        drop(component);
+        drop(running);
         // SAFETY: as the caller guarantees; it is closed with the subscription.
         let sink = unsafe { Sink::new(callback, user, &entry.queue, entry.watchdog()) };
         let id = Table::<SubscriptionEntry>::reserve();
@@ -165,16 +168,24 @@ pub unsafe extern "C" fn jaus_component_subscribe(
         unsafe { put(subscription, JausSubscription { id }, "subscription") }?;
         let shown = Arc::<Mutex<Shown>>::default();
         lock(&shown).note(&reports, false);
-        let task = runtime
-            .handle()
-            .spawn(follow(reports, id, shown.clone(), sink.clone()));
+        let following = follow(reports, id, shown.clone(), sink.clone());
         let subscribed = SubscriptionEntry {
             component: entry,
             sink,
             shown,
-            task: Mutex::new(Some(task)),
+            task: Mutex::default(),
         };
-        SUBSCRIPTIONS.insert(id, subscribed);
+        let subscribed = SUBSCRIPTIONS.insert(id, subscribed);
+        // From now on freeing the component ends this subscription, too, so that no callback follows.
+        let mut task = lock(&subscribed.task);
+        if let Err(freed) = check_not_freed(component) {
+            drop(task);
+            if let Ok(subscribed) = SUBSCRIPTIONS.remove(id) {
+                subscribed.end();
+            }
+            return Err(freed);
+        }
+        *task = Some(runtime.spawn(following));
         Ok(())
     })
 }

@@ -43,8 +43,10 @@ impl<T> Table<T> {
         Err(Failure::new(JausStatus::TooMany, text))
     }
 
-    pub(crate) fn insert(&self, id: u64, object: T) {
-        self.lock().insert(id, Arc::new(object));
+    pub(crate) fn insert(&self, id: u64, object: T) -> Arc<T> {
+        let object = Arc::new(object);
+        self.lock().insert(id, object.clone());
+        object
     }
 
     pub(crate) fn get(&self, id: u64) -> Result<Arc<T>, Failure> {
@@ -59,11 +61,19 @@ impl<T> Table<T> {
         removed.ok_or_else(|| self.unknown(id))
     }
 
-    /// The objects that belong to another one.
-    pub(crate) fn select(&self, belongs: impl Fn(&T) -> bool) -> Vec<u64> {
-        let objects = self.lock();
-        let found = objects.iter().filter(|(_, object)| belongs(object));
-        found.map(|(&id, _)| id).collect()
+    /// Removes the objects that belong to another one, all at once: none of them is freed meanwhile by
+    /// another thread.
+    pub(crate) fn remove_all(&self, belongs: impl Fn(&T) -> bool) -> Vec<Arc<T>> {
+        let mut objects = self.lock();
+        let mut removed = Vec::new();
+        objects.retain(|_, object| {
+            let is_kept = !belongs(object);
+            if !is_kept {
+                removed.push(object.clone());
+            }
+            is_kept
+        });
+        removed
     }
 
     fn unknown(&self, id: u64) -> Failure {
@@ -106,6 +116,20 @@ mod tests {
         }
         numbers.remove(id).unwrap();
         assert!(numbers.get(id).is_err() && numbers.remove(id).is_err());
+    }
+
+    #[test]
+    fn objects_that_belong_to_another_one_are_removed_together() {
+        let table = Table::new("number");
+        let ids = [0, 1, 2, 3].map(|number| {
+            let id = Table::<i32>::reserve();
+            table.insert(id, number);
+            id
+        });
+        table.remove(ids[0]).unwrap();
+        let removed = table.remove_all(|number| number % 2 == 0);
+        assert_eq!(removed, [Arc::new(2)]);
+        assert!(table.get(ids[2]).is_err() && table.get(ids[3]).is_ok());
     }
 
     #[test]

@@ -158,14 +158,14 @@ macro_rules! __codec_random_members {
     ($($content:tt)*) => {};
 }
 
-/// Implements a getter and a setter in engineering units for scaled members; those of optional members
-/// are marked with `?`.
+/// Implements a getter, a setter and a step of a builder in engineering units for scaled members; those
+/// of optional members are marked with `?`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __codec_accessors {
     ($name:ident { $(
         $member:ident: $type:ty $(, $optional:tt)? => $get:ident, $set:ident,
-        $what:literal, $range:literal;
+        $with:ident, $what:literal, $range:literal;
     )* }) => {
         impl $name {
             $(
@@ -184,6 +184,16 @@ macro_rules! __codec_accessors {
                 ) -> ::core::result::Result<(), $crate::OutOfRange> {
                     self.$member = $crate::accessor!(set value, $type $(, $optional)?);
                     Ok(())
+                }
+
+                #[doc = ::core::concat!("The same with ", $what, ", as [`", ::core::stringify!($set),
+                    "`](Self::", ::core::stringify!($set), ") sets it.")]
+                ///
+                /// # Errors
+                #[doc = ::core::concat!("If the value is not in ", $range, ".")]
+                pub fn $with(mut self, value: f64) -> ::core::result::Result<Self, $crate::OutOfRange> {
+                    self.$set(value)?;
+                    Ok(self)
                 }
             )*
         }

@@ -114,7 +114,7 @@ fn write(out: &mut Writer, newer: &Plan<'_>, older: &Plan<'_>, values: &[String]
         "_"
     };
     out.gap();
-    out.push("#[allow(unused_qualifications)]");
+    out.allow("unused_qualifications");
     out.push(format!("impl From<{old}> for {new} {{"));
     out.push(format!("fn from({unused}old: {old}) -> Self {{"));
     out.list("Self {", values, "}");

@@ -92,17 +92,25 @@ impl Names {
         }
     }
 
-    /// Identifier of a function, and that of another one with a prefix: `speed_m` and `set_speed_m`.
-    /// Neither is that of an earlier function.
-    pub(super) fn snake_pair(&mut self, name: &str, prefix: &str) -> (String, String) {
+    /// Identifier of a function, and those of others with prefixes: `speed_m`, `set_speed_m` and
+    /// `with_speed_m`. None is that of an earlier function.
+    pub(super) fn snake_family<const N: usize>(
+        &mut self,
+        name: &str,
+        prefixes: [&str; N],
+    ) -> (String, [String; N]) {
         let base = leading(&name.to_snake_case(), "_");
         let mut free = base.clone();
-        while self.taken.contains(&free) || self.taken.contains(&format!("{prefix}{free}")) {
+        let is_taken = |names: &Self, free: &str| {
+            let mut prefixed = prefixes.iter().map(|prefix| format!("{prefix}{free}"));
+            names.taken.contains(free) || prefixed.any(|it| names.taken.contains(&it))
+        };
+        while is_taken(self, &free) {
             free = format!("{base}_{}", self.next_number(&base));
         }
         let first = self.snake(&free);
-        let second = self.snake(&format!("{prefix}{free}"));
-        (first, second)
+        let others = prefixes.map(|prefix| self.snake(&format!("{prefix}{free}")));
+        (first, others)
     }
 
     /// Identifier of a type or an alternative: `ReportServiceList`.

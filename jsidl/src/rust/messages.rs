@@ -49,10 +49,9 @@ pub(super) fn message<'m>(
             kind(message)
         )
         .as_str(),
-        if message.is_deprecated {
-            DEPRECATED
-        } else {
-            ""
+        &match message.is_deprecated {
+            true => format!("Deprecated: {REPLACED}."),
+            false => String::new(),
         },
         &docs::prose(&message.description),
         &format!("Declared by {}.", services(&plan.services)),
@@ -61,6 +60,9 @@ pub(super) fn message<'m>(
         Content::Flat(fields, presence) => (fields, *presence),
         Content::Single(fields) => (fields, None),
     };
+    if plan.is_deprecated {
+        out.push(format!("#[deprecated = {REPLACED:?}]"));
+    }
     structs::declare(out, ident, fields, &prefix, false);
     out.gap();
     out.push(format!("impl codec::Message for {ident} {{"));
@@ -104,7 +106,7 @@ pub(super) fn message<'m>(
     }
 }
 
-const DEPRECATED: &str = "Deprecated: newer components use another message in its place.";
+const REPLACED: &str = "newer components use another message in its place";
 
 fn kind(message: &Message) -> &'static str {
     if message.is_command {

@@ -51,6 +51,7 @@ pub struct Settings {
     runtime: String,
     /// Paths of other modules, each with the beginnings of the URNs of its services.
     externs: Vec<(String, Vec<String>)>,
+    warns_of_deprecated: bool,
 }
 
 impl Settings {
@@ -60,6 +61,7 @@ impl Settings {
         Self {
             runtime: runtime.to_owned(),
             externs: Vec::new(),
+            warns_of_deprecated: true,
         }
     }
 
@@ -79,6 +81,14 @@ impl Settings {
             Some((_, urns)) => urns.push(urn.to_owned()),
             None => self.externs.push((path.to_owned(), vec![urn.to_owned()])),
         }
+        self
+    }
+
+    /// Whether the compiler warns of uses of messages that all their services call deprecated; it does if
+    /// nothing else is set. Code that must talk to peers of older versions may have it off.
+    #[must_use]
+    pub const fn warn_of_deprecated(mut self, warns: bool) -> Self {
+        self.warns_of_deprecated = warns;
         self
     }
 }
@@ -115,7 +125,12 @@ pub fn module_with<'m>(
     let mut names = Names::reserving(&["codec"]);
     names.reserve(&modules);
     let versions = registry::versions(&services, &mut names);
-    let plans = plan::plan(library, &services, &mut names);
+    let mut plans = plan::plan(library, &services, &mut names);
+    for plan in &mut plans {
+        plan.is_deprecated &= settings.warns_of_deprecated;
+    }
+    let has_deprecated = plans.iter().any(|plan| plan.is_deprecated);
+    out.uses_deprecated(has_deprecated || !settings.externs.is_empty());
     let externs: Vec<_> = settings
         .externs
         .iter()
@@ -148,6 +163,7 @@ fn write(out: &mut Writer, plans: &[Plan<'_>], paths: &ServicePaths<'_>) {
         out.push(format!(
             "/// The messages of services of version {version}."
         ));
+        out.allow_deprecated();
         out.push(format!("pub mod {} {{", names::version(version)));
         if plans.iter().any(|plan| plan.version == version) {
             out.push("use super::codec;");

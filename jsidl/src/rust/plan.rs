@@ -31,6 +31,9 @@ pub(super) struct Plan<'m> {
     pub(super) needs_control: bool,
     /// Whether the command requires a component that is ready.
     pub(super) needs_readiness: bool,
+    /// Whether all declarations call it deprecated. A message that an older version still recommends is
+    /// not: its peers know no other.
+    pub(super) is_deprecated: bool,
 }
 
 impl Plan<'_> {
@@ -122,6 +125,7 @@ struct Declared<'m> {
     services: Vec<&'m Id>,
     needs_control: bool,
     needs_readiness: bool,
+    is_deprecated: bool,
 }
 
 impl<'m> Declared<'m> {
@@ -149,6 +153,7 @@ impl<'m> Declared<'m> {
             services: self.services,
             needs_control: self.needs_control,
             needs_readiness: self.needs_readiness,
+            is_deprecated: self.is_deprecated,
         }
     }
 }
@@ -180,9 +185,11 @@ fn declare<'l, 'm>(
             services: Vec::new(),
             needs_control: false,
             needs_readiness: false,
+            is_deprecated: true,
         });
     }
     let declared = &mut layouts[index];
+    declared.is_deprecated &= message.is_deprecated;
     if service.version > declared.newest() {
         declared.message = message;
     }

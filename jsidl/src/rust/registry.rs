@@ -49,6 +49,7 @@ pub(super) fn services<'m>(
             format!("The service `{}`.", newest.name).as_str(),
             &docs::prose(&newest.description),
         ]);
+        out.allow_deprecated();
         out.push(format!("pub mod {module} {{\nuse super::codec;"));
         out.gap();
         out.push(format!(
@@ -110,6 +111,7 @@ pub(super) fn tables(
     out.push(
         "/// The message types of the set, by code; of several with one code the newest first.",
     );
+    out.allow_deprecated();
     out.push("pub static MESSAGES: &[codec::MessageInfo] = &[");
     for plan in plans {
         let services: Vec<_> = plan

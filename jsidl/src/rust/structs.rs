@@ -137,10 +137,10 @@ fn scale<'f>(field: &'f Field<'_>) -> Option<(&'f Scale, &'f str)> {
     }
 }
 
-/// The names of the getter and the setter of a field in its unit.
-fn accessor_names(names: &mut Names, field: &Field<'_>, unit: &str) -> (String, String) {
+/// The names of the getter, the setter and the step of the builder of a field in its unit.
+fn accessor_names(names: &mut Names, field: &Field<'_>, unit: &str) -> (String, [String; 2]) {
     let name = format!("{} {}", field.item.name, unit_suffix(unit));
-    names.snake_pair(&name, "set_")
+    names.snake_family(&name, ["set_", "with_"])
 }
 
 /// The names that the methods of a struct with these fields have.
@@ -152,7 +152,7 @@ pub(super) fn method_names(fields: &[Field<'_>]) -> Names {
     names
 }
 
-/// Getters and setters in the unit of the field.
+/// Getters, setters and steps of the builder in the unit of the field.
 fn accessors(out: &mut Writer, ident: &str, fields: &[Field<'_>], prefix: &str) {
     if !fields.iter().any(|field| scale(field).is_some()) {
         return;
@@ -164,7 +164,7 @@ fn accessors(out: &mut Writer, ident: &str, fields: &[Field<'_>], prefix: &str) 
         let Some((scale, unit)) = scale(field) else {
             continue;
         };
-        let (getter, setter) = accessor_names(&mut names, field, unit);
+        let (getter, [setter, step]) = accessor_names(&mut names, field, unit);
         let in_unit = match unit {
             "one" => String::new(),
             unit => format!(" in {}", docs::prose(unit)),
@@ -174,7 +174,7 @@ fn accessors(out: &mut Writer, ident: &str, fields: &[Field<'_>], prefix: &str) 
         let optional = if optional(field) { ", ?" } else { "" };
         let range = format!("{} to {}", scale.lower, scale.upper);
         out.push(format!(
-            "{}: {ty}{optional} => {getter}, {setter}, {what:?}, {range:?};",
+            "{}: {ty}{optional} => {getter}, {setter}, {step}, {what:?}, {range:?};",
             field.ident
         ));
     }

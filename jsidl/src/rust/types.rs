@@ -367,7 +367,7 @@ impl<'m, 's> Nested<'m, 's> {
         let ident = self.define(&item.name, &content, |nested| {
             let mut names = Names::reserving(&["raw", "names", "at"]);
             let fields = bits.fields.iter().map(|field| {
-                let (ident, replace) = names.snake_pair(&field.name, "with_");
+                let (ident, [replace]) = names.snake_family(&field.name, ["with_"]);
                 let number = Number::Unsigned(width(field));
                 let values = &field.values;
                 let enumeration = (!values.values.is_empty()).then(|| {

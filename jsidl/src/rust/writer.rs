@@ -8,6 +8,7 @@ const WIDTH: usize = 100;
 pub(super) struct Writer {
     text: String,
     depth: usize,
+    uses_deprecated: bool,
 }
 
 impl Writer {
@@ -66,10 +67,30 @@ impl Writer {
         self.line(close);
     }
 
+    /// Sets whether the text may use deprecated items.
+    pub(super) const fn uses_deprecated(&mut self, uses: bool) {
+        self.uses_deprecated = uses;
+    }
+
+    /// Lets the next item use deprecated ones, if there are any.
+    pub(super) fn allow_deprecated(&mut self) {
+        if self.uses_deprecated {
+            self.line("#[allow(deprecated)]");
+        }
+    }
+
+    /// Turns a lint off for the next item, and lets it use deprecated ones, if there are any.
+    pub(super) fn allow(&mut self, lint: &str) {
+        match self.uses_deprecated {
+            true => self.line(&format!("#[allow({lint}, deprecated)]")),
+            false => self.line(&format!("#[allow({lint})]")),
+        }
+    }
+
     /// Writes a public import of items from a module. A crate need not use all of them.
     pub(super) fn import(&mut self, module: &str, items: &[String]) {
         self.line("#[doc(inline)]");
-        self.line("#[allow(unused_imports)]");
+        self.allow("unused_imports");
         match items {
             [item] => self.line(&format!("pub use {module}::{item};")),
             _ => self.list(&format!("pub use {module}::{{"), items, "};"),

@@ -166,6 +166,32 @@ fn a_machine_with_too_many_reactions_is_refused_by_the_compiler() {
 }
 
 #[test]
+fn a_machine_without_actions_compiles() {
+    let message = message("Sample", 0xD001, &plain("A", false));
+    let machine = |guard: &str| {
+        format!(
+            r#"<protocol_behavior is_stateless="false"><start state_machine_name="ReceiveFSM" state_name="S0"/><state_machine name="ReceiveFSM"><state name="S0"><transition name="Receive"><parameter type="Sample" value="msg"/>{guard}<internal/></transition></state></state_machine></protocol_behavior>"#
+        )
+    };
+    let guard = |condition: &str| format!(r#"<guard condition="{condition}"/>"#);
+    for guard in [
+        "",
+        &guard("isSound(msg)"),
+        &guard("isControllingClient(msg)"),
+    ] {
+        assert_compiles(&emitted(&[service(&message, &machine(guard))]));
+    }
+}
+
+#[test]
+fn a_guard_may_have_the_name_of_a_message_that_is_a_keyword() {
+    let messages =
+        message("Sample", 0xD001, &plain("A", false)) + &message("fn", 0xD002, &plain("A", false));
+    let machine = r#"<protocol_behavior is_stateless="false"><start state_machine_name="ReceiveFSM" state_name="S0"/><state_machine name="ReceiveFSM"><state name="S0"><transition name="Receive"><parameter type="Sample" value="msg"/><guard condition="fn(msg)"/><internal/></transition></state></state_machine></protocol_behavior>"#;
+    assert_compiles(&emitted(&[service(&messages, machine)]));
+}
+
+#[test]
 fn the_code_of_a_large_machine_grows_with_its_reactions() {
     let length = |events| emitted(&[service("", &machine(60, events))]).len();
     let (one, four) = (length(100), length(400));
@@ -271,5 +297,57 @@ fn a_deprecated_message_says_so() {
     );
     let module = emitted(&[service(&message, "")]);
     assert!(module.contains("/// Deprecated: "), "{module}");
-    assert!(!module_of(&plain("A", false)).contains("Deprecated"));
+    assert_compiles(&module);
+    let errors = rustc::check(&[format!("{module}\npub type Used = v1_0::Sample;\n")]);
+    let errors = errors.expect_err("the compiler warns");
+    assert!(errors.contains("use of deprecated struct"), "{errors}");
+    let other = module_of(&plain("A", false));
+    assert!(!other.to_lowercase().contains("deprecated"), "{other}");
+}
+
+#[test]
+fn a_message_that_an_older_version_recommends_is_used_without_a_warning() {
+    let version = |minor: u8, deprecated: bool| {
+        let message = message("Sample", 0xD001, &plain("A", false)).replace(
+            r#"is_command="false""#,
+            &format!(r#"is_command="false" deprecated="{deprecated}""#),
+        );
+        service(&message, "").replace(r#"version="1.0""#, &format!(r#"version="1.{minor}""#))
+    };
+    let module = emitted(&[version(0, false), version(1, true)]);
+    assert!(module.contains("/// Deprecated: "), "{module}");
+    assert_compiles(&format!("{module}\npub type Used = Sample;\n"));
+}
+
+#[test]
+fn a_floating_point_number_may_have_a_value_set() {
+    let field = |number: &str| {
+        format!(
+            r#"<fixed_field name="{}" optional="false" field_type="{number}" field_units="meter"><value_set offset_to_lower_limit="false"><value_range lower_limit="-0.5" lower_limit_type="exclusive" upper_limit="1.5" upper_limit_type="inclusive" interpretation=""/><value_enum enum_index="-3" enum_const="Lost"/><value_enum enum_index="2" enum_const="Two"/></value_set></fixed_field>"#,
+            number.replace(' ', "")
+        )
+    };
+    let several = format!(
+        r#"<array name="Values" optional="false">{}<dimension name="D" size="3"/></array>"#,
+        field("float")
+    );
+    let module = module_of(&(field("float") + &field("long float") + &several));
+    assert!(module.contains("above -0.5 to 1.5"), "{module}");
+    assert_compiles(&module);
+}
+
+#[test]
+fn scaled_fields_have_the_steps_of_a_builder() {
+    let fields = scaled("X") + &scaled("Y") + &scaled("WithX") + &plain("Other", false);
+    let module = module_of(&fields);
+    let uses = format!(
+        r#"{module}
+/// A message.
+pub fn built() -> Result<Sample, codec::OutOfRange> {{
+    let sample = Sample {{ other: 1, ..Sample::default() }};
+    sample.with_x_m(0.5)?.with_y_m(1.0)
+}}
+"#
+    );
+    assert_compiles(&uses);
 }

@@ -428,6 +428,9 @@ impl Author {
             0 => {
                 let number = self.of(&["float", "long float"]);
                 self.push(format!(r#"field_type="{number}" field_units="{units}">"#));
+                if self.one_in(3) {
+                    self.values(100);
+                }
             }
             1 => {
                 let number = self.of(&UNSIGNED[..3]);

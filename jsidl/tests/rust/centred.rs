@@ -95,10 +95,10 @@ pub mod v1_0 {
     }
 
     codec::accessors!(SetLean {
-        lean: set_lean::Lean => lean_deg, set_lean_deg, "`Lean` in degree", "-127 to 127";
-        effort: set_lean::Effort, ? => effort_percent, set_effort_percent, "`Effort` in percent", "-100 to 100";
-        height: set_lean::Height, ? => height_m, set_height_m, "`Height` in meter", "-10000 to 35000";
-        latitude: set_lean::Latitude, ? => latitude_deg, set_latitude_deg, "`Latitude` in degree", "-90 to 90";
+        lean: set_lean::Lean => lean_deg, set_lean_deg, with_lean_deg, "`Lean` in degree", "-127 to 127";
+        effort: set_lean::Effort, ? => effort_percent, set_effort_percent, with_effort_percent, "`Effort` in percent", "-100 to 100";
+        height: set_lean::Height, ? => height_m, set_height_m, with_height_m, "`Height` in meter", "-10000 to 35000";
+        latitude: set_lean::Latitude, ? => latitude_deg, set_latitude_deg, with_latitude_deg, "`Latitude` in degree", "-90 to 90";
     });
 
     impl codec::Message for SetLean {

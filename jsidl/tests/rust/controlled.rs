@@ -240,6 +240,7 @@ pub mod siren {
     }
 
     /// A service and a call, as the state machine sees them.
+    #[allow(dead_code)]
     struct Step<'a, T, C> {
         service: &'a mut T,
         call: &'a mut C,

@@ -133,7 +133,7 @@ pub mod v1_0 {
     }
 
     codec::accessors!(Option_ {
-        self_2: option::Self_ => self_m, set_self_m, "`Self` in meter", "0 to 1";
+        self_2: option::Self_ => self_m, set_self_m, with_self_m, "`Self` in meter", "0 to 1";
     });
 
     impl codec::Message for Option_ {
@@ -429,7 +429,7 @@ pub mod v1_0 {
         }
 
         codec::accessors!(Some_ {
-            ok: Ok_ => ok_value, set_ok_value, "`Ok`", "0 to 1";
+            ok: Ok_ => ok_value, set_ok_value, with_ok_value, "`Ok`", "0 to 1";
         });
 
         impl codec::Fixed for Some_ {
@@ -597,8 +597,8 @@ pub mod v1_0 {
     }
 
     codec::accessors!(Codec {
-        position_rms: codec_2::PositionRms => position_rms_m, set_position_rms_m, "`Position_RMS` in meter", "0 to 1";
-        position_rms_2: codec_2::PositionRms2 => position_rms_m_2, set_position_rms_m_2, "`PositionRMS` in meter", "0 to 2";
+        position_rms: codec_2::PositionRms => position_rms_m, set_position_rms_m, with_position_rms_m, "`Position_RMS` in meter", "0 to 1";
+        position_rms_2: codec_2::PositionRms2 => position_rms_m_2, set_position_rms_m_2, with_position_rms_m_2, "`PositionRMS` in meter", "0 to 2";
     });
 
     impl codec::Message for Codec {

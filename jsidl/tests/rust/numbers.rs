@@ -196,12 +196,12 @@ pub mod v1_0 {
     }
 
     codec::accessors!(SetScaled {
-        percent: set_scaled::Percent => percent_percent, set_percent_percent, "`Percent` in percent", "0 to 100";
-        angle: set_scaled::Angle => angle_rad, set_angle_rad, "`Angle` in radian", "-1.5707963267948966 to 1.5707963267948966";
-        latitude: set_scaled::Latitude => latitude_deg, set_latitude_deg, "`Latitude` in degree", "-90 to 90";
-        fine: set_scaled::Fine => fine_value, set_fine_value, "`Fine`", "-1 to 1";
-        below: set_scaled::Below => below_m, set_below_m, "`Below` in meter", "-1 to 1";
-        above: set_scaled::Above => above_m, set_above_m, "`Above` in meter", "-1 to 1";
+        percent: set_scaled::Percent => percent_percent, set_percent_percent, with_percent_percent, "`Percent` in percent", "0 to 100";
+        angle: set_scaled::Angle => angle_rad, set_angle_rad, with_angle_rad, "`Angle` in radian", "-1.5707963267948966 to 1.5707963267948966";
+        latitude: set_scaled::Latitude => latitude_deg, set_latitude_deg, with_latitude_deg, "`Latitude` in degree", "-90 to 90";
+        fine: set_scaled::Fine => fine_value, set_fine_value, with_fine_value, "`Fine`", "-1 to 1";
+        below: set_scaled::Below => below_m, set_below_m, with_below_m, "`Below` in meter", "-1 to 1";
+        above: set_scaled::Above => above_m, set_above_m, with_above_m, "`Above` in meter", "-1 to 1";
     });
 
     impl codec::Message for SetScaled {
@@ -302,8 +302,8 @@ pub mod v1_0 {
     }
 
     codec::accessors!(SetScaledOptional {
-        latitude: set_scaled_optional::Latitude, ? => latitude_deg, set_latitude_deg, "`Latitude` in degree", "-90 to 90";
-        heading: set_scaled_optional::Heading, ? => heading_rad, set_heading_rad, "`Heading` in radian", "-3.141592653589793 to 3.141592653589793";
+        latitude: set_scaled_optional::Latitude, ? => latitude_deg, set_latitude_deg, with_latitude_deg, "`Latitude` in degree", "-90 to 90";
+        heading: set_scaled_optional::Heading, ? => heading_rad, set_heading_rad, with_heading_rad, "`Heading` in radian", "-3.141592653589793 to 3.141592653589793";
     });
 
     impl codec::Message for SetScaledOptional {

@@ -169,7 +169,7 @@ pub mod v1_0 {
     }
 
     codec::accessors!(ReportState {
-        speed: report_state::Speed => speed_m_per_s, set_speed_m_per_s, "`Speed` in meter per second", "0 to 327.67";
+        speed: report_state::Speed => speed_m_per_s, set_speed_m_per_s, with_speed_m_per_s, "`Speed` in meter per second", "0 to 327.67";
     });
 
     impl codec::Message for ReportState {
@@ -331,7 +331,7 @@ pub mod v1_1 {
     }
 
     codec::accessors!(ReportState {
-        speed: report_state::Speed => speed_m_per_s, set_speed_m_per_s, "`Speed` in meter per second", "0 to 327.67";
+        speed: report_state::Speed => speed_m_per_s, set_speed_m_per_s, with_speed_m_per_s, "`Speed` in meter per second", "0 to 327.67";
     });
 
     impl codec::Message for ReportState {

@@ -95,3 +95,10 @@ fn the_wrapper_in_cpp_moves_its_objects_and_throws_what_the_interface_says() {
         assert!(start("tests/programs/wrapper.cpp", &[]).end().success());
     }
 }
+
+#[test]
+fn a_hostile_program_gets_errors_and_no_callback_after_the_end() {
+    if has_compilers() {
+        assert!(start("tests/programs/attack.cpp", &[]).end().success());
+    }
+}

@@ -7,8 +7,10 @@
 
 namespace {
 
-bool is_fast(const jaus::Event &command) {
-    return messages::first_field(command, -100, 100, 2).value_or(0) > 50;
+bool is_fast(const jaus::Event &event) {
+    const auto command =
+        jaus::codec::decode<messages::SetWrenchEffort>({event.data(), event.size()});
+    return command && command->propulsive_linear_effort_x_percent().value_or(0) > 50;
 }
 
 [[noreturn]] void hang() {
@@ -31,9 +33,9 @@ int main(int count, char **arguments) {
         }
     };
     driver.offer("urn:jaus:jss:mobility:PrimitiveDriver", 1, 1)
-        .command(messages::set_wrench_effort, in_callback ? handler : nullptr,
+        .command(messages::SetWrenchEffort::kCode, in_callback ? handler : nullptr,
                  JAUS_VALIDITY_UNTIL_DONE)
-        .decline(messages::query_wrench_effort)
+        .decline(messages::QueryWrenchEffort::kCode)
         .on_stop([] { std::cout << "stop" << std::endl; });
     driver.start();
     for (;;) {

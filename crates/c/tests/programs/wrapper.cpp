@@ -2,6 +2,7 @@
 #include "messages.hpp"
 
 #include <cstdlib>
+#include <future>
 #include <iostream>
 
 namespace {
@@ -52,14 +53,14 @@ void an_unsafe_driver_does_not_start() {
             }
             auto service = driver.offer(urn, 1, 1);
             if (receives) {
-                service.receive(messages::set_wrench_effort);
+                service.receive(messages::SetWrenchEffort::kCode);
             }
-            service.command(messages::set_wrench_effort);
+            service.command(messages::SetWrenchEffort::kCode);
             if (stops) {
                 service.on_stop([] {});
             }
             if (declines) {
-                service.decline(messages::query_wrench_effort);
+                service.decline(messages::QueryWrenchEffort::kCode);
             }
             driver.start();
         });
@@ -79,16 +80,16 @@ void a_callback_answers_and_may_not_wait() {
     jaus::Component sensor(node, 44, JAUS_KIND_VEHICLE, "Rover");
     JausStatus waited = JausStatus_Ok;
     sensor.offer("urn:jaus:jss:mobility:VelocityStateSensor", 1, 1)
-        .answer(messages::query_velocity_state,
+        .answer(messages::QueryVelocityState::kCode,
                 [&](const jaus::Event &query) -> std::optional<jaus::Octets> {
                     waited = status_of([&] { client.find("urn:x"); });
                     require(query.source() == client.address(), "the client asks");
                     return messages::velocity(1.5);
                 })
-        .decline(messages::query_velocity_state_ext);
+        .decline(messages::QueryVelocityStateExt::kCode);
     sensor.start();
     jaus::Component moved = std::move(sensor);
-    const auto query = messages::message(messages::query_velocity_state, 1);
+    const auto query = messages::velocity_query();
     require(client.query(moved.address(), query) == messages::velocity(1.5), "the answer");
     require(waited == JausStatus_WrongThread, "a callback may not wait");
     require(client.find("urn:jaus:jss:mobility:VelocityStateSensor") == moved.address(), "found");
@@ -105,8 +106,8 @@ void handlers_live_as_long_as_the_library_may_call_them() {
         jaus::Component driver(node, 33, JAUS_KIND_VEHICLE, "Rover");
         driver.management();
         driver.offer("urn:jaus:jss:mobility:PrimitiveDriver", 1, 1)
-            .command(messages::set_wrench_effort, [](const jaus::Event &) {})
-            .decline(messages::query_wrench_effort)
+            .command(messages::SetWrenchEffort::kCode, [](const jaus::Event &) {})
+            .decline(messages::QueryWrenchEffort::kCode)
             .on_stop([&stops, text = std::string(100, 'x')] { stops += text.size() == 100; });
         driver.start();
         return driver;
@@ -124,15 +125,15 @@ void a_subscription_brings_its_events_and_ends() {
     jaus::Node node = loopback(101);
     jaus::Component sensor(node, 44, JAUS_KIND_VEHICLE, "Rover");
     sensor.offer("urn:jaus:jss:mobility:VelocityStateSensor", 1, 1)
-        .publish(messages::query_velocity_state)
-        .decline(messages::query_velocity_state_ext);
+        .publish(messages::QueryVelocityState::kCode)
+        .decline(messages::QueryVelocityStateExt::kCode);
     sensor.start();
     jaus::Component client(node, 1, JAUS_KIND_OPERATOR_CONTROL_UNIT, "Client");
     client.start();
     require(status_of([&] { sensor.publish(messages::effort(1)); }) == JausStatus_NotFound,
             "no service publishes it");
     sensor.publish(messages::velocity(0.5));
-    const auto query = messages::message(messages::query_velocity_state, 1);
+    const auto query = messages::velocity_query();
     auto speeds = client.subscribe(sensor.address(), query, 0);
     require(client.descriptor() >= 0, "a descriptor");
     sensor.publish(messages::velocity(0.75));
@@ -153,9 +154,59 @@ void a_subscription_brings_its_events_and_ends() {
     require(status_of([&] { client.address(); }) == JausStatus_InvalidHandle, "and its components");
 }
 
+void a_callback_may_destroy_its_subscription_and_is_whole_until_it_returns() {
+    jaus::Node node = loopback(101);
+    jaus::Component sensor(node, 44, JAUS_KIND_VEHICLE, "Rover");
+    sensor.offer("urn:jaus:jss:mobility:VelocityStateSensor", 1, 1)
+        .publish(messages::QueryVelocityState::kCode)
+        .decline(messages::QueryVelocityStateExt::kCode);
+    sensor.start();
+    sensor.publish(messages::velocity(0.5));
+    jaus::Component client(node, 1, JAUS_KIND_OPERATOR_CONTROL_UNIT, "Client");
+    client.start();
+    jaus::Subscription speeds;
+    std::promise<void> is_there;
+    std::promise<std::size_t> ended;
+    const auto end = [&, text = std::string(100, 'x')](const jaus::Event &event) {
+        if (event.kind() == JausEventKind_Report) {
+            // The first report may come before the subscription is in its place.
+            is_there.get_future().wait();
+            speeds = jaus::Subscription();
+            ended.set_value(text.size());
+        }
+    };
+    speeds = client.subscribe(sensor.address(), messages::velocity_query(), 0, end);
+    is_there.set_value();
+    require(ended.get_future().get() == 100, "what the callback holds is whole");
+    require(speeds.id() == 0, "the subscription is gone");
+}
+
+void functions_that_are_missing_are_errors_or_make_events() {
+    jaus::Node node = loopback(101);
+    jaus::Component component(node, 44, JAUS_KIND_VEHICLE, "Rover");
+    auto service = component.offer("urn:example:Lamp", 1, 0);
+    require(status_of([&] { service.answer(0x2404, nullptr); }) == JausStatus_NullPointer, "answer");
+    require(status_of([&] { service.on_stop(nullptr); }) == JausStatus_NullPointer, "stop");
+    component.on_discovery(nullptr).on_standing(nullptr).start();
+    jaus::Component other(node, 45, JAUS_KIND_VEHICLE, "Rover");
+    other.start();
+    require(component.next_event(jaus::Milliseconds(10000)).has_value(), "an event in time");
+}
+
+void time_limits_that_are_too_long_are_the_longest() {
+    using jaus::detail::milliseconds;
+    require(milliseconds<std::uint32_t>(std::chrono::hours(1200)) == UINT32_MAX, "too long");
+    require(milliseconds<std::uint32_t>(jaus::Milliseconds(-1)) == 0, "negative");
+    require(milliseconds<std::int32_t>(std::chrono::hours(600)) == INT32_MAX, "too long");
+    require(milliseconds<std::int32_t>(jaus::Milliseconds(-1)) == -1, "for ever");
+}
+
 } // namespace
 
 int main() {
+    a_callback_may_destroy_its_subscription_and_is_whole_until_it_returns();
+    functions_that_are_missing_are_errors_or_make_events();
+    time_limits_that_are_too_long_are_the_longest();
     errors_are_thrown();
     an_unsafe_driver_does_not_start();
     a_callback_answers_and_may_not_wait();

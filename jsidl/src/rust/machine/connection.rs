@@ -45,9 +45,9 @@ impl<'a> Connection<'a> {
 
     /// Reserves the names of its methods in the trait.
     pub(in super::super) fn reserve(&self, names: &mut Names) {
-        for method in &self.emitter.vocabulary.methods {
-            names.snake(&method.ident);
-        }
+        let methods = self.emitter.vocabulary.methods.iter();
+        let taken = methods.map(|method| method.ident.trim_start_matches("r#").to_owned());
+        names.reserve(&taken.collect::<Vec<_>>());
     }
 
     /// Writes the methods of the trait: guards and actions.
@@ -111,6 +111,8 @@ impl<'a> Connection<'a> {
         self.internal(out, emitter);
         out.gap();
         out.push("/// A service and a call, as the state machine sees them.");
+        // A machine without actions reads neither.
+        out.push("#[allow(dead_code)]");
         out.push("struct Step<'a, T, C> {\nservice: &'a mut T,\ncall: &'a mut C,\n}");
         out.gap();
         out.push("impl<T: Service<C>, C: codec::Call> machine::Behaviour for Step<'_, T, C> {");
@@ -134,6 +136,11 @@ impl<'a> Connection<'a> {
             match method.asks() {
                 true => given[place] = envelope,
                 false => given.insert(place, envelope),
+            }
+        }
+        if is_answered(method) {
+            for parameter in &mut given {
+                *parameter = parameter.replacen(name_of(parameter), "_", 1);
             }
         }
         let receiver = if method.asks() { "&self" } else { "&mut self" };

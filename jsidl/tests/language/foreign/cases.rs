@@ -97,9 +97,23 @@ fn agree(ours: &Json, theirs: &Json) -> bool {
         (Json::Object(a), Json::Object(b)) => {
             same_keys(a, b) && a.iter().all(|(key, a)| agree(a, &b[key]))
         }
-        (Json::Number(a), Json::Number(b)) => a == b || a.as_f64() == b.as_f64(),
+        (Json::Number(a), Json::Number(b)) => {
+            a == b || a.as_f64() == b.as_f64() || same_float(a, b)
+        }
         (a, b) => a == b,
     }
+}
+
+/// Whether both are the shortest decimals of one `float`: halfway between two decimals with as many digits
+/// one language takes the lower, another the upper.
+fn same_float(a: &serde_json::Number, b: &serde_json::Number) -> bool {
+    let is_short = |number: &serde_json::Number| {
+        let text = number.to_string();
+        let mantissa = text.split(['e', 'E']).next().unwrap_or_default();
+        mantissa.chars().filter(char::is_ascii_digit).count() <= 9
+    };
+    let float = |number: &serde_json::Number| number.as_f64().map(|it| it as f32);
+    is_short(a) && is_short(b) && float(a) == float(b)
 }
 
 /// A valid message with its view, and octets that are made from it: beginnings, one octet more, and
