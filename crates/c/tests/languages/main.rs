@@ -11,5 +11,6 @@
 mod compiler;
 mod mixes;
 mod parts;
+mod readme;
 mod safety;
 mod scene;

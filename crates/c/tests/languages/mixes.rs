@@ -1,9 +1,8 @@
 //! The same small system in every mix of languages, over UDP and over the local link.
 
-use jaus_test_kit::evidence::{not_tested, this_test};
 use jaus_test_kit::waiting::within_limit;
 
-use super::parts::{Driver, Language, Network, operate, sensor};
+use super::parts::{Driver, Language, Network, missing, operate, sensor};
 
 /// The languages of the sensor, the driver and the operator.
 type Mix = [Language; 3];
@@ -30,12 +29,7 @@ async fn run_over_the_local_link(mix: Mix) {
 
 /// The mixes whose languages are there.
 fn possible(mixes: impl IntoIterator<Item = Mix>) -> Vec<Mix> {
-    let missing = |it: &Language| !it.is_there();
-    let missing: Vec<_> = Language::ALL.into_iter().filter(missing).collect();
-    if !missing.is_empty() {
-        let reason = format!("no compilers or no JAUS_PYTHON: {missing:?}");
-        not_tested(&this_test(), &reason);
-    }
+    let missing = missing();
     let is_possible = |mix: &Mix| !mix.iter().any(|it| missing.contains(it));
     mixes.into_iter().filter(is_possible).collect()
 }

@@ -8,6 +8,7 @@ use std::process::Command;
 use jaus::component::{Component, Kind, When};
 use jaus::messages::mobility::{QueryVelocityState, primitive_driver, velocity_state_sensor};
 use jaus::node::{Address, Config, Host, Node, Port};
+use jaus_test_kit::evidence::{not_tested, this_test};
 use jaus_test_kit::example::Example;
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::within_limit;
@@ -34,7 +35,7 @@ impl Language {
     }
 
     /// Whether its programs run here.
-    pub(crate) fn is_there(self) -> bool {
+    fn is_there(self) -> bool {
         match self {
             Self::Rust => true,
             Self::Cpp => compiler::has_compilers(),
@@ -43,7 +44,7 @@ impl Language {
     }
 
     /// Starts the example of a part in another language than Rust.
-    fn start(self, part: &'static str, arguments: &[String]) -> Example {
+    pub(crate) fn start(self, part: &'static str, arguments: &[String]) -> Example {
         let mut command = match self {
             Self::Python => {
                 let interpreter = Self::interpreter().expect("is_there was asked");
@@ -55,12 +56,24 @@ impl Language {
             _ => Command::new(compiler::compile(match part {
                 "sensor" => "examples/sensor.cpp",
                 "driver" => "examples/driver.cpp",
+                "navigation" => "examples/navigation.cpp",
                 _ => "examples/operator.cpp",
             })),
         };
         command.args(arguments);
         Example::start_command(part, command)
     }
+}
+
+/// The languages whose programs do not run here, which is reported.
+pub(crate) fn missing() -> Vec<Language> {
+    let missing = |it: &Language| !it.is_there();
+    let missing: Vec<_> = Language::ALL.into_iter().filter(missing).collect();
+    if !missing.is_empty() {
+        let reason = "gcc, or a Python that JAUS_PYTHON names, is missing; run .ci/python";
+        not_tested(&this_test(), &format!("{missing:?}: {reason}"));
+    }
+    missing
 }
 
 /// How the parts are connected.
