@@ -1,5 +1,5 @@
 //! Generated Rust through the compiler: it accepts the code of every legal definition, without a
-//! warning.
+//! warning. And hostile definitions through every generator.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -8,8 +8,11 @@
 )]
 
 mod cases;
+mod chance;
 mod definitions;
+mod hostile;
 mod rustc;
+mod words;
 
 use jsidl::Loader;
 
@@ -24,6 +27,12 @@ pub(crate) fn emitted(files: &[String]) -> String {
     assert!(!errors.contains("error: "), "{errors}\n{}", files.concat());
     let services = loaded.library.services().map(AsRef::as_ref);
     jsidl::rust::module(&loaded.library, services, "::jaus_codec")
+}
+
+/// The number in an environment variable.
+pub(crate) fn number(name: &str, default: u64) -> u64 {
+    let value = std::env::var(name).ok();
+    value.and_then(|it| it.parse().ok()).unwrap_or(default)
 }
 
 /// Compiles the modules of several random definitions, and names the first that the compiler refuses.
@@ -55,12 +64,7 @@ fn random_legal_definitions_compile() {
 #[test]
 #[ignore = "takes as long as one wants: see .ci/full"]
 fn many_random_legal_definitions_compile() {
-    let number = |name, default| {
-        let value = std::env::var(name).ok();
-        value.and_then(|it| it.parse().ok()).unwrap_or(default)
-    };
-    let first: u64 = number("JAUS_SEED", 1000);
-    let cases = number("JAUS_CASES", 400);
+    let (first, cases) = (number("JAUS_SEED", 1000), number("JAUS_CASES", 400));
     for next in (first..first.saturating_add(cases)).step_by(40) {
         compiles(next..next + 40);
     }
