@@ -1,41 +1,34 @@
 //! Components: description and start.
-#![expect(clippy::disallowed_methods, reason = "an end has a time limit")]
 
 use std::ffi::{c_char, c_void};
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::Duration;
 
 use jaus::component::{
-    AccessControl, AttachError, Builder, Component, Handlers, Kind, Management, Service,
-    UndecodedFunctions,
+    AccessControl, AttachError, Builder, Component, Handlers, Management, UndecodedFunctions,
 };
-use jaus::endpoint::Received;
-use jaus::service::{Context, Handled, UnsafeService};
-use tokio::sync::oneshot;
+use jaus::service::UnsafeService;
+use jaus_binding::{
+    Attended, NOBODY, NotStarted, Place, Publications, Running, ServiceKey, follow_discovery,
+    follow_standing, kind, lock,
+};
 use tokio::task::AbortHandle;
 
 use crate::argument::{check_out, put, text};
-use crate::attended::Attended;
-use crate::event::EventQueue;
-use crate::lock::lock;
-use crate::news;
-use crate::node::{NODES, NodeEntry, Stage as NodeStage, not_attached};
-use crate::publications::Publications;
+use crate::event::{Event, Events, Shown};
+use crate::node::{NODES, NodeEntry};
 use crate::sink::Sink;
 use crate::status::{Failure, JausStatus, check_may_wait, run};
 use crate::table::Table;
-use crate::types::{JausComponent, JausEventCallback, JausNode};
+use crate::types::{JausComponent, JausEventCallback, JausEventKind, JausNode};
 use crate::watchdog::Watchdog;
 
 pub(crate) static COMPONENTS: Table<ComponentEntry> = Table::new("component");
 
-/// How long a component that ends may take to stop and to release what it controls.
-const END: Duration = Duration::from_secs(2);
-
 /// A component of the program.
 pub(crate) struct ComponentEntry {
     pub(crate) node: Arc<NodeEntry>,
-    pub(crate) queue: Arc<EventQueue>,
+    pub(crate) queue: Arc<Events>,
+    pub(crate) shown: Shown,
     pub(crate) publications: Arc<Publications>,
     stage: Mutex<Stage>,
     /// Close the callbacks that the component may call.
@@ -44,7 +37,10 @@ pub(crate) struct ComponentEntry {
 
 enum Stage {
     Draft(Box<Draft>),
-    Runs(Running),
+    Runs {
+        running: Running,
+        notices: Vec<AbortHandle>,
+    },
     Ended,
 }
 
@@ -63,6 +59,8 @@ pub(crate) struct Draft {
 pub(crate) struct ServiceDraft {
     /// `None` after a call that failed.
     pub(crate) handlers: Option<Handlers<UndecodedFunctions>>,
+    /// Names it in the queue of events.
+    pub(crate) key: ServiceKey,
     /// Whether messages of it wait for the program in the queue of events.
     pub(crate) is_polled: bool,
 }
@@ -71,13 +69,6 @@ enum Guard {
     None,
     AccessControl(AccessControl),
     Management(Management),
-}
-
-struct Running {
-    component: Component,
-    /// Ends when the component's services are gone.
-    ended: oneshot::Receiver<()>,
-    notices: Vec<AbortHandle>,
 }
 
 impl ComponentEntry {
@@ -110,7 +101,7 @@ impl ComponentEntry {
 
     pub(crate) fn running(&self) -> Result<Component, Failure> {
         match &*self.stage() {
-            Stage::Runs(running) => Ok(running.component.clone()),
+            Stage::Runs { running, .. } => Ok(running.component().clone()),
             Stage::Draft(_) => Err(Failure::new(
                 JausStatus::WrongState,
                 "the component does not run: call jaus_component_start first",
@@ -124,7 +115,7 @@ impl ComponentEntry {
 
     fn start(&self) -> Result<(), Failure> {
         check_may_wait()?;
-        let node = self.node.running()?;
+        let place = self.node.place()?;
         let mut stage = self.stage();
         let draft = match std::mem::replace(&mut *stage, Stage::Ended) {
             Stage::Draft(draft) => draft,
@@ -134,32 +125,19 @@ impl ComponentEntry {
                 return Err(Failure::new(JausStatus::WrongState, text));
             }
         };
-        let running = self.node.runtime.wait(draft.start(node, &self.queue))?;
-        *stage = Stage::Runs(running?);
+        *stage = self.node.runtime.wait(draft.start(&place, &self.queue))??;
         Ok(())
     }
 
     /// Ends the component and its callbacks.
     pub(crate) fn end(&self) -> Result<(), Failure> {
         let stage = std::mem::replace(&mut *self.stage(), Stage::Ended);
-        if let Stage::Runs(running) = stage {
-            for notices in &running.notices {
+        if let Stage::Runs { running, notices } = stage {
+            for notices in &notices {
                 notices.abort();
             }
-            drop(running.component);
-            let ended = running.ended;
-            let gone = async {
-                // An error means that it has ended.
-                let _ = ended.await;
-                // The task that owned the services still frees the component's number. One that is
-                // started now on its thread runs after that.
-                let _ = tokio::spawn(async {}).await;
-            };
             // If it takes too long, its callbacks end all the same.
-            let _ = self
-                .node
-                .runtime
-                .wait(async { tokio::time::timeout(END, gone).await })?;
+            self.node.runtime.wait(running.end())?;
         }
         self.queue.end();
         let closers = std::mem::take(&mut *lock(&self.closers));
@@ -171,35 +149,22 @@ impl ComponentEntry {
 }
 
 impl Draft {
-    async fn start(self, node: NodeStage, queue: &Arc<EventQueue>) -> Result<Running, Failure> {
+    async fn start(self, place: &Place, queue: &Arc<Events>) -> Result<Stage, Failure> {
         let number = self.number;
         let (on_standing, on_discovery) = (self.on_standing.clone(), self.on_discovery.clone());
-        let (alive, ended) = oneshot::channel();
-        let builder = self.builder(queue)?.offer(Ending { _alive: alive });
-        let component = match node {
-            NodeStage::Host(host) => {
-                let port = host
-                    .attach(number)
-                    .await
-                    .map_err(|error| not_attached(&error))?;
-                builder.live_on(port)
-            }
-            NodeStage::Runs(node) => builder.attach(&node, number),
-            NodeStage::Settings(_) | NodeStage::Ended => {
-                return Err(Failure::new(JausStatus::Stopped, "the node has stopped"));
-            }
-        };
-        let component = component.map_err(|error| refused(&error))?;
-        let standing = on_standing.map(|sink| news::of_standing(&component, sink));
-        let discovery = on_discovery.map(|sink| news::of_discovery(&component, sink));
-        Ok(Running {
-            notices: standing.into_iter().chain(discovery).collect(),
-            component,
-            ended,
-        })
+        let started = Running::start(self.builder(queue)?, place, number).await;
+        let running = started.map_err(|error| match error {
+            NotStarted::Attach(error) => refused(&error),
+            NotStarted::Host(error) => Failure::of(JausStatus::NotStarted, &error),
+        })?;
+        let component = running.component();
+        let standing = on_standing.map(|sink| tell_standing(component, sink));
+        let discovery = on_discovery.map(|sink| tell_discovery(component, sink));
+        let notices = standing.into_iter().chain(discovery).collect();
+        Ok(Stage::Runs { running, notices })
     }
 
-    fn builder(self, queue: &Arc<EventQueue>) -> Result<Builder, Failure> {
+    fn builder(self, queue: &Arc<Events>) -> Result<Builder, Failure> {
         let mut builder = Component::builder(kind(self.kind), self.name);
         builder = match self.guard {
             Guard::None => builder,
@@ -212,7 +177,7 @@ impl Draft {
                 Failure::new(JausStatus::WrongState, text)
             })?;
             builder = match service.is_polled {
-                true => builder.offer(Attended::new(handlers, queue.clone())),
+                true => builder.offer(Attended::new(handlers, service.key, queue.clone())),
                 false => builder.offer(handlers),
             };
         }
@@ -220,16 +185,24 @@ impl Draft {
     }
 }
 
-fn kind(number: u16) -> Kind {
-    match number {
-        10001 => Kind::Vehicle,
-        20001 => Kind::OperatorControlUnit,
-        30001 => Kind::OtherSubsystem,
-        40001 => Kind::Node,
-        50001 => Kind::Payload,
-        60001 => Kind::Component,
-        other => Kind::Unknown(other),
-    }
+fn tell_standing(component: &Component, sink: Sink) -> AbortHandle {
+    follow_standing(component, move |standing| {
+        let controller = standing.controller.map_or(NOBODY, |it| it.id);
+        sink.tell(Event {
+            value: standing.state as u8,
+            ..Event::new(JausEventKind::Standing, controller)
+        });
+    })
+}
+
+fn tell_discovery(component: &Component, sink: Sink) -> AbortHandle {
+    follow_discovery(component, move |id, is_found| {
+        let kind = match is_found {
+            true => JausEventKind::Found,
+            false => JausEventKind::Lost,
+        };
+        sink.tell(Event::new(kind, id));
+    })
 }
 
 /// Why a component was not attached, in the words of this interface.
@@ -258,26 +231,6 @@ fn refused(error: &AttachError) -> Failure {
     Failure::new(JausStatus::Unsafe, text)
 }
 
-/// Shows when the services of a component are gone. It offers nothing.
-struct Ending {
-    _alive: oneshot::Sender<()>,
-}
-
-impl Service for Ending {
-    fn offers(&self) -> Vec<jaus::codec::ServiceId> {
-        Vec::new()
-    }
-
-    fn handle_message(
-        &mut self,
-        _: std::time::Instant,
-        _: &Received,
-        _: &mut Context<'_>,
-    ) -> Handled {
-        Handled::No
-    }
-}
-
 /// Changes the description of a component before its start.
 pub(crate) fn edit<T>(
     component: u64,
@@ -286,7 +239,7 @@ pub(crate) fn edit<T>(
     let entry = COMPONENTS.get(component)?;
     match &mut *entry.stage() {
         Stage::Draft(draft) => change(draft, &entry),
-        Stage::Runs(_) | Stage::Ended => Err(Failure::new(
+        Stage::Runs { .. } | Stage::Ended => Err(Failure::new(
             JausStatus::WrongState,
             "the component was started: describe it before jaus_component_start",
         )),
@@ -326,7 +279,7 @@ pub unsafe extern "C" fn jaus_component_create(
             )));
         }
         COMPONENTS.check_room()?;
-        let queue = EventQueue::new();
+        let queue = Events::new();
         let queue = queue.map_err(|error| Failure::of(JausStatus::NotStarted, &error))?;
         let draft = Draft {
             number,
@@ -341,6 +294,7 @@ pub unsafe extern "C" fn jaus_component_create(
         let entry = ComponentEntry {
             node,
             queue: Arc::new(queue),
+            shown: Shown::default(),
             publications: Arc::default(),
             stage: Mutex::new(Stage::Draft(Box::new(draft))),
             closers: Mutex::default(),
