@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, TryLockError};
 
 use crate::event::Event;
-use crate::lock::lock;
 use crate::status::{begin_callback, is_in_callback};
 use crate::types::{JausAnswer, JausEvent};
 use crate::watchdog::{Stop, Watchdog};
+use jaus_binding::lock;
 
 pub(crate) type EventFunction = unsafe extern "C" fn(*mut c_void, *const JausEvent);
 pub(crate) type AnswerFunction =

@@ -1,42 +1,35 @@
 //! Components: description and start.
-#![expect(clippy::disallowed_methods, reason = "an end has a time limit")]
 
 use std::ffi::{c_char, c_void};
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::Duration;
 
 use jaus::component::{
-    AccessControl, AttachError, Builder, Component, Handlers, Kind, Management, Service,
-    UndecodedFunctions,
+    AccessControl, AttachError, Builder, Component, Handlers, Management, UndecodedFunctions,
 };
-use jaus::endpoint::Received;
-use jaus::node::{Node, Port};
-use jaus::service::{Context, Handled, UnsafeService};
-use tokio::sync::oneshot;
+use jaus::node::Port;
+use jaus::service::UnsafeService;
+use jaus_binding::{
+    Attended, NOBODY, NotStarted, Publications, Running, ServiceKey, follow_discovery,
+    follow_standing, kind, lock,
+};
 use tokio::task::AbortHandle;
 
 use crate::argument::{check_out, put, text};
-use crate::attended::Attended;
-use crate::event::EventQueue;
-use crate::lock::lock;
-use crate::news;
-use crate::node::{NODES, NodeEntry, Stage as NodeStage, not_attached};
-use crate::publications::Publications;
+use crate::event::{Event, Events, Shown};
+use crate::node::{NODES, NodeEntry};
 use crate::sink::Sink;
 use crate::status::{Failure, JausStatus, check_may_wait, run};
 use crate::table::Table;
-use crate::types::{JausComponent, JausEventCallback, JausNode};
+use crate::types::{JausComponent, JausEventCallback, JausEventKind, JausNode};
 use crate::watchdog::Watchdog;
 
 pub(crate) static COMPONENTS: Table<ComponentEntry> = Table::new("component");
 
-/// How long a component that ends may take to stop and to release what it controls.
-const END: Duration = Duration::from_secs(2);
-
 /// A component of the program.
 pub(crate) struct ComponentEntry {
     pub(crate) node: Arc<NodeEntry>,
-    pub(crate) queue: Arc<EventQueue>,
+    pub(crate) queue: Arc<Events>,
+    pub(crate) shown: Shown,
     pub(crate) publications: Arc<Publications>,
     stage: Mutex<Stage>,
     /// Close the callbacks that the component may call.
@@ -47,7 +40,10 @@ enum Stage {
     Draft(Box<Draft>),
     /// Waits for the node of the host.
     Starts,
-    Runs(Running),
+    Runs {
+        running: Running,
+        notices: Vec<AbortHandle>,
+    },
     Ended,
 }
 
@@ -66,6 +62,8 @@ pub(crate) struct Draft {
 pub(crate) struct ServiceDraft {
     /// `None` after a call that failed.
     pub(crate) handlers: Option<Handlers<UndecodedFunctions>>,
+    /// Names it in the queue of events.
+    pub(crate) key: ServiceKey,
     /// Whether messages of it wait for the program in the queue of events.
     pub(crate) is_polled: bool,
 }
@@ -74,13 +72,6 @@ enum Guard {
     None,
     AccessControl(AccessControl),
     Management(Management),
-}
-
-struct Running {
-    component: Component,
-    /// Ends when the component's services are gone.
-    ended: oneshot::Receiver<()>,
-    notices: Vec<AbortHandle>,
 }
 
 impl ComponentEntry {
@@ -113,7 +104,7 @@ impl ComponentEntry {
 
     pub(crate) fn running(&self) -> Result<Component, Failure> {
         match &*self.stage() {
-            Stage::Runs(running) => Ok(running.component.clone()),
+            Stage::Runs { running, .. } => Ok(running.component().clone()),
             Stage::Draft(_) => Err(Failure::new(
                 JausStatus::WrongState,
                 "the component does not run: call jaus_component_start first",
@@ -128,19 +119,18 @@ impl ComponentEntry {
 
     fn start(&self) -> Result<(), Failure> {
         check_may_wait()?;
-        let node = self.node.running()?;
+        let place = self.node.place()?;
         let draft = self.begin()?;
         let runtime = &self.node.runtime;
         // Not under the lock: a callback that waits for it would hold up the runtime, and this with it.
-        let place = runtime.wait(place(node, draft.number))?;
+        let port = runtime.wait(place.attach(draft.number))?;
         let mut stage = self.stage();
         if !matches!(*stage, Stage::Starts) {
             return Err(stopped());
         }
         *stage = Stage::Ended;
-        let place = place?;
-        let running = runtime.wait(async { draft.start(place, &self.queue) })??;
-        *stage = Stage::Runs(running);
+        let port = port.map_err(not_started)?;
+        *stage = runtime.wait(async { draft.start(port, &self.queue) })??;
         Ok(())
     }
 
@@ -160,24 +150,12 @@ impl ComponentEntry {
     /// Ends the component and its callbacks.
     pub(crate) fn end(&self) -> Result<(), Failure> {
         let stage = std::mem::replace(&mut *self.stage(), Stage::Ended);
-        if let Stage::Runs(running) = stage {
-            for notices in &running.notices {
+        if let Stage::Runs { running, notices } = stage {
+            for notices in &notices {
                 notices.abort();
             }
-            drop(running.component);
-            let ended = running.ended;
-            let gone = async {
-                // An error means that it has ended.
-                let _ = ended.await;
-                // The task that owned the services still frees the component's number. One that is
-                // started now on its thread runs after that.
-                let _ = tokio::spawn(async {}).await;
-            };
             // If it takes too long, its callbacks end all the same.
-            let _ = self
-                .node
-                .runtime
-                .wait(async { tokio::time::timeout(END, gone).await })?;
+            self.node.runtime.wait(running.end())?;
         }
         self.queue.end();
         let closers = std::mem::take(&mut *lock(&self.closers));
@@ -192,48 +170,26 @@ fn stopped() -> Failure {
     Failure::new(JausStatus::Stopped, "the component has stopped")
 }
 
-/// Where a component starts.
-enum Place {
-    Node(Node),
-    Host(Port),
-}
-
-/// The place on a node. Waits for the node of the host.
-async fn place(node: NodeStage, number: u8) -> Result<Place, Failure> {
-    match node {
-        NodeStage::Host(host) => {
-            let port = host.attach(number).await;
-            port.map(Place::Host).map_err(|error| not_attached(&error))
-        }
-        NodeStage::Runs(node) => Ok(Place::Node(node)),
-        NodeStage::Settings(_) | NodeStage::Ended => {
-            Err(Failure::new(JausStatus::Stopped, "the node has stopped"))
-        }
+fn not_started(error: NotStarted) -> Failure {
+    match error {
+        NotStarted::Attach(error) => refused(&error),
+        NotStarted::Host(error) => Failure::of(JausStatus::NotStarted, &error),
     }
 }
 
 impl Draft {
     /// On the library's runtime.
-    fn start(self, place: Place, queue: &Arc<EventQueue>) -> Result<Running, Failure> {
-        let number = self.number;
+    fn start(self, port: Port, queue: &Arc<Events>) -> Result<Stage, Failure> {
         let (on_standing, on_discovery) = (self.on_standing.clone(), self.on_discovery.clone());
-        let (alive, ended) = oneshot::channel();
-        let builder = self.builder(queue)?.offer(Ending { _alive: alive });
-        let component = match place {
-            Place::Host(port) => builder.live_on(port),
-            Place::Node(node) => builder.attach(&node, number),
-        };
-        let component = component.map_err(|error| refused(&error))?;
-        let standing = on_standing.map(|sink| news::of_standing(&component, sink));
-        let discovery = on_discovery.map(|sink| news::of_discovery(&component, sink));
-        Ok(Running {
-            notices: standing.into_iter().chain(discovery).collect(),
-            component,
-            ended,
-        })
+        let running = Running::on(self.builder(queue)?, port).map_err(|error| refused(&error))?;
+        let component = running.component();
+        let standing = on_standing.map(|sink| tell_standing(component, sink));
+        let discovery = on_discovery.map(|sink| tell_discovery(component, sink));
+        let notices = standing.into_iter().chain(discovery).collect();
+        Ok(Stage::Runs { running, notices })
     }
 
-    fn builder(self, queue: &Arc<EventQueue>) -> Result<Builder, Failure> {
+    fn builder(self, queue: &Arc<Events>) -> Result<Builder, Failure> {
         let mut builder = Component::builder(kind(self.kind), self.name);
         builder = match self.guard {
             Guard::None => builder,
@@ -246,7 +202,7 @@ impl Draft {
                 Failure::new(JausStatus::WrongState, text)
             })?;
             builder = match service.is_polled {
-                true => builder.offer(Attended::new(handlers, queue.clone())),
+                true => builder.offer(Attended::new(handlers, service.key, queue.clone())),
                 false => builder.offer(handlers),
             };
         }
@@ -254,16 +210,24 @@ impl Draft {
     }
 }
 
-fn kind(number: u16) -> Kind {
-    match number {
-        10001 => Kind::Vehicle,
-        20001 => Kind::OperatorControlUnit,
-        30001 => Kind::OtherSubsystem,
-        40001 => Kind::Node,
-        50001 => Kind::Payload,
-        60001 => Kind::Component,
-        other => Kind::Unknown(other),
-    }
+fn tell_standing(component: &Component, sink: Sink) -> AbortHandle {
+    follow_standing(component, move |standing| {
+        let controller = standing.controller.map_or(NOBODY, |it| it.id);
+        sink.tell(Event {
+            value: standing.state as u8,
+            ..Event::new(JausEventKind::Standing, controller)
+        });
+    })
+}
+
+fn tell_discovery(component: &Component, sink: Sink) -> AbortHandle {
+    follow_discovery(component, move |id, is_found| {
+        let kind = match is_found {
+            true => JausEventKind::Found,
+            false => JausEventKind::Lost,
+        };
+        sink.tell(Event::new(kind, id));
+    })
 }
 
 /// Why a component was not attached, in the words of this interface.
@@ -292,26 +256,6 @@ fn refused(error: &AttachError) -> Failure {
     Failure::new(JausStatus::Unsafe, text)
 }
 
-/// Shows when the services of a component are gone. It offers nothing.
-struct Ending {
-    _alive: oneshot::Sender<()>,
-}
-
-impl Service for Ending {
-    fn offers(&self) -> Vec<jaus::codec::ServiceId> {
-        Vec::new()
-    }
-
-    fn handle_message(
-        &mut self,
-        _: std::time::Instant,
-        _: &Received,
-        _: &mut Context<'_>,
-    ) -> Handled {
-        Handled::No
-    }
-}
-
 /// Changes the description of a component before its start.
 pub(crate) fn edit<T>(
     component: u64,
@@ -320,7 +264,7 @@ pub(crate) fn edit<T>(
     let entry = COMPONENTS.get(component)?;
     match &mut *entry.stage() {
         Stage::Draft(draft) => change(draft, &entry),
-        Stage::Starts | Stage::Runs(_) | Stage::Ended => Err(Failure::new(
+        Stage::Starts | Stage::Runs { .. } | Stage::Ended => Err(Failure::new(
             JausStatus::WrongState,
             "the component was started: describe it before jaus_component_start",
         )),
@@ -368,7 +312,7 @@ pub unsafe extern "C" fn jaus_component_create(
             )));
         }
         COMPONENTS.check_room()?;
-        let queue = EventQueue::new();
+        let queue = Events::new();
         let queue = queue.map_err(|error| Failure::of(JausStatus::NotStarted, &error))?;
         let draft = Draft {
             number,
@@ -383,6 +327,7 @@ pub unsafe extern "C" fn jaus_component_create(
         let entry = ComponentEntry {
             node,
             queue: Arc::new(queue),
+            shown: Shown::default(),
             publications: Arc::default(),
             stage: Mutex::new(Stage::Draft(Box::new(draft))),
             closers: Mutex::default(),

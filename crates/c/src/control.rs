@@ -1,22 +1,18 @@
 //! Control of peers.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "a reference to control has a time limit"
-)]
 
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use jaus::component::Control;
-use jaus::node::{now, sleep_until};
+use jaus::node::now;
+use jaus_binding::{HeldControl, lock};
 use tokio::task::JoinHandle;
 
 use crate::argument::{check_out, message, one_component, priority, put};
 use crate::client::{not_sent, uncontrolled, undelivered, unmanaged};
 use crate::component::{ComponentEntry, check_not_freed, running};
 use crate::event::Event;
-use crate::lock::lock;
 use crate::sink::Sink;
 use crate::status::{Failure, JausStatus, run};
 use crate::table::Table;
@@ -34,38 +30,30 @@ struct ControlEntry {
     tasks: Mutex<Vec<JoinHandle<()>>>,
 }
 
-/// The control itself, until it is given up.
+/// The control, and when the program last showed that it runs.
 struct Held {
-    control: Mutex<Option<Arc<Control>>>,
-    /// When the program last showed that it runs.
+    control: HeldControl,
     shown: Mutex<Instant>,
 }
 
 impl Held {
-    fn get(&self) -> Result<Arc<Control>, Failure> {
-        let control = lock(&self.control).clone();
-        control.ok_or_else(|| {
+    /// The control, for a call of the program, which shows that it runs.
+    fn used(&self) -> Result<Arc<Control>, Failure> {
+        *lock(&self.shown) = now();
+        self.control.get().ok_or_else(|| {
             let text = "control was released, because the program did not show that it runs";
             Failure::new(JausStatus::ControlLost, text)
         })
     }
 
-    /// The control, for a call of the program, which shows that it runs.
-    fn used(&self) -> Result<Arc<Control>, Failure> {
-        *lock(&self.shown) = now();
-        self.get()
-    }
-
     /// Releases control when the program has not used it for this time.
     async fn expire(self: Arc<Self>, limit: Duration, event: Event, sink: Sink) {
-        loop {
-            let end = *lock(&self.shown) + limit;
-            if now() >= end {
-                break;
-            }
-            sleep_until(Some(end)).await;
-        }
-        if lock(&self.control).take().is_some() {
+        if self
+            .control
+            .watch(limit, || *lock(&self.shown))
+            .await
+            .is_some()
+        {
             let reason = format!(
                 "the program has not used control for {:.1} s",
                 limit.as_secs_f64()
@@ -73,28 +61,21 @@ impl Held {
             sink.tell(event.because(&reason));
         }
     }
-}
 
-/// Passes on the states that the peer reports, and then why control was lost.
-async fn follow(held: Arc<Held>, event: impl Fn(JausEventKind) -> Event, sink: Sink) {
-    /// How long it keeps a reference. Control is released with the last one.
-    const MOMENT: Duration = Duration::from_millis(100);
-    let mut known = None;
-    while let Ok(control) = held.get() {
-        let status = tokio::time::timeout(MOMENT, control.status_after(known)).await;
-        drop(control);
-        match status {
-            Err(_) => {}
-            Ok(Ok(status)) => {
-                known = status;
-                sink.tell(Event {
-                    value: status.unwrap_or(JAUS_STATE_UNKNOWN),
-                    ..event(JausEventKind::ControlStatus)
-                });
-            }
-            Ok(Err(error)) => {
-                return sink.tell(event(JausEventKind::ControlLost).because(&error));
-            }
+    /// Passes on the states that the peer reports, and then why control was lost.
+    async fn follow(
+        self: Arc<Self>,
+        event: impl Fn(JausEventKind) -> Event + Send + Sync,
+        sink: Sink,
+    ) {
+        let tell = |status: Option<u8>| {
+            sink.tell(Event {
+                value: status.unwrap_or(JAUS_STATE_UNKNOWN),
+                ..event(JausEventKind::ControlStatus)
+            });
+        };
+        if let Some(error) = self.control.follow(tell).await {
+            sink.tell(event(JausEventKind::ControlLost).because(&error));
         }
     }
 }
@@ -102,7 +83,7 @@ async fn follow(held: Arc<Held>, event: impl Fn(JausEventKind) -> Event, sink: S
 impl ControlEntry {
     /// Releases control. Waits for the peer's confirmation, but not in a callback.
     fn end(&self) {
-        let control = lock(&self.held.control).take();
+        let control = self.held.control.take();
         // Not under the lock: a task can be in a callback that waits for it.
         let tasks = std::mem::take(&mut *lock(&self.tasks));
         for task in tasks {
@@ -156,14 +137,14 @@ pub unsafe extern "C" fn jaus_component_control(
         // SAFETY: as the caller guarantees.
         unsafe { put(control, JausControl { id }, "control") }?;
         let held = Arc::new(Held {
-            control: Mutex::new(Some(Arc::new(granted))),
+            control: HeldControl::new(granted),
             shown: Mutex::new(now()),
         });
         let event = move |kind| Event {
             subject: id,
             ..Event::new(kind, peer)
         };
-        let following = follow(held.clone(), event, sink.clone());
+        let following = held.clone().follow(event, sink.clone());
         let controlled = ControlEntry {
             component: entry,
             sink,

@@ -21,23 +21,19 @@
 //! blocks therefore blocks the whole node: its peers see it as dead, as they must. A second thread
 //! watches: after 500 ms it calls the stop callbacks of the node's components (`src/watchdog.rs`).
 //! Messages without a callback wait in a queue for a program with its own loop; a program that does not
-//! fetch its commands in time hangs, too (`src/attended.rs`).
+//! fetch its commands in time hangs, too (`Attended` of the crate `jaus-binding`).
 #![cfg(unix)]
 
 mod argument;
-mod attended;
 mod callback;
 mod client;
 mod component;
 mod control;
 mod ends;
 mod event;
-mod lock;
 mod log;
-mod news;
 mod node;
 mod notices;
-mod publications;
 mod runtime;
 mod service;
 mod sink;

@@ -4,10 +4,10 @@ use std::ffi::c_char;
 use std::sync::{Mutex, MutexGuard};
 
 use jaus::link::Group;
-use jaus::node::{Address, Config, Host, HostError, Node, StartError};
+use jaus::node::{Address, Config, Host, Node, StartError};
+use jaus_binding::{Place, lock};
 
 use crate::argument::{check_out, put, text};
-use crate::lock::lock;
 use crate::runtime::Runtime;
 use crate::status::{Failure, JausStatus, check_may_wait, run};
 use crate::table::Table;
@@ -22,12 +22,9 @@ pub(crate) struct NodeEntry {
 }
 
 /// What there is of a node.
-#[derive(Clone)]
-pub(crate) enum Stage {
+enum Stage {
     Settings(Box<Config>),
-    Runs(Node),
-    /// The node of this host, in another process.
-    Host(Host),
+    Runs(Place),
     Ended,
 }
 
@@ -45,15 +42,15 @@ impl NodeEntry {
         lock(&self.stage)
     }
 
-    /// A copy of what runs.
-    pub(crate) fn running(&self) -> Result<Stage, Failure> {
+    /// Where components run.
+    pub(crate) fn place(&self) -> Result<Place, Failure> {
         match &*self.stage() {
             Stage::Settings(_) => Err(Failure::new(
                 JausStatus::WrongState,
                 "the node does not run: call jaus_node_start first",
             )),
             Stage::Ended => Err(Failure::new(JausStatus::Stopped, "the node has stopped")),
-            running => Ok(running.clone()),
+            Stage::Runs(place) => Ok(place.clone()),
         }
     }
 
@@ -79,14 +76,14 @@ impl NodeEntry {
         };
         let config = (**config).clone();
         let started = self.runtime.wait(async { Node::start(config) })?;
-        *stage = Stage::Runs(started.map_err(|error| not_started(&error))?);
+        *stage = Stage::Runs(Place::Node(started.map_err(|error| not_started(&error))?));
         Ok(())
     }
 
     /// Closes its links.
     pub(crate) fn end(&self) -> Result<(), Failure> {
         let stage = std::mem::replace(&mut *self.stage(), Stage::Ended);
-        if let Stage::Runs(node) = stage {
+        if let Stage::Runs(Place::Node(node)) = stage {
             self.runtime.wait(node.shutdown())?;
         }
         Ok(())
@@ -94,10 +91,6 @@ impl NodeEntry {
 }
 
 fn not_started(error: &StartError) -> Failure {
-    Failure::of(JausStatus::NotStarted, error)
-}
-
-pub(crate) fn not_attached(error: &HostError) -> Failure {
     Failure::of(JausStatus::NotStarted, error)
 }
 
@@ -151,7 +144,7 @@ pub unsafe extern "C" fn jaus_node_of_host(
         check_out(node, "node")?;
         // SAFETY: as the caller guarantees.
         let address: Address = parse(unsafe { text(address, "address") }?)?;
-        let created = NodeEntry::add(Stage::Host(Host::at(address)))?;
+        let created = NodeEntry::add(Stage::Runs(Place::Host(Host::at(address))))?;
         // SAFETY: as the caller guarantees.
         unsafe { put(node, created, "node") }
     })

@@ -4,10 +4,10 @@ use std::ffi::{c_int, c_void};
 use std::time::Duration;
 
 use jaus::component::Condition;
+use jaus_binding::NOBODY;
 
-use crate::argument::{check_out, code_of, message, put};
+use crate::argument::{check_out, message, put};
 use crate::component::{COMPONENTS, edit, running};
-use crate::news::NOBODY;
 use crate::status::{Failure, JausStatus, check_may_wait, run};
 use crate::types::{
     JAUS_CONDITION_FAILED, JAUS_CONDITION_INITIALIZED, JAUS_CONDITION_SAFE, JausAddress,
@@ -112,9 +112,11 @@ pub unsafe extern "C" fn jaus_component_next_event(
         }
         let entry = COMPONENTS.get(component.id)?;
         let limit = u64::try_from(timeout).ok().map(Duration::from_millis);
+        entry.shown.clear();
         let next = entry.queue.next(limit);
         let next =
             next.map_err(|_| Failure::new(JausStatus::Stopped, "the component has stopped"))?;
+        let next = entry.shown.show(next);
         // SAFETY: as the caller guarantees.
         unsafe { put(event, next, "event") }
     })
@@ -169,7 +171,10 @@ pub unsafe extern "C" fn jaus_component_publish(
         // SAFETY: as the caller guarantees.
         let report = unsafe { message(data, length) }?;
         let (entry, component) = running(component)?;
-        let query = entry.publications.publish(code_of(&report), report)?;
+        let query = entry.publications.publish(report).map_err(|error| {
+            let text = format!("{error}: call jaus_service_publish with the code of its query");
+            Failure::new(JausStatus::NotFound, text)
+        })?;
         let runtime = entry.node.runtime.handle();
         entry.publications.announce(runtime, component, query);
         Ok(())

@@ -1,45 +1,32 @@
 //! The library's thread: a tokio runtime, on which a node, its components and all callbacks run.
 
 use std::future::Future;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
-use tokio::runtime::{Builder, Handle};
-use tokio::sync::oneshot;
+use jaus_binding::{NodeThread, lock};
+use tokio::runtime::Handle;
 
 use crate::status::{Failure, JausStatus, check_may_wait, is_in_callback};
 use crate::watchdog::Watchdog;
 
 /// The thread of one node, and the thread of its watchdog.
 pub(crate) struct Runtime {
-    handle: Handle,
+    node: NodeThread,
     watchdog: Arc<Watchdog>,
-    stop: Mutex<Option<oneshot::Sender<()>>>,
-    threads: Mutex<Vec<JoinHandle<()>>>,
+    watching: Mutex<Option<JoinHandle<()>>>,
 }
 
 impl Runtime {
     pub(crate) fn start() -> Result<Self, Failure> {
         let failed = |error: std::io::Error| Failure::of(JausStatus::NotStarted, &error);
-        // One thread, so that a callback that hangs holds up everything: nothing of a node looks
-        // alive that is not.
-        let runtime = Builder::new_current_thread().enable_all().build();
-        let runtime = runtime.map_err(failed)?;
-        let handle = runtime.handle().clone();
-        let (stop, stopped) = oneshot::channel::<()>();
-        let thread = std::thread::Builder::new().name("jaus".to_owned());
-        let thread = thread.spawn(move || {
-            // An error means that the handle is gone, which is the end, too.
-            let _ = runtime.block_on(stopped);
-        });
-        let thread = thread.map_err(failed)?;
+        let node = NodeThread::start().map_err(failed)?;
         let watchdog = Arc::new(Watchdog::default());
         let watching = watchdog.start().map_err(failed)?;
         Ok(Self {
-            handle,
+            node,
             watchdog,
-            stop: Mutex::new(Some(stop)),
-            threads: Mutex::new(vec![thread, watching]),
+            watching: Mutex::new(Some(watching)),
         })
     }
 
@@ -47,14 +34,14 @@ impl Runtime {
         self.watchdog.clone()
     }
 
-    pub(crate) fn handle(&self) -> &Handle {
-        &self.handle
+    pub(crate) const fn handle(&self) -> &Handle {
+        self.node.handle()
     }
 
     /// Waits for the result of a future, on a thread of the program.
     pub(crate) fn wait<T>(&self, future: impl Future<Output = T>) -> Result<T, Failure> {
         check_may_wait()?;
-        Ok(self.handle.block_on(future))
+        Ok(self.handle().block_on(future))
     }
 
     /// Ends a task. Waits until it runs no more, but not in a callback.
@@ -68,17 +55,13 @@ impl Runtime {
 impl Drop for Runtime {
     /// Drops what still runs, which stops what moves, and waits for the end.
     fn drop(&mut self) {
-        let stop = self.stop.get_mut().unwrap_or_else(PoisonError::into_inner);
-        drop(stop.take());
+        let thread = self.node.end();
         self.watchdog.end();
         if is_in_callback() {
             return;
         }
-        let threads = self
-            .threads
-            .get_mut()
-            .unwrap_or_else(PoisonError::into_inner);
-        for thread in threads.drain(..) {
+        let watching = lock(&self.watching).take();
+        for thread in thread.into_iter().chain(watching) {
             // An error means that it has panicked, which is its end, too.
             let _ = thread.join();
         }

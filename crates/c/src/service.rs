@@ -1,19 +1,17 @@
 //! The services that a component offers, as functions of the program.
 
-use std::collections::BTreeSet;
 use std::ffi::{c_char, c_void};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
-use jaus::codec::{ServiceId, report_code};
+use jaus::codec::report_code;
 use jaus::component::{Handlers, UndecodedFunctions, Validity};
 use jaus::endpoint::Received;
-use jaus::messages;
+use jaus_binding::{ServiceKey, service_id};
 
 use crate::argument::{check_out, message, put, text};
 use crate::callback::Callback;
 use crate::component::{ComponentEntry, ServiceDraft, edit};
 use crate::event::Event;
-use crate::lock::lock;
 use crate::status::{Failure, JausStatus, run};
 use crate::types::{
     JAUS_VALIDITY_BRIEF, JAUS_VALIDITY_BY_CODE, JAUS_VALIDITY_UNTIL_DONE,
@@ -22,33 +20,6 @@ use crate::types::{
 };
 
 type ServiceHandlers = Handlers<UndecodedFunctions>;
-
-/// The id of a service that lives as long as the program: the library's own, or a copy that is made
-/// once for each URN.
-fn service_id(urn: &str, major: u8, minor: u8) -> Result<ServiceId, Failure> {
-    static OWN: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
-    /// Limit of URNs that the library does not know.
-    const MOST: usize = 1024;
-    let known = messages::registry().services().find(|it| it.id.urn == urn);
-    if let Some(known) = known {
-        let urn = known.id.urn;
-        return Ok(ServiceId { urn, major, minor });
-    }
-    let mut own = lock(&OWN);
-    let urn = match own.get(urn) {
-        Some(urn) => urn,
-        None if own.len() >= MOST => {
-            let text = format!("the program has offered {MOST} services of its own");
-            return Err(Failure::new(JausStatus::TooMany, text));
-        }
-        None => {
-            let urn: &'static str = Box::leak(urn.into());
-            own.insert(urn);
-            urn
-        }
-    };
-    Ok(ServiceId { urn, major, minor })
-}
 
 fn validity(number: u8, code: u16) -> Result<Validity, Failure> {
     Ok(match number {
@@ -67,7 +38,11 @@ fn validity(number: u8, code: u16) -> Result<Validity, Failure> {
 /// Adds to a service before its component starts.
 fn extend(
     service: JausService,
-    extension: impl FnOnce(ServiceHandlers, &ComponentEntry) -> Result<ServiceHandlers, Failure>,
+    extension: impl FnOnce(
+        ServiceHandlers,
+        &ComponentEntry,
+        ServiceKey,
+    ) -> Result<ServiceHandlers, Failure>,
     is_polled: bool,
 ) -> Result<(), Failure> {
     edit(service.component, |draft, component| {
@@ -80,7 +55,7 @@ fn extend(
             let text = "an earlier call for this service has failed: create the component anew";
             return Err(Failure::new(JausStatus::WrongState, text));
         };
-        draft.handlers = Some(extension(handlers, component)?);
+        draft.handlers = Some(extension(handlers, component, draft.key)?);
         draft.is_polled |= is_polled;
         Ok(())
     })
@@ -107,7 +82,9 @@ pub unsafe extern "C" fn jaus_component_offer(
     run(|| {
         check_out(service, "service")?;
         // SAFETY: as the caller guarantees.
-        let id = service_id(unsafe { text(urn, "urn") }?, major, minor)?;
+        let urn = unsafe { text(urn, "urn") }?;
+        let id = service_id(urn, major, minor)
+            .map_err(|error| Failure::of(JausStatus::TooMany, &error))?;
         let place = edit(component.id, |draft, _| {
             let place = draft.services.len();
             // Report Services has one octet for their number, and some are always there.
@@ -117,6 +94,7 @@ pub unsafe extern "C" fn jaus_component_offer(
             }
             draft.services.push(ServiceDraft {
                 handlers: Some(Handlers::undecoded(id)),
+                key: ServiceKey::new(),
                 is_polled: false,
             });
             Ok(place as u32)
@@ -143,7 +121,7 @@ pub unsafe extern "C" fn jaus_service_answer(
 ) -> JausStatus {
     run(|| {
         let function = callback.ok_or_else(|| no_callback("callback"))?;
-        let extension = |handlers: ServiceHandlers, component: &ComponentEntry| {
+        let extension = |handlers: ServiceHandlers, component: &ComponentEntry, _| {
             // SAFETY: as the caller guarantees.
             let callback = unsafe { Callback::new(function, user, component.watchdog()) };
             let callback = Arc::new(callback);
@@ -192,7 +170,7 @@ pub extern "C" fn jaus_service_publish(service: JausService, query: u16) -> Jaus
                 "{query:04X}h is not the code of a query"
             )));
         };
-        let extension = |handlers: ServiceHandlers, component: &ComponentEntry| {
+        let extension = |handlers: ServiceHandlers, component: &ComponentEntry, _| {
             let publications = component.publications.clone();
             publications.admit(query, report);
             Ok(handlers.answer(query, move |_| publications.latest(report)))
@@ -204,7 +182,13 @@ pub extern "C" fn jaus_service_publish(service: JausService, query: u16) -> Jaus
 /// Leaves queries with this message code without an answer.
 #[unsafe(no_mangle)]
 pub extern "C" fn jaus_service_decline(service: JausService, query: u16) -> JausStatus {
-    run(|| extend(service, |handlers, _| Ok(handlers.declines(query)), false))
+    run(|| {
+        extend(
+            service,
+            |handlers, _, _| Ok(handlers.declines(query)),
+            false,
+        )
+    })
 }
 
 /// Handles messages with this code from any sender. Without a callback they are events of the
@@ -220,10 +204,11 @@ pub unsafe extern "C" fn jaus_service_receive(
     user: *mut c_void,
 ) -> JausStatus {
     run(|| {
-        let extension = |handlers: ServiceHandlers, component: &ComponentEntry| {
+        let extension = |handlers: ServiceHandlers, component: &ComponentEntry, _| {
             // SAFETY: as the caller guarantees.
             let sink = unsafe { component.sink(callback, user) };
-            let received = handlers.receive(code, move |message, _| sink.tell(event_of(message)));
+            let received =
+                handlers.receive(code, move |message, _| sink.tell_message(event_of(message)));
             received.map_err(|error| Failure::of(JausStatus::Unsafe, &error))
         };
         extend(service, extension, callback.is_none())
@@ -243,10 +228,10 @@ pub unsafe extern "C" fn jaus_service_configure(
     user: *mut c_void,
 ) -> JausStatus {
     run(|| {
-        let extension = |handlers: ServiceHandlers, component: &ComponentEntry| {
+        let extension = |handlers: ServiceHandlers, component: &ComponentEntry, _| {
             // SAFETY: as the caller guarantees.
             let sink = unsafe { component.sink(callback, user) };
-            Ok(handlers.configure(code, move |message, _| sink.tell(event_of(message))))
+            Ok(handlers.configure(code, move |message, _| sink.tell_message(event_of(message))))
         };
         extend(service, extension, callback.is_none())
     })
@@ -275,10 +260,12 @@ pub unsafe extern "C" fn jaus_service_command(
 ) -> JausStatus {
     run(|| {
         let valid = validity(valid, code)?;
-        let extension = |handlers: ServiceHandlers, component: &ComponentEntry| {
+        let extension = |handlers: ServiceHandlers, component: &ComponentEntry, key| {
             // SAFETY: as the caller guarantees.
             let sink = unsafe { component.sink(callback, user) };
-            Ok(handlers.command(code, valid, move |message, _| sink.tell(event_of(message))))
+            Ok(handlers.command(code, valid, move |message, _| {
+                sink.tell_command(key, event_of(message));
+            }))
         };
         extend(service, extension, callback.is_none())
     })
@@ -298,7 +285,7 @@ pub unsafe extern "C" fn jaus_service_on_stop(
 ) -> JausStatus {
     run(|| {
         let function = callback.ok_or_else(|| no_callback("callback"))?;
-        let extension = |handlers: ServiceHandlers, component: &ComponentEntry| {
+        let extension = |handlers: ServiceHandlers, component: &ComponentEntry, _| {
             let watchdog = component.watchdog();
             // SAFETY: as the caller guarantees.
             let stop = Arc::new(unsafe { Callback::new(function, user, watchdog.clone()) });

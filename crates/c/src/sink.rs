@@ -4,7 +4,9 @@ use std::ffi::c_void;
 use std::sync::Arc;
 
 use crate::callback::{Callback, EventFunction};
-use crate::event::{Event, EventQueue};
+use jaus_binding::ServiceKey;
+
+use crate::event::{Event, Events};
 use crate::types::JausEventCallback;
 use crate::watchdog::Watchdog;
 
@@ -12,7 +14,7 @@ use crate::watchdog::Watchdog;
 #[derive(Clone)]
 pub(crate) enum Sink {
     Callback(Arc<Callback<EventFunction>>),
-    Queue(Arc<EventQueue>),
+    Queue(Arc<Events>),
 }
 
 impl Sink {
@@ -23,7 +25,7 @@ impl Sink {
     pub(crate) unsafe fn new(
         callback: JausEventCallback,
         user: *mut c_void,
-        queue: &Arc<EventQueue>,
+        queue: &Arc<Events>,
         watchdog: Arc<Watchdog>,
     ) -> Self {
         match callback {
@@ -40,6 +42,22 @@ impl Sink {
         match self {
             Self::Callback(callback) => callback.tell(&event),
             Self::Queue(queue) => queue.push(event),
+        }
+    }
+
+    /// Tells of a message for a service.
+    pub(crate) fn tell_message(&self, event: Event) {
+        match self {
+            Self::Callback(callback) => callback.tell(&event),
+            Self::Queue(queue) => queue.push_in_time(event),
+        }
+    }
+
+    /// Tells of a command of a service.
+    pub(crate) fn tell_command(&self, service: ServiceKey, event: Event) {
+        match self {
+            Self::Callback(callback) => callback.tell(&event),
+            Self::Queue(queue) => queue.push_command(service, event),
         }
     }
 

@@ -61,9 +61,7 @@ impl Failure {
 
     /// A failure with the text of an error and of its sources.
     pub(crate) fn of(status: JausStatus, error: &dyn std::error::Error) -> Self {
-        let sources = std::iter::successors(Some(error), |error| error.source());
-        let texts: Vec<_> = sources.map(ToString::to_string).collect();
-        Self::new(status, texts.join(": "))
+        Self::new(status, jaus_binding::with_sources(error))
     }
 
     pub(crate) fn argument(text: impl Into<String>) -> Self {

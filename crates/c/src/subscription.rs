@@ -4,16 +4,16 @@ use std::ffi::c_void;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use jaus::component::{SubscribeError, Subscription, Undecoded, Update, When};
+use jaus::component::{SubscribeError, Subscription, Undecoded, When};
 use jaus::node::now;
 use jaus::service::Topic;
+use jaus_binding::{Step, follow_reports, lock};
 use tokio::task::JoinHandle;
 
 use crate::argument::{check_out, message, one_component, put};
 use crate::client::report_of;
 use crate::component::{ComponentEntry, check_not_freed, running};
 use crate::event::Event;
-use crate::lock::lock;
 use crate::sink::Sink;
 use crate::status::{Failure, JausStatus, run};
 use crate::table::Table;
@@ -63,7 +63,7 @@ fn not_subscribed(error: &SubscribeError) -> Failure {
 
 /// Passes updates on until the subscription ends.
 async fn follow(
-    mut reports: Subscription<Undecoded>,
+    reports: Subscription<Undecoded>,
     subject: u64,
     shown: Arc<Mutex<Shown>>,
     sink: Sink,
@@ -73,29 +73,27 @@ async fn follow(
         subject,
         ..Event::new(kind, peer)
     };
-    while let Some(update) = reports.next().await {
-        let is_report = matches!(update, Update::Report(_));
-        lock(&shown).note(&reports, is_report);
-        sink.tell(match update {
-            Update::Report(Undecoded(message)) => Event {
+    follow_reports(reports, |reports, step| {
+        lock(&shown).note(reports, matches!(step, Step::Report(_)));
+        sink.tell(match step {
+            Step::Report(message) => Event {
                 message,
                 arrived: lock(&shown).arrived,
                 lost: reports.lost(),
                 ..event(JausEventKind::Report)
             },
-            Update::Up => Event {
+            Step::Up => Event {
                 rate: reports.hz().unwrap_or_default(),
                 ..event(JausEventKind::SubscriptionUp)
             },
-            Update::Down { why, .. } => event(JausEventKind::SubscriptionDown).because(&why),
+            Step::Down(why) => event(JausEventKind::SubscriptionDown).because(&why),
+            Step::Ended(why) => event(JausEventKind::SubscriptionEnded).because(&why),
+            Step::Stopped => {
+                event(JausEventKind::SubscriptionEnded).because(&"the component has stopped")
+            }
         });
-    }
-    lock(&shown).note(&reports, false);
-    let ended = event(JausEventKind::SubscriptionEnded);
-    sink.tell(match reports.end() {
-        Some(end) => ended.because(&end),
-        None => ended.because(&"the component has stopped"),
-    });
+    })
+    .await;
 }
 
 impl SubscriptionEntry {

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use crate::lock::lock;
 use crate::status::{Failure, JausStatus};
+use jaus_binding::lock;
 
 /// All tables share it, so that no two objects have the same number.
 static LAST: AtomicU64 = AtomicU64::new(0);

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use jaus::node::now;
 
-use crate::lock::lock;
+use jaus_binding::{HUNG, lock};
 
 /// What stops something that moves while a callback hangs.
 pub(crate) trait Stop: Send + Sync {
@@ -34,8 +34,6 @@ struct State {
 }
 
 impl Watchdog {
-    /// A callback that runs for longer than this hangs.
-    pub(crate) const HUNG: Duration = Duration::from_millis(500);
     /// How often its thread looks.
     const INTERVAL: Duration = Duration::from_millis(50);
 
@@ -82,7 +80,7 @@ impl Watchdog {
             if state.has_ended {
                 return None;
             }
-            if state.since.is_some_and(|since| now() - since > Self::HUNG) {
+            if state.since.is_some_and(|since| now() - since > HUNG) {
                 state.since = None;
                 return Some(state.stops.clone());
             }

@@ -5,16 +5,16 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use bytes::Bytes;
 use jaus::component::Component;
+use jaus::service::code_of;
 use tokio::runtime::Handle;
 
 use crate::lock::lock;
-use crate::status::{Failure, JausStatus};
 
 /// The published reports of a component.
-#[derive(Default)]
-pub(crate) struct Publications(Mutex<State>);
+#[derive(Debug, Default)]
+pub struct Publications(Mutex<State>);
 
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct State {
     /// By the code of the report.
     reports: BTreeMap<u16, Report>,
@@ -22,39 +22,49 @@ struct State {
     changed: BTreeSet<u16>,
 }
 
+#[derive(Debug)]
 struct Report {
     query: u16,
     latest: Option<Bytes>,
 }
 
+/// No service of the component publishes a report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("no service of the component publishes {report:04X}h")]
+pub struct NotPublished {
+    /// Its code.
+    pub report: u16,
+}
+
 impl Publications {
     /// Makes room for the report with this code, which answers a query.
-    pub(crate) fn admit(&self, query: u16, report: u16) {
+    pub fn admit(&self, query: u16, report: u16) {
         let latest = None;
         self.lock().reports.insert(report, Report { query, latest });
     }
 
-    pub(crate) fn latest(&self, report: u16) -> Option<Bytes> {
+    /// The report with this code that was published last.
+    #[must_use]
+    pub fn latest(&self, report: u16) -> Option<Bytes> {
         self.lock().reports.get(&report)?.latest.clone()
     }
 
-    /// Replaces a report; returns the code of the query that it answers.
-    pub(crate) fn publish(&self, code: u16, report: Bytes) -> Result<u16, Failure> {
+    /// Replaces a report, which begins with its code; returns the code of the query that it answers.
+    ///
+    /// # Errors
+    /// If no place was made for it.
+    pub fn publish(&self, report: Bytes) -> Result<u16, NotPublished> {
+        let code = code_of(&report).unwrap_or_default();
         let mut state = self.lock();
-        let Some(place) = state.reports.get_mut(&code) else {
-            let text = format!(
-                "no service of the component publishes {code:04X}h: call jaus_service_publish with \
-                 the code of its query"
-            );
-            return Err(Failure::new(JausStatus::NotFound, text));
-        };
+        let place = state.reports.get_mut(&code);
+        let place = place.ok_or(NotPublished { report: code })?;
         place.latest = Some(report);
         Ok(place.query)
     }
 
     /// Tells subscribers of the query that its answer has changed. Does not wait; changes in quick
     /// succession are one.
-    pub(crate) fn announce(self: &Arc<Self>, runtime: &Handle, component: Component, query: u16) {
+    pub fn announce(self: &Arc<Self>, runtime: &Handle, component: Component, query: u16) {
         if !self.lock().changed.insert(query) {
             return;
         }

@@ -10,14 +10,19 @@ use jaus::component::{Handlers, Service, Standing, UndecodedFunctions};
 use jaus::endpoint::Received;
 use jaus::service::{Context, Handled, Hazards, Publication, StopCause};
 
-use crate::event::{Event, EventQueue};
-use crate::types::JausEventKind;
-use crate::watchdog::Watchdog;
+use crate::HUNG;
+use crate::events::{EventQueue, Notice, ServiceKey};
 
 /// A service whose messages wait for the program in a queue.
-pub(crate) struct Attended {
+///
+/// When what it moves must stop, the commands that still wait are withdrawn, and the program gets the news.
+/// A program that does not come for its messages for [`HUNG`], or does not come at all while a command is in
+/// force, hangs: the service stops, and its component fails until the program comes again.
+#[derive(Debug)]
+pub struct Attended<E> {
     inner: Handlers<UndecodedFunctions>,
-    queue: Arc<EventQueue>,
+    key: ServiceKey,
+    queue: Arc<EventQueue<E>>,
     /// Since when a command has been in force.
     moving: Option<Instant>,
     /// When the program was last looked after.
@@ -26,13 +31,20 @@ pub(crate) struct Attended {
     hung: Option<Instant>,
 }
 
-impl Attended {
+impl<E: Notice> Attended<E> {
     /// How often the program is called while a command is in force, and looked after while it hangs.
     const BEAT: Duration = Duration::from_millis(200);
 
-    pub(crate) const fn new(inner: Handlers<UndecodedFunctions>, queue: Arc<EventQueue>) -> Self {
+    /// A service whose functions push its messages into the queue, its commands under this key.
+    #[must_use]
+    pub const fn new(
+        inner: Handlers<UndecodedFunctions>,
+        key: ServiceKey,
+        queue: Arc<EventQueue<E>>,
+    ) -> Self {
         Self {
             inner,
+            key,
             queue,
             moving: None,
             looked: None,
@@ -46,6 +58,12 @@ impl Attended {
             true => self.moving.or(Some(now)),
             false => None,
         };
+    }
+
+    /// Tells the program of a stop, after which it must not act on the commands that wait.
+    fn note_stop(&self, cause: Option<&StopCause>, id: JausId) {
+        self.queue.withdraw_commands(self.key);
+        self.queue.push_in_time(E::stopped(self.key, id, cause));
     }
 
     /// Since when the program has owed a call.
@@ -76,7 +94,7 @@ impl Attended {
         let gap = self
             .owed_since()
             .map(|since| now.saturating_duration_since(since));
-        if let Some(gap) = gap.filter(|gap| *gap >= Watchdog::HUNG) {
+        if let Some(gap) = gap.filter(|gap| *gap >= HUNG) {
             self.hung = Some(now);
             tracing::error!(id = %context.id(), ?gap, "stopped: the program does not fetch its events");
             let cause = StopCause::Hung(gap);
@@ -86,7 +104,7 @@ impl Attended {
     }
 }
 
-impl Service for Attended {
+impl<E: Notice> Service for Attended<E> {
     fn offers(&self) -> Vec<ServiceId> {
         self.inner.offers()
     }
@@ -115,8 +133,7 @@ impl Service for Attended {
         self.inner.handle_timeout(now, context);
         self.note_motion(now);
         if was_moving && !self.inner.is_moving() {
-            self.queue
-                .push(Event::new(JausEventKind::Stop, context.id()));
+            self.note_stop(None, context.id());
         }
         self.attend(now, context);
     }
@@ -125,9 +142,9 @@ impl Service for Attended {
         let was_moving = self.inner.is_moving();
         self.inner.handle_stop(cause, context);
         self.moving = None;
+        self.queue.withdraw_commands(self.key);
         if was_moving {
-            self.queue
-                .push(Event::new(JausEventKind::Stop, context.id()).because(cause));
+            self.note_stop(Some(cause), context.id());
         }
     }
 
@@ -160,7 +177,7 @@ impl Service for Attended {
         let look = match self.hung {
             Some(hung) => next_look.or(Some(hung)),
             None => {
-                let hangs = self.owed_since().map(|since| since + Watchdog::HUNG);
+                let hangs = self.owed_since().map(|since| since + HUNG);
                 let beat = self.moving.map(|moving| next_look.unwrap_or(moving));
                 [hangs, beat].into_iter().flatten().min()
             }

@@ -1,0 +1,63 @@
+"""A driver that hangs at an effort above 50 %: ``SUBSYSTEM GROUP HOW``."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import threading
+import time
+from typing import Any
+
+from conftest import Motor, driver_of
+
+import jaus
+
+
+async def main(subsystem: str, group: str, how: str) -> None:
+    motor = Motor()
+
+    def drive(effort: Any, _sender: jaus.JausId) -> None:
+        print("handles", round(effort.value))
+        if effort.value <= 50:
+            motor.effort = effort.value
+            return
+        if how == "sleep":
+            time.sleep(3600)
+        elif how == "spin":
+            while True:
+                pass
+        elif how == "late":
+            # Until it is stopped beside this.
+            stops = motor.stops
+            while motor.stops == stops:
+                time.sleep(0.01)
+            motor.effort = effort.value
+
+    def show() -> None:
+        last: Any = None
+        while True:
+            if motor.effort != last:
+                last = motor.effort
+                print("motor", round(last))
+            time.sleep(0.01)
+
+    async with jaus.Node(f"{subsystem}.1", loopback=True, group=group) as node:
+        driver = driver_of(node, motor, drive, validity="until-done")
+
+        @driver.on_standing
+        def standing(standing: jaus.Standing) -> None:
+            print(f"state {standing.state.name.lower()}, effort {round(motor.effort or 0)}")
+
+        @driver.on_stop
+        def stop() -> None:
+            motor.stop()
+            print("stop")
+
+        threading.Thread(target=show, daemon=True).start()
+        async with driver:
+            print("up")
+            await asyncio.sleep(3600)
+
+
+if __name__ == "__main__":
+    asyncio.run(main(*sys.argv[1:]))

@@ -1,0 +1,34 @@
+"""An operator that drives at 40 % and then ends as told: ``SUBSYSTEM GROUP HOW``."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import time
+
+from messages import SetWrenchEffort
+
+import jaus
+
+
+async def main(subsystem: str, group: str, how: str) -> None:
+    node = await jaus.Node(f"{subsystem}.1", loopback=True, group=group).start()
+    operator = await node.component(1, kind="ocu", name="Operator").start()
+    driver = await operator.find(SetWrenchEffort)
+    control = await operator.control(driver, watch=None if how == "unwatched" else 0.5)
+    await control.resume()
+    await control.deliver(SetWrenchEffort(40))
+    print("drives")
+    if how == "leave":
+        return
+    if how == "sleep":
+        time.sleep(3600)
+    try:
+        await asyncio.sleep(3600)
+    finally:
+        await node.close()
+        print("closed")
+
+
+if __name__ == "__main__":
+    asyncio.run(main(*sys.argv[1:]))
