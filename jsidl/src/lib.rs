@@ -41,6 +41,7 @@ pub mod lua;
 pub mod machine;
 pub mod model;
 pub mod presence;
+pub mod python;
 mod resolve;
 pub mod rust;
 #[cfg(feature = "json")]

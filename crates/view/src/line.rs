@@ -33,6 +33,9 @@ pub struct Line<'d> {
     pub content: Content,
     /// `carries`: the message inside an event or a request for events, as an object of this kind.
     pub carried: Option<Box<Self>>,
+    /// The message from its code on, unless this is a fragment, an acknowledgement or an error
+    /// outside any message. Not in the object.
+    pub octets: Option<Bytes>,
 }
 
 /// The content of a [`Line`].
@@ -147,6 +150,7 @@ impl<'d> Line<'d> {
             version: reading.version,
             content,
             carried: None,
+            octets: Some(octets.clone()),
         }
     }
 
@@ -179,6 +183,7 @@ impl<'d> Line<'d> {
                 octets: None,
             },
             carried: None,
+            octets: None,
         }
     }
 }

@@ -218,6 +218,10 @@ impl<'d> MessageLog<'d> {
                 .or_else(|| self.dictionary.name_of(code))
         };
         let message = code.and_then(name);
+        let octets = match &content {
+            Content::Octets(octets) => Some(octets.clone()),
+            _ => None,
+        };
         Line {
             envelope: Some(envelope),
             code,
@@ -226,6 +230,7 @@ impl<'d> MessageLog<'d> {
             version: None,
             content,
             carried: None,
+            octets,
         }
     }
 }

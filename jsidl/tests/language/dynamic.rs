@@ -386,6 +386,7 @@ fn json_is_read_as_people_write_it() {
             json!({ "hex": "ff" }),
         ),
         ("/Texts/Fixed", json!("A\0\0"), json!("A")),
+        ("/Texts/Image/format", json!("JPEG"), json!(3)),
         (
             "/Measured/Joint",
             json!({ "index": 4, "value": 1 }),

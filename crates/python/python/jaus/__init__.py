@@ -22,9 +22,11 @@ from .component import Component, Standing, State
 from .control import Control
 from .errors import (
     ArgumentError,
+    CaptureError,
     ClosedError,
     ControlLostError,
     DecodeError,
+    DefinitionError,
     Error,
     FieldError,
     ForkError,
@@ -43,11 +45,13 @@ from .subscription import Down, Subscription, Up
 
 __all__ = [
     "ArgumentError",
+    "CaptureError",
     "ClosedError",
     "Component",
     "Control",
     "ControlLostError",
     "DecodeError",
+    "DefinitionError",
     "Down",
     "Error",
     "FieldError",

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use bytes::Bytes;
 use serde_json::{Map, Value as Json};
 
 use crate::dictionary::Dictionary;
@@ -16,6 +17,8 @@ pub struct Entry {
     pub source: Option<JausId>,
     /// The destination, if known.
     pub destination: Option<JausId>,
+    /// The message from its code on, if the entry is made from octets and not from JSON.
+    pub octets: Option<Bytes>,
     json: Map<String, Json>,
 }
 
@@ -52,6 +55,7 @@ impl Entry {
         Self {
             source: header.map(|header| header.source),
             destination: header.map(|header| header.destination),
+            octets: line.octets.clone(),
             json,
         }
     }
@@ -63,6 +67,7 @@ impl Entry {
         Self {
             source: id("source"),
             destination: id("destination"),
+            octets: None,
             json,
         }
     }

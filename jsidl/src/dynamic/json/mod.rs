@@ -11,7 +11,7 @@
 //! | bit_field | object of its sub-fields, and `"_reserved"`: the other bits, where they are not 0 |
 //! | strings | text; `{"hex": "…"}` where the octets are not UTF-8 |
 //! | variable_length_field | text of hexadecimal digits |
-//! | variable_format_field | `{"format": index, "data": "hex"}` |
+//! | variable_format_field | `{"format": index, "data": "hex"}`; the format's name is understood as well |
 //! | variable_field | `{"index": n, "units": "meter", "value": …}`; units are not read |
 //! | array | nested arrays, indexed in the order of the dimensions |
 //!

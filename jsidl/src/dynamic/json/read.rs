@@ -10,8 +10,8 @@ use crate::dynamic::error::{Fault, Step};
 use crate::dynamic::scale::Steps;
 use crate::dynamic::{Raw, Value};
 use crate::model::{
-    Array, BitField, Choice, Group, Item, Meaning, Message, Number, Scalar, Scale, Shape, Signed,
-    SubField, Unsigned, ValueSet, Variant,
+    Array, BitField, Choice, Format, Group, Item, Meaning, Message, Number, Scalar, Scale, Shape,
+    Signed, SubField, Unsigned, ValueSet, Variant,
 };
 
 /// Converts the JSON view of a message.
@@ -85,7 +85,7 @@ fn shape(shape: &Shape, json: &Json) -> Read<Value> {
         }
         Shape::VariableString { .. } => text(json).map(Value::Text),
         Shape::Blob { .. } => hex(json).map(Value::Blob),
-        Shape::FormattedBlob { .. } => formatted(json),
+        Shape::FormattedBlob { formats, .. } => formatted(formats, json),
         Shape::Measure { choices } => measure(choices, json),
         Shape::Array(definition) => array(definition, json),
     }
@@ -312,11 +312,16 @@ fn hex(json: &Json) -> Read<Vec<u8>> {
     octets.ok_or_else(|| expected("text of hexadecimal digits, two for each octet", json))
 }
 
-fn formatted(json: &Json) -> Read<Value> {
+fn formatted(formats: &[Format], json: &Json) -> Read<Value> {
     let keys = ["format", "data"];
     let object = object(json)?;
     known(object, |key| keys.contains(&key), || keys.into_iter())?;
-    let format = octet(required(object, "format")?).map_err(|fault| fault.member("format"))?;
+    let json = required(object, "format")?;
+    let named = formats.iter().find(|it| json.as_str() == Some(&it.name));
+    let format = match named {
+        Some(format) => format.index,
+        None => octet(json).map_err(|fault| fault.member("format"))?,
+    };
     let octets = hex(required(object, "data")?).map_err(|fault| fault.member("data"))?;
     Ok(Value::Formatted { format, octets })
 }

@@ -9,6 +9,7 @@ mod docs;
 mod explain;
 mod fmt;
 mod lua;
+mod python;
 mod ra;
 mod rust;
 mod schema;
@@ -38,6 +39,7 @@ enum Command {
     Cpp(cpp::Arguments),
     #[command(name = "typescript")]
     TypeScript(typescript::Arguments),
+    Python(python::Arguments),
     Lua(lua::Arguments),
     Docs(docs::Arguments),
     Schema(schema::Arguments),
@@ -53,6 +55,7 @@ impl Jsidl {
             Command::Rust(arguments) => rust::run(&arguments),
             Command::Cpp(arguments) => cpp::run(&arguments),
             Command::TypeScript(arguments) => typescript::run(&arguments),
+            Command::Python(arguments) => python::run(&arguments),
             Command::Lua(arguments) => lua::run(&arguments),
             Command::Docs(arguments) => docs::run(&arguments),
             Command::Schema(arguments) => schema::run(&arguments),
