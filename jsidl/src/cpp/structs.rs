@@ -240,7 +240,7 @@ fn define(out: &mut Lines, Definition { ident, kind }: &Definition<'_>) {
             for (place, (name, value)) in values.iter().enumerate() {
                 comment(out, &notes::value(value));
                 let end = if place + 1 == values.len() { "" } else { "," };
-                out.line(format!("{name} = {}{}{end}", value.index, suffix(*number)));
+                out.line(format!("{name} = {}{end}", integer(value.index, *number)));
             }
             out.close("};");
         }
@@ -359,11 +359,13 @@ const fn number(number: Number) -> &'static str {
     }
 }
 
-/// The suffix of literals.
-const fn suffix(number: Number) -> &'static str {
+/// A literal of an integer.
+fn integer(value: i128, number: Number) -> String {
     match number {
-        Number::Unsigned(_) => "u",
-        _ => "",
+        Number::Unsigned(_) => format!("{value}u"),
+        // A literal has no sign, and this one without it is too large.
+        _ if value == i64::MIN.into() => format!("{} - 1", i64::MIN + 1),
+        _ => value.to_string(),
     }
 }
 

@@ -1,5 +1,7 @@
 //! Collects Rust text and indents it.
 
+use crate::typed::lines::is_misleading;
+
 /// Characters in a line of code.
 const WIDTH: usize = 100;
 
@@ -145,16 +147,6 @@ impl Writer {
     pub(super) fn finish(self) -> String {
         self.text
     }
-}
-
-/// Whether a character of a comment would be invisible or change the order in which text is shown.
-/// The compiler refuses some of them, also in comments.
-const fn is_misleading(c: char) -> bool {
-    matches!(
-        c,
-        '\0'..='\x1F' | '\x7F'..='\u{9F}' | '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}'
-            | '\u{2060}'..='\u{206F}' | '\u{FEFF}'
-    )
 }
 
 /// Wraps text at blanks into lines of at most `width` characters.

@@ -69,3 +69,13 @@ pub(crate) fn quoted(text: &str, other: impl Fn(&mut String, char)) -> String {
     out.push('"');
     out
 }
+
+/// Whether a character of a comment would be invisible or change the order in which text is shown.
+/// Compilers warn of some of them, or refuse them, also in comments.
+pub(crate) const fn is_misleading(c: char) -> bool {
+    matches!(
+        c,
+        '\0'..='\x1F' | '\x7F'..='\u{9F}' | '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}'
+            | '\u{2060}'..='\u{206F}' | '\u{FEFF}'
+    )
+}

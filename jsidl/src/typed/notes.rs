@@ -1,6 +1,7 @@
 //! Documentation of types and members, as plain text.
 
 use super::Plan;
+use super::lines::is_misleading;
 use super::types::{Field, Kind};
 use crate::model::{
     Count, Item, Meaning, NamedValue, Scalar, Shape, SubField, Unsigned, ValueRange, ValueSet,
@@ -217,13 +218,14 @@ pub(crate) fn wrapped(paragraphs: &[String], width: usize) -> Vec<String> {
         }
         let mut line = String::new();
         for word in paragraph.split_whitespace() {
+            let word = word.replace(is_misleading, "");
             if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > width {
                 lines.push(std::mem::take(&mut line));
             }
             if !line.is_empty() {
                 line.push(' ');
             }
-            line.push_str(word);
+            line.push_str(&word);
         }
         lines.push(line);
     }

@@ -184,6 +184,22 @@ fn a_machine_without_actions_compiles() {
 }
 
 #[test]
+fn an_older_machine_may_have_no_transitions() {
+    let messages = message("Sample", 0xD001, &plain("A", false));
+    let version = |minor: u8, transition: &str| {
+        let machine = format!(
+            r#"<protocol_behavior is_stateless="false"><start state_machine_name="ReceiveFSM" state_name="S0"/><state_machine name="ReceiveFSM"><state name="S0">{transition}</state></state_machine></protocol_behavior>"#
+        );
+        service(&messages, &machine).replace(r#"version="1.0""#, &format!(r#"version="1.{minor}""#))
+    };
+    let transition = r#"<transition name="Receive"><parameter type="Sample" value="msg"/><internal/></transition>"#;
+    for transitions in [["", transition], [transition, ""], ["", ""]] {
+        let [old, new] = transitions;
+        assert_compiles(&emitted(&[version(0, old), version(1, new)]));
+    }
+}
+
+#[test]
 fn a_guard_may_have_the_name_of_a_message_that_is_a_keyword() {
     let messages =
         message("Sample", 0xD001, &plain("A", false)) + &message("fn", 0xD002, &plain("A", false));

@@ -102,6 +102,10 @@ fn of_service<'p, 'm>(
 pub(super) fn machines(out: &mut Writer, messages: Messages<'_>, versions: &[&Service]) {
     let with = versions.iter().filter(|it| !it.behaviour.is_empty());
     for (age, service) in with.enumerate() {
+        let machines = machines_of(messages.library, service);
+        if machines.is_empty() {
+            continue;
+        }
         let version = (age > 0).then(|| names::version(service.id.version));
         if let Some(version) = &version {
             out.gap();
@@ -113,7 +117,7 @@ pub(super) fn machines(out: &mut Writer, messages: Messages<'_>, versions: &[&Se
         } else {
             "super::super"
         };
-        machines_in(out, messages, service, root);
+        machines_in(out, messages, service, &machines, root);
         if version.is_some() {
             out.push("}");
         }
@@ -152,11 +156,16 @@ pub(super) fn machines_of<'a>(library: &'a Library, service: &'a Service) -> Vec
     own.filter(Machine::has_transitions).collect()
 }
 
-fn machines_in(out: &mut Writer, messages: Messages<'_>, service: &Service, root: &str) {
-    let machines = machines_of(messages.library, service);
+fn machines_in(
+    out: &mut Writer,
+    messages: Messages<'_>,
+    service: &Service,
+    machines: &[Machine<'_>],
+    root: &str,
+) {
     let mut modules = Names::reserving(&["codec"]);
-    for machine in &machines {
-        let name = match machines.as_slice() {
+    for machine in machines {
+        let name = match machines {
             [_] => "machine",
             _ => machine.name().last(),
         };

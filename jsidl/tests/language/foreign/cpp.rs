@@ -130,6 +130,36 @@ fn messages_with_every_construct_pass_through_cpp() {
 }
 
 #[test]
+fn texts_that_look_like_code_and_extreme_values_pass_through_cpp() {
+    if !has_compilers() {
+        return;
+    }
+    let library = super::awkward();
+    let cases = cases::random("", &library, 8);
+    pass("awkward-cpp", &library, |_| true, &cases);
+}
+
+#[test]
+fn random_octets_are_refused_or_come_back_in_cpp() {
+    if !has_compilers() {
+        return;
+    }
+    let mut loader = Loader::new();
+    loader.catalogue().path(workspace("jsidl/tests/rust"));
+    let library = loader.load().library;
+    let is_chosen =
+        |service: &Service| is_core(service) || service.id.urn.starts_with("urn:example:");
+    for compiler in compilers() {
+        let directory = directory(&format!("random-cpp-{compiler}"));
+        write(&directory, &library, is_chosen);
+        let program = compile(&compiler, &directory, "random.cpp");
+        let output = run(&mut Command::new(program), "");
+        let (read, _) = output.split_once(" of ").unwrap();
+        assert!(read.parse::<u32>().unwrap() > 10_000, "{output}");
+    }
+}
+
+#[test]
 fn cpp_reads_sets_and_checks_values_in_units() {
     if !has_compilers() {
         return;

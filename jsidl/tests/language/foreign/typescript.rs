@@ -83,6 +83,18 @@ fn random_messages_of_every_type_pass_through_javascript() {
 }
 
 #[test]
+fn texts_that_look_like_code_and_extreme_values_pass_through_javascript() {
+    if !has_program("node") {
+        return;
+    }
+    let library = super::awkward();
+    let directory = node_directory("awkward-js");
+    write(&directory, "awkward", &library);
+    let cases = cases::random("awkward", &library, 8);
+    check(&mut node(&directory, "run.js"), &cases);
+}
+
+#[test]
 fn javascript_reads_sets_and_checks_values_in_units() {
     if !has_program("node") {
         return;
