@@ -150,9 +150,7 @@ impl Client {
             let message = Bytes::from(message);
             let delivered = component.deliver_undecoded(urgency, destination, message);
             let delivered = delivered.await;
-            delivered
-                .map(|()| Answer::Nothing)
-                .map_err(|error| (&error).into())
+            Answer::nothing(delivered)
         })?)
     }
 
@@ -161,8 +159,7 @@ impl Client {
         let peer = one_component(peer)?;
         Ok(self.begin(async move |component, _, _| {
             let set = component.set_emergency(peer).await;
-            set.map(|()| Answer::Nothing)
-                .map_err(|error| (&error).into())
+            Answer::nothing(set)
         })?)
     }
 
@@ -171,9 +168,7 @@ impl Client {
         let peer = one_component(peer)?;
         Ok(self.begin(async move |component, _, _| {
             let cleared = component.clear_emergency(peer).await;
-            cleared
-                .map(|()| Answer::Nothing)
-                .map_err(|error| (&error).into())
+            Answer::nothing(cleared)
         })?)
     }
 
