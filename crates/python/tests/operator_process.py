@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import signal
 import sys
 import time
 
@@ -12,23 +13,28 @@ import jaus
 
 
 async def main(subsystem: str, group: str, how: str) -> None:
-    node = await jaus.Node(f"{subsystem}.1", loopback=True, group=group).start()
+    node = jaus.Node(f"{subsystem}.1", loopback=True, group=group)
+    if how == "leave":
+        await drive(await node.start(), how)
+    else:
+        async with node:
+            await drive(node, how)
+
+
+async def drive(node: jaus.Node, how: str) -> None:
     operator = await node.component(1, kind="ocu", name="Operator").start()
     driver = await operator.find(SetWrenchEffort)
     control = await operator.control(driver, watch=None if how == "unwatched" else 0.5)
     await control.resume()
     await control.deliver(SetWrenchEffort(40))
     print("drives")
-    if how == "leave":
-        return
     if how == "sleep":
         time.sleep(3600)
-    try:
+    if how != "leave":
         await asyncio.sleep(3600)
-    finally:
-        await node.close()
-        print("closed")
 
 
 if __name__ == "__main__":
+    # A shell ignores it for what it runs in the background.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     asyncio.run(main(*sys.argv[1:]))

@@ -181,9 +181,10 @@ async def test_a_slow_reader_misses_the_oldest_reports(
 async def test_a_subscription_to_what_is_not_there_is_an_error_and_can_be_cancelled(
     operator: jaus.Component,
 ) -> None:
-    with pytest.raises(jaus.ArgumentError, match="Hz|hz|rate"):
-        async for _ in operator.subscribe("99.1.1", QueryVelocityState(), hz=5000):
-            pass
+    for hz in [5000, 0, float("nan")]:
+        with pytest.raises(jaus.ArgumentError, match="Hz|hz|rate"):
+            async for _ in operator.subscribe("99.1.1", QueryVelocityState(), hz=hz):
+                pass
     with pytest.raises(asyncio.TimeoutError):
         await asyncio.wait_for(
             anext(operator.subscribe("99.1.1", QueryVelocityState()).updates()), 0.05

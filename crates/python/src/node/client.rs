@@ -56,10 +56,14 @@ fn report_of(query: &[u8], given: Option<u16>) -> Result<u16, Failure> {
 }
 
 /// When reports are sent: `hz` is a rate, or `None` for every change.
-fn when(hz: Option<f64>, at_least: Option<f64>) -> When {
+fn when(hz: Option<f64>, at_least: Option<f64>) -> Result<When, Failure> {
+    let least = at_least.unwrap_or_default();
     match hz {
-        None => When::OnChange,
-        Some(hz) => When::hz(hz).at_least(at_least.unwrap_or_default()),
+        None => Ok(When::OnChange),
+        Some(hz) if hz > 0.0 && least >= 0.0 => Ok(When::hz(hz).at_least(least)),
+        Some(hz) => Err(Failure::argument(format!(
+            "{hz} Hz, at least {least} Hz: give positive rates, or hz=None for every change"
+        ))),
     }
 }
 
@@ -146,9 +150,7 @@ impl Client {
             let message = Bytes::from(message);
             let delivered = component.deliver_undecoded(urgency, destination, message);
             let delivered = delivered.await;
-            delivered
-                .map(|()| Answer::Nothing)
-                .map_err(|error| (&error).into())
+            Answer::nothing(delivered)
         })?)
     }
 
@@ -157,8 +159,7 @@ impl Client {
         let peer = one_component(peer)?;
         Ok(self.begin(async move |component, _, _| {
             let set = component.set_emergency(peer).await;
-            set.map(|()| Answer::Nothing)
-                .map_err(|error| (&error).into())
+            Answer::nothing(set)
         })?)
     }
 
@@ -167,9 +168,7 @@ impl Client {
         let peer = one_component(peer)?;
         Ok(self.begin(async move |component, _, _| {
             let cleared = component.clear_emergency(peer).await;
-            cleared
-                .map(|()| Answer::Nothing)
-                .map_err(|error| (&error).into())
+            Answer::nothing(cleared)
         })?)
     }
 
@@ -186,7 +185,7 @@ impl Client {
             peer: one_component(peer)?,
             report: report_of(&query, report)?,
             query: Bytes::from(query),
-            when: when(hz, at_least),
+            when: when(hz, at_least)?,
         };
         Ok(
             self.begin(async move |component, number, shared: Arc<Shared>| {

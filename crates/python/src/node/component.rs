@@ -451,9 +451,7 @@ impl Life {
     pub(crate) fn running(&self) -> Result<(Arc<Program>, Runs), Failure> {
         match &*lock(&self.0) {
             Stage::Runs(live) if live.program.thread.is_of_other_process() => {
-                let text =
-                    "the component belongs to the parent process: create one in this process";
-                Err(Failure::new("ForkError", text))
+                Err(Failure::forked("component"))
             }
             Stage::Runs(live) => Ok((live.program.clone(), live.running.component().clone())),
             Stage::Draft(_) | Stage::Starts => Err(Failure::new(

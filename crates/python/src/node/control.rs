@@ -64,9 +64,7 @@ impl Control {
         let (program, _) = self.life.running()?;
         program.begin(async move |_, _| {
             let resumed = control.resume().await;
-            resumed
-                .map(|()| Answer::Nothing)
-                .map_err(|error| (&error).into())
+            Answer::nothing(resumed)
         })
     }
 
@@ -76,9 +74,7 @@ impl Control {
         let (program, _) = self.life.running()?;
         program.begin(async move |_, _| {
             let standing = control.standby().await;
-            standing
-                .map(|()| Answer::Nothing)
-                .map_err(|error| (&error).into())
+            Answer::nothing(standing)
         })
     }
 
@@ -101,9 +97,7 @@ impl Control {
             let command = Bytes::from(command);
             let delivery = component.deliver_undecoded(urgency, control.peer(), command);
             let delivered = delivery.await;
-            delivered
-                .map(|()| Answer::Nothing)
-                .map_err(|error| (&error).into())
+            Answer::nothing(delivered)
         })
     }
 

@@ -155,6 +155,17 @@ impl Event {
 }
 
 impl Answer {
+    /// The result of a request that has no other answer than its success.
+    pub(crate) fn nothing<E>(result: Result<(), E>) -> Result<Self, Failure>
+    where
+        for<'a> Failure: From<&'a E>,
+    {
+        match result {
+            Ok(()) => Ok(Self::Nothing),
+            Err(error) => Err((&error).into()),
+        }
+    }
+
     fn into_python(self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         match self {
             Self::Nothing => Ok(py.None()),

@@ -43,6 +43,11 @@ impl Failure {
         &self.text
     }
 
+    pub(crate) fn forked(what: &str) -> Self {
+        let text = format!("the {what} belongs to the parent process: create one in this process");
+        Self::new("ForkError", text)
+    }
+
     /// The exception of the package.
     pub(crate) fn exception<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let class = py.import("jaus.errors")?.getattr(self.class)?;

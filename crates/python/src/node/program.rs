@@ -103,8 +103,7 @@ impl Program {
         F: Future<Output = Result<Answer, Failure>> + Send + 'static,
     {
         if self.thread.is_of_other_process() {
-            let text = "the node belongs to the parent process: create one in this process";
-            return Err(Failure::new("ForkError", text));
+            return Err(Failure::forked("node"));
         }
         if self.thread.has_ended() {
             return Err(Failure::closed("node"));

@@ -183,8 +183,7 @@ impl Node {
     pub(crate) fn program(&self) -> Result<Arc<Program>, Failure> {
         match &*lock(&self.0) {
             Stage::Runs(program) if program.thread.is_of_other_process() => {
-                let text = "the node belongs to the parent process: create one in this process";
-                Err(Failure::new("ForkError", text))
+                Err(Failure::forked("node"))
             }
             Stage::Runs(program) => Ok(program.clone()),
             Stage::Settings(_) => {
