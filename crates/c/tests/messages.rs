@@ -6,8 +6,7 @@ use jaus_test_kit::snapshot;
 use jsidl::{Loader, cpp};
 
 /// The services of the examples.
-const SERVICES: [&str; 3] = [
-    "urn:jaus:jss:mobility:NavigationState",
+const SERVICES: [&str; 2] = [
     "urn:jaus:jss:mobility:PrimitiveDriver",
     "urn:jaus:jss:mobility:VelocityStateSensor",
 ];

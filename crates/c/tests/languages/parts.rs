@@ -4,6 +4,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
 use jaus::component::{Component, Kind, When};
 use jaus::messages::mobility::{QueryVelocityState, primitive_driver, velocity_state_sensor};
@@ -16,7 +17,7 @@ use tokio::sync::watch;
 use tokio::task::{JoinHandle, spawn_blocking};
 
 use super::compiler;
-use super::scene::{driver_on, keep_driving, sensor_on};
+use super::scene::{driver_on, effort, sensor_on};
 
 /// What a part is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,13 +51,14 @@ impl Language {
                 let interpreter = Self::interpreter().expect("is_there was asked");
                 let mut command = Command::new(interpreter);
                 let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../python/examples");
+                let part = if part == "operator" { "console" } else { part };
                 command.arg(examples.join(part).with_extension("py"));
                 command
             }
             _ => Command::new(compiler::compile(match part {
                 "sensor" => "examples/sensor.cpp",
                 "driver" => "examples/driver.cpp",
-                "navigation" => "examples/navigation.cpp",
+                "speedometer" => "examples/speedometer.cpp",
                 _ => "examples/operator.cpp",
             })),
         };
@@ -219,9 +221,12 @@ async fn hear_and_drive(operator: &Component) {
             speeds.report().await.unwrap();
         }
     };
-    tokio::select! {
-        () = hears => {}
-        () = keep_driving(&control, 40.0) => panic!("control is lost"),
-    }
+    let drives = async {
+        for _ in 0..30 {
+            control.send(&effort(40.0)).expect("control is kept");
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+    };
+    tokio::join!(hears, drives);
     control.standby().await.unwrap();
 }
