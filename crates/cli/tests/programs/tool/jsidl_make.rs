@@ -107,6 +107,20 @@ fn a_rust_module_has_the_users_messages_alone() {
 }
 
 #[test]
+fn a_rust_module_refers_to_messages_of_other_modules_by_their_paths() {
+    let directory = directory("rust-extern");
+    let (path, out) = (lamp(), directory.to_str().unwrap());
+    let core = "urn:jaus:jss:core:=::jaus::messages::core";
+    let ran = jsidl(&["rust", &path, "-o", out, "--extern-path", core]);
+    assert_eq!(ran.status, 0, "{ran:?}");
+    for malformed in ["urn:jaus:jss:core:", "=::jaus", "urn:jaus:jss:core:="] {
+        let ran = jsidl(&["rust", &path, "-o", out, "--extern-path", malformed]);
+        assert_eq!(ran.status, 2, "{ran:?}");
+        assert!(ran.stderr.contains("expected URN=RUST_PATH"), "{ran:?}");
+    }
+}
+
+#[test]
 fn code_of_other_languages_has_the_users_messages_or_the_built_in_ones() {
     let directory = directory("foreign");
     let out = |name: &str| directory.join(name).to_str().unwrap().to_owned();

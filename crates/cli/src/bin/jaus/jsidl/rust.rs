@@ -7,6 +7,7 @@ use clap::Args;
 use jaus_cli::failure::Failure;
 use jaus_cli::output::{Output, say};
 use jsidl::model::Service;
+use jsidl::rust::Settings;
 
 use super::sources::{self, Sources};
 
@@ -45,6 +46,18 @@ pub(crate) struct Arguments {
     /// The path of the codec runtime in the generated code
     #[arg(long, value_name = "RUST_PATH", default_value = "::jaus::codec")]
     runtime: String,
+
+    /// The path of the module with the messages of services whose URN begins with URN, such as
+    /// urn:jaus:jss:core:=::jaus::messages::core; state machines then get these messages as their types
+    #[arg(long, value_name = "URN=RUST_PATH", value_parser = extern_path)]
+    extern_path: Vec<ExternPath>,
+}
+
+/// A module of generated messages elsewhere.
+#[derive(Debug, Clone)]
+struct ExternPath {
+    urn: String,
+    path: String,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -58,12 +71,29 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return Err(Failure::new("these files define no service"));
     }
     let services = library.services().map(AsRef::<Service>::as_ref);
-    let text = jsidl::rust::module(&loaded.library, services, &arguments.runtime);
+    let mut settings = Settings::new(&arguments.runtime);
+    for ExternPath { urn, path } in &arguments.extern_path {
+        settings = settings.extern_path(urn, path);
+    }
+    let text = jsidl::rust::module_with(&loaded.library, services, &settings);
     let path = arguments.output.join(format!("{}.rs", arguments.module));
     sources::write(&path, &text)?;
     let summary = sources::summary(&library);
     Output::new().line(format_args!("{}: {summary}", path.display()))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Parses the beginning of a URN and a path.
+fn extern_path(text: &str) -> Result<ExternPath, String> {
+    let expected = "expected URN=RUST_PATH, such as urn:jaus:jss:core:=::jaus::messages::core";
+    let (urn, path) = text.split_once('=').ok_or(expected)?;
+    if urn.is_empty() || path.is_empty() {
+        return Err(expected.to_owned());
+    }
+    Ok(ExternPath {
+        urn: urn.to_owned(),
+        path: path.to_owned(),
+    })
 }
 
 /// Parses a module name.
