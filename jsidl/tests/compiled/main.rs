@@ -9,6 +9,7 @@
 
 mod cases;
 mod definitions;
+mod guards;
 mod rustc;
 
 use jsidl::Loader;
