@@ -67,12 +67,19 @@ fn convert_writes_the_compact_form_beside_xml_and_back() {
     );
     let file = folder.join("Types.csd");
     let file = file.to_str().expect("UTF-8");
-    assert_eq!(run(&["jsidl", "convert", file], b"").status, 2, "the XML exists");
+    assert_eq!(
+        run(&["jsidl", "convert", file], b"").status,
+        2,
+        "the XML exists"
+    );
     let said = run(&["jsidl", "convert", "--force", file], b"");
     assert_eq!(said.status, 0, "{said:?}");
     let xml = fs::read_to_string(folder.join("Types.xml")).expect("a file");
     assert!(xml.contains("\n  <fixed_field name=\"A\""), "{xml}");
-    let said = run(&["jsidl", "check", "-"], compact.replace("one", "bushel").as_bytes());
+    let said = run(
+        &["jsidl", "check", "-"],
+        compact.replace("one", "bushel").as_bytes(),
+    );
     assert_eq!(said.status, 1, "{said:?}");
     assert!(said.stdout.contains("--> standard input:2:17"), "{said:?}");
 }
