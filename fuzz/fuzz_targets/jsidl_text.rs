@@ -1,5 +1,6 @@
 //! Arbitrary text through the loader, which must answer any input with diagnostics; and each
-//! definition that it accepts through the codec, with some octets, and through every emitter.
+//! definition that it accepts through the codec, with some octets, and through every emitter. The
+//! text may be in the compact form; XML is brought into that form and back.
 #![no_main]
 
 use jaus_fuzz::{octets_come_back, with_code};
@@ -64,6 +65,16 @@ fn format_twice(text: &str) {
     let _ = format::strict("fuzz.xml", text);
 }
 
+/// A text in the compact form is written there as it was read, and can be read back.
+fn convert_twice(text: &str) {
+    if let Ok(compact) = format::compact("fuzz.xml", text) {
+        assert_eq!(format::compact("fuzz.csd", &compact), Ok(compact.clone()));
+        let mut loader = Loader::new();
+        loader.catalogue().text("fuzz.csd", &compact);
+        let _ = loader.xml();
+    }
+}
+
 fuzz_target!(|text: &str| {
     let mut loader = Loader::new();
     loader.text("fuzz.xml", text);
@@ -86,5 +97,6 @@ fuzz_target!(|text: &str| {
     if text.len() <= LONGEST {
         emit(&loaded.library);
         format_twice(text);
+        convert_twice(text);
     }
 });

@@ -22,6 +22,7 @@ pub mod behaviour;
 pub mod build;
 pub mod catalogue;
 mod check;
+mod compact;
 pub mod cpp;
 mod diagnostic;
 pub mod diff;

@@ -3,10 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::compact;
+
 /// Maximum depth of nested directories.
 const DEEPEST: usize = 32;
 
-/// The `.xml` files below a directory.
+/// The definition files below a directory.
 #[derive(Debug, Default)]
 pub(crate) struct Listing {
     pub(crate) files: Vec<PathBuf>,
@@ -14,7 +16,7 @@ pub(crate) struct Listing {
     pub(crate) unreadable: Vec<(PathBuf, String)>,
 }
 
-/// The `.xml` files below a directory, in the order in which a [`Loader`](crate::Loader) reads
+/// The `.xml`, `.csd` and `.cjsidl` files below a directory, in the order in which a [`Loader`](crate::Loader) reads
 /// them.
 ///
 /// # Errors
@@ -54,9 +56,10 @@ impl Listing {
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                 self.add(&path, depth + 1);
             } else if path.is_file()
-                && path
-                    .extension()
-                    .is_some_and(|e| e.eq_ignore_ascii_case("xml"))
+                && (compact::has_extension(&path)
+                    || path
+                        .extension()
+                        .is_some_and(|e| e.eq_ignore_ascii_case("xml")))
             {
                 self.files.push(path);
             }

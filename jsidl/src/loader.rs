@@ -1,15 +1,17 @@
 //! Gathers definitions from files, directories and texts, and compiles them together.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::catalogue;
+use crate::compact::{self, Known};
 use crate::diagnostic::{Diagnostics, Report};
+use crate::format;
 use crate::library::Library;
 use crate::listing::Listing;
 use crate::resolve::resolve;
 use crate::source::Sources;
-use crate::syntax::{Program, Strictness, check_strictly, read};
+use crate::syntax::{Program, Strictness, check_strictly, excess, read};
 
 /// Collects definitions; [`load`](Self::load) compiles them.
 ///
@@ -23,6 +25,17 @@ pub struct Loader {
     with_catalogue: bool,
     with_reference_architecture: bool,
     is_strict: bool,
+    /// Texts in the compact form: what they refer to decides how they are read.
+    compact: Vec<Compact>,
+}
+
+/// A text in the compact form.
+#[derive(Debug)]
+struct Compact {
+    /// Its place among the sources.
+    source: usize,
+    is_strict: bool,
+    root: compact::Element,
 }
 
 /// Result of a load.
@@ -48,7 +61,10 @@ impl Loader {
         self
     }
 
-    /// Adds a file, or all `.xml` files below a directory. An unreadable file becomes a diagnostic.
+    /// Adds a file, or all `.xml`, `.csd` and `.cjsidl` files below a directory. An unreadable file
+    /// becomes a diagnostic.
+    ///
+    /// A file that does not begin with `<` may be in the compact form of the language, CJSIDL.
     pub fn path(&mut self, path: impl AsRef<Path>) -> &mut Self {
         let path = path.as_ref();
         if path.is_dir() {
@@ -92,16 +108,14 @@ impl Loader {
 
     /// Compiles everything that was added.
     pub fn load(mut self) -> Loaded {
+        self.translate();
         self.is_strict = false;
-        for entry in catalogue::entries() {
-            let wanted = if entry.of_reference_architecture() {
-                self.with_reference_architecture
-            } else {
-                self.with_catalogue
-            };
-            if wanted {
-                self.add(&catalogue::name(entry), &entry.text(), Strictness::Named);
-            }
+        let wanted: Vec<_> = catalogue::entries()
+            .iter()
+            .filter(|it| self.wants(it))
+            .collect();
+        for entry in wanted {
+            self.add(&catalogue::name(entry), &entry.text(), Strictness::Named);
         }
         let library = resolve(&self.program, &self.sources, &mut self.report);
         Loaded {
@@ -110,8 +124,91 @@ impl Loader {
         }
     }
 
+    /// The XML of all added texts in the compact form, each with its name, formatted. References
+    /// are completed from everything that was added. A text with mistakes has no XML.
+    #[must_use]
+    pub fn xml(mut self) -> (Vec<(PathBuf, String)>, Diagnostics) {
+        let places = self.translate();
+        let documents = places.into_iter().map(|place| {
+            let source = self.sources.at(place);
+            (source.path().to_owned(), format::document(source.xml()))
+        });
+        (documents.collect(), self.report.finish(&self.sources))
+    }
+
+    fn wants(&self, entry: &catalogue::Entry) -> bool {
+        if entry.of_reference_architecture() {
+            self.with_reference_architecture
+        } else {
+            self.with_catalogue
+        }
+    }
+
+    /// Translates the texts in the compact form and reads them. Returns the places of those without
+    /// mistakes among the sources.
+    fn translate(&mut self) -> Vec<usize> {
+        let compact = std::mem::take(&mut self.compact);
+        if compact.is_empty() {
+            return Vec::new();
+        }
+        let known = self.known(&compact);
+        let mut places = Vec::new();
+        for text in compact {
+            let before = self.report.errors();
+            let source = self.sources.at(text.source);
+            let translation = compact::translate(text.root, &known, source, &mut self.report);
+            if self.report.errors() > before {
+                continue;
+            }
+            places.push(text.source);
+            let source = self.sources.translate(text.source, translation);
+            read(
+                source,
+                Strictness::Named,
+                &mut self.program,
+                &mut self.report,
+            );
+            if text.is_strict {
+                check_strictly(source, &mut self.report);
+            }
+        }
+        places
+    }
+
+    /// What the texts in the compact form may refer to.
+    fn known(&self, compact: &[Compact]) -> Known {
+        let mut known = Known::default();
+        compact.iter().for_each(|it| known.add(&it.root));
+        let mut add = |text: &str| {
+            // What is wrong with it is reported where it is read.
+            if text.starts_with('<')
+                && excess(text).is_none()
+                && let Ok(root) = compact::of_xml(text)
+            {
+                known.add(&root);
+            }
+        };
+        for source in self.sources.iter() {
+            add(source.text());
+        }
+        for entry in catalogue::entries().iter().filter(|it| self.wants(it)) {
+            add(&entry.text());
+        }
+        known
+    }
+
     fn add(&mut self, name: &Path, text: &str, strictness: Strictness) {
+        let place = self.sources.count();
         let source = self.sources.add(name, text);
+        if compact::is_compact(name, source.text()) {
+            let root = compact::read(source, &mut self.report);
+            self.compact.extend(root.map(|root| Compact {
+                source: place,
+                is_strict: self.is_strict,
+                root,
+            }));
+            return;
+        }
         read(source, strictness, &mut self.program, &mut self.report);
         if self.is_strict {
             check_strictly(source, &mut self.report);

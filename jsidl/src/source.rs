@@ -4,6 +4,8 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::compact::Translation;
+
 /// Place of a declaration: file, line and column (both from 1).
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Location {
@@ -53,6 +55,8 @@ pub(crate) struct Source {
     /// Number of characters before each block of octets: column lookup costs the same in a text
     /// that is one long line.
     characters: Vec<u32>,
+    /// The XML of a text in the compact form.
+    translation: Option<Translation>,
 }
 
 /// Octets per entry in [`Source::characters`].
@@ -65,13 +69,25 @@ fn characters(octets: &[u8]) -> u32 {
 }
 
 impl Source {
+    /// Its name.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// The text without its byte order mark.
     pub(crate) fn text(&self) -> &Arc<str> {
         &self.text
     }
 
-    /// The position of this octet of the text.
+    /// The text as XML: itself, or its translation.
+    pub(crate) fn xml(&self) -> &str {
+        self.translation.as_ref().map_or(&*self.text, |it| &it.xml)
+    }
+
+    /// The position of this octet of the [XML](Self::xml).
     pub(crate) fn span(&self, offset: usize) -> Span {
+        let origin = self.translation.as_ref().map(|it| it.origin(offset));
+        let offset = origin.unwrap_or(offset);
         let offset = u32::try_from(offset).unwrap_or(u32::MAX);
         Span {
             file: self.id,
@@ -125,8 +141,31 @@ impl Sources {
             text: Arc::from(text),
             lines,
             characters,
+            translation: None,
         });
         &self.0[index]
+    }
+
+    /// All texts, in the order in which they were added.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Source> {
+        self.0.iter()
+    }
+
+    /// The number of texts.
+    pub(crate) fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    /// A text by its place in the order of [`iter`](Self::iter).
+    pub(crate) fn at(&self, index: usize) -> &Source {
+        &self.0[index]
+    }
+
+    /// Sets the XML of a text in the compact form.
+    pub(crate) fn translate(&mut self, index: usize, translation: Translation) -> &Source {
+        let source = &mut self.0[index];
+        source.translation = Some(translation);
+        source
     }
 
     /// File, line and column of a position.

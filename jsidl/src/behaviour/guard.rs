@@ -187,6 +187,16 @@ impl Comparison {
             Self::Greater => ">",
         }
     }
+
+    /// Whether it holds for two values in this order.
+    pub const fn holds(self, order: std::cmp::Ordering) -> bool {
+        match self {
+            Self::Equal => order.is_eq(),
+            Self::Unequal => order.is_ne(),
+            Self::Less => order.is_lt(),
+            Self::Greater => order.is_gt(),
+        }
+    }
 }
 
 /// Parses a whole text with one rule of the grammar.

@@ -63,6 +63,15 @@ pub(super) fn document(nodes: &[Node<'_>]) -> String {
     writer.text
 }
 
+/// Nodes that are not a whole document.
+pub(super) fn part(nodes: &[Node<'_>]) -> String {
+    let mut writer = Writer {
+        text: String::new(),
+    };
+    writer.nodes(nodes, 0);
+    writer.text
+}
+
 struct Writer {
     text: String,
 }

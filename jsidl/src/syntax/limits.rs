@@ -15,7 +15,7 @@ const MOST_ATTRIBUTES: usize = 50;
 const MOST_NAMESPACES: usize = 2_000;
 
 /// The position of the first excess in a text, with the remedy.
-pub(super) fn excess(text: &str) -> Option<(usize, String)> {
+pub(crate) fn excess(text: &str) -> Option<(usize, String)> {
     if text.len() as u64 > LARGEST {
         let message = format!("the text is larger than {} MiB: split it", LARGEST >> 20);
         return Some((0, message));

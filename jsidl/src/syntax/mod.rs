@@ -19,7 +19,7 @@ use crate::expr::Expression;
 use crate::model::{GroupKind, Id, Number, Rounding, Unsigned, Version};
 use crate::source::{Span, Spanned};
 
-pub(crate) use limits::LARGEST;
+pub(crate) use limits::{LARGEST, excess};
 pub(crate) use root::{Strictness, check_strictly, is_definition, read};
 
 /// Declarations of all files.

@@ -57,7 +57,7 @@ pub(crate) fn is_definition(source: &Source, report: &mut Report) -> bool {
 }
 
 fn parse<'s>(source: &'s Source, report: &mut Report) -> Option<Document<'s>> {
-    let text = source.text();
+    let text = source.xml();
     if let Some((at, what)) = limits::excess(text) {
         report.error(source.span(at), what);
         return None;
@@ -94,11 +94,11 @@ fn malformed(error: &roxmltree::Error) -> String {
 fn malformed_at(source: &Source, error: &roxmltree::Error) -> Span {
     let pos = error.pos();
     let before = source
-        .text()
+        .xml()
         .split_inclusive('\n')
         .take(pos.row as usize - usize::from(pos.row > 0));
     let line: usize = before.map(str::len).sum();
-    let rest = source.text().get(line..).unwrap_or("");
+    let rest = source.xml().get(line..).unwrap_or("");
     let column = (pos.col as usize).saturating_sub(1);
     let within = rest
         .char_indices()

@@ -10,6 +10,7 @@
 mod cases;
 mod chance;
 mod definitions;
+mod guards;
 mod hostile;
 mod rustc;
 mod words;

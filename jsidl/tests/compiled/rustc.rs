@@ -19,6 +19,50 @@ pub(crate) fn check(modules: &[String]) -> Result<(), String> {
     run(&text, CODEC.get_or_init(codec))
 }
 
+/// Compiles modules with a `main` function, and runs it.
+///
+/// # Errors
+/// The compiler's errors, or what the program printed before it failed.
+pub(crate) fn execute(module: &str, main: &str) -> Result<(), String> {
+    let codec = codec();
+    let program = PathBuf::from(env!("CARGO_TARGET_TMPDIR"))
+        .join(format!("generated_program_{}", std::process::id()));
+    let source = program.with_extension("rs");
+    let text = format!("#![allow(dead_code)]\nmod case {{\n{module}\n}}\n{main}");
+    fs::write(&source, text).unwrap();
+    let output = compiler(&codec)
+        .arg("-o")
+        .arg(&program)
+        .arg(&source)
+        .output()
+        .unwrap();
+    let _ = fs::remove_file(&source);
+    let said = |output: &std::process::Output| String::from_utf8_lossy(&output.stderr).into_owned();
+    if !output.status.success() {
+        return Err(said(&output));
+    }
+    let output = Command::new(&program).output().unwrap();
+    let _ = fs::remove_file(&program);
+    match output.status.success() {
+        true => Ok(()),
+        false => Err(said(&output)),
+    }
+}
+
+/// The compiler with what every compilation needs.
+fn compiler(codec: &Path) -> Command {
+    let mut codec_is = std::ffi::OsString::from("jaus_codec=");
+    codec_is.push(codec);
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let mut command = Command::new(rustc);
+    command
+        .args(["--edition", "2024", "--error-format", "short", "--extern"])
+        .arg(codec_is)
+        .arg("-L")
+        .arg(format!("dependency={}", codec.parent().unwrap().display()));
+    command
+}
+
 /// The library of the codec that was built with this test: the newest that a crate can use with the
 /// dependencies beside it.
 fn codec() -> PathBuf {
@@ -47,25 +91,9 @@ fn run(text: &str, codec: &Path) -> Result<(), String> {
         directory.join(format!("lib{name}.rmeta")),
     );
     fs::write(&source, text).unwrap();
-    let mut codec_is = std::ffi::OsString::from("jaus_codec=");
-    codec_is.push(codec);
-    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let output = Command::new(rustc)
-        .args([
-            "--edition",
-            "2024",
-            "--crate-type",
-            "lib",
-            "--emit",
-            "metadata",
-        ])
-        .args(["--error-format", "short"])
-        .arg("-o")
+    let output = compiler(codec)
+        .args(["--crate-type", "lib", "--emit", "metadata", "-o"])
         .arg(&metadata)
-        .arg("--extern")
-        .arg(codec_is)
-        .arg("-L")
-        .arg(format!("dependency={}", codec.parent().unwrap().display()))
         .arg(&source)
         .output()
         .unwrap();

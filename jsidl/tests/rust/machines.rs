@@ -101,9 +101,6 @@ pub mod door {
             /// `text` is one of "night".
             fn is_late(&self, text: &'static str, envelope: &Self::Envelope) -> bool;
 
-            /// `steps == 0`.
-            fn steps_is_0(&self, number: i64) -> bool;
-
             /// `lightOn`.
             fn light_on(&mut self);
 
@@ -265,7 +262,7 @@ pub mod door {
             fn on_moved<B: Behaviour + ?Sized>(&mut self, number_0: i64, behaviour: &mut B) -> Outcome {
                 match self.state {
                     State::WorkingOpened => {
-                        if behaviour.steps_is_0(number_0) {
+                        if number_0 == 0 {
                             behaviour.start_motor("down");
                             behaviour.count(number_0);
                             behaviour.start_motor("up");
@@ -325,9 +322,6 @@ pub mod door {
         ///
         /// `text` is one of "down", "up".
         fn start_motor(&mut self, text: &'static str, call: &mut C);
-
-        /// `steps == 0`.
-        fn steps_is_0(&self, number: i64) -> bool;
 
         /// `count`.
         fn count(&mut self, number: i64, call: &mut C);
@@ -412,10 +406,6 @@ pub mod door {
 
         fn start_motor(&mut self, text: &'static str) {
             self.service.start_motor(text, self.call);
-        }
-
-        fn steps_is_0(&self, number: i64) -> bool {
-            self.service.steps_is_0(number)
         }
 
         fn count(&mut self, number: i64) {

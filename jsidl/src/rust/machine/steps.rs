@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::super::writer::Writer;
 use super::states::States;
-use super::vocabulary::{Event, Kind, Method, Value, Vocabulary, value};
+use super::vocabulary::{Event, Kind, Method, Value, Vocabulary, comparison, value};
 use crate::behaviour::{Action, Call, Guard, Transition, TransitionKind, Trigger};
 use crate::machine::{Declared, Machine, MachineState, StateIndex, Stimulus};
 
@@ -225,11 +225,15 @@ impl Steps<'_> {
                     .join(" && "),
             ),
             Guard::Not(inner) => (2, format!("!{}", self.guard(trigger, inner, 2))),
-            question => {
-                let asked = self.vocabulary.question(trigger, question);
-                let call = asked.map(|(method, values)| self.call(Some(trigger), method, &values));
-                (3, call.unwrap_or_else(|| "false".into()))
-            }
+            question => match comparison(trigger, question) {
+                Some(condition) => (1, condition),
+                None => {
+                    let asked = self.vocabulary.question(trigger, question);
+                    let call =
+                        asked.map(|(method, values)| self.call(Some(trigger), method, &values));
+                    (3, call.unwrap_or_else(|| "false".into()))
+                }
+            },
         };
         if rank < least {
             format!("({text})")

@@ -228,6 +228,7 @@ impl Vocabulary {
                 self.add_guard(event, trigger, left);
                 self.add_guard(event, trigger, right);
             }
+            question if comparison(trigger, question).is_some() => {}
             question => self.add(event, question_of(Some(trigger), question)),
         }
     }
@@ -345,6 +346,56 @@ fn action_of(trigger: Option<&Trigger>, action: &Action) -> Spoken {
         _ => (last.to_owned(), action.arguments.as_slice()),
     };
     spoken(trigger, name, rest, false)
+}
+
+/// A side of a comparison that the generated code knows.
+#[derive(PartialEq)]
+enum Operand {
+    /// Index of the event's numeric parameter.
+    Number(usize),
+    Integer(i64),
+    Text(String),
+}
+
+impl Operand {
+    fn of(trigger: &Trigger, guard: &Guard) -> Option<Self> {
+        match guard {
+            Guard::Name(name) => match value(Some(trigger), &Argument::Variable(name.clone())) {
+                Value::Number(number) => Some(Self::Number(number)),
+                _ => None,
+            },
+            Guard::Literal(Argument::Integer(digits)) => digits.parse().ok().map(Self::Integer),
+            Guard::Literal(Argument::Text(text)) => Some(Self::Text(text.clone())),
+            _ => None,
+        }
+    }
+
+    fn code(&self) -> Option<String> {
+        match self {
+            Self::Number(number) => Some(format!("number_{number}")),
+            Self::Integer(integer) => Some(integer.to_string()),
+            Self::Text(_) => None,
+        }
+    }
+}
+
+/// A comparison as a Rust condition, if numbers of the event and constants decide it; `None` if the
+/// service is asked.
+pub(super) fn comparison(trigger: &Trigger, guard: &Guard) -> Option<String> {
+    let Guard::Compare(comparison, left, right) = guard else {
+        return None;
+    };
+    let [left, right] = [left, right].map(|it| Operand::of(trigger, it));
+    let (left, right) = (left?, right?);
+    let decided = match (&left, &right) {
+        (Operand::Integer(left), Operand::Integer(right)) => Some(left.cmp(right)),
+        (Operand::Text(left), Operand::Text(right)) => Some(left.cmp(right)),
+        _ => (left == right).then_some(std::cmp::Ordering::Equal),
+    };
+    Some(match decided {
+        Some(order) => comparison.holds(order).to_string(),
+        None => format!("{} {} {}", left.code()?, comparison.sign(), right.code()?),
+    })
 }
 
 fn question_of(trigger: Option<&Trigger>, question: &Guard) -> Spoken {

@@ -55,6 +55,36 @@ fn a_definition_does_not_differ_from_itself() {
 }
 
 #[test]
+fn convert_writes_the_compact_form_beside_xml_and_back() {
+    let folder = folder("jsidl-convert", TYPES);
+    let path = folder.to_str().expect("UTF-8");
+    let said = run(&["jsidl", "convert", path], b"");
+    assert_eq!(said.status, 0, "{said:?}");
+    let compact = fs::read_to_string(folder.join("Types.csd")).expect("a file");
+    assert_eq!(
+        compact,
+        "typeset T (id = urn.me.Types, version = 1.0) {\n  field uint8 A one;\n}\n"
+    );
+    let file = folder.join("Types.csd");
+    let file = file.to_str().expect("UTF-8");
+    assert_eq!(
+        run(&["jsidl", "convert", file], b"").status,
+        2,
+        "the XML exists"
+    );
+    let said = run(&["jsidl", "convert", "--force", file], b"");
+    assert_eq!(said.status, 0, "{said:?}");
+    let xml = fs::read_to_string(folder.join("Types.xml")).expect("a file");
+    assert!(xml.contains("\n  <fixed_field name=\"A\""), "{xml}");
+    let said = run(
+        &["jsidl", "check", "-"],
+        compact.replace("one", "bushel").as_bytes(),
+    );
+    assert_eq!(said.status, 1, "{said:?}");
+    assert!(said.stdout.contains("--> standard input:2:17"), "{said:?}");
+}
+
+#[test]
 fn fmt_lays_files_out_once() {
     let folder = folder("jsidl-fmt", TYPES);
     let path = folder.to_str().expect("UTF-8");

@@ -1,6 +1,7 @@
 //! `jaus jsidl`: works on service definitions, one file per subcommand.
 
 mod check;
+mod convert;
 mod cpp;
 mod datagram;
 mod definitions;
@@ -34,6 +35,7 @@ pub(crate) struct Jsidl {
 enum Command {
     Check(check::Arguments),
     Fmt(fmt::Arguments),
+    Convert(convert::Arguments),
     Diff(diff::Arguments),
     Rust(rust::Arguments),
     Cpp(cpp::Arguments),
@@ -51,6 +53,7 @@ impl Jsidl {
         match self.command {
             Command::Check(arguments) => check::run(&arguments),
             Command::Fmt(arguments) => fmt::run(&arguments),
+            Command::Convert(arguments) => convert::run(&arguments),
             Command::Diff(arguments) => diff::run(&arguments),
             Command::Rust(arguments) => rust::run(&arguments),
             Command::Cpp(arguments) => cpp::run(&arguments),
