@@ -2,14 +2,20 @@
 #![expect(clippy::disallowed_methods, reason = "an application has a clock")]
 
 use jaus::component::{Component, Handlers, Kind};
-use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+use jaus::messages::mobility::{
+    QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, velocity_state_sensor,
+};
 use jaus::node::{Config, Node};
 
 #[tokio::main(flavor = "current_thread")]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let node = Node::start(Config::loopback(107, 1))?;
     let rover = Component::builder(Kind::Vehicle, "Rover")
-        .offer(Handlers::new(velocity_state_sensor::V1_0).publishes::<QueryVelocityState>())
+        .offer(
+            Handlers::new(velocity_state_sensor::LATEST)
+                .publishes::<QueryVelocityState>()
+                .declines::<QueryVelocityStateExt>(),
+        )
         .attach(&node, 44)?;
 
     // A real vehicle reads its sensors here.

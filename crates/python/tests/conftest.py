@@ -149,7 +149,7 @@ def driver_of(
     """A primitive driver that is described, with a handler of its own or one that sets the effort."""
 
     def drive(effort: Any, _sender: jaus.JausId) -> None:
-        motor.effort = effort.value
+        motor.effort = effort.propulsive_linear_effort_x_percent
 
     driver = node.component(33, kind="vehicle", name="Rover", management=True)
     driver.command(SetWrenchEffort, **command)(function or drive)

@@ -17,9 +17,9 @@ async def main(subsystem: str, group: str, how: str) -> None:
     motor = Motor()
 
     def drive(effort: Any, _sender: jaus.JausId) -> None:
-        print("handles", round(effort.value))
-        if effort.value <= 50:
-            motor.effort = effort.value
+        print("handles", round(effort.propulsive_linear_effort_x_percent))
+        if effort.propulsive_linear_effort_x_percent <= 50:
+            motor.effort = effort.propulsive_linear_effort_x_percent
             return
         if how == "sleep":
             time.sleep(3600)
@@ -31,7 +31,7 @@ async def main(subsystem: str, group: str, how: str) -> None:
             stops = motor.stops
             while motor.stops == stops:
                 time.sleep(0.01)
-            motor.effort = effort.value
+            motor.effort = effort.propulsive_linear_effort_x_percent
 
     def show() -> None:
         last: Any = None
@@ -50,8 +50,9 @@ async def main(subsystem: str, group: str, how: str) -> None:
 
         @driver.on_stop
         def stop() -> None:
-            motor.stop()
+            # Before a handler that waits for the stop goes on, so that its lines follow this one.
             print("stop")
+            motor.stop()
 
         threading.Thread(target=show, daemon=True).start()
         async with driver:

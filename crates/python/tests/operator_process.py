@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 
-from messages import SetWrenchEffort
+from messages import SetWrenchEffort, set_effort
 
 import jaus
 
@@ -26,7 +26,7 @@ async def drive(node: jaus.Node, how: str) -> None:
     driver = await operator.find(SetWrenchEffort)
     control = await operator.control(driver, watch=None if how == "unwatched" else 0.5)
     await control.resume()
-    await control.deliver(SetWrenchEffort(40))
+    await control.deliver(set_effort(40))
     print("drives")
     if how == "sleep":
         time.sleep(3600)

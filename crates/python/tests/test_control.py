@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from conftest import Motor, driver_of, until, within
-from messages import Note, SetWrenchEffort
+from messages import Note, SetWrenchEffort, set_effort
 
 import jaus
 
@@ -22,18 +22,18 @@ async def test_a_driver_obeys_the_client_in_control_and_stops_at_the_end(
             assert control.is_held
             assert tuple(driver.standing) == (jaus.State.READY, operator.id)
             await until(lambda: control.state == jaus.State.READY)
-            await control.deliver(SetWrenchEffort(30))
+            await control.deliver(set_effort(30))
             await until(lambda: motor.effort == pytest.approx(30, abs=0.1))
             # It is not repeated.
             await until(lambda: motor.effort == 0)
             await until(lambda: driver.last_stop is not None)
-            control.send(SetWrenchEffort(40), priority="high")
+            control.send(set_effort(40), priority="high")
             await until(lambda: motor.effort == pytest.approx(40, abs=0.1))
             await control.standby()
             await until(lambda: motor.effort == 0)
         assert driver.standing.controller is None
         with pytest.raises(jaus.ClosedError, match="control\\(\\) again"):
-            control.send(SetWrenchEffort(30))
+            control.send(set_effort(30))
         assert isinstance(await within(control.lost()), jaus.ClosedError)
 
 
@@ -47,7 +47,7 @@ async def test_control_goes_to_the_greater_authority_and_the_loser_is_told(
         async with chief.control(driver.id, authority=20):
             assert isinstance(await within(control.lost()), jaus.ControlLostError)
             with pytest.raises(jaus.ControlLostError):
-                control.send(SetWrenchEffort(30))
+                control.send(set_effort(30))
         await control.release()
 
 
@@ -72,7 +72,7 @@ async def test_an_emergency_stops_a_driver(node: jaus.Node, operator: jaus.Compo
     async with driver_of(node, motor, validity="until-done") as driver:
         async with operator.control(driver.id) as control:
             await control.resume()
-            control.send(SetWrenchEffort(30))
+            control.send(set_effort(30))
             await until(lambda: motor.effort != 0)
             await operator.set_emergency(driver.id)
             await until(lambda: motor.effort == 0)
@@ -86,13 +86,13 @@ async def test_a_command_handler_that_raises_stops_the_component_until_it_recove
     motor = Motor()
 
     def drive(effort: Any, _sender: jaus.JausId) -> None:
-        motor.effort = effort.value
+        motor.effort = effort.propulsive_linear_effort_x_percent
         raise ValueError("the motor is on fire")
 
     async with driver_of(node, motor, drive, validity="until-done") as driver:
         async with operator.control(driver.id) as control:
             await control.resume()
-            control.send(SetWrenchEffort(30))
+            control.send(set_effort(30))
             assert isinstance(await within(control.lost()), jaus.ControlLostError)
         await until(lambda: motor.effort == 0)
         assert driver.standing.state is jaus.State.FAILURE
@@ -112,12 +112,12 @@ async def test_a_malformed_command_stops_what_moves(
     async with driver_of(node, motor, validity="until-done") as driver:
         async with operator.control(driver.id) as control:
             await control.resume()
-            control.send(SetWrenchEffort(30))
+            control.send(set_effort(30))
             await until(lambda: motor.effort != 0)
-            control.send(Malformed(30))
+            control.send(Malformed(propulsive_linear_effort_x_percent=30))
             await until(lambda: motor.effort == 0)
             assert "malformed SetWrenchEffort" in caplog.text
-            control.send(SetWrenchEffort(30))
+            control.send(set_effort(30))
             await until(lambda: motor.effort != 0)
 
 
@@ -129,7 +129,7 @@ async def test_a_stop_ends_an_asynchronous_handler_before_it_goes_on(
     released: asyncio.Event = asyncio.Event()
 
     async def drive(effort: Any, _sender: jaus.JausId) -> None:
-        motor.effort = effort.value
+        motor.effort = effort.propulsive_linear_effort_x_percent
         try:
             await released.wait()
         except asyncio.CancelledError:
@@ -140,9 +140,9 @@ async def test_a_stop_ends_an_asynchronous_handler_before_it_goes_on(
     async with driver_of(node, motor, drive, validity="until-done") as driver:
         async with operator.control(driver.id) as control:
             await control.resume()
-            control.send(SetWrenchEffort(30))
+            control.send(set_effort(30))
             await until(lambda: motor.effort == pytest.approx(30, abs=0.1))
-            control.send(SetWrenchEffort(40))
+            control.send(set_effort(40))
             await until(lambda: motor.effort == pytest.approx(40, abs=0.1))
             assert ends == ["cancelled"], "the newer command counts"
             # Stopped and released in one turn of the loop: the handler is ready to go on.
@@ -162,13 +162,13 @@ async def test_a_stop_during_a_handler_is_repeated_after_it(
         while motor.stops == stops:
             # The stop thread calls the stop function meanwhile.
             pass
-        motor.effort = effort.value
+        motor.effort = effort.propulsive_linear_effort_x_percent
 
     driver = driver_of(node, motor, drive, validity="until-done")
     async with driver, operator.control(driver.id) as control:
         await control.resume()
         stops = motor.stops
-        control.send(SetWrenchEffort(30))
+        control.send(set_effort(30))
         await until(lambda: motor.stops > stops)
         assert motor.effort == 0 and motor.stops == stops + 2
 
@@ -192,11 +192,11 @@ async def test_a_message_that_configures_comes_from_the_client_in_control(
 ) -> None:
     notes: list[int] = []
     board = node.component(50, name="Board", access_control=True)
-    board.configure(Note)(lambda note, _sender: notes.append(round(note.value)))
+    board.configure(Note)(lambda note, _sender: notes.append(note.number))
     async with board:
-        await operator.deliver(board.id, Note(1))
+        await operator.deliver(board.id, Note(number=1))
         async with operator.control(board.id) as control:
-            await control.deliver(Note(2))
+            await control.deliver(Note(number=2))
             await until(lambda: bool(notes))
         assert notes == [2]
 
@@ -207,4 +207,4 @@ async def test_control_is_refused_with_a_watch_that_is_too_short(
     with pytest.raises(jaus.ArgumentError, match="at least 0.1"):
         await operator.control("42.1.33", watch=0.01)
     with pytest.raises(jaus.StateError, match="await"):
-        operator.control("42.1.33").send(SetWrenchEffort(1))
+        operator.control("42.1.33").send(set_effort(1))

@@ -19,6 +19,8 @@ from messages import (
     QueryVelocityStateExt,
     ReportVelocityState,
     SetWrenchEffort,
+    set_effort,
+    velocity,
 )
 
 import jaus
@@ -55,11 +57,11 @@ async def test_a_published_report_answers_a_query(
     node: jaus.Node, operator: jaus.Component
 ) -> None:
     async with sensor_of(node) as sensor:
-        sensor.publish(ReportVelocityState(1.5))
+        sensor.publish(velocity(1.5))
         assert await operator.find(QueryVelocityState) == sensor.id
         assert operator.providers(QueryVelocityState) == [sensor.id]
         report = await operator.query(str(sensor.id), QueryVelocityState())
-        assert report.value == pytest.approx(1.5, abs=0.01)
+        assert report.velocity_x_m_per_s == pytest.approx(1.5, abs=0.01)
 
 
 async def test_a_function_answers_a_query(node: jaus.Node, operator: jaus.Component) -> None:
@@ -69,11 +71,11 @@ async def test_a_function_answers_a_query(node: jaus.Node, operator: jaus.Compon
     @sensor.answers(QueryVelocityState)
     async def speed(_query: Any, sender: jaus.JausId) -> ReportVelocityState:
         await asyncio.sleep(0)
-        return ReportVelocityState(sender.component)
+        return velocity(sender.component)
 
     async with sensor:
         report = await operator.query(sensor.id, QueryVelocityState())
-        assert report.value == pytest.approx(1, abs=0.01)
+        assert report.velocity_x_m_per_s == pytest.approx(1, abs=0.01)
 
 
 async def test_a_query_without_an_answer_says_what_was_asked(
@@ -119,17 +121,17 @@ async def test_a_subscription_yields_reports_and_ends_with_the_loop(
     node: jaus.Node, operator: jaus.Component
 ) -> None:
     async with sensor_of(node) as sensor:
-        sensor.publish(ReportVelocityState(0))
+        sensor.publish(velocity(0))
 
         async def publish() -> None:
             for speed in itertools.count(1):
-                sensor.publish(ReportVelocityState(speed))
+                sensor.publish(velocity(speed))
                 await asyncio.sleep(0.02)
 
         publishing = asyncio.ensure_future(publish())
         seen = 0
         async for report in operator.subscribe(sensor.id, QueryVelocityState()):
-            seen += report.value > 0.5
+            seen += report.velocity_x_m_per_s > 0.5
             if seen == 3:
                 break
         publishing.cancel()
@@ -140,7 +142,7 @@ async def test_a_subscription_in_a_block_lasts_until_its_end(
     node: jaus.Node, operator: jaus.Component
 ) -> None:
     async with sensor_of(node) as sensor:
-        sensor.publish(ReportVelocityState(1.5))
+        sensor.publish(velocity(1.5))
         async with operator.subscribe(sensor.id, QueryVelocityState(), hz=20) as speeds:
             for _ in range(2):
                 async for _report in speeds:
@@ -156,7 +158,7 @@ async def test_a_subscription_in_a_block_lasts_until_its_end(
 
 async def test_a_subscription_shows_an_outage(node: jaus.Node, operator: jaus.Component) -> None:
     sensor = await sensor_of(node).start()
-    sensor.publish(ReportVelocityState(1.5))
+    sensor.publish(velocity(1.5))
     speeds = operator.subscribe(sensor.id, QueryVelocityState(), hz=20)
     updates = speeds.updates()
     assert isinstance(await within(anext(updates)), jaus.Up)
@@ -171,7 +173,7 @@ async def test_a_slow_reader_misses_the_oldest_reports(
     node: jaus.Node, operator: jaus.Component
 ) -> None:
     async with sensor_of(node) as sensor:
-        sensor.publish(ReportVelocityState(0))
+        sensor.publish(velocity(0))
         subscription = operator.subscribe(sensor.id, QueryVelocityState(), hz=100, buffer=1)
         async with subscription as speeds:
             await until(lambda: speeds.missed > 2)
@@ -200,15 +202,15 @@ async def test_messages_of_own_services_arrive_and_their_failures_are_logged(
 
     @board.receive(Note)
     async def take(note: Any, sender: jaus.JausId) -> None:
-        notes.append((round(note.value), sender))
+        notes.append((note.number, sender))
         raise ValueError("no room")
 
     async with board:
-        await operator.deliver(board.id, Note(7))
+        await operator.deliver(board.id, Note(number=7))
         await until(lambda: bool(notes))
         assert notes == [(7, operator.id)]
         await until(lambda: "no room" in caplog.text)
-        operator.send(board.id, Note(8), priority="high")
+        operator.send(board.id, Note(number=8), priority="high")
         await until(lambda: len(notes) == 2)
 
 
@@ -260,11 +262,11 @@ async def test_calls_in_the_wrong_state_say_what_to_do(group: str) -> None:
     with pytest.raises(jaus.StateError, match="before"):
         component.publishes(QueryVelocityState)
     with pytest.raises(jaus.NotFoundError, match="publishes"):
-        component.publish(ReportVelocityState(1))
+        component.publish(velocity(1))
     with pytest.raises(jaus.ArgumentError, match="not a query"):
-        await component.query("1.1.1", SetWrenchEffort(1))
+        await component.query("1.1.1", set_effort(1))
     with pytest.raises(jaus.ArgumentError, match="single component"):
-        await component.deliver("1.255.1", Note(1))
+        await component.deliver("1.255.1", Note(number=1))
     with pytest.raises(jaus.StartError):
         await node.component(1).start()
     assert repr(component) == "<jaus.Component 42.1.1, ready>"
@@ -318,7 +320,7 @@ async def test_several_nodes_in_one_loop_find_each_other(group: str) -> None:
     async with jaus.Node("101.1", loopback=True, group=group) as first:
         async with jaus.Node("102.1", loopback=True, group=group) as second:
             async with sensor_of(first) as sensor, second.component(1) as operator:
-                sensor.publish(ReportVelocityState(2))
+                sensor.publish(velocity(2))
                 assert await operator.find(QueryVelocityState) == sensor.id
                 await operator.query(sensor.id, QueryVelocityState())
 
@@ -361,7 +363,7 @@ async def test_the_log_goes_to_the_logger_jaus(
     async with driver_of(node, motor) as driver:
         async with operator.control(driver.id) as control:
             await control.resume()
-            control.send(SetWrenchEffort(30))
+            control.send(set_effort(30))
             await until(lambda: "but the client sent it once" in caplog.text)
             status = await operator.query(driver.id, QueryStatus())
-            assert status.value == jaus.State.READY
+            assert status.status == jaus.State.READY

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from conftest import Motor, Program, driver_of, until, within
-from messages import QueryStatus, SetWrenchEffort
+from messages import QueryStatus, SetWrenchEffort, set_effort
 
 import jaus
 
@@ -36,7 +36,7 @@ async def driving(control: jaus.Control, effort: float) -> AsyncIterator[None]:
     async def drive() -> None:
         with contextlib.suppress(jaus.Error):
             while True:
-                control.send(SetWrenchEffort(effort))
+                control.send(set_effort(effort))
                 await asyncio.sleep(0.05)
 
     task = asyncio.ensure_future(drive())
@@ -48,7 +48,7 @@ async def driving(control: jaus.Control, effort: float) -> AsyncIterator[None]:
 
 async def status(operator: jaus.Component, driver: Any) -> jaus.State:
     report = await within(operator.query(driver, QueryStatus()))
-    return jaus.State(report.value)
+    return jaus.State(report.status)
 
 
 @pytest.mark.parametrize("how", ["sleep", "spin"])
@@ -57,10 +57,10 @@ async def test_a_driver_whose_event_loop_hangs_is_stopped_and_fails(
 ) -> None:
     driver = start("driver_process.py", "102", group, how)
     async with driven(operator) as control:
-        control.send(SetWrenchEffort(30))
+        control.send(set_effort(30))
         await driver.expect("motor 30")
         # It would last until it is done: only the watch over the event loop stops it.
-        control.send(SetWrenchEffort(60))
+        control.send(set_effort(60))
         await driver.expect("handles 60")
         await driver.expect("stop")
         assert isinstance(await within(control.lost()), jaus.ControlLostError)
@@ -85,9 +85,9 @@ async def test_commands_that_waited_for_a_hung_event_loop_are_not_handled(
 ) -> None:
     driver = start("driver_process.py", "102", group, "late")
     async with driven(operator) as control:
-        control.send(SetWrenchEffort(60))
+        control.send(set_effort(60))
         await driver.expect("handles 60")
-        control.send(SetWrenchEffort(30))
+        control.send(set_effort(30))
         lines = ""
         while not lines.endswith("state standby, effort 0\n"):
             lines += await driver.expect("") + "\n"
