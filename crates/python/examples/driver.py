@@ -12,6 +12,11 @@ import jaus
 from jaus.messages import mobility
 
 
+def say(line: str) -> None:
+    """Prints a line with one write: two threads do."""
+    print(f"{line}\n", end="", flush=True)
+
+
 class Motor:
     """A motor that gets its effort every 50 ms. A real one stops by itself 200 ms after the last command, for the
     case that this program dies.
@@ -26,7 +31,7 @@ class Motor:
         while True:
             effort = self.effort
             if effort or last:
-                print(f"motor {effort:g}", flush=True)
+                say(f"motor {effort:g}")
             last = effort
             time.sleep(0.05)
 
@@ -48,10 +53,10 @@ async def main() -> None:
 
         @driver.on_standing
         def show(standing: jaus.Standing) -> None:
-            print("state", standing.state.value, flush=True)
+            say(f"state {standing.state.value}")
 
         async with driver:
-            print(driver.id, "is up", flush=True)
+            say(f"{driver.id} is up")
             await asyncio.Event().wait()
     # ANCHOR_END: driver
 

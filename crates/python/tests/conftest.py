@@ -44,22 +44,24 @@ class Program:
             bufsize=1,
             env=environment,
         )
+        self.seen: list[str] = []
 
     async def expect(self, beginning: str, is_it: Callable[[str], bool] | None = None) -> str:
         """Waits for a line with this beginning, or for one that is it."""
-        found: str = await within(
-            asyncio.to_thread(self._find, is_it or (lambda line: line.startswith(beginning)))
-        )
+        is_it = is_it or (lambda line: line.startswith(beginning))
+        try:
+            found: str = await within(asyncio.to_thread(self._find, is_it))
+        except asyncio.TimeoutError as error:
+            raise AssertionError(f"no {beginning!r} after {self.seen}") from error
         return found
 
     def _find(self, is_it: Callable[[str], bool]) -> str:
         assert self.process.stdout is not None
-        seen: list[str] = []
         for line in self.process.stdout:
-            seen.append(line.rstrip())
-            if is_it(seen[-1]):
-                return seen[-1]
-        raise AssertionError(f"the process ended, after {seen}")
+            self.seen.append(line.rstrip())
+            if is_it(self.seen[-1]):
+                return self.seen[-1]
+        raise AssertionError(f"the process ended, after {self.seen}")
 
     async def code(self) -> int:
         """Waits for the end of the process."""

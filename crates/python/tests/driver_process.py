@@ -13,11 +13,16 @@ from conftest import Motor, driver_of
 import jaus
 
 
+def say(line: str) -> None:
+    """Prints a line with one write: several threads do."""
+    print(f"{line}\n", end="", flush=True)
+
+
 async def main(subsystem: str, group: str, how: str) -> None:
     motor = Motor()
 
     def drive(effort: Any, _sender: jaus.JausId) -> None:
-        print("handles", round(effort.propulsive_linear_effort_x_percent))
+        say(f"handles {effort.propulsive_linear_effort_x_percent:.0f}")
         if effort.propulsive_linear_effort_x_percent <= 50:
             motor.effort = effort.propulsive_linear_effort_x_percent
             return
@@ -38,7 +43,7 @@ async def main(subsystem: str, group: str, how: str) -> None:
         while True:
             if motor.effort != last:
                 last = motor.effort
-                print("motor", round(last))
+                say(f"motor {round(last)}")
             time.sleep(0.01)
 
     async with jaus.Node(f"{subsystem}.1", loopback=True, group=group) as node:
@@ -46,17 +51,17 @@ async def main(subsystem: str, group: str, how: str) -> None:
 
         @driver.on_standing
         def standing(standing: jaus.Standing) -> None:
-            print(f"state {standing.state.name.lower()}, effort {round(motor.effort or 0)}")
+            say(f"state {standing.state.name.lower()}, effort {round(motor.effort or 0)}")
 
         @driver.on_stop
         def stop() -> None:
             # Before a handler that waits for the stop goes on, so that its lines follow this one.
-            print("stop")
+            say("stop")
             motor.stop()
 
         threading.Thread(target=show, daemon=True).start()
         async with driver:
-            print("up")
+            say("up")
             await asyncio.sleep(3600)
 
 
