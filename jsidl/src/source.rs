@@ -4,8 +4,6 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::compact::Translation;
-
 /// Place of a declaration: file, line and column (both from 1).
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Location {
@@ -186,6 +184,30 @@ impl Sources {
 
     fn source(&self, span: Span) -> &Source {
         &self.0[span.file as usize]
+    }
+}
+
+/// The XML of a text in the compact form.
+#[derive(Debug)]
+pub(crate) struct Translation {
+    pub(crate) xml: String,
+    /// Offsets in the XML, in order, each with the offset in the compact text that it comes from.
+    places: Vec<(u32, u32)>,
+}
+
+impl Translation {
+    /// Pairs of offsets: in the XML, in order, and in the compact text.
+    pub(crate) const fn new(xml: String, places: Vec<(u32, u32)>) -> Self {
+        Self { xml, places }
+    }
+
+    /// The offset in the compact text of an offset in the XML.
+    pub(crate) fn origin(&self, offset: usize) -> usize {
+        let after = self
+            .places
+            .partition_point(|(xml, _)| *xml as usize <= offset);
+        let place = after.checked_sub(1).and_then(|it| self.places.get(it));
+        place.map_or(0, |(_, origin)| *origin as usize)
     }
 }
 

@@ -22,10 +22,13 @@ mod write_machines;
 use std::path::Path;
 
 pub(crate) use known::Known;
-pub(crate) use tree::{Element, Translation};
+pub(crate) use tree::Element;
 
 use crate::diagnostic::Report;
-use crate::source::Source;
+use crate::source::{Source, Translation};
+
+/// Maximum length of a line that is written, where words allow it.
+pub(crate) const WIDTH: usize = 116;
 
 /// Extensions of files in the compact form.
 pub(crate) const EXTENSIONS: [&str; 2] = ["csd", "cjsidl"];

@@ -3,6 +3,7 @@
 use roxmltree::{Document, Node as Xml, ParsingOptions};
 
 use crate::grammar::{self, Edition};
+use crate::source::Translation;
 
 /// Name of a reference in the compact form, which does not say what it refers to.
 pub(super) const REFERENCE: &str = "declared_";
@@ -237,25 +238,6 @@ fn of_xml(xml: Xml<'_, '_>, depth: usize) -> Result<Element, (usize, String)> {
     Ok(element)
 }
 
-/// The XML of a text in the compact form.
-#[derive(Debug)]
-pub(crate) struct Translation {
-    pub(crate) xml: String,
-    /// Offsets in the XML, in order, each with the offset in the compact text that it comes from.
-    places: Vec<(u32, u32)>,
-}
-
-impl Translation {
-    /// The offset in the compact text of an offset in the XML.
-    pub(crate) fn origin(&self, offset: usize) -> usize {
-        let after = self
-            .places
-            .partition_point(|(xml, _)| *xml as usize <= offset);
-        let place = after.checked_sub(1).and_then(|it| self.places.get(it));
-        place.map_or(0, |(_, origin)| *origin as usize)
-    }
-}
-
 #[derive(Default)]
 struct Writer {
     text: String,
@@ -270,10 +252,7 @@ impl Writer {
     }
 
     fn translation(self) -> Translation {
-        Translation {
-            xml: self.text,
-            places: self.places,
-        }
+        Translation::new(self.text, self.places)
     }
 
     fn comments(&mut self, comments: &[String]) {

@@ -4,13 +4,13 @@
 //! cannot say is added as an amendment (`//@ …`), or the construct is written as XML in `/*@ … */`:
 //! the JAUS Tool Set takes both for comments.
 
+use super::WIDTH;
 use super::amendments::amendments;
 use super::cursor::{Cursor, Place, Read};
 use super::lexer::{Fault, Kind, quoted};
 use super::machines::{flat, nested};
 use super::tree::{Element, REFERENCE};
 use super::write_machines::explained;
-use crate::format::WIDTH;
 
 /// A construct that the compact form cannot say.
 pub(super) struct Inexpressible;

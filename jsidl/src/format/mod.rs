@@ -17,7 +17,7 @@ use crate::source::Sources;
 use crate::syntax;
 
 /// Maximum line length, where words allow it.
-pub const WIDTH: usize = 116;
+pub const WIDTH: usize = compact::WIDTH;
 
 /// Formats a definition. `name` is its name in findings.
 ///
