@@ -25,7 +25,7 @@ use super::definitions::{load, load_strictly, own_findings, own_services, style}
     jaus jsidl check --json my-services/ | jq .message\n  \
     git show HEAD:Lights.xml | jaus jsidl check -")]
 pub(crate) struct Arguments {
-    /// JSIDL files, and directories with `.xml` files; - is standard input
+    /// JSIDL files, and directories with `.xml`, `.csd` or `.cjsidl` files; - is standard input
     ///
     /// They are checked together and may refer to each other, and to the built-in definitions.
     #[arg(required = true, value_name = "PATH")]

@@ -24,7 +24,7 @@ use super::sources;
     auto octets = jaus::codec::encode(pose);\n\n\
     Exit status: 0 written; 1 not written, because a definition has errors; 2 not written.")]
 pub(crate) struct Arguments {
-    /// JSIDL files, and directories with `.xml` files; without any, the built-in definitions
+    /// JSIDL files, and directories with `.xml`, `.csd` or `.cjsidl` files; without any, the built-in definitions
     #[arg(value_name = "PATH")]
     paths: Vec<PathBuf>,
 

@@ -24,7 +24,7 @@ use super::definitions::{complain, load, own_findings};
     jaus jsidl diff --json released-services/ my-services/ | jq 'select(.wire)'\n  \
     git show v1.0:Lights.xml | jaus jsidl diff - Lights.xml")]
 pub(crate) struct Arguments {
-    /// A JSIDL file, or a directory with `.xml` files; - is standard input
+    /// A JSIDL file, or a directory with `.xml`, `.csd` or `.cjsidl` files; - is standard input
     #[arg(value_name = "OLD")]
     old: PathBuf,
 

@@ -21,7 +21,7 @@ use super::sources::{self, Sources};
     jaus jsidl docs my-services/ -o docs/services --markdown\n\n\
     Exit status: 0 written; 1 written, without the definitions that have errors; 2 not written.")]
 pub(crate) struct Arguments {
-    /// JSIDL files, and directories with `.xml` files; without any, the built-in definitions
+    /// JSIDL files, and directories with `.xml`, `.csd` or `.cjsidl` files; without any, the built-in definitions
     ///
     /// Includes pages of the built-in services that yours inherit from.
     #[arg(value_name = "PATH")]

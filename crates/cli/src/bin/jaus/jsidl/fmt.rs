@@ -27,7 +27,7 @@ const NAMESPACE: &str = "urn:jaus:jsidl:";
     jaus jsidl fmt --strict my-services/\n  \
     jaus jsidl fmt - < Lights.xml")]
 pub(crate) struct Arguments {
-    /// JSIDL files, and directories with `.xml` files; - formats standard input to standard output
+    /// JSIDL files, and directories with `.xml`, `.csd` or `.cjsidl` files; - formats standard input to standard output
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
 
@@ -62,7 +62,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         } else if path.is_dir() {
             let files = jsidl::definition_files(path).map_err(Failure::new)?;
             if files.is_empty() {
-                say(format_args!("{} has no `.xml` files", path.display()));
+                say(format_args!("{} has no definitions", path.display()));
             }
             for file in files {
                 run.file(&file, true)?;

@@ -28,7 +28,7 @@ const FILE: &str = "jaus.lua";
     For ports other than 3794: Wireshark's Decode As, or tshark -d udp.port==5000,jaus\n\n\
     Exit status: 0 written; 1 written, without the definitions that have errors; 2 not written.")]
 pub(crate) struct Arguments {
-    /// JSIDL files, and directories with `.xml` files
+    /// JSIDL files, and directories with `.xml`, `.csd` or `.cjsidl` files
     #[arg(required_if_eq("only", "true"), value_name = "PATH")]
     paths: Vec<PathBuf>,
 

@@ -31,7 +31,7 @@ use super::sources::{self, Sources};
     }\n\n\
     Exit status: 0 written; 1 not written, because a definition has errors; 2 not written.")]
 pub(crate) struct Arguments {
-    /// JSIDL files, and directories with `.xml` files
+    /// JSIDL files, and directories with `.xml`, `.csd` or `.cjsidl` files
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
 

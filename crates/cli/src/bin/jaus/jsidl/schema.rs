@@ -22,7 +22,7 @@ use super::sources::{self, Sources};
     check-jsonschema --schemafile schemas/core.Discovery.1.1.schema.json line.json\n\n\
     Exit status: 0 written; 1 written, without the definitions that have errors; 2 not written.")]
 pub(crate) struct Arguments {
-    /// JSIDL files, and directories with `.xml` files; without any, the built-in definitions
+    /// JSIDL files, and directories with `.xml`, `.csd` or `.cjsidl` files; without any, the built-in definitions
     #[arg(value_name = "PATH")]
     paths: Vec<PathBuf>,
 
