@@ -1,4 +1,4 @@
-// The README's component: reports its speed to queries and subscriptions, until Ctrl-C.
+// The README's speed sensor: reports its speed to queries and subscriptions, until Ctrl-C.
 
 #include "jaus/mobility.hpp"
 #include <jaus.hpp>

@@ -1,4 +1,4 @@
-//! The README's component in each language but Rust, whose example has a test of its own.
+//! The README's sensor in each language but Rust, whose example has a test of its own.
 
 use jaus::component::{Component, Kind};
 use jaus::messages::mobility::{QueryVelocityState, velocity_state_sensor};
