@@ -82,8 +82,8 @@ impl HeldControl {
         Some(reason)
     }
 
-    /// Tells of the states that the peer reports, and returns why control was lost; `None` when it was given
-    /// up.
+    /// Calls `tell` with each state that the peer reports. Returns why control was lost; `None` when it was
+    /// given up.
     pub async fn follow(&self, tell: impl Fn(Option<u8>) + Send) -> Option<ControlError> {
         /// How long it keeps a reference. Control is released with the last one.
         const MOMENT: Duration = Duration::from_millis(100);

@@ -9,7 +9,7 @@ use tokio::task::AbortHandle;
 /// The address of no component.
 pub const NOBODY: JausId = JausId::new(0, 0, 0);
 
-/// Tells of each change of the component's standing. On a runtime.
+/// Calls `tell` after each change of the component's standing. On a runtime.
 pub fn follow_standing(
     component: &Component,
     tell: impl Fn(&Standing) + Send + 'static,
@@ -24,7 +24,7 @@ pub fn follow_standing(
     tokio::runtime::Handle::current().spawn(task).abort_handle()
 }
 
-/// Tells of components that are found (`true`) and lost. On a runtime.
+/// Calls `tell` when a component is found (`true`) or lost. On a runtime.
 pub fn follow_discovery(
     component: &Component,
     tell: impl Fn(JausId, bool) + Send + 'static,
@@ -57,7 +57,7 @@ pub enum Step {
     Stopped,
 }
 
-/// Tells of each step of a subscription, until it ends.
+/// Calls `tell` with each step of a subscription, until it ends.
 pub async fn follow_reports(
     mut reports: Subscription<Undecoded>,
     tell: impl Fn(&Subscription<Undecoded>, Step) + Send,

@@ -18,7 +18,7 @@ pub struct Publications(Mutex<State>);
 struct State {
     /// By the code of the report.
     reports: BTreeMap<u16, Report>,
-    /// Queries whose subscribers are to be told that the answer has changed.
+    /// Queries with a changed answer, of which the subscribers are not notified yet.
     changed: BTreeSet<u16>,
 }
 

@@ -45,7 +45,7 @@ impl Sink {
         }
     }
 
-    /// Tells of a message for a service.
+    /// Passes on a message for a service.
     pub(crate) fn tell_message(&self, event: Event) {
         match self {
             Self::Callback(callback) => callback.tell(&event),
@@ -53,7 +53,7 @@ impl Sink {
         }
     }
 
-    /// Tells of a command of a service.
+    /// Passes on a command for a service.
     pub(crate) fn tell_command(&self, service: ServiceKey, event: Event) {
         match self {
             Self::Callback(callback) => callback.tell(&event),

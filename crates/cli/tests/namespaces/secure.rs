@@ -1,4 +1,4 @@
-//! Secure nodes on two hosts that find each other by beacons alone.
+//! Secure nodes on two hosts: by two commands on each, and by beacons alone.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -117,6 +117,35 @@ fn hex(octets: &[u8]) -> String {
     octets.iter().map(|octet| format!("{octet:02x}")).collect()
 }
 
+/// Pings the vehicle from the operator's host until it answers.
+fn reach(hosts: &TwoHosts, flags: &[String]) -> Lines {
+    let mut ping = hosts.command(OPERATOR, JAUS);
+    ping.args(["ping", "101.1.1", "--id", "60.1.1", "--json"]);
+    let ping = Lines::of(ping.args(["--with", "identification"]).args(flags));
+    ping.wait_for(|line| {
+        let query: serde_json::Value = serde_json::from_str(line).unwrap();
+        query["ms"].is_number()
+    });
+    ping
+}
+
+#[test]
+fn two_commands_on_each_of_two_hosts_give_a_vehicle_and_an_operator() {
+    on_two_hosts(|hosts| {
+        let [at_vehicle, at_operator] = [(), ()].map(|()| Keys(tempfile::tempdir().unwrap()));
+        let (vehicle_key, operator_key) = (at_vehicle.run(&["new"]), at_operator.run(&["new"]));
+
+        let mut vehicle = hosts.command(VEHICLE, JAUS);
+        vehicle.args(["vehicle", "--id", "101.1.1", "--secure-listen"]);
+        vehicle.arg(format!("--trust=operator {operator_key} 60.255.255"));
+        let _vehicle = VehicleProcess::start(vehicle.args(at_vehicle.flags()));
+
+        let peer = "--secure-peer=10.213.77.1".to_owned();
+        let trust = format!("--trust=rover {vehicle_key} 101.255.255");
+        let _ping = reach(hosts, &[&[peer, trust][..], &at_operator.flags()].concat());
+    });
+}
+
 #[test]
 fn a_vehicle_and_an_operator_find_each_other_by_beacons_that_expose_no_ids() {
     if !has_tshark() {
@@ -130,14 +159,8 @@ fn a_vehicle_and_an_operator_find_each_other_by_beacons_that_expose_no_ids() {
         vehicle.args(["vehicle", "--id", "101.1.1", "--secure-listen"]);
         vehicle.arg("--secure-announce").args(at_vehicle.flags());
         let _vehicle = VehicleProcess::start(&mut vehicle);
-        let mut ping = hosts.command(OPERATOR, JAUS);
-        ping.args(["ping", "101.1.1", "--id", "60.1.1", "--json"]);
-        ping.args(["--with", "identification", "--secure-announce=jaus0"]);
-        let ping = Lines::of(ping.args(at_operator.flags()));
-        ping.wait_for(|line| {
-            let query: serde_json::Value = serde_json::from_str(line).unwrap();
-            query["ms"].is_number()
-        });
+        let announce = ["--secure-announce=jaus0".to_owned()];
+        let _ping = reach(hosts, &[&announce[..], &at_operator.flags()].concat());
 
         for source in ["10.213.77.1", "10.213.77.2"] {
             captured
