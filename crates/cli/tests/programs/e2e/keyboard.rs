@@ -74,6 +74,8 @@ pub(crate) fn run(_: &System, page: &mut Browser) {
     page.type_keys("4.5");
     tab_to(page, "#destination-y");
     page.type_keys("1.5");
+    tab_to(page, "#destination-speed");
+    page.type_keys("0.2");
     enter(page, "#plan");
     page.wait("!document.querySelector('#approve').disabled");
     enter(page, "#approve");
