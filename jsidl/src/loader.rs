@@ -70,8 +70,8 @@ impl Loader {
         if path.is_dir() {
             let found = Listing::of(path);
             if found.files.is_empty() && found.unreadable.is_empty() {
-                let message = "this directory has no `.xml` files: service definitions are files \
-                    with that extension";
+                let message = "this directory has no service definitions: their files end in \
+                    `.xml`, `.csd` or `.cjsidl`";
                 self.unreadable(path, message);
             }
             for (path, reason) in found.unreadable {

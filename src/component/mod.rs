@@ -80,6 +80,7 @@ mod directories;
 mod driver;
 mod error;
 mod feed;
+mod find;
 mod group;
 mod handle;
 mod list;

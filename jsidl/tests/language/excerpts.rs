@@ -27,8 +27,8 @@ fn a_directory_without_services_is_shown() {
     let (said, place) = text.split_once('\n').unwrap_or_default();
     assert_eq!(
         said,
-        "error: this directory has no `.xml` files: service definitions are files with that \
-         extension"
+        "error: this directory has no service definitions: their files end in `.xml`, `.csd` or \
+         `.cjsidl`"
     );
     assert!(place.contains("no-services"), "{place}");
 }

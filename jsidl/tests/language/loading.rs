@@ -322,7 +322,7 @@ fn what_cannot_be_read_is_a_finding() {
         found[1..],
         [
             "the file is not UTF-8 at octet 3: convert it",
-            "this directory has no `.xml` files: service definitions are files with that extension"
+            "this directory has no service definitions: their files end in `.xml`, `.csd` or `.cjsidl`"
         ]
     );
 }
