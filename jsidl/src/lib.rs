@@ -35,6 +35,7 @@ mod expr;
 mod fingerprint;
 pub mod format;
 mod grammar;
+mod layout;
 mod library;
 mod listing;
 mod loader;

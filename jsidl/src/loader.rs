@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::catalogue;
 use crate::compact::{self, Known};
 use crate::diagnostic::{Diagnostics, Report};
-use crate::format;
+use crate::layout;
 use crate::library::Library;
 use crate::listing::Listing;
 use crate::resolve::resolve;
@@ -131,7 +131,7 @@ impl Loader {
         let places = self.translate();
         let documents = places.into_iter().map(|place| {
             let source = self.sources.at(place);
-            (source.path().to_owned(), format::document(source.xml()))
+            (source.path().to_owned(), layout::document(source.xml()))
         });
         (documents.collect(), self.report.finish(&self.sources))
     }

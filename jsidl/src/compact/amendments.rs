@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::tree::{Element, REFERENCE};
-use super::write_fields::greatest;
+use super::words::greatest;
 
 /// Values that an attribute has if it is absent.
 const DEFAULTS: [(&str, &str); 6] = [

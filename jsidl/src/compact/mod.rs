@@ -18,6 +18,7 @@ mod words;
 mod write;
 mod write_fields;
 mod write_machines;
+mod writer;
 
 use std::path::Path;
 
@@ -26,9 +27,6 @@ pub(crate) use tree::Element;
 
 use crate::diagnostic::Report;
 use crate::source::{Source, Translation};
-
-/// Maximum length of a line that is written, where words allow it.
-pub(crate) const WIDTH: usize = 116;
 
 /// Extensions of files in the compact form.
 pub(crate) const EXTENSIONS: [&str; 2] = ["csd", "cjsidl"];

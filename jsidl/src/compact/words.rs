@@ -131,3 +131,9 @@ pub(super) const fn presence(optional: usize) -> &'static str {
 /// Ending of a reference's name in the compact form if it would have the name of its type, which
 /// the JAUS Tool Set's editor cannot tell apart.
 pub(super) const SAME_NAME: &str = "_8A27vDR";
+
+/// The greatest number of an unsigned type.
+pub(super) fn greatest(kind: &str) -> u64 {
+    let known = UNSIGNED.iter().find(|(name, _)| *name == kind);
+    known.map_or(u64::MAX, |(_, greatest)| *greatest)
+}

@@ -4,18 +4,12 @@
 //! cannot say is added as an amendment (`//@ …`), or the construct is written as XML in `/*@ … */`:
 //! the JAUS Tool Set takes both for comments.
 
-use super::WIDTH;
 use super::amendments::amendments;
 use super::cursor::{Cursor, Place, Read};
 use super::lexer::{Fault, Kind, quoted};
 use super::machines::{flat, nested};
 use super::tree::{Element, REFERENCE};
-use super::write_machines::explained;
-
-/// A construct that the compact form cannot say.
-pub(super) struct Inexpressible;
-
-pub(super) type Written<T> = Result<T, Inexpressible>;
+use super::writer::{Inexpressible, Writer, Written, explained, tag};
 
 /// Constructs that have no interpretation in the public grammar.
 const UNEXPLAINED: [&str; 7] = [
@@ -128,20 +122,7 @@ fn references_last(element: &mut Element) {
     element.children.iter_mut().for_each(references_last);
 }
 
-#[derive(Default)]
-pub(super) struct Writer {
-    pub(super) text: String,
-}
-
 impl Writer {
-    pub(super) fn line(&mut self, indent: usize, line: &str) {
-        if !line.is_empty() {
-            self.text.extend(std::iter::repeat_n(' ', indent));
-            self.text.push_str(line);
-        }
-        self.text.push('\n');
-    }
-
     /// Writes a construct with everything that precedes it.
     pub(super) fn item(&mut self, element: &Element, place: Place, indent: usize) -> Written<()> {
         let kept = self.text.len();
@@ -161,44 +142,12 @@ impl Writer {
         let mut bare = element.clone();
         bare.comments.clear();
         flat(&mut bare);
-        let part = crate::format::part(&bare.to_part());
+        let part = crate::layout::part(&bare.to_part());
         self.line(indent, "/*@");
         for line in part.lines() {
             self.line(indent, line);
         }
         self.line(indent, "*/");
-    }
-
-    pub(super) fn comments(&mut self, comments: &[String], indent: usize) {
-        for line in comments.iter().flat_map(|it| it.lines()) {
-            let line = line.trim();
-            if !line.is_empty() {
-                // `//@` would be an amendment.
-                self.line(indent, &format!("// {line}"));
-            }
-        }
-    }
-
-    /// Writes an interpretation on lines of its own.
-    fn interpretation(&mut self, element: &Element, indent: usize) {
-        let text = element.value("interpretation");
-        if text.is_empty() || text.contains("##") || text.starts_with('#') || text.ends_with('#') {
-            return;
-        }
-        let words = format!("##{text}##");
-        let mut line = String::new();
-        for word in words.split(' ') {
-            if !line.is_empty() && indent + line.chars().count() + 1 + word.chars().count() > WIDTH
-            {
-                self.line(indent, &line);
-                line.clear();
-            }
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-        self.line(indent, &line);
     }
 
     fn compose(&mut self, element: &Element, place: Place, indent: usize) -> Written<()> {
@@ -391,14 +340,6 @@ fn hollow(element: &Element) -> Option<Element> {
         children: element.children.iter().filter(own).cloned().collect(),
         ..Element::default()
     })
-}
-
-/// What a variant writes before an alternative.
-pub(super) fn tag(element: &Element, place: Place) -> String {
-    match place {
-        Place::Alternative => format!("vtag: {}", explained(element)),
-        _ => String::new(),
-    }
 }
 
 /// The name of a reference: not the name of its type.

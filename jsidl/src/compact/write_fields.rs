@@ -3,8 +3,7 @@
 use super::cursor::Place;
 use super::tree::Element;
 use super::words;
-use super::write::{Inexpressible, Writer, Written, tag};
-use crate::model::Unsigned;
+use super::writer::{Inexpressible, Writer, Written, tag};
 
 impl Writer {
     pub(super) fn field(&mut self, element: &Element, place: Place, indent: usize) -> Written<()> {
@@ -233,14 +232,9 @@ fn explanation(element: &Element) -> String {
 fn ends(count: &Element) -> (String, String) {
     let least = count.attribute("min_count").map_or("0", |it| &it.value);
     let most = count.attribute("max_count").map(|it| it.value.clone());
-    let most = most.unwrap_or_else(|| greatest(count.value("field_type_unsigned")).to_string());
+    let most =
+        most.unwrap_or_else(|| words::greatest(count.value("field_type_unsigned")).to_string());
     (least.to_owned(), most)
-}
-
-/// The greatest number of an unsigned type.
-pub(super) fn greatest(kind: &str) -> u64 {
-    let known = words::UNSIGNED.iter().find(|(name, _)| *name == kind);
-    known.map_or(Unsigned::U64.max(), |(_, greatest)| *greatest)
 }
 
 fn limits(count: &Element) -> String {

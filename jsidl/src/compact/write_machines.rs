@@ -4,7 +4,7 @@ use super::cursor::Place;
 use super::machines::TARGETS;
 use super::tree::Element;
 use super::words;
-use super::write::{Inexpressible, Writer, Written};
+use super::writer::{Inexpressible, Writer, Written, explained};
 
 impl Writer {
     /// Writes an element of protocol behaviour; `false` if it is none.
@@ -149,14 +149,6 @@ impl Writer {
             }
         }
         Ok(())
-    }
-}
-
-/// An interpretation within a line, before a blank.
-pub(super) fn explained(element: &Element) -> String {
-    match element.value("interpretation") {
-        text if text.is_empty() || text.contains('#') => String::new(),
-        text => format!("##{text}## "),
     }
 }
 

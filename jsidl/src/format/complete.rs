@@ -3,8 +3,8 @@
 
 use std::borrow::Cow;
 
-use super::read::{Attribute, Content, Element, Kind, Node};
 use crate::grammar::{self, Edition, Occurs};
+use crate::layout::{Attribute, Content, Element, Kind, Node};
 
 /// Values of mandatory attributes that published definitions leave out.
 const DEFAULTS: [(&str, &str); 4] = [

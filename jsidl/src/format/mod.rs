@@ -6,18 +6,17 @@
 //! [`compact()`] brings XML into it, and [`Loader::xml`](crate::Loader::xml) back.
 
 mod complete;
-mod read;
-mod write;
 
 use std::path::Path;
 
 use crate::compact;
 use crate::diagnostic::{Diagnostics, Report};
+use crate::layout::{self, Node, nodes};
 use crate::source::Sources;
 use crate::syntax;
 
 /// Maximum line length, where words allow it.
-pub const WIDTH: usize = compact::WIDTH;
+pub const WIDTH: usize = layout::WIDTH;
 
 /// Formats a definition. `name` is its name in findings.
 ///
@@ -120,20 +119,10 @@ pub fn compact(name: impl AsRef<Path>, text: &str) -> Result<String, Diagnostics
     }
 }
 
-/// An XML text that is known to be well-formed, in the canonical layout.
-pub(crate) fn document(xml: &str) -> String {
-    write::document(&read::nodes(xml))
-}
-
-/// As [`document`], without the first line.
-pub(crate) fn part(xml: &str) -> String {
-    write::part(&read::nodes(xml))
-}
-
 fn laid_out(
     name: &Path,
     text: &str,
-    change: impl FnOnce(&mut [read::Node<'_>]),
+    change: impl FnOnce(&mut [Node<'_>]),
 ) -> Result<String, Diagnostics> {
     if compact::is_compact(name, text) {
         return compact(name, text);
@@ -144,7 +133,7 @@ fn laid_out(
     if !syntax::is_definition(source, &mut report) {
         return Err(report.finish(&sources));
     }
-    let mut nodes = read::nodes(source.text());
+    let mut nodes = nodes(source.text());
     change(&mut nodes);
-    Ok(write::document(&nodes))
+    Ok(layout::written(&nodes))
 }

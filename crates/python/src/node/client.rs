@@ -8,15 +8,15 @@ use jaus::codec::report_code;
 use jaus::component::{Component, QueryOptions, When};
 use jaus::node::now;
 use jaus::service::{Topic, code_of};
-use jaus::wire::Priority;
+
 use jaus_binding::{HeldControl, Step, follow_reports};
 use pyo3::prelude::*;
 
-use super::component::Life;
-use super::control::Control;
+use super::control::{Control, priority};
 use super::event::{Answer, Event};
 use super::failure::Failure;
 use super::id::{JausId, id_of, one_component};
+use super::life::Life;
 use super::program::{Begun, Shared};
 
 /// A component as a client. The Python class `jaus.Component` uses it.
@@ -29,20 +29,6 @@ pub(crate) struct Client {
 fn limit(seconds: f64) -> Result<Duration, Failure> {
     let limit = Duration::try_from_secs_f64(seconds);
     limit.map_err(|_| Failure::argument(format!("a time limit of {seconds} s: give seconds")))
-}
-
-pub(crate) fn priority(name: &str) -> Result<Priority, Failure> {
-    Ok(match name {
-        "low" => Priority::Low,
-        "standard" => Priority::Standard,
-        "high" => Priority::High,
-        "safety-critical" => Priority::SafetyCritical,
-        _ => {
-            return Err(Failure::argument(format!(
-                "priority {name:?}: choose \"low\", \"standard\", \"high\" or \"safety-critical\""
-            )));
-        }
-    })
 }
 
 /// The code of the report that answers a query: as given, or by the standard's numbers.

@@ -1,7 +1,7 @@
 //! Components: description, start, publications, end.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
 
 use bytes::Bytes;
 use jaus::codec::{ServiceId, report_code};
@@ -10,7 +10,7 @@ use jaus::component::{
     Validity,
 };
 use jaus_binding::{
-    Attended, Publications, Running, ServiceKey, follow_discovery, follow_standing, kind, lock,
+    Attended, Publications, Running, ServiceKey, follow_discovery, follow_standing, kind,
     service_id,
 };
 use pyo3::prelude::*;
@@ -20,7 +20,8 @@ use super::client::Client;
 use super::event::{Answer, Event};
 use super::failure::Failure;
 use super::id::JausId;
-use super::program::{Program, Shared, number};
+use super::life::{Draft, Guard, Item, Life, Live, ServiceDraft};
+use super::program::{Shared, number};
 use super::settings::Node;
 
 /// A component. The Python class `jaus.Component` uses it.
@@ -31,54 +32,6 @@ pub(crate) struct Component {
     /// How often it has been stopped.
     stops: Arc<AtomicU64>,
     life: Life,
-}
-
-/// The life of a component, for all that use it: none of them keeps it alive.
-#[derive(Clone)]
-pub(crate) struct Life(Arc<Mutex<Stage>>);
-
-enum Stage {
-    Draft(Box<Draft>),
-    Starts,
-    Runs(Live),
-    Ended,
-}
-
-struct Live {
-    program: Arc<Program>,
-    running: Running,
-    notices: Vec<AbortHandle>,
-}
-
-struct Draft {
-    number: u8,
-    kind: u16,
-    name: String,
-    guard: Guard,
-    services: Vec<ServiceDraft>,
-    on_stop: Option<Py<PyAny>>,
-}
-
-#[derive(Clone, Copy)]
-enum Guard {
-    None,
-    AccessControl(AccessControl),
-    Management(Management),
-}
-
-struct ServiceDraft {
-    id: ServiceId,
-    items: Vec<Item>,
-}
-
-/// A part of a service.
-#[derive(Clone, Copy)]
-enum Item {
-    Publish(u16, u16),
-    Decline(u16),
-    Receive(u16, u64),
-    Configure(u16, u64),
-    Command(u16, Validity, u64),
 }
 
 #[pymethods]
@@ -124,7 +77,7 @@ impl Component {
             key: ServiceKey::new(),
             publications: Arc::default(),
             stops: Arc::default(),
-            life: Life(Arc::new(Mutex::new(Stage::Draft(Box::new(draft))))),
+            life: Life::new(draft),
         })
     }
 
@@ -200,13 +153,13 @@ impl Component {
 
     /// Sets the function that stops what commands have started. It must not raise.
     fn on_stop(&self, function: Py<PyAny>) -> Result<(), Failure> {
-        self.edit(|draft| draft.on_stop = Some(function))
+        self.life.edit(|draft| draft.on_stop = Some(function))
     }
 
     /// Starts the component on a node: a request.
     fn start(&self, py: Python<'_>, node: &Bound<'_, Node>) -> Result<u64, Failure> {
         let program = node.get().program()?;
-        let draft = self.take_draft()?;
+        let draft = self.life.take_draft()?;
         if let Some(function) = &draft.on_stop {
             let stopper = &program.shared.stopper;
             stopper.add(self.key.number(), function.clone_ref(py));
@@ -220,30 +173,25 @@ impl Component {
             let running = match started {
                 Ok(running) => running,
                 Err(error) => {
-                    *lock(&life.0) = Stage::Ended;
+                    life.end();
                     shared.stopper.settle(subject).await;
                     return Err((&error).into());
                 }
             };
             let notices = follow(running.component(), subject, &shared);
             let id = running.component().id();
-            let mut stage = lock(&life.0);
-            // It may have been closed meanwhile.
-            if matches!(*stage, Stage::Starts) {
-                *stage = Stage::Runs(Live {
-                    program: live_program,
-                    running,
-                    notices,
-                });
-            }
+            life.begin(Live {
+                program: live_program,
+                running,
+                notices,
+            });
             Ok(Answer::Id(id))
         })
     }
 
     /// Ends the component: a request, or `None` if it does not run.
     fn close(&self) -> Result<Option<u64>, Failure> {
-        let stage = std::mem::replace(&mut *lock(&self.life.0), Stage::Ended);
-        let Stage::Runs(live) = stage else {
+        let Some(live) = self.life.end() else {
             return Ok(None);
         };
         let Live {
@@ -325,28 +273,6 @@ impl Component {
 }
 
 impl Component {
-    fn edit<T>(&self, change: impl FnOnce(&mut Draft) -> T) -> Result<T, Failure> {
-        match &mut *lock(&self.life.0) {
-            Stage::Draft(draft) => Ok(change(draft)),
-            _ => Err(Failure::new(
-                "StateError",
-                "the component was started: describe it before",
-            )),
-        }
-    }
-
-    fn take_draft(&self) -> Result<Draft, Failure> {
-        let mut stage = lock(&self.life.0);
-        match std::mem::replace(&mut *stage, Stage::Starts) {
-            Stage::Draft(draft) => Ok(*draft),
-            other => {
-                *stage = other;
-                let text = "a component is started once: create a new one";
-                Err(Failure::new("StateError", text))
-            }
-        }
-    }
-
     /// Adds to the service with this URN. The highest version that is given counts.
     fn add(
         &self,
@@ -359,7 +285,7 @@ impl Component {
         let id = service_id(urn, major, minor);
         let id = id.map_err(|error| Failure::of("LimitError", &error))?;
         let item = item(id)?;
-        self.edit(|draft| {
+        self.life.edit(|draft| {
             let services = &mut draft.services;
             if let Some(service) = services.iter_mut().find(|it| it.id.urn == urn) {
                 service.id = service.id.max(id);
@@ -443,23 +369,6 @@ impl Component {
             stops.fetch_add(1, Ordering::SeqCst);
             stopper.stop(subject);
         })
-    }
-}
-
-impl Life {
-    /// The component that runs.
-    pub(crate) fn running(&self) -> Result<(Arc<Program>, Runs), Failure> {
-        match &*lock(&self.0) {
-            Stage::Runs(live) if live.program.thread.is_of_other_process() => {
-                Err(Failure::forked("component"))
-            }
-            Stage::Runs(live) => Ok((live.program.clone(), live.running.component().clone())),
-            Stage::Draft(_) | Stage::Starts => Err(Failure::new(
-                "StateError",
-                "the component does not run: use `async with`, or await its start()",
-            )),
-            Stage::Ended => Err(Failure::closed("component")),
-        }
     }
 }
 

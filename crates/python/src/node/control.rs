@@ -3,14 +3,13 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use jaus::component;
+use jaus::component::{self, Priority};
 use jaus_binding::{HeldControl, NotUsed};
 use pyo3::prelude::*;
 
-use super::client::priority;
-use super::component::Life;
 use super::event::Answer;
 use super::failure::Failure;
+use super::life::Life;
 use super::program::Begun;
 
 /// Control of a peer. The Python class `jaus.Control` uses it.
@@ -19,6 +18,21 @@ pub(crate) struct Control {
     life: Life,
     held: Arc<HeldControl>,
     number: u64,
+}
+
+/// The priority of a message, by its name.
+pub(crate) fn priority(name: &str) -> Result<Priority, Failure> {
+    Ok(match name {
+        "low" => Priority::Low,
+        "standard" => Priority::Standard,
+        "high" => Priority::High,
+        "safety-critical" => Priority::SafetyCritical,
+        _ => {
+            return Err(Failure::argument(format!(
+                "priority {name:?}: choose \"low\", \"standard\", \"high\" or \"safety-critical\""
+            )));
+        }
+    })
 }
 
 /// Why control was released.

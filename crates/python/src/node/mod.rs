@@ -14,6 +14,7 @@ mod control;
 mod event;
 mod failure;
 mod id;
+mod life;
 mod log;
 mod program;
 mod settings;

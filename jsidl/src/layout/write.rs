@@ -1,7 +1,7 @@
 //! Writes nodes in the canonical layout.
 
 use super::WIDTH;
-use super::read::{Attribute, Content, Element, Kind, Node};
+use super::nodes::{Attribute, Content, Element, Kind, Node};
 
 /// The order of attributes: name, kind, limits. Others follow in document order, then the
 /// interpretation and the namespaces.
@@ -55,7 +55,7 @@ const INLINE: &[&str] = &["action", "send_action", "simple", "push", "pop"];
 const CONTINUED: usize = 4;
 
 /// A whole document.
-pub(super) fn document(nodes: &[Node<'_>]) -> String {
+pub(crate) fn document(nodes: &[Node<'_>]) -> String {
     let mut writer = Writer {
         text: "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n".to_owned(),
     };
@@ -64,7 +64,7 @@ pub(super) fn document(nodes: &[Node<'_>]) -> String {
 }
 
 /// Nodes that are not a whole document.
-pub(super) fn part(nodes: &[Node<'_>]) -> String {
+pub(crate) fn part(nodes: &[Node<'_>]) -> String {
     let mut writer = Writer {
         text: String::new(),
     };

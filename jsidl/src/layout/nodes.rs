@@ -7,16 +7,16 @@ use std::borrow::Cow;
 
 /// A child of an element or of the document.
 #[derive(Debug)]
-pub(super) struct Node<'t> {
-    pub(super) kind: Kind<'t>,
+pub(crate) struct Node<'t> {
+    pub(crate) kind: Kind<'t>,
     /// Whether a blank line precedes it.
-    pub(super) apart: bool,
+    pub(crate) apart: bool,
     /// Whether it starts on the last line of its predecessor.
-    pub(super) same_line: bool,
+    pub(crate) same_line: bool,
 }
 
 #[derive(Debug)]
-pub(super) enum Kind<'t> {
+pub(crate) enum Kind<'t> {
     Element(Element<'t>),
     /// With its `<!--` and `-->`.
     Comment(&'t str),
@@ -25,21 +25,21 @@ pub(super) enum Kind<'t> {
 }
 
 #[derive(Debug)]
-pub(super) struct Element<'t> {
+pub(crate) struct Element<'t> {
     /// With its prefix.
-    pub(super) name: Cow<'t, str>,
-    pub(super) attributes: Vec<Attribute<'t>>,
-    pub(super) content: Content<'t>,
+    pub(crate) name: Cow<'t, str>,
+    pub(crate) attributes: Vec<Attribute<'t>>,
+    pub(crate) content: Content<'t>,
 }
 
 impl Element<'_> {
     /// The name without its prefix.
-    pub(super) fn local_name(&self) -> &str {
+    pub(crate) fn local_name(&self) -> &str {
         self.name.rsplit(':').next().unwrap_or(&self.name)
     }
 
     /// The prefix with its colon; empty if there is none.
-    pub(super) fn prefix(&self) -> String {
+    pub(crate) fn prefix(&self) -> String {
         let length = self.name.len() - self.local_name().len();
         self.name[..length].to_owned()
     }
@@ -47,21 +47,21 @@ impl Element<'_> {
 
 /// As written: character references are not expanded.
 #[derive(Debug)]
-pub(super) struct Attribute<'t> {
-    pub(super) name: &'t str,
-    pub(super) value: &'t str,
-    pub(super) quote: char,
+pub(crate) struct Attribute<'t> {
+    pub(crate) name: &'t str,
+    pub(crate) value: &'t str,
+    pub(crate) quote: char,
 }
 
 #[derive(Debug)]
-pub(super) enum Content<'t> {
+pub(crate) enum Content<'t> {
     Nodes(Vec<Node<'t>>),
     /// Everything between the tags, if that includes text.
     Text(&'t str),
 }
 
 /// The nodes of a whole text, without its XML declaration.
-pub(super) fn nodes(text: &str) -> Vec<Node<'_>> {
+pub(crate) fn nodes(text: &str) -> Vec<Node<'_>> {
     let mut reader = Reader { text, at: 0 };
     reader.nodes().0
 }
