@@ -170,7 +170,8 @@ async def test_a_stop_during_a_handler_is_repeated_after_it(
         stops = motor.stops
         control.send(set_effort(30))
         await until(lambda: motor.stops > stops)
-        assert motor.effort == 0 and motor.stops == stops + 2
+        # More often where the handler takes so long that the driver counts as hung.
+        assert motor.effort == 0 and motor.stops >= stops + 2
 
 
 async def test_a_stop_function_that_raises_is_logged(
