@@ -138,7 +138,12 @@ class Motor:
 
     def __init__(self) -> None:
         self.effort: float | None = 0.0
+        self.moves = 0
         self.stops = 0
+
+    def move(self, effort: float | None) -> None:
+        self.effort = effort
+        self.moves += 1
 
     def stop(self) -> None:
         self.effort = 0.0
@@ -151,7 +156,7 @@ def driver_of(
     """A primitive driver that is described, with a handler of its own or one that sets the effort."""
 
     def drive(effort: Any, _sender: jaus.JausId) -> None:
-        motor.effort = effort.propulsive_linear_effort_x_percent
+        motor.move(effort.propulsive_linear_effort_x_percent)
 
     driver = node.component(33, kind="vehicle", name="Rover", management=True)
     driver.command(SetWrenchEffort, **command)(function or drive)
