@@ -12,7 +12,7 @@ pub(super) struct ByName<'v>(pub(super) &'v Value);
 impl Serialize for ByName<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self.0 {
-            Value::Named(_, name) => serializer.serialize_str(name),
+            Value::Named(_, name) | Value::SignedNamed(_, name) => serializer.serialize_str(name),
             Value::List(values) => serializer.collect_seq(values.iter().map(ByName)),
             Value::Object(members) => {
                 let mut map = serializer.serialize_map(Some(members.len()))?;
