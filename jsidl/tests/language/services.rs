@@ -43,8 +43,8 @@ fn every_service_of_each_set_is_there() {
     for (set, versions) in [
         // 1.1, and 1.0 without List Manager.
         ("urn:jaus:jss:core:", 8 + 7),
-        // 1.1, and the layouts that were published before.
-        ("urn:jaus:jss:mobility:", 21 + 3),
+        // 1.1, 1.0 with its own List Manager, and a draft of acceleration.
+        ("urn:jaus:jss:mobility:", 21 + 15 + 1),
         // 2.0 and 1.0.
         ("urn:jaus:jss:environmentSensing:", 12 + 5),
         // 2.0, and 1.0 with one service under two names.
@@ -106,10 +106,52 @@ fn every_message_and_field_says_what_it_is_for() {
     }
 }
 
+const LIST_DRIVERS: &[&str] = &[
+    "mobility:GlobalPathSegmentDriver 1.0",
+    "mobility:GlobalWaypointListDriver 1.0",
+    "mobility:LocalPathSegmentDriver 1.0",
+    "mobility:LocalWaypointListDriver 1.0",
+];
+const EXECUTE_LIST: &[&str] = &["041E ExecuteList"];
+const WRENCH_EFFORT: &[&str] = &["0405 SetWrenchEffort", "4405 ReportWrenchEffort"];
+const VELOCITY_LIMITS: &[&str] = &[
+    "0415 SetVelocityCommand",
+    "0416 SetAccelerationLimit",
+    "4415 ReportVelocityCommand",
+    "4416 ReportAccelerationLimit",
+];
+
 /// Differences from a public service of the same name and version: the collection, the services,
 /// and all messages that differ in each of them. Our definition agrees with the other collections,
 /// or is as the comment says.
 const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
+    // The same octets. As in 1.1, the list is executed only for the client in control, efforts are
+    // percent, and the kinds of limits have shorter names.
+    ("fkie", LIST_DRIVERS, EXECUTE_LIST),
+    ("jts", LIST_DRIVERS, EXECUTE_LIST),
+    ("fkie", &["mobility:PrimitiveDriver 1.0"], WRENCH_EFFORT),
+    ("jts", &["mobility:PrimitiveDriver 1.0"], WRENCH_EFFORT),
+    (
+        "fkie",
+        &["mobility:VelocityStateDriver 1.0"],
+        VELOCITY_LIMITS,
+    ),
+    (
+        "jts",
+        &["mobility:VelocityStateDriver 1.0"],
+        VELOCITY_LIMITS,
+    ),
+    // Waypoints of the list drivers are only elements of their lists in another collection.
+    (
+        "fkie",
+        &["mobility:GlobalWaypointListDriver 1.0"],
+        &["040C SetGlobalWaypoint", "base"],
+    ),
+    (
+        "fkie",
+        &["mobility:LocalWaypointListDriver 1.0"],
+        &["040D SetLocalWaypoint", "base"],
+    ),
     // Two collections disagree on whether a vector's speed is optional.
     (
         "jts",
@@ -229,7 +271,7 @@ const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
     // older base: apparently a draft, because the other collections agree.
     (
         "fkie",
-        &["ugv:StabilizerDriver 1.0"],
+        &["ugv:StabilizerDriver 1.0", "ugv:StabilizerDriverClient 1.0"],
         &[
             "0503 SetStabilizerEffort",
             "0504 SetStabilizerPosition",
@@ -291,15 +333,11 @@ fn differences(ours: &Service, theirs: &Service) -> Vec<String> {
     different
 }
 
-/// Whether we omit a public service: client services have no messages, version 1.0 of mobility has
-/// nothing on the wire that the next version lacks, and a misspelt service exists under its correct
-/// name.
+/// Whether we omit a public service: a client service, which has no messages of its own, or a service
+/// under a misspelt name, which exists under its correct name.
 fn is_left_out(id: &str) -> bool {
-    let is_client = id
-        .rsplit_once(' ')
-        .is_some_and(|(urn, _)| urn.ends_with("Client"));
-    let is_old_mobility = id.starts_with("urn:jaus:jss:mobility:") && id.ends_with(" 1.0");
-    is_client || is_old_mobility || id == "urn:jaus:jss:core:Liveliness 1.0"
+    let urn = id.rsplit_once(' ').map(|(urn, _)| urn);
+    urn.is_some_and(|urn| urn.ends_with("Client")) || id == "urn:jaus:jss:core:Liveliness 1.0"
 }
 
 #[test]
