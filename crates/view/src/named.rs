@@ -52,3 +52,21 @@ fn name(values: &ValueSet, number: i128) -> Option<&str> {
     let first = values().find(|it| it.name == name)?;
     (first.index == number).then_some(name)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_written_by_name_also_below_0() {
+        let members = [
+            ("Gear".into(), Value::SignedNamed(-2, "Reverse")),
+            ("Range".into(), Value::Named(3, "Low")),
+            ("Speed".into(), Value::Signed(-4)),
+        ];
+        let view = Value::Object(members.into());
+        let written = serde_json::to_value(ByName(&view)).unwrap();
+        let wanted = serde_json::json!({ "Gear": "Reverse", "Range": "Low", "Speed": -4 });
+        assert_eq!(written, wanted);
+    }
+}
