@@ -26,6 +26,7 @@ use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::catalogue;
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::loader::Loader;
 use crate::model::Service;
@@ -53,7 +54,7 @@ impl Build {
     /// to; types are generated only for what [`module`](Self::module) names.
     pub fn new() -> Self {
         let mut loader = Loader::new();
-        loader.catalogue().reference_architecture();
+        loader.clients().reference_architecture();
         Self {
             loader,
             settings: rust::Settings::new("::jaus::codec"),
@@ -73,7 +74,8 @@ impl Build {
     }
 
     /// Generates `<name>.rs`, with the services whose URN begins with `urn`, for example
-    /// `urn:jaus:jss:core:`. Said again with the same name, it adds to that module.
+    /// `urn:jaus:jss:core:`. Said again with the same name, it adds to that module. A client service
+    /// of this crate, such as `urn:jaus:jss:core:EventsClient`, must be named in full.
     #[must_use]
     pub fn module(mut self, name: &str, urn: &str) -> Self {
         match self.modules.iter_mut().find(|(known, _)| known == name) {
@@ -147,14 +149,20 @@ impl Build {
         let loaded = self.loader.load();
         let module = |(name, urns): &(String, Vec<String>)| {
             let services = loaded.library.services().map(AsRef::<Service>::as_ref);
-            let chosen =
-                services.filter(|it| urns.iter().any(|urn| it.id.urn.starts_with(urn.as_str())));
+            let chosen = services.filter(|it| urns.iter().any(|urn| is_meant(it, urn)));
             let text = rust::module_with(&loaded.library, chosen, &self.settings);
             (format!("{name}.rs"), text)
         };
         let files = self.modules.iter().map(module).collect();
         (files, loaded.diagnostics)
     }
+}
+
+/// Whether the beginning of a URN selects a service. Client services have the messages of others,
+/// so those of the catalogue would only repeat them.
+fn is_meant(service: &Service, urn: &str) -> bool {
+    let id = &*service.id.urn;
+    id == urn || id.starts_with(urn) && !catalogue::holds_client(&service.location)
 }
 
 fn report(diagnostic: &Diagnostic) {

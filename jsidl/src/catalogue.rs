@@ -5,6 +5,10 @@
 //! [those of the Reference Architecture](Entry::of_reference_architecture), whose message codes
 //! collide with the others;
 //! [`Loader::reference_architecture`](crate::Loader::reference_architecture) loads those.
+//!
+//! [Client services](Entry::of_client) have the messages of the services that they use. They are
+//! loaded if a definition refers to them, or all of them by
+//! [`Loader::clients`](crate::Loader::clients).
 
 use std::path::{Path, PathBuf};
 
@@ -30,6 +34,9 @@ pub struct Entry {
     packed: &'static [u8],
 }
 
+/// The directory of client services within a set.
+const CLIENTS: &str = "clients";
+
 /// The sets of the Reference Architecture.
 const REFERENCE_ARCHITECTURE: &[&str] = &["ra33"];
 
@@ -39,6 +46,13 @@ impl Entry {
     #[must_use]
     pub fn of_reference_architecture(&self) -> bool {
         REFERENCE_ARCHITECTURE.contains(&self.set)
+    }
+
+    /// Whether this is a client service, such as `EventsClient`: it sends what another service
+    /// receives, and receives what that one sends.
+    #[must_use]
+    pub fn of_client(&self) -> bool {
+        self.path.split('/').nth(1) == Some(CLIENTS)
     }
 
     /// The XML text.
@@ -81,8 +95,17 @@ pub fn find(id: &Id) -> Option<&'static Entry> {
 /// Whether a location is in an embedded file, as [`Loader::catalogue`](crate::Loader::catalogue)
 /// names them.
 pub fn holds(location: &Location) -> bool {
-    let path = location.file.strip_prefix(FOLDER);
-    path.is_ok_and(|path| ENTRIES.iter().any(|entry| Path::new(entry.path) == path))
+    entry_of(location).is_some()
+}
+
+/// Whether a location is in the file of an embedded [client service](Entry::of_client).
+pub(crate) fn holds_client(location: &Location) -> bool {
+    entry_of(location).is_some_and(Entry::of_client)
+}
+
+fn entry_of(location: &Location) -> Option<&'static Entry> {
+    let path = location.file.strip_prefix(FOLDER).ok()?;
+    ENTRIES.iter().find(|entry| Path::new(entry.path) == path)
 }
 
 /// Path of an embedded file in findings.
@@ -98,7 +121,7 @@ mod tests {
     #[test]
     fn every_embedded_definition_is_sound() {
         let mut loader = Loader::new();
-        loader.catalogue().reference_architecture();
+        loader.clients().reference_architecture();
         let loaded = loader.load();
         assert_eq!(loaded.diagnostics.to_string(), "");
         let services = ENTRIES.iter().filter(|e| e.element == "service_def");
@@ -124,7 +147,7 @@ mod tests {
     fn definitions_are_found_by_set_and_by_identity() {
         assert!(sets().any(|set| set == "core"));
         let mut loader = Loader::new();
-        loader.catalogue();
+        loader.clients();
         for service in loader.load().library.services() {
             let entry = find(&service.id).expect("every service has a file");
             assert_eq!(entry.element, "service_def");

@@ -23,6 +23,7 @@ pub struct Loader {
     program: Program,
     report: Report,
     with_catalogue: bool,
+    with_clients: bool,
     with_reference_architecture: bool,
     is_strict: bool,
     /// Texts in the compact form: what they refer to decides how they are read.
@@ -92,11 +93,19 @@ impl Loader {
         self
     }
 
-    /// Adds the definitions that ship with this crate, except those of the Reference Architecture.
-    /// Definitions added by other means take precedence, in any order.
+    /// Adds the definitions that ship with this crate, except those of the Reference Architecture;
+    /// of the client services only those that another definition refers to. Definitions added by
+    /// other means take precedence, in any order.
     pub fn catalogue(&mut self) -> &mut Self {
         self.with_catalogue = true;
         self
+    }
+
+    /// Adds [the catalogue](Self::catalogue) with all its client services, such as `EventsClient`.
+    /// Their messages are those of the services that they use.
+    pub fn clients(&mut self) -> &mut Self {
+        self.with_clients = true;
+        self.catalogue()
     }
 
     /// Adds the definitions of the Reference Architecture that ship with this crate. They use
@@ -115,8 +124,9 @@ impl Loader {
             .filter(|it| self.wants(it))
             .collect();
         for entry in wanted {
-            self.add(&catalogue::name(entry), &entry.text(), Strictness::Named);
+            self.embedded(entry);
         }
+        self.referenced_clients();
         let library = resolve(&self.program, &self.sources, &mut self.report);
         Loaded {
             library,
@@ -139,9 +149,37 @@ impl Loader {
     fn wants(&self, entry: &catalogue::Entry) -> bool {
         if entry.of_reference_architecture() {
             self.with_reference_architecture
+        } else if entry.of_client() {
+            self.with_clients
         } else {
             self.with_catalogue
         }
+    }
+
+    /// Adds the client services of the catalogue that something refers to, and those that they
+    /// refer to.
+    fn referenced_clients(&mut self) {
+        if !self.with_catalogue || self.with_clients {
+            return;
+        }
+        let clients = catalogue::entries().iter();
+        let mut clients: Vec<_> = clients.filter(|it| it.of_client()).collect();
+        loop {
+            let urns = self.program.referenced();
+            let (wanted, rest): (Vec<_>, Vec<_>) =
+                clients.into_iter().partition(|it| urns.contains(it.urn));
+            if wanted.is_empty() {
+                return;
+            }
+            for entry in wanted {
+                self.embedded(entry);
+            }
+            clients = rest;
+        }
+    }
+
+    fn embedded(&mut self, entry: &catalogue::Entry) {
+        self.add(&catalogue::name(entry), &entry.text(), Strictness::Named);
     }
 
     /// Translates the texts in the compact form and reads them. Returns the places of those without
@@ -191,7 +229,9 @@ impl Loader {
         for source in self.sources.iter() {
             add(source.text());
         }
-        for entry in catalogue::entries().iter().filter(|it| self.wants(it)) {
+        let is_known =
+            |it: &&catalogue::Entry| self.wants(it) || (it.of_client() && self.with_catalogue);
+        for entry in catalogue::entries().iter().filter(is_known) {
             add(&entry.text());
         }
         known

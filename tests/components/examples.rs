@@ -179,7 +179,7 @@ fn every_example_is_shown_and_has_fewer_than_60_lines() {
     let page = include_str!("../../docs/examples.md");
     // Shown elsewhere.
     let others = [
-        "navigation.rs",
+        "speedometer.rs",
         "sensor.rs",
         "client.rs",
         "driver.rs",
@@ -206,7 +206,7 @@ fn the_texts_show_the_examples_as_they_are() {
     let readme = include_str!("../../README.md");
     let tutorial = include_str!("../../docs/tutorial.md");
     for (text, example) in [
-        (readme, include_str!("../../examples/navigation.rs")),
+        (readme, include_str!("../../examples/speedometer.rs")),
         (tutorial, include_str!("../../examples/sensor.rs")),
         (tutorial, include_str!("../../examples/client.rs")),
         (tutorial, include_str!("../../examples/driver.rs")),

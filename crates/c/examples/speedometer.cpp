@@ -11,9 +11,8 @@ int main() {
     node.loopback();
     node.start();
     jaus::Component rover(node, 44, JAUS_KIND_VEHICLE, "Rover");
-    rover.offer("urn:jaus:jss:mobility:VelocityStateSensor", 1, 1)
-        .publish(QueryVelocityState::kCode)
-        .decline(QueryVelocityStateExt::kCode);
+    rover.offer("urn:jaus:jss:mobility:VelocityStateSensor", 1, 0)
+        .publish(QueryVelocityState::kCode);
     rover.start();
 
     ReportVelocityState report;

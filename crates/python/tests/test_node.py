@@ -64,6 +64,18 @@ async def test_a_published_report_answers_a_query(
         assert report.velocity_x_m_per_s == pytest.approx(1.5, abs=0.01)
 
 
+async def test_an_older_version_of_a_service_needs_only_its_own_queries(
+    node: jaus.Node, operator: jaus.Component
+) -> None:
+    sensor = node.component(44, kind="vehicle", name="Rover")
+    sensor.publishes(QueryVelocityState, version="1.0")
+    async with sensor:
+        sensor.publish(velocity(1.5))
+        assert await operator.find(QueryVelocityState.service) == sensor.id
+        report = await operator.query(sensor.id, QueryVelocityState())
+        assert report.velocity_x_m_per_s == pytest.approx(1.5, abs=0.01)
+
+
 async def test_a_function_answers_a_query(node: jaus.Node, operator: jaus.Component) -> None:
     sensor = node.component(44, kind="vehicle", name="Rover")
     sensor.declines(QueryVelocityStateExt)
@@ -244,6 +256,8 @@ async def test_what_makes_a_service_safe_is_required(node: jaus.Node) -> None:
     sensor.publishes(QueryVelocityState)
     with pytest.raises(jaus.UnsafeServiceError, match="declines"):
         await sensor.start()
+    with pytest.raises(jaus.ArgumentError, match="VelocityStateSensor 1.0"):
+        sensor.publishes(QueryVelocityState, version="2.0")
     with pytest.raises(jaus.UnsafeServiceError, match="command"):
         node.component(62).receive(SetWrenchEffort)(print)
     with pytest.raises(jaus.ArgumentError, match="plain function"):

@@ -12,7 +12,7 @@ pub(super) struct ByName<'v>(pub(super) &'v Value);
 impl Serialize for ByName<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self.0 {
-            Value::Named(_, name) => serializer.serialize_str(name),
+            Value::Named(_, name) | Value::SignedNamed(_, name) => serializer.serialize_str(name),
             Value::List(values) => serializer.collect_seq(values.iter().map(ByName)),
             Value::Object(members) => {
                 let mut map = serializer.serialize_map(Some(members.len()))?;
@@ -51,4 +51,22 @@ fn name(values: &ValueSet, number: i128) -> Option<&str> {
     let name = &*values().find(|it| it.index == number)?.name;
     let first = values().find(|it| it.name == name)?;
     (first.index == number).then_some(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_written_by_name_also_below_0() {
+        let members = [
+            ("Gear".into(), Value::SignedNamed(-2, "Reverse")),
+            ("Range".into(), Value::Named(3, "Low")),
+            ("Speed".into(), Value::Signed(-4)),
+        ];
+        let view = Value::Object(members.into());
+        let written = serde_json::to_value(ByName(&view)).unwrap();
+        let wanted = serde_json::json!({ "Gear": "Reverse", "Range": "Low", "Speed": -4 });
+        assert_eq!(written, wanted);
+    }
 }

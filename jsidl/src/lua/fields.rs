@@ -6,6 +6,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
+use std::ops::RangeInclusive;
 
 use super::text;
 use crate::model::{NamedValue, Number, Signed, Unsigned};
@@ -80,13 +81,13 @@ impl Kind {
         }
     }
 
-    /// The largest value that can have a name.
-    const fn greatest(self) -> u64 {
+    /// The values that can have a name.
+    const fn nameable(self) -> RangeInclusive<i128> {
         match self {
-            Self::Int => i32::MAX as u64,
-            Self::Int64 => i64::MAX as u64,
-            Self::Uint64 => u64::MAX,
-            _ => u32::MAX as u64,
+            Self::Int => i32::MIN as i128..=i32::MAX as i128,
+            Self::Int64 => i64::MIN as i128..=i64::MAX as i128,
+            Self::Uint64 => 0..=u64::MAX as i128,
+            _ => 0..=u32::MAX as i128,
         }
     }
 }
@@ -199,11 +200,10 @@ impl Fields {
 
     /// Registers a table of named values; returns its number (from 1), or `None` without names.
     pub(super) fn names(&mut self, kind: Kind, values: &[NamedValue]) -> Option<usize> {
-        let mut named: BTreeMap<u64, &str> = BTreeMap::new();
+        let mut named: BTreeMap<i128, &str> = BTreeMap::new();
         for value in values {
-            let index = u64::try_from(value.index).ok();
-            if let Some(index) = index.filter(|index| *index <= kind.greatest()) {
-                named.entry(index).or_insert(&value.name);
+            if kind.nameable().contains(&value.index) {
+                named.entry(value.index).or_insert(&value.name);
             }
         }
         self.names_of(named)
@@ -212,7 +212,7 @@ impl Fields {
     /// As [`names`](Self::names), for numbered values.
     pub(super) fn names_of<'n>(
         &mut self,
-        named: impl IntoIterator<Item = (u64, &'n str)>,
+        named: impl IntoIterator<Item = (i128, &'n str)>,
     ) -> Option<usize> {
         let entries = named.into_iter();
         let entries: Vec<_> = entries

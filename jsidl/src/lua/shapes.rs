@@ -120,7 +120,7 @@ impl Emitter<'_> {
     /// The count's size, the field of the format, which formats are messages, the count's limits.
     fn formatted(&mut self, name: &str, formats: &[Format], count: &Count) -> String {
         let field = self.field(name, Kind::Octets, None);
-        let named = formats.iter().map(|f| (u64::from(f.index), &*f.name));
+        let named = formats.iter().map(|f| (f.index.into(), &*f.name));
         let names = self.fields.names_of(named);
         let format = self.field(&format!("{name}_format"), Kind::Uint, names);
         let messages = formats
@@ -138,7 +138,7 @@ impl Emitter<'_> {
         let field = self.field(name, Kind::Real, None);
         let named = choices.iter().map(|choice| {
             let name = choice.name.as_ref().unwrap_or(&choice.scalar.units);
-            (u64::from(choice.index), name.as_str())
+            (choice.index.into(), name.as_str())
         });
         let names = self.fields.names_of(named);
         let index = self.field(&format!("{name}_index"), Kind::Uint, names);

@@ -223,7 +223,7 @@ mod tests {
             .find(|(name, _)| name == "mobility.pyi")
             .unwrap();
         let initializer =
-            "def __init__(self, *, latitude_deg: float | v1_1.SetGlobalWaypoint.Latitude, ";
+            "def __init__(self, *, latitude_deg: float | v1_0.SetGlobalWaypoint.Latitude, ";
         assert!(mobility.contains(initializer));
         assert!(
             mobility.contains("def __init__(self, *, presence_vector: int = ...) -> None: ...")

@@ -11,6 +11,7 @@ mod limits;
 mod message;
 mod root;
 
+use std::collections::HashSet;
 use std::fmt;
 use std::sync::Arc;
 
@@ -28,6 +29,15 @@ pub(crate) struct Program {
     pub(crate) services: Vec<ServiceDef>,
     pub(crate) type_sets: Vec<TypeSet>,
     pub(crate) const_sets: Vec<ConstSet>,
+}
+
+impl Program {
+    /// The URNs of all services that others inherit from or are clients of.
+    pub(crate) fn referenced(&self) -> HashSet<Arc<str>> {
+        let services = self.services.iter();
+        let references = services.flat_map(|it| it.inherits_from.iter().chain(&it.client_of));
+        references.map(|it| it.urn.clone()).collect()
+    }
 }
 
 /// Index of a type set in [`Program::type_sets`].

@@ -1,5 +1,6 @@
 //! Definitions whose code did not compile, or took too much time or memory.
 
+use jsidl::build::Build;
 use jsidl::model::Service;
 use jsidl::rust::Settings;
 
@@ -252,6 +253,24 @@ fn a_message_of_another_module_has_its_type_if_the_path_of_that_is_known() {
     if let Err(errors) = rustc::check(&[core, typed]) {
         panic!("{errors}");
     }
+}
+
+#[test]
+fn client_services_compile_with_their_messages() {
+    let names = [
+        "EventsClient",
+        "AccessControlClient",
+        "ManagementClient",
+        "ListManagerClient",
+        "DiscoveryClient",
+    ];
+    let build = Build::new().runtime("::jaus_codec");
+    let build = names.into_iter().fold(build, |build, name| {
+        build.module("clients", &format!("urn:jaus:jss:core:{name}"))
+    });
+    let (mut files, diagnostics) = build.generate();
+    assert_eq!(diagnostics.to_string(), "");
+    assert_compiles(&files.remove(0).1);
 }
 
 /// Messages of one service in two versions, the newer with these fields.

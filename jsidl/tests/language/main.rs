@@ -8,6 +8,7 @@
 )]
 
 mod behaviour;
+mod clients;
 mod corpus;
 mod diagnostics;
 mod diff;

@@ -462,9 +462,11 @@ pub mod v1_0 {
         impl Signed {
             /// `Three` = 3.
             pub const THREE: Self = Self(3);
+            /// `Minus two` = -2.
+            pub const MINUS_TWO: Self = Self(-2);
         }
 
-        codec::enumeration!(Signed(i16), [(3, "Three")]);
+        codec::enumeration!(Signed(i16), [(3, "Three"), (18446744073709551614, "Minus two")]);
 
         /// `Both`: a number with named values. Others are kept as they come.
         ///

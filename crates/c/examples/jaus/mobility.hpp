@@ -7,7 +7,7 @@
 
 namespace jaus::mobility {
 
-namespace v1_1 {
+namespace v1_0 {
 
 namespace SetWrenchEffort_types {
 
@@ -77,12 +77,13 @@ struct ResistiveRotationalEffortZ : codec::Scaled<ResistiveRotationalEffortZ, st
 ///
 /// Drives open loop: pushes, turns and brakes with a share of what is possible. There is no answer.
 ///
-/// Declared by urn:jaus:jss:mobility:PrimitiveDriver 1.1.
+/// Declared by urn:jaus:jss:mobility:PrimitiveDriver 1.0, urn:jaus:jss:mobility:PrimitiveDriver
+/// 1.1.
 struct SetWrenchEffort {
     static constexpr std::uint16_t kCode = 0x0405;
     static constexpr const char* kName = "SetWrenchEffort";
     static constexpr bool kIsCommand = true;
-    static constexpr std::array<const char*, 1> kServices{"urn:jaus:jss:mobility:PrimitiveDriver 1.1"};
+    static constexpr std::array<const char*, 2> kServices{"urn:jaus:jss:mobility:PrimitiveDriver 1.0", "urn:jaus:jss:mobility:PrimitiveDriver 1.1"};
 
     using PropulsiveLinearEffortX = SetWrenchEffort_types::PropulsiveLinearEffortX;
     using PropulsiveLinearEffortY = SetWrenchEffort_types::PropulsiveLinearEffortY;
@@ -227,12 +228,13 @@ struct SetWrenchEffort {
 ///
 /// Asks for velocity and turn rates. Deprecated since 1.1 in favour of Query Velocity State Ext.
 ///
-/// Declared by urn:jaus:jss:mobility:VelocityStateSensor 1.1.
+/// Declared by urn:jaus:jss:mobility:VelocityStateSensor 1.0,
+/// urn:jaus:jss:mobility:VelocityStateSensor 1.1.
 struct QueryVelocityState {
     static constexpr std::uint16_t kCode = 0x2404;
     static constexpr const char* kName = "QueryVelocityState";
     static constexpr bool kIsCommand = false;
-    static constexpr std::array<const char*, 1> kServices{"urn:jaus:jss:mobility:VelocityStateSensor 1.1"};
+    static constexpr std::array<const char*, 2> kServices{"urn:jaus:jss:mobility:VelocityStateSensor 1.0", "urn:jaus:jss:mobility:VelocityStateSensor 1.1"};
 
     /// PresenceVector.
     ///
@@ -249,12 +251,13 @@ struct QueryVelocityState {
 ///
 /// Asks for the effort that was commanded.
 ///
-/// Declared by urn:jaus:jss:mobility:PrimitiveDriver 1.1.
+/// Declared by urn:jaus:jss:mobility:PrimitiveDriver 1.0, urn:jaus:jss:mobility:PrimitiveDriver
+/// 1.1.
 struct QueryWrenchEffort {
     static constexpr std::uint16_t kCode = 0x2405;
     static constexpr const char* kName = "QueryWrenchEffort";
     static constexpr bool kIsCommand = false;
-    static constexpr std::array<const char*, 1> kServices{"urn:jaus:jss:mobility:PrimitiveDriver 1.1"};
+    static constexpr std::array<const char*, 2> kServices{"urn:jaus:jss:mobility:PrimitiveDriver 1.0", "urn:jaus:jss:mobility:PrimitiveDriver 1.1"};
 
     /// PresenceVector.
     ///
@@ -264,34 +267,6 @@ struct QueryWrenchEffort {
     template <class Visitor, class Self>
     static bool visit(Visitor& visitor, Self& self) {
         return visitor("PresenceVector", self.presence_vector);
-    }
-};
-
-/// QueryVelocityStateExt (24A4h).
-///
-/// Asks for velocity and turn rates in a chosen frame, with speeds and POSIX time.
-///
-/// Declared by urn:jaus:jss:mobility:VelocityStateSensor 1.1.
-struct QueryVelocityStateExt {
-    static constexpr std::uint16_t kCode = 0x24A4;
-    static constexpr const char* kName = "QueryVelocityStateExt";
-    static constexpr bool kIsCommand = false;
-    static constexpr std::array<const char*, 1> kServices{"urn:jaus:jss:mobility:VelocityStateSensor 1.1"};
-
-    /// VelocityVarPresenceVector.
-    ///
-    /// Wanted velocity components; bit 0 is the first.
-    std::uint8_t velocity_var_presence_vector{};
-
-    /// ReportVelocityStateExtRecPresenceVector.
-    ///
-    /// Wanted fields of the record that follows the velocity components; bit 0 is the first.
-    std::uint16_t report_velocity_state_ext_rec_presence_vector{};
-
-    template <class Visitor, class Self>
-    static bool visit(Visitor& visitor, Self& self) {
-        return visitor("VelocityVarPresenceVector", self.velocity_var_presence_vector)
-            && visitor("ReportVelocityStateExtRecPresenceVector", self.report_velocity_state_ext_rec_presence_vector);
     }
 };
 
@@ -372,12 +347,13 @@ struct TimeStamp : codec::Bits<TimeStamp, std::uint32_t> {
 ///
 /// Tells velocity and turn rates. Deprecated since 1.1 in favour of Report Velocity State Ext.
 ///
-/// Declared by urn:jaus:jss:mobility:VelocityStateSensor 1.1.
+/// Declared by urn:jaus:jss:mobility:VelocityStateSensor 1.0,
+/// urn:jaus:jss:mobility:VelocityStateSensor 1.1.
 struct ReportVelocityState {
     static constexpr std::uint16_t kCode = 0x4404;
     static constexpr const char* kName = "ReportVelocityState";
     static constexpr bool kIsCommand = false;
-    static constexpr std::array<const char*, 1> kServices{"urn:jaus:jss:mobility:VelocityStateSensor 1.1"};
+    static constexpr std::array<const char*, 2> kServices{"urn:jaus:jss:mobility:VelocityStateSensor 1.0", "urn:jaus:jss:mobility:VelocityStateSensor 1.1"};
 
     using VelocityX = ReportVelocityState_types::VelocityX;
     using VelocityY = ReportVelocityState_types::VelocityY;
@@ -549,12 +525,13 @@ struct ResistiveRotationalEffortZ : codec::Scaled<ResistiveRotationalEffortZ, st
 ///
 /// Tells the effort that was commanded.
 ///
-/// Declared by urn:jaus:jss:mobility:PrimitiveDriver 1.1.
+/// Declared by urn:jaus:jss:mobility:PrimitiveDriver 1.0, urn:jaus:jss:mobility:PrimitiveDriver
+/// 1.1.
 struct ReportWrenchEffort {
     static constexpr std::uint16_t kCode = 0x4405;
     static constexpr const char* kName = "ReportWrenchEffort";
     static constexpr bool kIsCommand = false;
-    static constexpr std::array<const char*, 1> kServices{"urn:jaus:jss:mobility:PrimitiveDriver 1.1"};
+    static constexpr std::array<const char*, 2> kServices{"urn:jaus:jss:mobility:PrimitiveDriver 1.0", "urn:jaus:jss:mobility:PrimitiveDriver 1.1"};
 
     using PropulsiveLinearEffortX = ReportWrenchEffort_types::PropulsiveLinearEffortX;
     using PropulsiveLinearEffortY = ReportWrenchEffort_types::PropulsiveLinearEffortY;
@@ -692,6 +669,48 @@ struct ReportWrenchEffort {
             && visitor("ResistiveRotationalEffortX", self.resistive_rotational_effort_x)
             && visitor("ResistiveRotationalEffortY", self.resistive_rotational_effort_y)
             && visitor("ResistiveRotationalEffortZ", self.resistive_rotational_effort_z);
+    }
+};
+
+} // namespace v1_0
+
+namespace v1_1 {
+
+using SetWrenchEffort = v1_0::SetWrenchEffort;
+
+using QueryVelocityState = v1_0::QueryVelocityState;
+
+using QueryWrenchEffort = v1_0::QueryWrenchEffort;
+
+using ReportVelocityState = v1_0::ReportVelocityState;
+
+using ReportWrenchEffort = v1_0::ReportWrenchEffort;
+
+/// QueryVelocityStateExt (24A4h).
+///
+/// Asks for velocity and turn rates in a chosen frame, with speeds and POSIX time.
+///
+/// Declared by urn:jaus:jss:mobility:VelocityStateSensor 1.1.
+struct QueryVelocityStateExt {
+    static constexpr std::uint16_t kCode = 0x24A4;
+    static constexpr const char* kName = "QueryVelocityStateExt";
+    static constexpr bool kIsCommand = false;
+    static constexpr std::array<const char*, 1> kServices{"urn:jaus:jss:mobility:VelocityStateSensor 1.1"};
+
+    /// VelocityVarPresenceVector.
+    ///
+    /// Wanted velocity components; bit 0 is the first.
+    std::uint8_t velocity_var_presence_vector{};
+
+    /// ReportVelocityStateExtRecPresenceVector.
+    ///
+    /// Wanted fields of the record that follows the velocity components; bit 0 is the first.
+    std::uint16_t report_velocity_state_ext_rec_presence_vector{};
+
+    template <class Visitor, class Self>
+    static bool visit(Visitor& visitor, Self& self) {
+        return visitor("VelocityVarPresenceVector", self.velocity_var_presence_vector)
+            && visitor("ReportVelocityStateExtRecPresenceVector", self.report_velocity_state_ext_rec_presence_vector);
     }
 };
 
@@ -1066,22 +1085,22 @@ struct ReportVelocityStateExt {
 
 } // namespace v1_1
 
-using SetWrenchEffort = v1_1::SetWrenchEffort;
-using QueryVelocityState = v1_1::QueryVelocityState;
-using QueryWrenchEffort = v1_1::QueryWrenchEffort;
+using SetWrenchEffort = v1_0::SetWrenchEffort;
+using QueryVelocityState = v1_0::QueryVelocityState;
+using QueryWrenchEffort = v1_0::QueryWrenchEffort;
+using ReportVelocityState = v1_0::ReportVelocityState;
+using ReportWrenchEffort = v1_0::ReportWrenchEffort;
 using QueryVelocityStateExt = v1_1::QueryVelocityStateExt;
-using ReportVelocityState = v1_1::ReportVelocityState;
-using ReportWrenchEffort = v1_1::ReportWrenchEffort;
 using ReportVelocityStateExt = v1_1::ReportVelocityStateExt;
 
 /// All messages, older versions first.
 using messages = codec::Types<
-    v1_1::SetWrenchEffort,
-    v1_1::QueryVelocityState,
-    v1_1::QueryWrenchEffort,
+    v1_0::SetWrenchEffort,
+    v1_0::QueryVelocityState,
+    v1_0::QueryWrenchEffort,
+    v1_0::ReportVelocityState,
+    v1_0::ReportWrenchEffort,
     v1_1::QueryVelocityStateExt,
-    v1_1::ReportVelocityState,
-    v1_1::ReportWrenchEffort,
     v1_1::ReportVelocityStateExt>;
 
 } // namespace jaus::mobility

@@ -25,6 +25,8 @@ pub enum Value {
     Named(u64, &'static str),
     /// A negative integer when reading; any signed field when writing.
     Signed(i64),
+    /// A negative integer, with its name in the definition. Serializes as the integer.
+    SignedNamed(i64, &'static str),
     /// A real number.
     Real(f64),
     /// Text.
@@ -93,7 +95,7 @@ impl Value {
     pub fn number(&self) -> Result<f64, Error> {
         match self {
             Self::Unsigned(value) | Self::Named(value, _) => Ok(*value as f64),
-            Self::Signed(value) => Ok(*value as f64),
+            Self::Signed(value) | Self::SignedNamed(value, _) => Ok(*value as f64),
             Self::Real(value) => Ok(*value),
             _ => Err(self.unexpected("a number")),
         }
@@ -106,7 +108,7 @@ impl Value {
     pub fn integer<T: TryFrom<u64> + TryFrom<i64>>(&self) -> Result<T, Error> {
         let integer = match *self {
             Self::Unsigned(value) | Self::Named(value, _) => T::try_from(value).ok(),
-            Self::Signed(value) => T::try_from(value).ok(),
+            Self::Signed(value) | Self::SignedNamed(value, _) => T::try_from(value).ok(),
             _ => return Err(self.unexpected("an integer")),
         };
         let bits = 8 * size_of::<T>();
@@ -117,14 +119,18 @@ impl Value {
     pub(super) fn with_name(self, names: &[(u64, &'static str)]) -> Self {
         let raw = match self {
             Self::Unsigned(raw) => Some(raw),
-            Self::Signed(raw) => u64::try_from(raw).ok(),
+            // The names of negative values are in two's complement.
+            Self::Signed(raw) => Some(raw.cast_unsigned()),
             _ => None,
         };
         let named = names.iter().find(|(value, _)| Some(*value) == raw);
         let stands_for = |name| names.iter().find(|(_, it)| *it == name);
         match named {
             Some(&(raw, name)) if stands_for(name).is_some_and(|(it, _)| *it == raw) => {
-                Self::Named(raw, name)
+                match self {
+                    Self::Signed(negative @ ..0) => Self::SignedNamed(negative, name),
+                    _ => Self::Named(raw, name),
+                }
             }
             _ => self,
         }
@@ -163,7 +169,7 @@ impl fmt::Display for Value {
             Self::Null => f.write_str("null"),
             Self::Bool(value) => value.fmt(f),
             Self::Unsigned(value) | Self::Named(value, _) => value.fmt(f),
-            Self::Signed(value) => value.fmt(f),
+            Self::Signed(value) | Self::SignedNamed(value, _) => value.fmt(f),
             Self::Real(value) => value.fmt(f),
             Self::Text(text) if text.chars().count() <= 40 => write!(f, "{text:?}"),
             Self::Text(_) => f.write_str("a long text"),
@@ -231,7 +237,7 @@ impl Serialize for Value {
             Self::Null => serializer.serialize_none(),
             Self::Bool(value) => serializer.serialize_bool(*value),
             Self::Unsigned(value) | Self::Named(value, _) => serializer.serialize_u64(*value),
-            Self::Signed(value) => serializer.serialize_i64(*value),
+            Self::Signed(value) | Self::SignedNamed(value, _) => serializer.serialize_i64(*value),
             Self::Real(value) => serializer.serialize_f64(*value),
             Self::Text(text) => serializer.serialize_str(text),
             Self::List(elements) => serializer.collect_seq(elements),
@@ -312,5 +318,22 @@ impl<'de> Visitor<'de> for AnyValue {
             members.push((name.into(), value));
         }
         Ok(Value::Object(members))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// -2 and 3, in two's complement.
+    const NAMES: &[(u64, &str)] = &[((-2_i64).cast_unsigned(), "Reverse"), (3, "Third")];
+
+    #[test]
+    fn negative_values_have_their_names_and_the_same_integer() {
+        let reverse = Value::Signed(-2).with_name(NAMES);
+        assert_eq!(reverse, Value::SignedNamed(-2, "Reverse"));
+        assert_eq!(reverse.integer::<i8>(), Ok(-2));
+        assert_eq!(Value::Signed(3).with_name(NAMES), Value::Named(3, "Third"));
+        assert_eq!(Value::Signed(-3).with_name(NAMES), Value::Signed(-3));
     }
 }

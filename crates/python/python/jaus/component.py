@@ -93,10 +93,13 @@ class Component:
 
     # Description.
 
-    def publishes(self, query: type[Any]) -> None:
-        """Answers a query with the report that :meth:`publish` was given last, also to subscribers."""
+    def publishes(self, query: type[Any], *, version: str | None = None) -> None:
+        """Answers a query with the report that :meth:`publish` was given last, also to subscribers.
+
+        Offers the newest version of the service that has the query, or ``version``, such as ``"1.0"``.
+        """
         report = None if query.report is None else query.report.code
-        self._core.publishes(*_service(query), query.code, report)
+        self._core.publishes(*_service(query, version), query.code, report)
 
     def declines(self, *queries: type[Any]) -> None:
         """Leaves queries without an answer."""
@@ -452,9 +455,14 @@ class _Stops:
             self._component.fail()
 
 
-def _service(message: type[Any]) -> tuple[str, tuple[int, int]]:
-    """The URN and the version of the service that defines a message."""
-    major, _, minor = message.version.partition(".")
+def _service(message: type[Any], version: str | None = None) -> tuple[str, tuple[int, int]]:
+    """The URN and the version of the service that defines a message; the newest if none is given."""
+    if version is None:
+        version = message.version
+    elif f"{message.service} {version}" not in message.services:
+        versions = ", ".join(message.services)
+        raise ArgumentError(f"version {version!r} does not have {message.__name__}: these do: {versions}")
+    major, _, minor = version.partition(".")
     return message.service, (int(major), int(minor or 0))
 
 

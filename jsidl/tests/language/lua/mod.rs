@@ -2,6 +2,7 @@
 
 mod expected;
 mod golden;
+mod names;
 mod packets;
 mod random;
 mod transport;

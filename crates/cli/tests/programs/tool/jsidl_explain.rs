@@ -28,6 +28,20 @@ offset  octets                   field             raw  meaning
 }
 
 #[test]
+fn a_client_service_explains_a_message_only_if_it_is_named() {
+    let explained_by = |options: &[&str]| {
+        let arguments = [&["jsidl", "explain", "00", "2B", "02"], options].concat();
+        let run = run(&arguments, b"");
+        run.stdout.lines().next().unwrap_or_default().to_owned()
+    };
+    let discovery = "QueryIdentification 2B00h of urn:jaus:jss:core:Discovery@1.1";
+    let client = "QueryIdentification 2B00h of urn:jaus:jss:core:DiscoveryClient@1.1";
+    assert_eq!(explained_by(&[]), discovery);
+    assert_eq!(explained_by(&["--service", "Discovery@1.1"]), discovery);
+    assert_eq!(explained_by(&["--service", "DiscoveryClient@1.1"]), client);
+}
+
+#[test]
 fn a_datagram_is_recognised_and_its_header_explained() {
     for input in [DATAGRAM.to_owned(), DATAGRAM.replace(' ', ":")] {
         let run = run(&["jsidl", "explain", "--json", "-"], input.as_bytes());
@@ -146,6 +160,7 @@ fn documentation_and_schemas_of_the_built_in_services_are_written() {
     let directory = directory("made");
     for (arguments, made) in [
         (&["docs"][..], "index.html"),
+        (&["docs"], "core.DiscoveryClient.1.1.html"),
         (&["docs", "--markdown"], "core.Discovery.1.1.md"),
         (&["schema"], "core.Discovery.1.1.schema.json"),
     ] {

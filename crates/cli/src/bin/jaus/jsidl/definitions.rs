@@ -17,6 +17,13 @@ pub(crate) fn load(paths: &[PathBuf]) -> Result<Loaded, Failure> {
     load_with(Loader::new(), paths)
 }
 
+/// As [`load`], with all built-in client services.
+pub(crate) fn load_with_clients(paths: &[PathBuf]) -> Result<Loaded, Failure> {
+    let mut loader = Loader::new();
+    loader.clients();
+    load_with(loader, paths)
+}
+
 /// As [`load`], with a check against the letter of the standard.
 pub(crate) fn load_strictly(paths: &[PathBuf]) -> Result<Loaded, Failure> {
     let mut loader = Loader::new();

@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let Sources { loaded, sound } = sources::load(&arguments.paths)?;
+    let Sources { loaded, sound } = sources::load_with_clients(&arguments.paths)?;
     let format = if arguments.markdown {
         Format::Markdown
     } else {

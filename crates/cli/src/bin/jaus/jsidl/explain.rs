@@ -63,7 +63,11 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let octets = octets(&arguments.input)?;
-    let Sources { loaded, .. } = sources::load(&arguments.jsidl)?;
+    // A client service has the messages of another, so that it is only used if it is wanted.
+    let Sources { loaded, .. } = match arguments.service {
+        Some(_) => sources::load_with_clients(&arguments.jsidl)?,
+        None => sources::load(&arguments.jsidl)?,
+    };
     let explainer = Explainer {
         library: loaded.library,
         ra: LazyCell::new(ReferenceArchitecture::load),

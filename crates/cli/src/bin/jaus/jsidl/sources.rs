@@ -20,15 +20,25 @@ pub(super) struct Sources {
 
 /// Loads files and directories, which may refer to each other and to the built-in definitions.
 pub(super) fn load(paths: &[PathBuf]) -> Result<Sources, Failure> {
-    let loaded = definitions::load(paths)?;
-    let mut sound = true;
-    for finding in definitions::own_findings(&loaded) {
-        if finding.severity == Severity::Error {
-            definitions::complain(&loaded.diagnostics, finding);
-            sound = false;
+    Ok(Sources::of(definitions::load(paths)?))
+}
+
+/// As [`load`], with all built-in client services.
+pub(super) fn load_with_clients(paths: &[PathBuf]) -> Result<Sources, Failure> {
+    Ok(Sources::of(definitions::load_with_clients(paths)?))
+}
+
+impl Sources {
+    fn of(loaded: Loaded) -> Self {
+        let mut sound = true;
+        for finding in definitions::own_findings(&loaded) {
+            if finding.severity == Severity::Error {
+                definitions::complain(&loaded.diagnostics, finding);
+                sound = false;
+            }
         }
+        Self { loaded, sound }
     }
-    Ok(Sources { loaded, sound })
 }
 
 /// Services of the user's own files.

@@ -26,7 +26,7 @@ async fn every_example_passes_every_step_about_each_service_that_it_offers() {
     drop(driver);
     tokio::join!(
         passes(&finder, "driver", &["102.1.33"]),
-        passes(&finder, "navigation", &["107.1.53"]),
+        passes(&finder, "speedometer", &["107.1.44"]),
         passes(&finder, "sensor", &["101.1.33"]),
         passes(&finder, "client", &["42.1.1"]),
         passes(&finder, "gnss", &["105.1.43"]),
