@@ -214,7 +214,10 @@ def test_the_class_is_found_by_the_message_code():
 def test_every_version_has_its_layout_and_the_newest_is_that_of_the_set():
     newest = mobility.ReportAccelerationState
     assert mobility.v0_6.ReportAccelerationState is not newest
-    assert newest.__qualname__ == f"v{newest.version.replace('.', '_')}.{newest.name}"
+    assert mobility.v1_1.ReportAccelerationState is newest
+    # Versions with one layout share a class, which is named after the oldest of them.
+    assert mobility.v1_0.ReportAccelerationState is newest
+    assert newest.__qualname__ == "v1_0.ReportAccelerationState"
     assert "ReportLocalPose" in dir(mobility) and "v1_0" in dir(mobility)
     assert "ReportLocalPose" in mobility.__all__
 

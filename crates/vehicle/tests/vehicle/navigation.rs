@@ -51,6 +51,7 @@ async fn pose(scene: &Scene) -> Option<ReportGlobalPose> {
 }
 
 // In real time, as the serial line is.
+#[cfg(feature = "serial")]
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_receiver_on_a_serial_line_gives_a_position_that_does_not_outlive_its_fix() {
     let scene = Scene::new();
