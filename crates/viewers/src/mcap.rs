@@ -20,8 +20,8 @@ const CHUNK: u64 = 256 << 10;
 /// Writes frames and the samples of their messages to an MCAP file.
 ///
 /// The file consists of chunks without compression. [`flush`](Self::flush) ends a chunk; all chunks
-/// before a crash are readable. In memory are a chunk, the channels, and the index of the file: some
-/// hundred octets for each chunk.
+/// before a crash are readable. In memory are a chunk, the channels, and the index of the file: 16
+/// octets for each channel in a chunk.
 ///
 /// ```
 /// use jaus_view::{Dictionary, Frame, LinkType, Network, Timestamp};

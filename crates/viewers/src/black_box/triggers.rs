@@ -82,6 +82,17 @@ pub struct Trigger {
     pub source: String,
 }
 
+impl Trigger {
+    /// The operator asks for it.
+    #[must_use]
+    pub const fn of_operator() -> Self {
+        Self {
+            kind: TriggerKind::Operator,
+            source: String::new(),
+        }
+    }
+}
+
 /// Recognises triggers in messages.
 ///
 /// A state that is reported again and again triggers once; it triggers again after another state, or

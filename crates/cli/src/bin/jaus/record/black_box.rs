@@ -20,6 +20,7 @@ use jaus_viewers::{
     BlackBox, BlackBoxLimits, Kept, RecordingFormat, Snapshot, Trigger, TriggerKind, Triggers,
 };
 use serde_json::json;
+use tokio::sync::mpsc::Receiver;
 use tokio::time::sleep_until;
 
 use super::filter::Filter;
@@ -117,68 +118,101 @@ impl Flags {
     }
 }
 
-/// Runs the black box until `end`.
+/// Runs the black box until `end`. The file that is pending then is completed, whatever happened.
 pub(super) async fn run(
     settings: &Settings,
-    mut source: Source,
-    mut filter: Filter,
+    source: Source,
+    filter: Filter,
     dictionary: Dictionary,
     printer: &mut EventPrinter,
     end: impl Future<Output = ()>,
 ) -> Result<Outcome, Failure> {
     let dictionary = Arc::new(dictionary);
-    let (writer, mut written) = Writer::start(settings, dictionary.clone())?;
-    let mut requests = Requests::open()?;
-    let mut watcher = Watcher::new(settings, &dictionary);
+    let (writer, mut reports) = Writer::start(settings, dictionary.clone())?;
     let mut keeper = Keeper::new(settings, writer);
     let details = json!({ "directory": settings.directory.display().to_string() });
     printer.plain("keeping", details, keeper.announcement())?;
-    tokio::pin!(end);
-    loop {
-        let pending = keeper.deadline();
-        let due = async {
-            match pending {
-                Some(at) => sleep_until(at.into()).await,
-                None => std::future::pending().await,
-            }
-        };
-        tokio::select! {
-            () = &mut end => break,
-            () = due => keeper.complete(printer)?,
-            () = requests.next() => {
-                let source = String::new();
-                keeper.handle_trigger(&Trigger { kind: TriggerKind::Operator, source }, now(), printer)?;
-            }
-            Some(report) = written.recv() => tell(&report, printer)?,
-            packets = source.next() => {
-                for packet in packets?.iter().flat_map(|it| selected(&mut filter, it)) {
-                    keeper.keep(&packet, now());
-                    if let Some(trigger) = watcher.handle(&packet, now()) {
-                        keeper.handle_trigger(&trigger, now(), printer)?;
+    let watching = Watching {
+        source,
+        filter,
+        requests: Requests::open()?,
+        watcher: Watcher::new(settings, &dictionary),
+    };
+    let result = watching.run(&mut keeper, &mut reports, printer, end).await;
+    let completed = keeper.complete(printer);
+    // Without the keeper the thread ends after its last file, and so do the reports.
+    drop(keeper);
+    while let Some(report) = reports.recv().await {
+        tell(&report, printer)?;
+    }
+    result.and(completed).map(|()| Outcome::Done)
+}
+
+/// What the black box watches.
+struct Watching<'d> {
+    source: Source,
+    filter: Filter,
+    requests: Requests,
+    watcher: Watcher<'d>,
+}
+
+impl Watching<'_> {
+    async fn run(
+        mut self,
+        keeper: &mut Keeper<'_>,
+        reports: &mut Receiver<Report>,
+        printer: &mut EventPrinter,
+        end: impl Future<Output = ()>,
+    ) -> Result<(), Failure> {
+        tokio::pin!(end);
+        loop {
+            let due = until(keeper.deadline());
+            tokio::select! {
+                () = &mut end => return Ok(()),
+                () = due => keeper.complete(printer)?,
+                () = self.requests.next() => {
+                    keeper.handle_trigger(&Trigger::of_operator(), now(), printer)?;
+                }
+                Some(report) = reports.recv() => tell(&report, printer)?,
+                packets = self.source.next() => {
+                    for packet in packets? {
+                        self.handle(&packet, keeper, printer)?;
                     }
                 }
             }
         }
     }
-    keeper.end(printer)?;
-    while let Some(report) = written.recv().await {
-        tell(&report, printer)?;
+
+    fn handle(
+        &mut self,
+        packet: &Packet,
+        keeper: &mut Keeper<'_>,
+        printer: &mut EventPrinter,
+    ) -> Result<(), Failure> {
+        let Some(earlier) = self.filter.select(packet) else {
+            return Ok(());
+        };
+        for packet in earlier.iter().chain([packet]) {
+            keeper.keep(packet, now());
+            if let Some(trigger) = self.watcher.handle(packet, now()) {
+                keeper.handle_trigger(&trigger, now(), printer)?;
+            }
+        }
+        Ok(())
     }
-    Ok(Outcome::Done)
+}
+
+/// Waits until this time; forever without one.
+async fn until(time: Option<Instant>) {
+    match time {
+        Some(time) => sleep_until(time.into()).await,
+        None => std::future::pending().await,
+    }
 }
 
 #[expect(clippy::disallowed_methods, reason = "a command runs in real time")]
 fn now() -> Instant {
     Instant::now()
-}
-
-/// The packets that a packet adds.
-fn selected(filter: &mut Filter, packet: &Packet) -> Vec<Packet> {
-    let Some(mut packets) = filter.select(packet) else {
-        return Vec::new();
-    };
-    packets.push(packet.clone());
-    packets
 }
 
 fn tell(report: &Report, printer: &mut EventPrinter) -> Result<(), Failure> {
@@ -360,11 +394,6 @@ impl<'s> Keeper<'s> {
             Ok(()) => Ok(()),
             Err(error) => tell(&error, printer),
         }
-    }
-
-    /// Completes the pending file at once, and lets the writer end.
-    fn end(mut self, printer: &mut EventPrinter) -> Result<(), Failure> {
-        self.complete(printer)
     }
 }
 
