@@ -6,7 +6,7 @@
 //!
 //! | JSON view of a message | for viewers |
 //! |---|---|
-//! | a name or a number | the number, with the names in the schema (`oneOf`) |
+//! | a name or a number | the number, with the names in the schema (`oneOf`); others may occur |
 //! | `"NaN"`, `"Infinity"` | left out |
 //! | octets in hexadecimal | base64 (`contentEncoding`) |
 //! | text, or `{"hex": …}` | text |
@@ -224,7 +224,11 @@ fn named(listed: &[Json]) -> (Json, Form) {
         constants.push(json!({ "title": name, "const": number }));
         names.entry(name).or_insert(number);
     }
-    let schema = json!({ "type": "integer", "oneOf": constants });
+    let mut schema = json!({ "type": "integer" });
+    // A single name is that of a special value among others, such as a timeout of 0.
+    if constants.len() > 1 {
+        schema["oneOf"] = constants.into();
+    }
     (schema, Form::Named(names))
 }
 
@@ -305,6 +309,15 @@ mod tests {
         assert_eq!(convert("EMERGENCY".into()), expected);
         assert_eq!(convert(5.into()), expected);
         assert_eq!(convert("no such name".into()), json!({ "Reserved": 0 }));
+    }
+
+    #[test]
+    fn a_number_with_one_special_value_is_no_enumeration() {
+        let schema = schema_of("ReportTimeout");
+        assert!(schema.json["properties"]["Timeout"].get("oneOf").is_none());
+        let body = json!({ "Timeout": "TIMEOUT_FEATURE_DISABLED" });
+        assert_eq!(schema.convert(&body), json!({ "Timeout": 0 }));
+        assert_eq!(schema.convert(&json!({ "Timeout": 4 })), json!({ "Timeout": 4 }));
     }
 
     #[test]
