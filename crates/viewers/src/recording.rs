@@ -27,7 +27,7 @@ enum Format<R> {
 #[non_exhaustive]
 pub enum RecordingError {
     /// A capture.
-    #[error("{}{}", .0, advice(.0))]
+    #[error(transparent)]
     Capture(#[from] CaptureError),
     /// The reader failed.
     #[error("cannot read the recording at octet {offset}: {source}")]
@@ -79,13 +79,6 @@ impl RecordingError {
             | Self::Damaged { offset, .. } => *offset,
             Self::Compressed { .. } | Self::NoFrames => 0,
         }
-    }
-}
-
-fn advice(error: &CaptureError) -> &'static str {
-    match error {
-        CaptureError::NotACapture { .. } => "; MCAP starts with 894d4341",
-        _ => "",
     }
 }
 
