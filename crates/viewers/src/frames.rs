@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_frame_is_refused_with_the_reason() {
+    fn an_invalid_sample_is_refused_with_the_reason() {
         for (sample, reason) in [
             ("{}", "missing field"),
             (r#"{"link":1,"octets":"*"}"#, "Invalid"),

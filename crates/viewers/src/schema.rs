@@ -317,7 +317,10 @@ mod tests {
         assert!(schema.json["properties"]["Timeout"].get("oneOf").is_none());
         let body = json!({ "Timeout": "TIMEOUT_FEATURE_DISABLED" });
         assert_eq!(schema.convert(&body), json!({ "Timeout": 0 }));
-        assert_eq!(schema.convert(&json!({ "Timeout": 4 })), json!({ "Timeout": 4 }));
+        assert_eq!(
+            schema.convert(&json!({ "Timeout": 4 })),
+            json!({ "Timeout": 4 })
+        );
     }
 
     #[test]

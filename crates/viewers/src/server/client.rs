@@ -147,7 +147,7 @@ async fn read(client: &Client, mut stream: SplitStream<Socket>, replies: &mpsc::
             _ => None,
         };
         if let Some(refusal) = refusal {
-            // One at a time; a client that makes many mistakes is told of some.
+            // One at a time: further mistakes in the meantime get no reply.
             let _ = replies.try_send(protocol::warning(&refusal));
         }
         count += 1;
@@ -215,7 +215,7 @@ impl Writer<'_> {
         Ok(())
     }
 
-    /// Tells the client how many samples it has lost, once it has caught up.
+    /// Warns the client of lost samples, with their number, once it has caught up.
     async fn tell_lost(&mut self, has_caught_up: bool) -> Result<(), Error> {
         if !has_caught_up {
             return Ok(());

@@ -35,7 +35,7 @@ pub(super) async fn accept(
     let config = WebSocketConfig::default()
         .max_message_size(Some(LONGEST))
         .max_frame_size(Some(LONGEST));
-    let handshake = accept_hdr_async_with_config(stream, Judgement { origins }, Some(config));
+    let handshake = accept_hdr_async_with_config(stream, RequestCheck { origins }, Some(config));
     #[expect(clippy::disallowed_methods, reason = "clients connect in real time")]
     let accepted = tokio::time::timeout(DEADLINE, handshake).await;
     match accepted {
@@ -45,11 +45,11 @@ pub(super) async fn accept(
 }
 
 /// Accepts or refuses a request.
-struct Judgement<'o> {
+struct RequestCheck<'o> {
     origins: &'o [String],
 }
 
-impl Callback for Judgement<'_> {
+impl Callback for RequestCheck<'_> {
     fn on_request(
         self,
         request: &Request,

@@ -1,7 +1,8 @@
 //! A server for live viewers: Foxglove's WebSocket protocol, read-only.
 //!
 //! It accepts [`MOST_CLIENTS`] connections, half as many from one address, and refuses more. A
-//! client that reads too slowly loses samples and is told how many. Publishing never waits.
+//! client that reads too slowly loses samples and gets a warning with their number. Publishing never
+//! waits.
 
 mod client;
 mod handshake;
@@ -167,8 +168,8 @@ impl Sharing {
             let mut data = None;
             for client in clients.iter() {
                 for subscription in client.subscriptions_to(sample.channel) {
-                    // Serialised once, and only if anybody wants it. Serialising to memory fails only
-                    // for non-text map keys, which do not occur.
+                    // Serialised once, and only for subscribers. Serialising to memory fails only for
+                    // non-text map keys, which do not occur.
                     let data = data.get_or_insert_with(|| {
                         serde_json::to_vec(&sample.value).unwrap_or_default()
                     });

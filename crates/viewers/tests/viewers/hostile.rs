@@ -38,7 +38,7 @@ async fn assert_alive(scene: &Scene) {
 }
 
 #[tokio::test]
-async fn a_handshake_that_is_none_is_refused_and_says_why() {
+async fn an_invalid_handshake_is_refused_with_the_reason() {
     let scene = Scene::new().await;
     let no_subprotocol = answer_to(&scene, &request("")).await;
     assert!(
@@ -96,7 +96,7 @@ async fn a_huge_frame_ends_the_connection_that_sent_it() {
 }
 
 #[tokio::test]
-async fn requests_that_are_none_are_answered_and_change_nothing() {
+async fn invalid_requests_get_a_warning_and_change_nothing() {
     let scene = Scene::new().await;
     let mut channels = scene.channels();
     scene.publish(&mut channels, "101.1.1", 0);
@@ -130,7 +130,7 @@ async fn unread(scene: &Scene) -> Viewer {
 }
 
 #[tokio::test]
-async fn a_viewer_that_never_reads_loses_samples_and_nobody_else_does() {
+async fn a_viewer_that_never_reads_loses_samples_and_others_lose_none() {
     let scene = Scene::new().await;
     let mut channels = scene.channels();
     scene.publish(&mut channels, "101.1.1", 0);
@@ -146,7 +146,7 @@ async fn a_viewer_that_never_reads_loses_samples_and_nobody_else_does() {
         let (_, _, value) = good.sample().await;
         assert_eq!(value["Reserved"], number);
     }
-    // Publishing has not waited, and what the lazy one has lost is told to it when it reads.
+    // Publishing has not waited. The lazy one gets a warning when it reads.
     loop {
         let message = within_limit(lazy.socket.next()).await.unwrap().unwrap();
         let is_told = message

@@ -127,7 +127,7 @@ fn a_file_of_the_black_box_is_whole_even_if_the_program_is_killed_at_once() {
 }
 
 #[test]
-fn flags_of_the_black_box_without_it_are_refused_and_triggers_that_are_none() {
+fn flags_of_the_black_box_need_it_and_unknown_triggers_are_refused() {
     let alone = run(&["record", "a.pcapng", "--on", "emergency"], b"");
     assert!(alone.stderr.contains("--last"), "{alone:?}");
     assert_eq!(alone.status, 2);

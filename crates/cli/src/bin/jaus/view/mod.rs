@@ -21,7 +21,8 @@ use source::Source;
 /// Each source and message is a channel with its fields by name; poses, positions, range points and
 /// images are there in Foxglove's schemas, too. It is read-only: viewers cannot send anything.
 /// Messages come from a communicator's debug view, or with --interface from the network itself, as
-/// for `jaus watch`. A viewer that reads too slowly loses messages and is told how many.
+/// for `jaus watch`. A viewer that reads too slowly loses messages, and shows a warning with
+/// their number.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus view                                   of the communicator of this host\n  \
