@@ -284,13 +284,18 @@ impl Dictionary {
     /// Looks a message of the Reference Architecture up; `None` if its code is unknown there.
     pub(super) fn read_ra(&self, octets: &Bytes) -> Option<Reading<'_>> {
         let code = u16::from_le_bytes(*octets.first_chunk()?);
-        let definition = self.ra.get(&code)?;
+        let definition = self.of_ra(code)?;
         Some(self.reading(code, 0, definition, definition.decode(octets)))
+    }
+
+    /// The Reference Architecture's definition for a code.
+    pub(super) fn of_ra(&self, code: u16) -> Option<&Definition> {
+        self.ra.get(&code)
     }
 
     /// The name of the Reference Architecture's message with this code.
     pub(super) fn ra_name_of(&self, code: u16) -> Option<&str> {
-        self.ra.get(&code).map(Definition::name)
+        self.of_ra(code).map(Definition::name)
     }
 
     fn reading<'d>(

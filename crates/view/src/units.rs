@@ -18,8 +18,9 @@ impl Dictionary {
         }
     }
 
-    /// The definition of the message in an object as a [`Line`](super::Line) serializes.
-    fn model_of(&self, object: &Map<String, Json>) -> Option<&Message> {
+    /// The definition of the message in an object as a [`Line`](super::Line) serializes; `None` if
+    /// the library has none, or the object names no message.
+    pub fn model_of(&self, object: &Map<String, Json>) -> Option<&Message> {
         let text = |key: &str| object.get(key)?.as_str();
         let code = u16::from_str_radix(text("code")?, 16).ok()?;
         let service = ServiceName {
@@ -27,7 +28,7 @@ impl Dictionary {
             version: text("version").and_then(|it| parse_version(it).ok()),
         };
         let name = text("message")?;
-        let mut fitting = self.candidates(code);
+        let mut fitting = self.candidates(code).chain(self.of_ra(code));
         let definition = fitting.find(|it| it.name() == name && it.belongs_to(&service))?;
         self.model(definition)
     }

@@ -68,6 +68,8 @@ pub struct Frame<'a> {
     /// Length of the frame on the link in octets. Greater than that of `octets` if the capture was
     /// limited to the beginning of each frame.
     pub length: u32,
+    /// Name of the interface (pcapng); empty if the capture does not name it.
+    pub interface: &'a str,
 }
 
 /// Link header type: a number from the registry at <https://www.tcpdump.org/linktypes.html>.
@@ -192,7 +194,13 @@ impl<R: Read> Capture<R> {
             Format::PcapNg(section) => section.next_packet(&mut self.input),
         };
         match packet {
-            Ok(Some(packet)) => Some(Ok(packet.frame(self.input.taken()))),
+            Ok(Some(packet)) => {
+                let interface = match &self.format {
+                    Format::Pcap(_) => "",
+                    Format::PcapNg(section) => section.interface_name(packet.interface),
+                };
+                Some(Ok(packet.frame(self.input.taken(), interface)))
+            }
             Ok(None) => {
                 self.finished = true;
                 None
@@ -212,16 +220,19 @@ struct Packet {
     length: u32,
     lost: u64,
     octets: Range<usize>,
+    /// Number of the interface in a pcapng section.
+    interface: u32,
 }
 
 impl Packet {
-    fn frame(self, taken: &[u8]) -> Frame<'_> {
+    fn frame<'a>(self, taken: &'a [u8], interface: &'a str) -> Frame<'a> {
         Frame {
             time: self.time,
             link: self.link,
             octets: taken.get(self.octets).unwrap_or_default(),
             length: self.length,
             lost: self.lost,
+            interface,
         }
     }
 }

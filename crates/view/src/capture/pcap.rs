@@ -117,6 +117,7 @@ impl Header {
             length: self.endian.u32(&record, 12),
             lost: 0,
             octets: 0..captured as usize,
+            interface: 0,
         }))
     }
 

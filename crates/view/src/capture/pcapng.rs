@@ -17,12 +17,16 @@ const OBSOLETE_PACKET: u32 = 2;
 const SIMPLE_PACKET: u32 = 3;
 const ENHANCED_PACKET: u32 = 6;
 
+const OPTION_NAME: u16 = 2;
 const OPTION_TIME_RESOLUTION: u16 = 9;
 const OPTION_TIME_OFFSET: u16 = 14;
 
 const SHORTEST_BLOCK: u32 = 12;
 const SHORTEST_HEADER: u32 = 28;
 const TOO_SHORT: &str = "a packet block that is too short";
+
+/// Limit of the name of an interface, in octets.
+const LONGEST_NAME: usize = 256;
 
 /// Limit of interface descriptions kept. A capture has only a handful of interfaces.
 const MOST_INTERFACES: usize = 4096;
@@ -34,8 +38,8 @@ pub(super) struct Section {
 }
 
 /// Content of an Interface Description Block.
-#[derive(Clone, Copy)]
 struct Interface {
+    name: String,
     link: LinkType,
     snap_length: u32,
     ticks: Ticks,
@@ -185,6 +189,7 @@ impl Section {
             return Err("an interface description that is too short");
         };
         let mut interface = Interface {
+            name: String::new(),
             link: LinkType(link),
             snap_length,
             ticks: Ticks::Decimal(6),
@@ -192,6 +197,9 @@ impl Section {
         };
         while let Some((code, value)) = fields.option() {
             match (code, value) {
+                (OPTION_NAME, name) if name.len() <= LONGEST_NAME => {
+                    interface.name = String::from_utf8_lossy(name).into_owned();
+                }
                 (OPTION_TIME_RESOLUTION, &[n]) if n & 0x80 != 0 => {
                     interface.ticks = Ticks::Binary(n & 0x7f);
                 }
@@ -235,6 +243,7 @@ impl Section {
             length,
             lost: fields.lost_before(captured as usize),
             octets,
+            interface: id,
         })
     }
 
@@ -253,11 +262,17 @@ impl Section {
             length,
             lost: 0,
             octets: fields.range(captured as usize).ok_or(TOO_SHORT)?,
+            interface: 0,
         })
     }
 
-    fn interface(&self, id: u32) -> Result<Interface, &'static str> {
-        let interface = self.interfaces.get(id as usize).copied();
+    /// The name of an interface; empty if it has none.
+    pub(super) fn interface_name(&self, id: u32) -> &str {
+        self.interfaces.get(id as usize).map_or("", |it| &it.name)
+    }
+
+    fn interface(&self, id: u32) -> Result<&Interface, &'static str> {
+        let interface = self.interfaces.get(id as usize);
         interface.ok_or("a packet from an interface that is not described")
     }
 

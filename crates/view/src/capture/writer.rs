@@ -7,7 +7,7 @@
 
 use std::io::{self, Write};
 
-use super::{LinkType, Timestamp};
+use super::{Frame, LinkType, Timestamp};
 
 const SECTION_HEADER: u32 = 0x0A0D_0D0A;
 const INTERFACE_DESCRIPTION: u32 = 1;
@@ -100,7 +100,19 @@ impl<W: Write> CaptureWriter<W> {
     /// # Errors
     /// I/O errors of the writer; [`io::ErrorKind::InvalidInput`] for a frame of 4 GiB or more.
     pub fn write(&mut self, on: InterfaceNumber, time: Timestamp, frame: &[u8]) -> io::Result<()> {
-        self.put_frame(on, time, frame)?;
+        self.put_frame(on, time, frame, None)?;
+        self.end()
+    }
+
+    /// Writes a frame of another capture, with its length on the link and the number of frames lost
+    /// before it. A frame without a time gets the beginning of 1970.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn write_frame(&mut self, on: InterfaceNumber, frame: &Frame<'_>) -> io::Result<()> {
+        let time = frame.time.unwrap_or_else(|| Timestamp::new(0, 0, 9));
+        self.put_frame(on, time, frame.octets, Some(frame.length))?;
+        self.put_loss(frame.lost);
         self.end()
     }
 
@@ -115,7 +127,7 @@ impl<W: Write> CaptureWriter<W> {
         frame: &[u8],
         comment: &str,
     ) -> io::Result<()> {
-        self.put_frame(on, time, frame)?;
+        self.put_frame(on, time, frame, None)?;
         if !comment.is_empty() {
             self.option(COMMENT, comment.as_bytes());
             self.option(END, &[]);
@@ -135,17 +147,29 @@ impl<W: Write> CaptureWriter<W> {
         frame: &[u8],
         lost: u64,
     ) -> io::Result<()> {
-        self.put_frame(on, time, frame)?;
+        self.put_frame(on, time, frame, None)?;
+        self.put_loss(lost);
+        self.end()
+    }
+
+    /// Adds the number of lost frames, if there are any.
+    fn put_loss(&mut self, lost: u64) {
         if lost > 0 {
             self.option(LOST, &lost.to_ne_bytes());
             self.option(COMMENT, format!("{lost} lost before this one").as_bytes());
             self.option(END, &[]);
         }
-        self.end()
     }
 
-    /// Starts the block of a frame. Options may follow.
-    fn put_frame(&mut self, on: InterfaceNumber, time: Timestamp, frame: &[u8]) -> io::Result<()> {
+    /// Starts the block of a frame, which had `on_link` octets on the link if that is known. Options
+    /// may follow.
+    fn put_frame(
+        &mut self,
+        on: InterfaceNumber,
+        time: Timestamp,
+        frame: &[u8],
+        on_link: Option<u32>,
+    ) -> io::Result<()> {
         let length = u32::try_from(frame.len()).map_err(|_| io::ErrorKind::InvalidInput)?;
         let nanos = i128::from(time.seconds()) * 1_000_000_000 + i128::from(time.subsec_nanos());
         // pcapng cannot represent times before 1970 or after 2554.
@@ -155,7 +179,7 @@ impl<W: Write> CaptureWriter<W> {
         self.put(&((nanos >> 32) as u32).to_ne_bytes());
         self.put(&(nanos as u32).to_ne_bytes());
         self.put(&length.to_ne_bytes());
-        self.put(&length.to_ne_bytes());
+        self.put(&on_link.unwrap_or(length).to_ne_bytes());
         self.put_padded(frame);
         Ok(())
     }
@@ -236,6 +260,24 @@ mod tests {
             assert_eq!(frame.time, Some(time));
         }
         assert!(capture.next_frame().is_none());
+    }
+
+    #[test]
+    fn a_frame_of_another_capture_keeps_its_interface_its_length_and_the_loss_before_it() {
+        let frame = Frame {
+            time: Some(Timestamp::new(7, 9, 9)),
+            link: LinkType::RAW,
+            octets: b"cut",
+            lost: 3,
+            length: 1500,
+            interface: "wlan0",
+        };
+        let mut file = Vec::new();
+        let mut writer = CaptureWriter::new(&mut file, "test").unwrap();
+        let on = writer.add_interface(frame.interface, frame.link).unwrap();
+        writer.write_frame(on, &frame).unwrap();
+        let mut capture = Capture::new(&file[..]).unwrap();
+        assert_eq!(capture.next_frame().unwrap().unwrap(), frame);
     }
 
     #[test]

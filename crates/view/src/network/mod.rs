@@ -359,6 +359,7 @@ mod tests {
             octets,
             length: octets.len() as u32,
             lost: 0,
+            interface: "",
         }
     }
 

@@ -127,7 +127,8 @@ impl Entry {
 
     /// The message inside an event or a request for events: an object with `code`, `message`,
     /// `service` and `body`.
-    pub(super) fn carried(&self) -> Option<&Map<String, Json>> {
+    #[must_use]
+    pub fn carried(&self) -> Option<&Map<String, Json>> {
         self.json.get("carries")?.as_object()
     }
 

@@ -8,7 +8,8 @@ use bytes::Bytes;
 use clap::Args;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::{Output, say};
-use jaus_view::{self, Capture, Counts, Dictionary, Line, MessageLog, Network};
+use jaus_view::{self, Counts, Dictionary, Line, MessageLog, Network};
+use jaus_viewers::Recording;
 
 use crate::definitions::Definitions;
 
@@ -26,7 +27,7 @@ use crate::definitions::Definitions;
     Offsets are in octets from 0: in a message from the first octet of its code, in a datagram or \
     capture from its start.")]
 pub(crate) struct Decode {
-    /// A pcap or pcapng file, or with --hex a text file; - is standard input
+    /// A pcap, pcapng or MCAP file, or with --hex a text file; - is standard input
     #[arg(required_unless_present = "hex", value_name = "FILE")]
     file: Option<PathBuf>,
 
@@ -74,11 +75,11 @@ impl Decode {
         printer: &mut Printer,
     ) -> Result<(), Failure> {
         let name = self.file.as_deref().unwrap_or(Path::new("-"));
-        let mut capture = Capture::new(BufReader::new(input))
+        let mut recording = Recording::new(BufReader::new(input))
             .map_err(|error| Failure::new(format!("{}: {error}", name.display())))?;
         let mut network = network(&self.port);
         let mut log = MessageLog::new(dictionary);
-        while let Some(frame) = capture.next_frame() {
+        while let Some(frame) = recording.next_frame() {
             match frame {
                 Ok(frame) => {
                     for datagram in network.handle_frame(&frame) {
@@ -87,7 +88,7 @@ impl Decode {
                         }
                     }
                 }
-                Err(error) => printer.print(&Line::from(&error))?,
+                Err(error) => printer.print(&Line::of_error(None, &error, error.offset()))?,
             }
         }
         report_skipped(network.counts(), log.incomplete_messages());

@@ -30,6 +30,7 @@ impl EventFormat {
             output: Output::new(),
             clock: Clock::start(),
             is_json: self.json,
+            is_silent: false,
         }
     }
 }
@@ -39,9 +40,15 @@ pub(crate) struct EventPrinter {
     output: Output,
     clock: Clock,
     is_json: bool,
+    is_silent: bool,
 }
 
 impl EventPrinter {
+    /// Prints no words from now on; objects are printed.
+    pub(crate) const fn silence(&mut self) {
+        self.is_silent = true;
+    }
+
     /// Prints an event: its words with the time, or an object with its details.
     pub(crate) fn timed(
         &mut self,
@@ -51,6 +58,7 @@ impl EventPrinter {
     ) -> Result<(), Failure> {
         match self.is_json {
             true => self.object(event, details),
+            false if self.is_silent => Ok(()),
             false => self.output.line(format_args!("{}  {words}", self.clock)),
         }
     }

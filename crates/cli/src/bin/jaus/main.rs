@@ -6,6 +6,8 @@
 )]
 
 mod control;
+mod convert;
+mod debug_view;
 mod decode;
 mod definitions;
 mod demo;
@@ -32,6 +34,7 @@ mod ping;
 mod queries;
 mod query;
 mod record;
+mod recordings;
 mod replay;
 mod send;
 mod subscribe;
@@ -40,6 +43,7 @@ mod test;
 mod up;
 mod users;
 mod vehicle;
+mod view;
 mod watch;
 
 use std::process::ExitCode;
@@ -102,6 +106,8 @@ enum Command {
     Drive(drive::Drive),
     Record(record::Record),
     Replay(replay::Replay),
+    Convert(convert::Convert),
+    View(view::View),
     Decode(decode::Decode),
     Encode(encode::Encode),
     Jsidl(jsidl::Jsidl),
@@ -145,6 +151,8 @@ impl Command {
             Self::Drive(drive) => drive.run(),
             Self::Record(record) => record.run(),
             Self::Replay(replay) => replay.run(),
+            Self::Convert(convert) => convert.run(),
+            Self::View(view) => view.run(),
             Self::Decode(decode) => decode.run(),
             Self::Encode(encode) => encode.run(),
             Self::Jsidl(jsidl) => return jsidl.run(),

@@ -8,8 +8,6 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::File;
-use std::io::BufReader;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -22,7 +20,7 @@ use jaus::wire::judp;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::say;
 use jaus_cli::runtime;
-use jaus_view::{Capture, Datagram, Filter, Line, MessageLog, Timestamp};
+use jaus_view::{Datagram, Filter, Line, MessageLog, Timestamp};
 use serde_json::{Value as Json, json};
 use socket2::SockRef;
 use tokio::net::UdpSocket;
@@ -31,6 +29,7 @@ use tokio::time::{Instant, sleep_until};
 use crate::decode::network;
 use crate::definitions::Definitions;
 use crate::events::EventFormat;
+use crate::recordings;
 
 /// Send the datagrams of a capture again, with their original timing
 ///
@@ -48,7 +47,7 @@ use crate::events::EventFormat;
     Events of --json: \"capture\" with the number of \"datagrams\", their \"span\" in seconds, their \
     \"senders\" and what is \"left_out\"; \"sent\" with the number of \"datagrams\".")]
 pub(crate) struct Replay {
-    /// The capture: pcap or pcapng from `jaus record`, tcpdump, Wireshark …
+    /// The capture: pcap, pcapng or MCAP from `jaus record`, tcpdump, Wireshark …
     file: PathBuf,
 
     /// The destination: ADDRESS, ADDRESS:PORT, or `group` for 239.255.0.1:3794
@@ -261,15 +260,12 @@ impl Replay {
 
     /// Reads the whole capture first, so that errors are reported before anything is sent.
     fn read(&self) -> Result<Found, Failure> {
-        let in_file =
-            |error: &dyn fmt::Display| Failure::new(format!("{}: {error}", self.file.display()));
-        let file = File::open(&self.file).map_err(|error| Failure::file(&self.file, &error))?;
-        let mut capture = Capture::new(BufReader::new(file)).map_err(|error| in_file(&error))?;
+        let mut recording = recordings::open(&self.file)?;
         let mut network = network(&self.port);
         let dictionary = self.definitions.load()?;
         let mut log = MessageLog::new(&dictionary);
         let (mut found, mut first) = (Found::default(), None);
-        while let Some(frame) = capture.next_frame() {
+        while let Some(frame) = recording.next_frame() {
             let frame = match frame {
                 Ok(frame) => frame,
                 Err(error) => {

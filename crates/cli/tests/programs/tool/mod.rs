@@ -28,4 +28,5 @@ mod subscribe;
 mod texts;
 mod users;
 mod vehicle;
+mod viewers;
 mod watch;

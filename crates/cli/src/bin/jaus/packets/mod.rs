@@ -14,7 +14,7 @@ use bytes::Bytes;
 use jaus::link::{Group, Interfaces};
 use jaus_cli::failure::Failure;
 use jaus_cli::output::say;
-use jaus_view::Timestamp;
+use jaus_view::{Frame, LinkType, Timestamp};
 
 /// A captured IP packet.
 #[derive(Clone)]
@@ -34,6 +34,19 @@ impl Packet {
             interface: interface.to_owned(),
             time: Timestamp::new(time.as_secs() as i64, time.subsec_nanos(), 9),
             octets,
+        }
+    }
+
+    /// The packet as a frame of a capture: a frame without a link header.
+    pub(super) fn frame(&self) -> Frame<'_> {
+        Frame {
+            time: Some(self.time),
+            link: LinkType::RAW,
+            octets: &self.octets,
+            lost: 0,
+            // Packets have at most 64 KiB, and are captured whole.
+            length: self.octets.len() as u32,
+            interface: &self.interface,
         }
     }
 }

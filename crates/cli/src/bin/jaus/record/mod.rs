@@ -1,11 +1,10 @@
-//! `jaus record`: records the traffic of JAUS peers into a capture file.
+//! `jaus record`: records the traffic of JAUS peers into a file, or keeps it until something happens.
 
+mod black_box;
 mod connections;
+mod file;
 mod filter;
 
-use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
-use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -13,17 +12,27 @@ use clap::Args;
 use jaus::link::Group;
 use jaus::node::units;
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::output::{self, say};
+use jaus_cli::output::say;
 use jaus_cli::runtime::{self, RunFor};
-use jaus_view::{CaptureWriter, InterfaceNumber, JAUS_PORT, LinkType};
-use serde_json::{Value as Json, json};
+use jaus_view::{Dictionary, JAUS_PORT};
+use jaus_viewers::RecordingFormat;
 use tokio::time::{MissedTickBehavior, interval};
 
+use crate::definitions::Definitions;
 use crate::events::{EventFormat, EventPrinter};
-use crate::packets::{Packet, Source};
+use crate::packets::Source;
+use black_box::Flags as BlackBoxFlags;
+use file::{Recording, STANDARD_OUTPUT, Tally};
 use filter::Filter;
 
-/// Record JAUS traffic to a capture file, for `jaus decode`, `jaus replay` and Wireshark
+/// Record JAUS traffic to a file, for `jaus decode`, `jaus replay`, Wireshark, Foxglove and PlotJuggler
+///
+/// The file is pcapng, or MCAP if its name ends with .mcap: with a channel for each source and
+/// message, and the frames themselves.
+///
+/// With --last it is a black box: the latest traffic stays in memory, and a file is written to a
+/// directory when something happens: --on names what, and the signal SIGUSR1 asks for a file at any
+/// time.
 ///
 /// With the privilege to open packet sockets (root, or `setcap cap_net_raw+ep jaus`) it records all
 /// traffic of this host: UDP and TCP of the chosen ports, and datagrams and TCP connections of other
@@ -35,15 +44,26 @@ use filter::Filter;
     jaus record drive.pcapng --interface eth0 --for 1min\n  \
     jaus record drive.pcapng --size 500MB --quiet &\n  \
     jaus record - | jaus decode -\n  \
-    jaus decode drive.pcapng\n\n\
+    jaus decode drive.pcapng\n  \
+    jaus record drive.mcap                 for Foxglove and PlotJuggler\n  \
+    jaus record /var/log/jaus --last 5min --on emergency,fault,control-lost\n  \
+    jaus record boxes --last 1min --on-message 'message=ReportStatus status=shutdown' --format mcap\n\n\
     Events of --json, on standard output: \"progress\" each second and \"end\", with \"packets\" and \
-    \"octets\".")]
+    \"octets\". Of a black box: \"keeping\", then for each file \"trigger\" with its \"kind\" and \
+    \"source\", and \"written\" with the \"file\", its \"packets\" and \"octets\"; the second time \
+    with --after. \"failed\" has an \"error\" instead.")]
 pub(crate) struct Record {
-    /// The file to write (pcapng), which must not exist without --overwrite; - is standard output
+    /// The file to write, which must not exist without --overwrite; - is standard output. With
+    /// --last, a directory
+    #[arg(value_name = "FILE")]
     file: PathBuf,
 
+    /// The format: pcapng or mcap [default: mcap if the file's name ends with .mcap, else pcapng]
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<RecordingFormat>,
+
     /// Overwrite an existing file
-    #[arg(long)]
+    #[arg(long, conflicts_with = "last")]
     overwrite: bool,
 
     /// Record only this interface, by name or address (repeatable) [default: all, including
@@ -63,7 +83,7 @@ pub(crate) struct Record {
     run_for: RunFor,
 
     /// End when the file reaches this size, such as 500MB
-    #[arg(long, value_name = "SIZE", value_parser = units::size)]
+    #[arg(long, value_name = "SIZE", value_parser = units::size, conflicts_with = "last")]
     size: Option<usize>,
 
     /// Print no progress
@@ -71,33 +91,67 @@ pub(crate) struct Record {
     quiet: bool,
 
     #[command(flatten)]
-    format: EventFormat,
+    definitions: Definitions,
+
+    #[command(flatten)]
+    black_box: BlackBoxFlags,
+
+    #[command(flatten)]
+    events: EventFormat,
 }
 
 impl Record {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        if self.format.is_json() && self.file == Path::new(STANDARD_OUTPUT) {
+        if self.events.is_json() && self.file == Path::new(STANDARD_OUTPUT) {
             return Err(Failure::new(
                 "--json prints events on standard output, where `-` writes the recording: name a file",
             ));
         }
+        let dictionary = self.definitions.load()?;
+        if let Some(settings) = self.black_box.settings(&self.file, self.format) {
+            return self.keep(&settings, dictionary);
+        }
         runtime::run(async {
             let mut source = Source::open(&self.interface, self.group)?;
-            let mut recording = Recording::create(&self.file, self.overwrite, &self.port)?;
+            let mut recording = self.create(&dictionary)?;
             let mut progress = self.progress();
             let result = self
                 .record(&mut source, &mut recording, &mut progress)
                 .await;
-            recording.flush()?;
-            progress.end(&recording)?;
-            result.map(|()| Outcome::complete_if(recording.packets > 0))
+            let tally = recording.finish()?;
+            progress.end(&self.file, &tally)?;
+            result.map(|()| Outcome::complete_if(tally.packets > 0))
+        })
+    }
+
+    fn create<'d>(&self, dictionary: &'d Dictionary) -> Result<Recording<'d>, Failure> {
+        let usual = RecordingFormat::of_path(&self.file);
+        let format = self.format.unwrap_or(usual);
+        Recording::create(&self.file, self.overwrite, format, &self.port, dictionary)
+    }
+
+    /// Runs the black box.
+    fn keep(
+        &self,
+        settings: &black_box::Settings,
+        dictionary: Dictionary,
+    ) -> Result<Outcome, Failure> {
+        let mut printer = self.events.printer();
+        if self.quiet {
+            printer.silence();
+        }
+        runtime::run(async {
+            let source = Source::open(&self.interface, self.group)?;
+            let filter = Filter::new(&self.port);
+            let end = self.run_for.end();
+            black_box::run(settings, source, filter, dictionary, &mut printer, end).await
         })
     }
 
     fn progress(&self) -> Progress {
-        match (self.quiet, self.format.is_json()) {
+        match (self.quiet, self.events.is_json()) {
             (true, _) => Progress::Quiet,
-            (false, true) => Progress::Events(self.format.printer()),
+            (false, true) => Progress::Events(self.events.printer()),
             (false, false) => Progress::Words,
         }
     }
@@ -105,7 +159,7 @@ impl Record {
     async fn record(
         &self,
         source: &mut Source,
-        recording: &mut Recording,
+        recording: &mut Recording<'_>,
         progress: &mut Progress,
     ) -> Result<(), Failure> {
         let end = self.run_for.end();
@@ -118,9 +172,10 @@ impl Record {
                 () = &mut end => return Ok(()),
                 _ = second.tick() => {
                     recording.flush()?;
-                    if recording.packets > told {
-                        told = recording.packets;
-                        progress.tell(recording)?;
+                    let tally = recording.tally();
+                    if tally.packets > told {
+                        told = tally.packets;
+                        progress.tell(&tally)?;
                     }
                 }
                 packets = source.next() => {
@@ -128,7 +183,7 @@ impl Record {
                 }
             }
             let limit = self.size.map(|size| size as u64);
-            if limit.is_some_and(|limit| recording.writer.written() >= limit) {
+            if limit.is_some_and(|limit| recording.tally().octets >= limit) {
                 return Ok(());
             }
         }
@@ -145,132 +200,22 @@ enum Progress {
 }
 
 impl Progress {
-    fn tell(&mut self, recording: &Recording) -> Result<(), Failure> {
+    fn tell(&mut self, tally: &Tally) -> Result<(), Failure> {
         match self {
             Self::Quiet => {}
-            Self::Words => say(recording.tally()),
-            Self::Events(printer) => printer.plain("progress", recording.to_json(), "")?,
+            Self::Words => say(tally),
+            Self::Events(printer) => printer.plain("progress", tally.to_json(), "")?,
         }
         Ok(())
     }
 
-    fn end(&mut self, recording: &Recording) -> Result<(), Failure> {
-        let file = recording.file.display();
+    fn end(&mut self, file: &Path, tally: &Tally) -> Result<(), Failure> {
         match self {
             Self::Quiet => {}
-            Self::Words if recording.file == Path::new(STANDARD_OUTPUT) => say(recording.tally()),
-            Self::Words => say(format_args!("{} in {file}", recording.tally())),
-            Self::Events(printer) => printer.plain("end", recording.to_json(), "")?,
+            Self::Words if file == Path::new(STANDARD_OUTPUT) => say(tally),
+            Self::Words => say(format_args!("{tally} in {}", file.display())),
+            Self::Events(printer) => printer.plain("end", tally.to_json(), "")?,
         }
         Ok(())
-    }
-}
-
-/// The file with its counters.
-struct Recording {
-    file: PathBuf,
-    writer: CaptureWriter<BufWriter<Box<dyn Write>>>,
-    interfaces: BTreeMap<String, InterfaceNumber>,
-    filter: Filter,
-    packets: u64,
-}
-
-impl Recording {
-    fn create(path: &Path, overwrite: bool, ports: &[u16]) -> Result<Self, Failure> {
-        let file: Box<dyn Write> = match path == Path::new(STANDARD_OUTPUT) {
-            true => Box::new(standard_output()?),
-            false => Box::new(new_file(path, overwrite)?),
-        };
-        let program = concat!("jaus ", env!("CARGO_PKG_VERSION"));
-        let writer = CaptureWriter::new(BufWriter::new(file), program)
-            .map_err(|error| failure(path, &error))?;
-        Ok(Self {
-            file: path.to_owned(),
-            writer,
-            interfaces: BTreeMap::new(),
-            filter: Filter::new(ports),
-            packets: 0,
-        })
-    }
-
-    /// Writes a packet, if it is selected.
-    fn take(&mut self, packet: &Packet) -> Result<(), Failure> {
-        let Some(earlier) = self.filter.select(packet) else {
-            return Ok(());
-        };
-        earlier.iter().try_for_each(|packet| self.write(packet))?;
-        self.write(packet)
-    }
-
-    fn write(&mut self, packet: &Packet) -> Result<(), Failure> {
-        let failed = |error| failure(&self.file, &error);
-        let known = self.interfaces.get(&packet.interface).copied();
-        let on = match known {
-            Some(on) => on,
-            None => {
-                let name = &packet.interface;
-                let on = self.writer.add_interface(name, LinkType::RAW);
-                let on = on.map_err(failed)?;
-                self.interfaces.insert(name.clone(), on);
-                on
-            }
-        };
-        self.packets += 1;
-        self.writer
-            .write(on, packet.time, &packet.octets)
-            .map_err(failed)
-    }
-
-    fn flush(&mut self) -> Result<(), Failure> {
-        let flushed = self.writer.flush();
-        flushed.map_err(|error| failure(&self.file, &error))
-    }
-
-    fn to_json(&self) -> Json {
-        json!({ "packets": self.packets, "octets": self.writer.written() })
-    }
-
-    fn tally(&self) -> String {
-        let written = output::size(self.writer.written());
-        format!("{} packets recorded, {written}", self.packets)
-    }
-}
-
-/// The name that stands for standard output.
-const STANDARD_OUTPUT: &str = "-";
-
-fn standard_output() -> Result<io::Stdout, Failure> {
-    let output = io::stdout();
-    match output.is_terminal() {
-        true => Err(Failure::new(
-            "standard output is a terminal, and a recording is not text: write to a file, or to a \
-             pipe as in `jaus record - | jaus decode -`",
-        )),
-        false => Ok(output),
-    }
-}
-
-fn new_file(path: &Path, overwrite: bool) -> Result<File, Failure> {
-    let mut options = OpenOptions::new();
-    options.write(true).truncate(true);
-    let options = if overwrite {
-        options.create(true)
-    } else {
-        options.create_new(true)
-    };
-    options.open(path).map_err(|error| match error.kind() {
-        io::ErrorKind::AlreadyExists => Failure::new(format!(
-            "{} exists already: choose another name, or add --overwrite",
-            path.display()
-        )),
-        _ => Failure::file(path, &error),
-    })
-}
-
-/// A recording that cannot be written on. A closed pipe is the end that its reader has chosen.
-fn failure(path: &Path, error: &io::Error) -> Failure {
-    match error.kind() {
-        io::ErrorKind::BrokenPipe => Failure::OutputClosed,
-        _ => Failure::file(path, error),
     }
 }

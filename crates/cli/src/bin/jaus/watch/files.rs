@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::say;
-use jaus_view::{Capture, Counts, Filter, MessageStream, Network};
+use jaus_view::{Counts, Filter, MessageStream, Network};
+use jaus_viewers::Recording;
 
 use super::{Printer, tell_lost};
 use crate::decode::report_skipped;
@@ -56,14 +57,17 @@ fn logs_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
     for entry in std::fs::read_dir(directory).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
         let extension = path.extension().unwrap_or_default();
-        if extension == "pcapng" || extension == "jsonl" {
+        if ["pcapng", "mcap", "jsonl"]
+            .iter()
+            .any(|it| extension == *it)
+        {
             files.push(path);
         }
     }
     files.sort();
     if files.is_empty() {
         return Err(Failure::new(format!(
-            "{} holds no log: it has no .pcapng or .jsonl files",
+            "{} holds no log: it has no .pcapng, .mcap or .jsonl files",
             directory.display()
         )));
     }
@@ -73,18 +77,18 @@ fn logs_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
 /// Returns whether all of it was readable, and what was skipped.
 fn read_capture(
     path: &Path,
-    file: impl Read,
+    file: impl BufRead,
     stream: &mut MessageStream<'_>,
     printer: &mut Printer<'_>,
 ) -> Result<(bool, Counts), Failure> {
     let name = path.display();
-    let mut capture = match Capture::new(file) {
-        Ok(capture) => capture,
+    let mut recording = match Recording::new(file) {
+        Ok(recording) => recording,
         Err(error) => return Err(Failure::new(format!("{name}: {error}"))),
     };
     let mut network = Network::by_content();
     let mut complete = true;
-    while let Some(frame) = capture.next_frame() {
+    while let Some(frame) = recording.next_frame() {
         let frame = match frame {
             Ok(frame) => frame,
             Err(error) => {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use jaus::link::Group;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::runtime;
-use jaus_view::{Filter, Frame, LinkType, MessageStream, Network};
+use jaus_view::{Filter, MessageStream, Network};
 
 use super::Printer;
 use crate::packets::Source;
@@ -29,14 +29,7 @@ pub(super) fn watch(
                 packets = source.next() => packets?,
             };
             for packet in &packets {
-                let frame = Frame {
-                    time: Some(packet.time),
-                    link: LinkType::RAW,
-                    octets: &packet.octets,
-                    lost: 0,
-                    // A packet socket delivers packets of at most 64 KiB, whole.
-                    length: packet.octets.len() as u32,
-                };
+                let frame = packet.frame();
                 for datagram in network.handle_frame(&frame) {
                     for entry in stream.read_datagram(frame.time, &datagram) {
                         printer.entry(&entry)?;

@@ -1,0 +1,157 @@
+//! The thread that writes the files of the black box.
+
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use jaus_cli::failure::Failure;
+use jaus_view::{Dictionary, Network, Timestamp};
+use jaus_viewers::{BlackBoxFiles, BlackBoxNames, Recorder, RecordingFormat, Snapshot};
+use tokio::sync::mpsc;
+
+use super::Settings;
+
+/// Limit of files that wait to be written: the first and the complete version of one.
+const WAITING: usize = 2;
+/// Limit of reports that wait to be printed.
+const REPORTS: usize = 16;
+/// An MCAP file has samples up to this multiple of the limit of memory; then frames alone.
+const SAMPLES: u64 = 8;
+
+/// Why a file is not written if the thread has not caught up.
+pub(super) const BUSY: &str = "the disk is still busy with the file before it";
+
+/// A file to write.
+pub(super) struct Job {
+    pub(super) file: PathBuf,
+    pub(super) snapshot: Snapshot,
+}
+
+/// What has become of a job.
+pub(super) struct Report {
+    pub(super) file: PathBuf,
+    pub(super) packets: usize,
+    /// Its size, or why it is not written.
+    pub(super) octets: Result<u64, String>,
+}
+
+/// Hands jobs to the thread, which ends with the last job when this is dropped.
+pub(super) struct Writer {
+    jobs: SyncSender<Job>,
+    names: BlackBoxNames,
+    format: RecordingFormat,
+    /// Number of jobs that are not done.
+    waiting: Arc<AtomicUsize>,
+}
+
+impl Writer {
+    /// Starts the thread. The reports end when it has ended.
+    pub(super) fn start(
+        settings: &Settings,
+        dictionary: Arc<Dictionary>,
+    ) -> Result<(Self, mpsc::Receiver<Report>), Failure> {
+        let (files, names) = BlackBoxFiles::open(&settings.directory, settings.files)
+            .map_err(|error| Failure::file(&settings.directory, &error))?;
+        let (jobs, queue) = sync_channel(WAITING);
+        let (reports, written) = mpsc::channel(REPORTS);
+        let waiting = Arc::new(AtomicUsize::new(0));
+        let thread = Thread {
+            files,
+            waiting: waiting.clone(),
+            format: settings.format,
+            dictionary,
+            sample_limit: SAMPLES * settings.limits.octets as u64,
+        };
+        std::thread::Builder::new()
+            .name("black-box".to_owned())
+            .spawn(move || thread.run(&queue, &reports))
+            .map_err(|error| Failure::new(format!("cannot start a thread: {error}")))?;
+        let writer = Self {
+            jobs,
+            names,
+            format: settings.format,
+            waiting,
+        };
+        Ok((writer, written))
+    }
+
+    /// The name of a new file.
+    pub(super) fn reserve(&mut self, reason: &str) -> PathBuf {
+        #[expect(
+            clippy::disallowed_methods,
+            reason = "files are named after the time of day"
+        )]
+        let time = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+        let time = Timestamp::since_1970(time.unwrap_or_default(), 0);
+        self.names.reserve(time, reason, self.format.extension())
+    }
+
+    /// Whether the thread still writes.
+    pub(super) fn is_busy(&self) -> bool {
+        self.waiting.load(Ordering::Relaxed) > 0
+    }
+
+    /// Queues a job. Never waits.
+    ///
+    /// # Errors
+    /// A report, if the disk is too slow for one more.
+    pub(super) fn enqueue(&self, job: Job) -> Result<(), Report> {
+        self.waiting.fetch_add(1, Ordering::Relaxed);
+        self.jobs.try_send(job).map_err(|error| {
+            self.waiting.fetch_sub(1, Ordering::Relaxed);
+            let (std::sync::mpsc::TrySendError::Full(job)
+            | std::sync::mpsc::TrySendError::Disconnected(job)) = error;
+            Report {
+                file: job.file,
+                packets: job.snapshot.frames().len(),
+                octets: Err(BUSY.to_owned()),
+            }
+        })
+    }
+}
+
+/// What the thread needs.
+struct Thread {
+    files: BlackBoxFiles,
+    waiting: Arc<AtomicUsize>,
+    format: RecordingFormat,
+    dictionary: Arc<Dictionary>,
+    sample_limit: u64,
+}
+
+impl Thread {
+    fn run(mut self, jobs: &Receiver<Job>, reports: &mpsc::Sender<Report>) {
+        for Job { file, snapshot } in jobs {
+            let octets = self.write(&file, &snapshot);
+            self.waiting.fetch_sub(1, Ordering::Relaxed);
+            let report = Report {
+                file,
+                packets: snapshot.frames().len(),
+                octets: octets.map_err(|error| error.to_string()),
+            };
+            if reports.blocking_send(report).is_err() {
+                return;
+            }
+        }
+    }
+
+    fn write(&mut self, file: &Path, snapshot: &Snapshot) -> std::io::Result<u64> {
+        let (format, dictionary) = (self.format, &self.dictionary);
+        let sample_limit = self.sample_limit;
+        let mut octets = 0;
+        self.files.write(file, |out| {
+            let mut out = BufWriter::new(out);
+            let network = Network::of_any_port();
+            let mut recorder = Recorder::new(&mut out, format, dictionary, network)?;
+            recorder.limit_samples(sample_limit);
+            for kept in snapshot.frames() {
+                recorder.write_frame(&kept.frame())?;
+            }
+            octets = recorder.finish()?;
+            out.flush()
+        })?;
+        Ok(octets)
+    }
+}

@@ -1,0 +1,281 @@
+//! One connected viewer: its subscriptions, and the queue of its samples.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use bytes::Bytes;
+use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::{SinkExt, StreamExt};
+use tokio::net::TcpStream;
+use tokio::sync::{mpsc, watch};
+use tokio::time::{Instant, MissedTickBehavior, interval};
+use tokio_tungstenite::WebSocketStream;
+use tokio_tungstenite::tungstenite::{Error, Message};
+
+use super::Shared;
+use crate::channels::MOST_CHANNELS;
+use crate::protocol::{self, Request};
+
+/// Limit of samples that wait for a client.
+const WAITING: usize = 4096;
+/// Limit of octets that wait for a client.
+const WAITING_OCTETS: usize = 16 << 20;
+/// A client that accepts no data for this time is disconnected.
+const STUCK: Duration = Duration::from_secs(30);
+/// Interval of pings, which clients answer by themselves.
+const PING: Duration = Duration::from_secs(10);
+/// A client that sends nothing for this time, not even answers to pings, is disconnected.
+const SILENCE: Duration = Duration::from_secs(60);
+/// Limit of a client's messages in a second. Further ones wait for the next second.
+const REQUESTS: u32 = 50;
+/// Channels that are announced in one message.
+const TOGETHER: usize = 64;
+
+type Socket = WebSocketStream<TcpStream>;
+
+/// What a client has subscribed to, and what waits for it.
+#[derive(Debug)]
+pub(super) struct Client {
+    /// The channels of the subscriptions, by the client's numbers.
+    subscriptions: Mutex<BTreeMap<u32, usize>>,
+    queue: mpsc::Sender<Bytes>,
+    waiting_octets: AtomicUsize,
+    lost: AtomicU64,
+}
+
+impl Client {
+    fn new() -> (Arc<Self>, mpsc::Receiver<Bytes>) {
+        let (queue, waiting) = mpsc::channel(WAITING);
+        let client = Self {
+            subscriptions: Mutex::default(),
+            queue,
+            waiting_octets: AtomicUsize::new(0),
+            lost: AtomicU64::new(0),
+        };
+        (Arc::new(client), waiting)
+    }
+
+    /// The numbers of the subscriptions to a channel.
+    pub(super) fn subscriptions_to(&self, channel: usize) -> Vec<u32> {
+        let subscriptions = self.subscriptions();
+        let of_channel = subscriptions.iter().filter(|(_, it)| **it == channel);
+        of_channel.map(|(&id, _)| id).collect()
+    }
+
+    /// Queues a sample; counts it as lost and returns false if the queue is full.
+    pub(super) fn offer(&self, message: Bytes) -> bool {
+        let length = message.len();
+        let waiting = self.waiting_octets.fetch_add(length, Ordering::Relaxed);
+        let is_queued = waiting + length <= WAITING_OCTETS && self.queue.try_send(message).is_ok();
+        if !is_queued {
+            self.taken(length);
+            self.lost.fetch_add(1, Ordering::Relaxed);
+        }
+        is_queued
+    }
+
+    /// Notes that octets wait no more.
+    fn taken(&self, length: usize) {
+        self.waiting_octets.fetch_sub(length, Ordering::Relaxed);
+    }
+
+    fn handle(&self, request: Request) -> Option<&'static str> {
+        let mut subscriptions = self.subscriptions();
+        match request {
+            Request::Subscribe { subscriptions: new } => {
+                for subscription in new {
+                    let channel = usize::try_from(subscription.channel_id);
+                    if subscriptions.len() >= MOST_CHANNELS {
+                        return Some("the limit of subscriptions is reached");
+                    }
+                    subscriptions.insert(subscription.id, channel.unwrap_or(usize::MAX));
+                }
+            }
+            Request::Unsubscribe { subscription_ids } => {
+                for id in subscription_ids {
+                    subscriptions.remove(&id);
+                }
+            }
+            Request::Other => {}
+        }
+        None
+    }
+
+    fn subscriptions(&self) -> MutexGuard<'_, BTreeMap<u32, usize>> {
+        let subscriptions = self.subscriptions.lock();
+        subscriptions.unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Serves a client until it has gone.
+pub(super) async fn serve(shared: &Shared, socket: Socket) {
+    let (client, waiting) = Client::new();
+    shared.clients().push(client.clone());
+    let (sink, stream) = socket.split();
+    let (replies, refused) = mpsc::channel(1);
+    let writer = Writer {
+        shared,
+        client: &client,
+        sink,
+        announced: 0,
+    };
+    tokio::select! {
+        ended = writer.run(waiting, refused) => {
+            if let Err(error) = ended {
+                tracing::debug!(%error, "a viewer's connection has ended");
+            }
+        }
+        () = read(&client, stream, &replies) => {}
+    }
+    shared.clients().retain(|it| !Arc::ptr_eq(it, &client));
+}
+
+/// Reads requests until the client has gone, or says nothing for too long.
+#[expect(clippy::disallowed_methods, reason = "clients run in real time")]
+async fn read(client: &Client, mut stream: SplitStream<Socket>, replies: &mpsc::Sender<String>) {
+    let (mut second, mut count) = (Instant::now(), 0);
+    while let Ok(Some(Ok(message))) = tokio::time::timeout(SILENCE, stream.next()).await {
+        let refusal = match message {
+            Message::Text(text) => match protocol::read(&text) {
+                Ok(request) => client.handle(request).map(str::to_owned),
+                Err(error) => Some(format!("a request that cannot be read: {error}")),
+            },
+            Message::Close(_) => return,
+            // Requests for what the server does not offer, and answers to pings.
+            _ => None,
+        };
+        if let Some(refusal) = refusal {
+            // One at a time: further mistakes in the meantime get no reply.
+            let _ = replies.try_send(protocol::warning(&refusal));
+        }
+        count += 1;
+        if second.elapsed() >= Duration::from_secs(1) {
+            (second, count) = (Instant::now(), 0);
+        } else if count >= REQUESTS {
+            tokio::time::sleep_until(second + Duration::from_secs(1)).await;
+        }
+    }
+}
+
+/// Sends announcements, samples, warnings and pings.
+struct Writer<'s> {
+    shared: &'s Shared,
+    client: &'s Client,
+    sink: SplitSink<Socket, Message>,
+    /// Number of channels that were announced.
+    announced: usize,
+}
+
+impl Writer<'_> {
+    async fn run(
+        mut self,
+        mut waiting: mpsc::Receiver<Bytes>,
+        mut refused: mpsc::Receiver<String>,
+    ) -> Result<(), Error> {
+        let settings = &self.shared.settings;
+        let info = protocol::server_info(&settings.name, &settings.session);
+        self.send(Message::text(info)).await?;
+        let mut count = self.shared.count.subscribe();
+        let mut turns = interval(PING);
+        turns.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        turns.reset();
+        loop {
+            self.announce(&mut count).await?;
+            tokio::select! {
+                changed = count.changed() => {
+                    if changed.is_err() {
+                        return Ok(());
+                    }
+                }
+                Some(data) = waiting.recv() => {
+                    let length = data.len();
+                    let sent = self.send(Message::Binary(data)).await;
+                    self.client.taken(length);
+                    sent?;
+                    self.tell_lost(waiting.is_empty()).await?;
+                }
+                Some(refusal) = refused.recv() => self.send(Message::text(refusal)).await?,
+                _ = turns.tick() => self.send(Message::Ping(Bytes::new())).await?,
+            }
+        }
+    }
+
+    /// Announces the channels that are new.
+    async fn announce(&mut self, count: &mut watch::Receiver<usize>) -> Result<(), Error> {
+        while self.announced < *count.borrow_and_update() {
+            let new = self.shared.channels_from(self.announced);
+            for some in new.chunks(TOGETHER) {
+                let text = protocol::advertise(some.iter().map(AsRef::as_ref));
+                self.send(Message::text(text)).await?;
+                self.announced += some.len();
+            }
+        }
+        Ok(())
+    }
+
+    /// Warns the client of lost samples, with their number, once it has caught up.
+    async fn tell_lost(&mut self, has_caught_up: bool) -> Result<(), Error> {
+        if !has_caught_up {
+            return Ok(());
+        }
+        match self.client.lost.swap(0, Ordering::Relaxed) {
+            0 => Ok(()),
+            lost => {
+                let words = format!("{lost} messages lost: this viewer reads too slowly");
+                self.send(Message::text(protocol::warning(&words))).await
+            }
+        }
+    }
+
+    async fn send(&mut self, message: Message) -> Result<(), Error> {
+        #[expect(clippy::disallowed_methods, reason = "clients run in real time")]
+        let sent = tokio::time::timeout(STUCK, self.sink.send(message)).await;
+        sent.unwrap_or_else(|_| Err(Error::Io(std::io::ErrorKind::TimedOut.into())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::Subscription;
+
+    #[test]
+    fn a_queue_is_bounded_in_messages_and_octets_and_losses_are_counted() {
+        let (client, mut waiting) = Client::new();
+        for _ in 0..WAITING {
+            assert!(client.offer(Bytes::from_static(b"x")));
+        }
+        assert!(!client.offer(Bytes::from_static(b"x")));
+        assert_eq!(client.lost.load(Ordering::Relaxed), 1);
+        while let Ok(data) = waiting.try_recv() {
+            client.taken(data.len());
+        }
+        let large = Bytes::from(vec![0; WAITING_OCTETS]);
+        assert!(client.offer(large.clone()));
+        assert!(!client.offer(large));
+        assert_eq!(client.lost.load(Ordering::Relaxed), 2);
+    }
+
+    #[test]
+    fn subscriptions_are_bounded_and_end_when_the_client_says_so() {
+        let (client, _waiting) = Client::new();
+        let subscribe = |from: u32, count: u32| Request::Subscribe {
+            subscriptions: (from..from + count)
+                .map(|id| Subscription { id, channel_id: 3 })
+                .collect(),
+        };
+        assert_eq!(client.handle(subscribe(7, 2)), None);
+        assert_eq!(client.subscriptions_to(3), [7, 8]);
+        assert!(client.subscriptions_to(4).is_empty());
+        let unsubscribe = Request::Unsubscribe {
+            subscription_ids: vec![7, 99],
+        };
+        assert_eq!(client.handle(unsubscribe), None);
+        assert_eq!(client.subscriptions_to(3), [8]);
+        let most = u32::try_from(MOST_CHANNELS).unwrap();
+        assert!(client.handle(subscribe(100, most)).is_some());
+        assert_eq!(client.subscriptions().len(), MOST_CHANNELS);
+    }
+}

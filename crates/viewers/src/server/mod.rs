@@ -1,0 +1,220 @@
+//! A server for live viewers: Foxglove's WebSocket protocol, read-only.
+//!
+//! It accepts [`MOST_CLIENTS`] connections, half as many from one address, and refuses more. A
+//! client that reads too slowly loses samples and gets a warning with their number. Publishing never
+//! waits.
+
+mod client;
+mod handshake;
+mod places;
+
+use std::convert::Infallible;
+use std::io;
+use std::net::SocketAddr;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::time::Duration;
+
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::watch;
+use tokio::task::JoinSet;
+
+use crate::channels::{Channel, Channels, Sample};
+use crate::protocol;
+use client::Client;
+use places::{Place, Places};
+
+/// Limit of connections, including those whose handshake is not complete.
+pub const MOST_CLIENTS: usize = 32;
+/// Pause after an error of the listener, for example too many open files.
+const PAUSE: Duration = Duration::from_millis(100);
+/// The reply to a connection beyond the limit.
+const NO_PLACE: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\n\
+    Content-Length: 46\r\nConnection: close\r\n\r\nthe limit of viewers is reached: close another\n";
+
+/// Settings of a [`Server`].
+#[derive(Debug, Clone, Default)]
+#[non_exhaustive]
+pub struct ServerSettings {
+    /// The name that viewers show.
+    pub name: String,
+    /// Names the run of the server: viewers keep their data as long as it is the same.
+    pub session: String,
+    /// Web pages that may connect besides those of this host, of Foxglove and of files, as browsers
+    /// name them: `https://viewer.example`.
+    pub origins: Vec<String>,
+}
+
+impl ServerSettings {
+    /// Settings with a name.
+    #[must_use]
+    pub fn new(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            ..Self::default()
+        }
+    }
+
+    /// Names the run of the server.
+    #[must_use]
+    pub fn session(self, session: impl Into<String>) -> Self {
+        Self {
+            session: session.into(),
+            ..self
+        }
+    }
+
+    /// Lets the pages of a site connect.
+    #[must_use]
+    pub fn origin(mut self, origin: impl Into<String>) -> Self {
+        self.origins.push(origin.into());
+        self
+    }
+}
+
+/// Serves the channels and samples that are published through its [`Sharing`].
+#[derive(Debug)]
+pub struct Server {
+    shared: Arc<Shared>,
+}
+
+/// Publishes samples to the clients of a [`Server`].
+#[derive(Debug, Clone)]
+pub struct Sharing(Arc<Shared>);
+
+#[derive(Debug)]
+struct Shared {
+    settings: ServerSettings,
+    channels: RwLock<Vec<Arc<Channel>>>,
+    /// The number of channels, for the clients to announce new ones.
+    count: watch::Sender<usize>,
+    /// At most as many as there are places.
+    clients: Mutex<Vec<Arc<Client>>>,
+    lost: AtomicU64,
+}
+
+impl Server {
+    /// Creates a server without channels, and the other end to publish them.
+    #[must_use]
+    pub fn new(settings: ServerSettings) -> (Self, Sharing) {
+        let shared = Arc::new(Shared {
+            settings,
+            channels: RwLock::new(Vec::new()),
+            count: watch::Sender::new(0),
+            clients: Mutex::new(Vec::new()),
+            lost: AtomicU64::new(0),
+        });
+        let sharing = Sharing(shared.clone());
+        (Self { shared }, sharing)
+    }
+
+    /// Serves clients for as long as the future lives.
+    pub async fn serve(self, listener: TcpListener) -> Infallible {
+        let places = Places::new(MOST_CLIENTS);
+        let mut tasks = JoinSet::new();
+        loop {
+            let accepted = tokio::select! {
+                accepted = listener.accept() => accepted,
+                Some(_) = tasks.join_next() => continue,
+            };
+            match accepted {
+                Ok((stream, address)) => match places.take(address.ip()) {
+                    Some(place) => {
+                        tasks.spawn(serve(self.shared.clone(), stream, address, place));
+                    }
+                    None => refuse(&stream, address),
+                },
+                Err(error) => pause_after(&error).await,
+            }
+        }
+    }
+}
+
+async fn serve(shared: Arc<Shared>, stream: TcpStream, address: SocketAddr, _place: Place) {
+    // Samples are small, and each is worth sending at once. A failure only adds latency.
+    let _ = stream.set_nodelay(true);
+    match handshake::accept(stream, &shared.settings.origins).await {
+        Ok(socket) => {
+            tracing::info!(%address, "a viewer has connected");
+            client::serve(&shared, socket).await;
+            tracing::info!(%address, "a viewer has gone");
+        }
+        Err(reason) => tracing::info!(%address, reason, "no viewer"),
+    }
+}
+
+fn refuse(stream: &TcpStream, address: SocketAddr) {
+    tracing::info!(%address, "a viewer too many");
+    // Best effort: never wait for the peer.
+    let _ = stream.try_write(NO_PLACE);
+}
+
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the server's pause is in real time"
+)]
+async fn pause_after(error: &io::Error) {
+    tracing::warn!(%error, "cannot accept connections");
+    tokio::time::sleep(PAUSE).await;
+}
+
+impl Sharing {
+    /// Publishes samples of `channels` to the clients that have subscribed to them, and announces new
+    /// channels. Never waits: a client whose queue is full loses samples.
+    pub fn publish(&self, channels: &Channels<'_>, samples: &[Sample]) {
+        self.announce(channels.all());
+        let clients = self.0.clients();
+        for sample in samples {
+            let mut data = None;
+            for client in clients.iter() {
+                for subscription in client.subscriptions_to(sample.channel) {
+                    // Serialised once, and only for subscribers. Serialising to memory fails only for
+                    // non-text map keys, which do not occur.
+                    let data = data.get_or_insert_with(|| {
+                        serde_json::to_vec(&sample.value).unwrap_or_default()
+                    });
+                    let message = protocol::message_data(subscription, sample.time, data);
+                    if !client.offer(message) {
+                        self.0.lost.fetch_add(1, Ordering::Relaxed);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Number of clients with a complete handshake.
+    #[must_use]
+    pub fn clients(&self) -> usize {
+        self.0.clients().len()
+    }
+
+    /// Number of samples that clients have lost because they read too slowly.
+    #[must_use]
+    pub fn lost(&self) -> u64 {
+        self.0.lost.load(Ordering::Relaxed)
+    }
+
+    fn announce(&self, all: &[Arc<Channel>]) {
+        if *self.0.count.borrow() == all.len() {
+            return;
+        }
+        let channels = self.0.channels.write();
+        let mut channels = channels.unwrap_or_else(PoisonError::into_inner);
+        let known = channels.len();
+        channels.extend(all.iter().skip(known).cloned());
+        self.0.count.send_replace(channels.len());
+    }
+}
+
+impl Shared {
+    fn clients(&self) -> std::sync::MutexGuard<'_, Vec<Arc<Client>>> {
+        self.clients.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The channels from this number on.
+    fn channels_from(&self, first: usize) -> Vec<Arc<Channel>> {
+        let channels = self.channels.read();
+        let channels = channels.unwrap_or_else(PoisonError::into_inner);
+        channels.iter().skip(first).cloned().collect()
+    }
+}
