@@ -215,14 +215,15 @@ impl Exchange {
             return;
         }
         if !is_alive {
-            let closed = self.remotes.withdraw(from, component);
+            let closed = self.remotes.withdraw(now, from, component);
             self.arrivals.extend(closed.map(Arrival::Closed));
             return;
         }
-        let outcome = if self.is_local(now, component) {
-            Err(Counter::OwnId)
-        } else if !self.accept.accepts(component) {
+        let outcome = if !self.accept.accepts(component) {
             Err(Counter::NotAccepted)
+        } else if self.is_local(now, component) {
+            self.remotes.claim(from, component);
+            Err(Counter::OwnId)
         } else {
             self.remotes.announce(now, from, component)
         };
@@ -411,6 +412,7 @@ impl Exchange {
             }
             self.locals.remove(&id);
             self.queue.declare(Command::Withdraw(id));
+            self.remotes.release(now, id);
         }
     }
 

@@ -1,6 +1,6 @@
 //! The bridges on the other side, and which of them speaks for which component.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
@@ -11,6 +11,8 @@ use crate::key::BridgeId;
 
 /// The most remote components, of all bridges together.
 const MOST_COMPONENTS: usize = 16_384;
+/// The most tokens that wait for their component.
+const MOST_CLAIMS: usize = 4096;
 /// How long a bridge without a token is remembered after its last message. Its tokens may arrive
 /// after its messages.
 const WITHOUT_TOKENS: Duration = Duration::from_secs(10);
@@ -33,12 +35,15 @@ impl Remote {
 /// The table of bridges.
 ///
 /// A component belongs to the first bridge that speaks for it, until that bridge withdraws it or is
-/// gone.
+/// gone. Then it belongs to another one that has declared its token.
 #[derive(Debug, Default)]
 pub(crate) struct Remotes {
     bridges: BTreeMap<BridgeId, Remote>,
     sessions: HashMap<SessionId, BridgeId>,
     owners: HashMap<JausId, BridgeId>,
+    /// Tokens of components that belong to another bridge or to this side: those of a bridge that
+    /// was started again may come before the old ones are gone.
+    claims: BTreeSet<(JausId, BridgeId)>,
     /// The number of the latest session.
     latest: u64,
 }
@@ -71,7 +76,29 @@ impl Remotes {
         bridge: BridgeId,
         component: JausId,
     ) -> Result<SessionId, Counter> {
-        self.enter(now, bridge, component, true)
+        let entered = self.enter(now, bridge, component, true);
+        if entered == Err(Counter::OtherBridge) {
+            self.claim(bridge, component);
+        }
+        entered
+    }
+
+    /// A bridge has declared the token of a component that belongs to this side at present.
+    pub(crate) fn claim(&mut self, bridge: BridgeId, component: JausId) {
+        if self.claims.len() < MOST_CLAIMS {
+            self.claims.insert((component, bridge));
+        }
+    }
+
+    /// A component belongs to nobody any more: it goes to a bridge that has declared its token.
+    pub(crate) fn release(&mut self, now: Instant, component: JausId) {
+        let first = (component, BridgeId::new(0));
+        let claim = self.claims.range(first..).next().copied();
+        if let Some((_, bridge)) = claim.filter(|(claimed, _)| *claimed == component) {
+            self.claims.remove(&(component, bridge));
+            // There is room: the component has just left the table, or this side's.
+            let _ = self.enter(now, bridge, component, true);
+        }
     }
 
     fn enter(
@@ -108,13 +135,20 @@ impl Remotes {
 
     /// A bridge has withdrawn the token of a component, or is gone itself. Returns its session if
     /// that was its last token.
-    pub(crate) fn withdraw(&mut self, bridge: BridgeId, component: JausId) -> Option<SessionId> {
+    pub(crate) fn withdraw(
+        &mut self,
+        now: Instant,
+        bridge: BridgeId,
+        component: JausId,
+    ) -> Option<SessionId> {
+        self.claims.remove(&(component, bridge));
         let remote = self.bridges.get_mut(&bridge)?;
-        // Without its token, the component may be heard through another bridge.
         remote.components.remove(&component)?;
         let is_last = !remote.has_tokens();
         self.owners.remove(&component);
-        is_last.then(|| self.remove(bridge)).flatten()
+        let closed = is_last.then(|| self.remove(now, bridge)).flatten();
+        self.release(now, component);
+        closed
     }
 
     /// Forgets the bridges without a token that have been silent; returns their sessions.
@@ -125,17 +159,18 @@ impl Remotes {
         let gone = self.bridges.iter().filter(|(_, remote)| is_over(remote));
         let gone: Vec<_> = gone.map(|(&bridge, _)| bridge).collect();
         gone.into_iter()
-            .filter_map(|bridge| self.remove(bridge))
+            .filter_map(|bridge| self.remove(now, bridge))
             .collect()
     }
 
-    fn remove(&mut self, bridge: BridgeId) -> Option<SessionId> {
+    fn remove(&mut self, now: Instant, bridge: BridgeId) -> Option<SessionId> {
         let remote = self.bridges.remove(&bridge)?;
-        for component in remote.components.keys() {
-            self.owners.remove(component);
-        }
         self.sessions.remove(&remote.session);
         tracing::info!(%bridge, session = remote.session.0, "bridge gone");
+        for component in remote.components.into_keys() {
+            self.owners.remove(&component);
+            self.release(now, component);
+        }
         Some(remote.session)
     }
 }
@@ -164,10 +199,10 @@ mod tests {
             assert_eq!(remotes.hear(now, TWO, component), refused);
             assert_eq!(remotes.announce(now, TWO, component), refused);
         }
-        assert_eq!(remotes.withdraw(ONE, ROVER), Some(session));
+        assert_eq!(remotes.withdraw(now, ONE, ROVER), Some(session));
         let next = remotes.hear(now, TWO, ROVER).unwrap();
         assert_ne!(next, session, "a number is not used twice");
-        assert!(!remotes.contains(SENSOR));
+        assert_eq!(remotes.hear(now, TWO, SENSOR), Ok(next));
     }
 
     #[test]
@@ -175,11 +210,26 @@ mod tests {
         let (now, mut remotes) = (Instant::now(), Remotes::default());
         let session = remotes.announce(now, ONE, ROVER).unwrap();
         remotes.announce(now, ONE, SENSOR).unwrap();
-        assert_eq!(remotes.withdraw(ONE, ROVER), None);
-        assert_eq!(remotes.withdraw(ONE, ROVER), None, "once more");
-        assert_eq!(remotes.withdraw(TWO, SENSOR), None, "not its own");
-        assert_eq!(remotes.withdraw(ONE, SENSOR), Some(session));
+        assert_eq!(remotes.withdraw(now, ONE, ROVER), None);
+        assert_eq!(remotes.withdraw(now, ONE, ROVER), None, "once more");
+        assert_eq!(remotes.withdraw(now, TWO, SENSOR), None, "not its own");
+        assert_eq!(remotes.withdraw(now, ONE, SENSOR), Some(session));
         assert_eq!(remotes.bridge(session), None);
+    }
+
+    #[test]
+    fn the_token_of_a_restarted_bridge_counts_when_the_old_one_is_gone() {
+        let (now, mut remotes) = (Instant::now(), Remotes::default());
+        let before = remotes.announce(now, ONE, ROVER).unwrap();
+        let refused = remotes.announce(now, TWO, ROVER);
+        assert_eq!(refused, Err(Counter::OtherBridge));
+        assert_eq!(remotes.withdraw(now, ONE, ROVER), Some(before));
+        assert!(remotes.contains(ROVER));
+        let session = remotes.hear(now, TWO, ROVER).unwrap();
+        // It has a token, so silence does not end it.
+        assert!(remotes.expire(now + 2 * WITHOUT_TOKENS).is_empty());
+        assert_eq!(remotes.withdraw(now, TWO, ROVER), Some(session));
+        assert!(!remotes.contains(ROVER));
     }
 
     #[test]

@@ -241,6 +241,21 @@ fn a_message_that_returns_to_its_own_side_is_refused() {
 }
 
 #[test]
+fn a_component_that_changes_sides_belongs_to_its_bridge_once_it_is_silent_here() {
+    let start = Instant::now();
+    let mut here = bridge(HERE, &[]);
+    here.handle_local(start, DRIVER, start);
+    let token = bridge(THERE, &[]).token_key(DRIVER);
+    here.handle_token(start, &token, true);
+    assert_eq!(here.counters().get(Counter::OwnId), 1);
+    let later = start + LOCAL_FOR;
+    here.expire(later);
+    // It belongs to the bridge, so it is not heard as one of this side any more.
+    here.handle_local(later, DRIVER, later);
+    assert!(!here.serves(DRIVER));
+}
+
+#[test]
 fn only_offered_components_leave() {
     let now = Instant::now();
     let settings = Settings {

@@ -7,6 +7,7 @@
 )]
 
 mod scene;
+mod tls;
 
 use std::collections::HashSet;
 use std::sync::{Arc, Mutex};
