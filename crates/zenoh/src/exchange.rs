@@ -12,7 +12,7 @@ use jaus::address::JausId;
 use jaus::codec::Message as _;
 use jaus::endpoint::{Remote, To, Transmit};
 use jaus::link::custom::Arrival;
-use jaus::messages::core::RequestControl;
+use jaus::messages::core::{QueryIdentification, RequestControl};
 use jaus::wire::{Acknowledgement, DataControl, Frame, Version, judp};
 use jaus_secure::rules::{Refusal, denial_of_control};
 
@@ -49,6 +49,28 @@ const LARGEST: usize = 65_507;
 /// The most kinds of refused messages that are logged.
 const MOST_WARNINGS: usize = 256;
 
+/// A component of this side.
+#[derive(Debug)]
+struct Local {
+    heard: Instant,
+    /// Its latest call: the broadcast Query Identification with which it searches for others, as a
+    /// datagram.
+    call: Option<Bytes>,
+}
+
+/// Whether messages can be published.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// The zenoh session is not open yet.
+    Opening,
+    Open,
+    /// The node stops.
+    Closed,
+}
+
+/// The longest call that is kept, in octets. Calls have less than twenty.
+const LONGEST_CALL: usize = 64;
+
 /// The bridge's tables and queues. See the [module](self).
 #[derive(Debug)]
 pub struct Exchange {
@@ -57,15 +79,15 @@ pub struct Exchange {
     accept: Acceptance,
     offer: Vec<JausId>,
     remotes: Remotes,
-    /// The components of this side, with the time at which each was last heard.
-    locals: BTreeMap<JausId, Instant>,
+    /// The components of this side.
+    locals: BTreeMap<JausId, Local>,
     /// Their subsystems, whose views this bridge serves.
     served: BTreeSet<u16>,
     thinner: Thinner,
     queue: Queue,
     arrivals: VecDeque<Arrival>,
     arrived_octets: usize,
-    is_open: bool,
+    phase: Phase,
     warned: BTreeSet<(JausId, u16)>,
     counters: Counters,
 }
@@ -86,7 +108,7 @@ impl Exchange {
             queue: Queue::default(),
             arrivals: VecDeque::new(),
             arrived_octets: 0,
-            is_open: false,
+            phase: Phase::Opening,
             warned: BTreeSet::new(),
             counters: Counters::default(),
         }
@@ -131,7 +153,9 @@ impl Exchange {
     /// The zenoh session is open: from now on messages are published. Before, they are dropped,
     /// because late commands do harm.
     pub fn handle_open(&mut self) {
-        self.is_open = true;
+        if self.phase == Phase::Opening {
+            self.phase = Phase::Open;
+        }
     }
 
     /// A sample was received.
@@ -139,6 +163,20 @@ impl Exchange {
         if let Err(counter) = self.receive(now, key, payload) {
             tracing::trace!(%counter, "sample refused");
             self.counters.add(counter);
+        }
+        self.repeat_calls(now);
+    }
+
+    /// Sends the calls of this side's components to the bridges that were found. The components have
+    /// called before, and would not call again for a while.
+    fn repeat_calls(&mut self, now: Instant) {
+        for bridge in self.remotes.take_found() {
+            let calls = self.locals.values().filter_map(|local| local.call.clone());
+            for call in calls.collect::<Vec<_>>() {
+                if let Some(frame) = only_frame(&call) {
+                    self.publish(now, &frame, Some(call), Recipient::Bridge(bridge));
+                }
+            }
         }
     }
 
@@ -233,10 +271,11 @@ impl Exchange {
             }
             self.counters.add(counter);
         }
+        self.repeat_calls(now);
     }
 
     fn is_local(&self, now: Instant, id: JausId) -> bool {
-        let is_recent = |&heard: &Instant| now.saturating_duration_since(heard) < LOCAL_FOR;
+        let is_recent = |local: &Local| now.saturating_duration_since(local.heard) < LOCAL_FOR;
         self.locals.get(&id).is_some_and(is_recent)
     }
 
@@ -244,21 +283,24 @@ impl Exchange {
     pub fn handle_local(&mut self, now: Instant, id: JausId, heard: Instant) {
         let is_recent = now.saturating_duration_since(heard) < LOCAL_FOR;
         if is_recent && self.offers(id) && !self.remotes.contains(id) {
-            // A full table is counted when the component sends something.
+            // What keeps it out is counted when it sends something.
             let _ = self.enter(id, heard);
         }
     }
 
     /// Enters a component of this side, and announces it if it is new.
     fn enter(&mut self, id: JausId, heard: Instant) -> Result<(), Counter> {
-        if let Some(latest) = self.locals.get_mut(&id) {
-            *latest = heard.max(*latest);
+        if self.phase == Phase::Closed {
+            return Err(Counter::NotConnected);
+        }
+        if let Some(local) = self.locals.get_mut(&id) {
+            local.heard = heard.max(local.heard);
             return Ok(());
         }
         if self.locals.len() >= MOST_LOCAL {
             return Err(Counter::LocalTableFull);
         }
-        self.locals.insert(id, heard);
+        self.locals.insert(id, Local { heard, call: None });
         self.queue.declare(Command::Announce(id));
         if self.served.insert(id.subsystem()) {
             self.queue.declare(Command::Serve(id.subsystem()));
@@ -315,9 +357,6 @@ impl Exchange {
         octets: Option<Bytes>,
         to: Recipient,
     ) -> Result<(), Counter> {
-        if !self.is_open {
-            return Err(Counter::NotConnected);
-        }
         if self.remotes.contains(frame.source) {
             return Err(Counter::FromOutside);
         }
@@ -325,8 +364,21 @@ impl Exchange {
             return Err(Counter::NotOffered);
         }
         self.enter(frame.source, now)?;
+        self.keep_call(frame);
+        if self.phase != Phase::Open {
+            return Err(Counter::NotConnected);
+        }
         self.publish(now, frame, octets, to);
         Ok(())
+    }
+
+    fn keep_call(&mut self, frame: &Frame) {
+        let is_call = frame.code() == Some(QueryIdentification::CODE)
+            && frame.destination.has_wildcard()
+            && frame.payload.len() <= LONGEST_CALL;
+        if is_call && let Some(local) = self.locals.get_mut(&frame.source) {
+            local.call = judp::encode(frame).ok();
+        }
     }
 
     /// Publishes a frame; `octets` is its datagram, if it exists already.
@@ -414,6 +466,7 @@ impl Exchange {
             self.queue.declare(Command::Withdraw(id));
             self.remotes.release(now, id);
         }
+        self.repeat_calls(now);
     }
 
     /// Withdraws all components of this side, because the node stops.
@@ -422,7 +475,7 @@ impl Exchange {
         for command in std::mem::take(&mut self.locals).into_iter().map(withdraw) {
             self.queue.declare(command);
         }
-        self.is_open = false;
+        self.phase = Phase::Closed;
     }
 
     /// The next message or closed session for the node.

@@ -44,6 +44,8 @@ pub(crate) struct Remotes {
     /// Tokens of components that belong to another bridge or to this side: those of a bridge that
     /// was started again may come before the old ones are gone.
     claims: BTreeSet<(JausId, BridgeId)>,
+    /// The bridges that were found since the last look.
+    found: Vec<BridgeId>,
     /// The number of the latest session.
     latest: u64,
 }
@@ -52,6 +54,11 @@ impl Remotes {
     /// Whether a bridge speaks for this component.
     pub(crate) fn contains(&self, component: JausId) -> bool {
         self.owners.contains_key(&component)
+    }
+
+    /// The bridges that were found since the last call.
+    pub(crate) fn take_found(&mut self) -> Vec<BridgeId> {
+        std::mem::take(&mut self.found)
     }
 
     /// The bridge of a session.
@@ -117,10 +124,12 @@ impl Remotes {
             }
         }
         let (sessions, latest) = (&mut self.sessions, &mut self.latest);
+        let found = &mut self.found;
         let remote = self.bridges.entry(bridge).or_insert_with(|| {
             *latest += 1;
             let session = SessionId(*latest);
             sessions.insert(session, bridge);
+            found.push(bridge);
             tracing::info!(%bridge, session = session.0, "bridge found");
             Remote {
                 session,

@@ -241,6 +241,27 @@ fn a_message_that_returns_to_its_own_side_is_refused() {
 }
 
 #[test]
+fn a_bridge_that_is_found_hears_the_calls_that_it_has_missed() {
+    let now = Instant::now();
+    let mut here = Exchange::new(HERE, Settings::default());
+    let call = frame(OPERATOR, JausId::EVERYONE, b"\x00\x2B\x02");
+    // Before the session is open, and so to nobody.
+    here.transmit(now, &to_group(std::slice::from_ref(&call)));
+    here.handle_open();
+    assert!(samples(now, &mut here).is_empty());
+    here.handle_token(now, &bridge(THERE, &[]).token_key(DRIVER), true);
+    let sent = samples(now, &mut here);
+    assert_eq!(
+        sent[0].key,
+        "jaus/60/1/1/raw/2B00/0000000000000001/0000000000000002"
+    );
+    assert_eq!(sent[0].payload, datagram(&[call]));
+    let other = bridge(THERE, &[]).token_key(JausId::new(101, 1, 34));
+    here.handle_token(now, &other, true);
+    assert!(here.is_idle(), "it is found already");
+}
+
+#[test]
 fn a_component_that_changes_sides_belongs_to_its_bridge_once_it_is_silent_here() {
     let start = Instant::now();
     let mut here = bridge(HERE, &[]);

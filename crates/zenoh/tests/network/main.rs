@@ -3,9 +3,13 @@
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,
-    reason = "the tests run in real time, within a limit"
+    clippy::expect_used,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "the tests run in real time, within a limit, and fail by panicking"
 )]
 
+mod fleet;
 mod scene;
 mod tls;
 

@@ -27,10 +27,14 @@ fn script(name: &str) -> PathBuf {
 }
 
 /// A process that is killed when it is dropped.
-pub struct Process(Child);
+pub(crate) struct Process(Child);
 
 impl Process {
-    pub fn kill(&mut self) {
+    pub(crate) fn id(&self) -> u32 {
+        self.0.id()
+    }
+
+    pub(crate) fn kill(&mut self) {
         self.0.kill().unwrap();
         self.0.wait().unwrap();
     }
@@ -45,14 +49,14 @@ impl Drop for Process {
 }
 
 /// An endpoint on loopback at a free port.
-pub fn endpoint() -> String {
+pub(crate) fn endpoint() -> String {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let address = listener.local_addr().unwrap();
     format!("tcp/{address}")
 }
 
 /// Starts the router of the package `eclipse-zenoh`, connected to others.
-pub fn router(listen: &str, connect: &[&str]) -> Process {
+pub(crate) fn router(listen: &str, connect: &[&str]) -> Process {
     let mut child = Command::new(python())
         .arg(script("router.py"))
         .arg(listen)
@@ -69,13 +73,13 @@ pub fn router(listen: &str, connect: &[&str]) -> Process {
 }
 
 /// A zenoh program that knows nothing of JAUS, with its output.
-pub struct Client {
+pub(crate) struct Client {
     _process: Process,
     lines: std::io::Lines<BufReader<std::process::ChildStdout>>,
 }
 
 impl Client {
-    pub fn start(endpoint: &str, arguments: &[&str]) -> Self {
+    pub(crate) fn start(endpoint: &str, arguments: &[&str]) -> Self {
         let mut child = Command::new(python())
             .arg(script("client.py"))
             .arg(endpoint)
@@ -89,35 +93,35 @@ impl Client {
     }
 
     /// The next line of its output; `None` at the end.
-    pub fn line(&mut self) -> Option<String> {
+    pub(crate) fn line(&mut self) -> Option<String> {
         self.lines.next().map(Result::unwrap)
     }
 
     /// The whole output.
-    pub fn output(endpoint: &str, arguments: &[&str]) -> Vec<String> {
+    pub(crate) fn output(endpoint: &str, arguments: &[&str]) -> Vec<String> {
         let mut client = Self::start(endpoint, arguments);
         std::iter::from_fn(|| client.line()).collect()
     }
 }
 
 /// One JAUS system: its multicast group on loopback.
-pub struct System {
+pub(crate) struct System {
     group: Group,
 }
 
 impl System {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { group: own_group() }
     }
 
-    pub fn node(&self, subsystem: u16, node: u8) -> Node {
+    pub(crate) fn node(&self, subsystem: u16, node: u8) -> Node {
         let mut config = Config::loopback(subsystem, node);
         config.group = self.group;
         Node::start(config).unwrap()
     }
 
     /// Starts a bridge of this system.
-    pub fn bridge(&self, id: &str, flags: &[&str]) -> Process {
+    pub(crate) fn bridge(&self, id: &str, flags: &[&str]) -> Process {
         let child = Command::new(env!("CARGO_BIN_EXE_jaus-zenoh"))
             .args(["--loopback", "--port", "0", "--id", id])
             .args(["--group", &self.group.to_string()])
@@ -152,7 +156,7 @@ impl primitive_driver::Service<Call<'_>> for Motor {
 }
 
 /// A vehicle with a motor.
-pub fn rover(node: &Node) -> Component {
+pub(crate) fn rover(node: &Node) -> Component {
     Component::builder(Kind::Vehicle, "Rover")
         .offer(Handlers::of(primitive_driver::Server::new(Motor(0.0))))
         .management(Management::new())
@@ -160,14 +164,14 @@ pub fn rover(node: &Node) -> Component {
         .unwrap()
 }
 
-pub fn operator(node: &Node) -> Component {
+pub(crate) fn operator(node: &Node) -> Component {
     Component::builder(Kind::OperatorControlUnit, "Operator")
         .attach(node, 1)
         .unwrap()
 }
 
 /// Its effort in percent, as it reports it itself.
-pub async fn effort(asks: &Component, rover: JausId) -> f64 {
+pub(crate) async fn effort(asks: &Component, rover: JausId) -> f64 {
     let query = QueryWrenchEffort::all();
     let report = asks.query(rover, &query).await.unwrap();
     report.propulsive_linear_effort_x_percent().unwrap_or(0.0)
