@@ -5,7 +5,7 @@
 //! The view only reads: no request leads to anything but a query or a subscription.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -113,7 +113,6 @@ impl Drop for Stream {
 /// Answers requests.
 pub(crate) struct Viewer {
     component: Component,
-    dictionary: Arc<Dictionary>,
     shared: Arc<Shared>,
     queries: JoinSet<()>,
     streams: BTreeMap<(JausId, u16), Stream>,
@@ -124,7 +123,6 @@ impl Viewer {
     pub(crate) fn new(component: Component, shared: Arc<Shared>) -> Self {
         Self {
             component,
-            dictionary: Arc::new(dictionary()),
             shared,
             queries: JoinSet::new(),
             streams: BTreeMap::new(),
@@ -147,14 +145,13 @@ impl Viewer {
                 });
             }
         };
-        let (component, dictionary) = (self.component.clone(), self.dictionary.clone());
-        let shared = self.shared.clone();
+        let (component, shared) = (self.component.clone(), self.shared.clone());
         self.queries.spawn(async move {
             let (peer, report) = (request.component, query.report);
             let options = QueryOptions::default();
             let asked = component.query_undecoded(options, peer, query.octets, report);
             let result = asked.await.map_err(|error| error.to_string());
-            let result = result.and_then(|octets| json(&dictionary, peer, &octets));
+            let result = result.and_then(|octets| json(peer, &octets));
             let query = request.query;
             shared.answer(Answer { query, result });
         });
@@ -180,7 +177,7 @@ impl Viewer {
         if self.queries.len() >= MOST_QUERIES {
             return Err("too many queries wait for their reports: try again".to_owned());
         }
-        let encoded = encode(&self.dictionary, *report)?;
+        let encoded = encode(*report)?;
         if let Some(schedule) = Schedule::parse(query.parameters())? {
             self.subscribe(*component, &encoded, schedule)?;
         }
@@ -215,7 +212,6 @@ impl Viewer {
         let (end, ends) = watch::channel(end);
         let publisher = Publisher {
             component: self.component.clone(),
-            dictionary: self.dictionary.clone(),
             shared: self.shared.clone(),
         };
         let task = self.tasks.spawn(publisher.run(topic, ends));
@@ -228,7 +224,6 @@ impl Viewer {
 /// Publishes the reports of one subscription.
 struct Publisher {
     component: Component,
-    dictionary: Arc<Dictionary>,
     shared: Arc<Shared>,
 }
 
@@ -254,7 +249,7 @@ impl Publisher {
     }
 
     fn publish(&self, peer: JausId, report: u16, octets: &Bytes) {
-        match json(&self.dictionary, peer, octets) {
+        match json(peer, octets) {
             Ok(json) => self
                 .shared
                 .with(|exchange| exchange.publish_view(now(), peer, report, json.into())),
@@ -263,13 +258,13 @@ impl Publisher {
     }
 }
 
-/// All messages that the tool `jaus` knows, too.
-fn dictionary() -> Dictionary {
-    Dictionary::of(messages::registry()).with_catalogue()
-}
+/// All messages that the tool `jaus` knows, too. Reading them takes some milliseconds, at the first
+/// request of the process.
+static DICTIONARY: LazyLock<Dictionary> =
+    LazyLock::new(|| Dictionary::of(messages::registry()).with_catalogue());
 
 /// The query that a report answers, with all fields of the report requested.
-fn encode(dictionary: &Dictionary, report: u16) -> Result<EncodedQuery, String> {
+fn encode(report: u16) -> Result<EncodedQuery, String> {
     let registry = messages::registry();
     let mut queries = registry
         .iter()
@@ -278,7 +273,7 @@ fn encode(dictionary: &Dictionary, report: u16) -> Result<EncodedQuery, String> 
         return Err(format!("no query is known whose report is {report:04X}h"));
     };
     let request = jaus_view::Request::new(query.name, serde_json::json!({}));
-    let encoded = dictionary.query(&request, &[]);
+    let encoded = DICTIONARY.query(&request, &[]);
     encoded.map_err(|error| error.to_string())
 }
 
@@ -290,10 +285,10 @@ struct View<'d> {
     line: Line<'d>,
 }
 
-fn json(dictionary: &Dictionary, source: JausId, octets: &Bytes) -> Result<String, String> {
+fn json(source: JausId, octets: &Bytes) -> Result<String, String> {
     let view = View {
         source: source.to_string(),
-        line: dictionary.line(octets),
+        line: DICTIONARY.line(octets),
     };
     serde_json::to_string(&view).map_err(|error| error.to_string())
 }
@@ -327,19 +322,17 @@ mod tests {
 
     #[test]
     fn a_view_exists_of_reports_and_of_nothing_else() {
-        let dictionary = dictionary();
-        let query = encode(&dictionary, 0x4404).unwrap();
+        let query = encode(0x4404).unwrap();
         assert_eq!(query.octets[..2], [0x04, 0x24]);
         for code in [0x0405, 0x2404, 0x4FFF] {
-            assert!(encode(&dictionary, code).is_err(), "{code:04X}h");
+            assert!(encode(code).is_err(), "{code:04X}h");
         }
     }
 
     #[test]
     fn a_view_is_an_object_with_the_source_and_the_fields_by_name() {
-        let dictionary = dictionary();
         let report = Bytes::from_static(b"\x04\x44\x00\x00");
-        let text = json(&dictionary, JausId::new(101, 1, 43), &report).unwrap();
+        let text = json(JausId::new(101, 1, 43), &report).unwrap();
         let view: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert_eq!(view["source"], "101.1.43");
         assert_eq!(view["message"], "ReportVelocityState");
