@@ -20,6 +20,7 @@ use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::component::{Component, ControlError, Priority, Update, When};
 use jaus::messages::mobility::{QueryWrenchEffort, SetWrenchEffort, primitive_driver};
+use jaus::wire::{Frame, judp};
 use jaus_test_kit::waiting::{until, within_limit};
 use serde_json::Value as Json;
 
@@ -115,6 +116,17 @@ async fn by_default_the_other_side_observes_and_gets_no_control() {
         matches!(refused, Err(ControlError::Refused { .. })),
         "{refused:?}"
     );
+    assert_eq!(rover.standing().controller, None);
+
+    // Neither does a program that publishes under the keys of a bridge, or anything else there.
+    let client = JausId::new(61, 1, 1);
+    let request = Frame::new(client, driver, Bytes::from_static(b"\x0D\x00\x7F"));
+    let request = jaus_view::to_hex(&judp::encode(&request).unwrap());
+    let key = "jaus/61/1/1/raw/000D/00000000000000aa/all";
+    for (key, octets) in [(key, &request[..]), (key, "02"), ("jaus/60/x/raw", "00")] {
+        Client::output(&network, &["put", key, octets]);
+    }
+    assert!(effort(&operator, driver).await < 0.1);
     assert_eq!(rover.standing().controller, None);
 }
 
