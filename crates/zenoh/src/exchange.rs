@@ -368,6 +368,9 @@ impl Exchange {
         if self.phase != Phase::Open {
             return Err(Counter::NotConnected);
         }
+        // The node searches for a component whose route it does not know yet. Its token tells.
+        let owner = self.remotes.owner(frame.destination);
+        let to = owner.map_or(to, Recipient::Bridge);
         self.publish(now, frame, octets, to);
         Ok(())
     }

@@ -61,6 +61,11 @@ impl Remotes {
         std::mem::take(&mut self.found)
     }
 
+    /// The bridge that speaks for a component; `None` for ids with wildcards.
+    pub(crate) fn owner(&self, component: JausId) -> Option<BridgeId> {
+        self.owners.get(&component).copied()
+    }
+
     /// The bridge of a session.
     pub(crate) fn bridge(&self, session: SessionId) -> Option<BridgeId> {
         self.sessions.get(&session).copied()

@@ -241,6 +241,25 @@ fn a_message_that_returns_to_its_own_side_is_refused() {
 }
 
 #[test]
+fn a_message_for_a_component_with_a_token_goes_to_its_bridge_alone() {
+    let now = Instant::now();
+    let mut here = bridge(HERE, &[]);
+    here.handle_token(now, &bridge(THERE, &[]).token_key(DRIVER), true);
+    let stranger = JausId::new(102, 1, 33);
+    let search = [DRIVER, stranger].map(|to| frame(OPERATOR, to, QUERY));
+    here.transmit(now, &to_group(&search));
+    let sent = samples(now, &mut here);
+    let keys: Vec<_> = sent.iter().map(|it| it.key.as_str()).collect();
+    assert_eq!(
+        keys,
+        [
+            "jaus/60/1/1/raw/2404/0000000000000001/0000000000000002",
+            "jaus/60/1/1/raw/2404/0000000000000001/all",
+        ]
+    );
+}
+
+#[test]
 fn a_bridge_that_is_found_hears_the_calls_that_it_has_missed() {
     let now = Instant::now();
     let mut here = Exchange::new(HERE, Settings::default());
