@@ -68,7 +68,8 @@ struct Program<F: Args> {
 
 /// Log filter without `-v`: warnings of every module, such as an emergency or an unwritable log,
 /// and the reports of the parts.
-const USUAL: &str = "warn,jaus_vehicle=info,jaus_ocu=info,jaus_ra=info,jaus_cli=info";
+const USUAL: &str =
+    "warn,jaus_vehicle=info,jaus_ocu=info,jaus_ra=info,jaus_zenoh=info,jaus_cli=info";
 
 /// Runs a program: reads flags and settings, attaches to a node, runs the part until Ctrl-C or
 /// SIGTERM, and detaches.
@@ -111,9 +112,9 @@ fn end<F: Ready>(outcome: Result<Outcome, Failure>) -> ExitCode {
 impl<F: Ready> Program<F> {
     fn run(self) -> Result<Outcome, Failure> {
         let for_node = self.flags.for_node();
-        let part = self.flags.part()?;
+        let mut part = self.flags.part()?;
         runtime::run(async {
-            let place = self.network.join(F::ID, for_node);
+            let place = self.network.join(F::ID, for_node, part.links());
             let until = self.run_for.end();
             tokio::pin!(until);
             let place = tokio::select! {

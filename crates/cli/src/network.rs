@@ -8,6 +8,7 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::component::{Component, Kind};
 use jaus::endpoint::{AccessEntry, Binding};
+use jaus::link::custom::CustomLink;
 #[cfg(unix)]
 use jaus::link::junior::DEFAULT_FOLDER;
 use jaus::link::local::record::Reason;
@@ -197,24 +198,25 @@ impl Network {
     /// Attaches a permanent component: to the host's node or to its own. `usual` is the id if none
     /// is chosen; on the host's node only its component number counts.
     ///
-    /// `for_node` changes the settings of a node of our own.
+    /// `for_node` changes the settings of a node of our own, which also gets the `links`.
     ///
     /// Waits for the host's node without a timeout: components may be started in any order.
     ///
     /// # Errors
     /// An invalid flag or file, a node that cannot be started, or a node that refuses the
-    /// component.
+    /// component; links for the host's node.
     pub async fn join(
         &self,
         usual: JausId,
         for_node: impl FnOnce(&mut Config),
+        links: Vec<Box<dyn CustomLink>>,
     ) -> Result<Place, Failure> {
         let Some(address) = &self.attach else {
             let (id, identity, mut config) = self.for_node(usual)?;
             for_node(&mut config);
             config.validate().map_err(Failure::of)?;
             let config = config.or_any_free_port();
-            let node = self.start(config)?;
+            let node = self.start_with(config, links)?;
             let port = node.attach(id.component()).map_err(Failure::of)?;
             return Ok(Place {
                 port,
@@ -222,6 +224,11 @@ impl Network {
                 stay: Stay::OnOurs(node),
             });
         };
+        if !links.is_empty() {
+            return Err(Failure::new(
+                "this program opens links of its own, so it runs its own node: omit --attach",
+            ));
+        }
         let (identity, node) = self.settings()?;
         let id = self.chosen_id(&identity, &node);
         let host = Host::at(address.clone());
@@ -301,13 +308,20 @@ impl Network {
     /// # Errors
     /// A key or trust file that cannot be used, or a node that cannot be started.
     pub fn start(&self, config: Config) -> Result<Node, Failure> {
+        self.start_with(config, Vec::new())
+    }
+
+    /// The same, with further links.
+    fn start_with(&self, config: Config, links: Vec<Box<dyn CustomLink>>) -> Result<Node, Failure> {
         #[cfg(feature = "secure")]
         if let Some(secure) = self.secure()? {
             let config = Secure::restrict(config)?;
             let link = secure.open(JausId::new(config.subsystem, config.node, 0))?;
-            return Node::start_with(config, vec![Box::new(link)]).map_err(Failure::of);
+            let mut links = links;
+            links.push(Box::new(link));
+            return Node::start_with(config, links).map_err(Failure::of);
         }
-        Node::start(config).map_err(Failure::of)
+        Node::start_with(config, links).map_err(Failure::of)
     }
 
     /// The settings of the file, or the defaults.

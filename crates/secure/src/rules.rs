@@ -23,8 +23,11 @@ mod selection;
 use std::fmt;
 use std::str::FromStr;
 
+use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::wire::{DataControl, Frame};
+use jaus::codec::Message as _;
+use jaus::messages::core::{ConfirmControl, confirm_control::ResponseCode};
+use jaus::wire::{DataControl, EncodeError, Frame, judp};
 
 use permission::{Carried, Permission};
 pub use selection::{Selection, UnknownName};
@@ -213,6 +216,19 @@ pub(crate) fn is_recorded(frame: &Frame) -> bool {
         }
     }
     false
+}
+
+/// The answer to a refused request for control: a datagram with Confirm Control, as from the
+/// component.
+///
+/// # Errors
+/// The header cannot carry it.
+pub fn denial_of_control(request: &Frame) -> Result<Bytes, EncodeError> {
+    let confirm = ConfirmControl {
+        response_code: ResponseCode::INSUFFICIENT_AUTHORITY,
+    };
+    let payload = confirm.encode().unwrap_or_default();
+    judp::encode(&Frame::new(request.destination, request.source, payload))
 }
 
 /// Why a word is no rule.

@@ -5,7 +5,7 @@ use jaus::address::JausId;
 use jaus::codec::Message as _;
 use jaus::messages;
 use jaus::messages::core::{ConfirmControl, confirm_control::ResponseCode};
-use jaus::wire::{EncodeError, Frame, judp};
+use jaus::wire::{Frame, judp};
 
 use crate::rules::Refusal;
 use crate::trust::Peer;
@@ -68,15 +68,6 @@ pub(super) fn screen(
         Some(passed.freeze())
     };
     Some(Screened { passed, frames })
-}
-
-/// The answer to a refused request for control: Confirm Control, as from the component.
-pub(super) fn denial_of_control(request: &Frame) -> Result<Bytes, EncodeError> {
-    let confirm = ConfirmControl {
-        response_code: ResponseCode::INSUFFICIENT_AUTHORITY,
-    };
-    let payload = confirm.encode().unwrap_or_default();
-    judp::encode(&Frame::new(request.destination, request.source, payload))
 }
 
 /// What Confirm Control says, if the frame is one.

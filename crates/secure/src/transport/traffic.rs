@@ -14,7 +14,7 @@ use super::Transport;
 use super::record::{Act, Record};
 use super::screen::{self, Stop};
 use super::session::Session;
-use crate::rules::is_recorded;
+use crate::rules::{denial_of_control, is_recorded};
 use crate::trust::Peer;
 
 /// The first octet of a notice: text for the peer, about a message of its that was refused. No
@@ -211,7 +211,7 @@ impl Transport {
         let mut dropped = 0;
         if frame.code() == Some(RequestControl::CODE)
             && frame.destination.is_unicast()
-            && let Ok(denial) = screen::denial_of_control(frame)
+            && let Ok(denial) = denial_of_control(frame)
         {
             dropped += session.queue(frame.flags.priority(), denial);
         }

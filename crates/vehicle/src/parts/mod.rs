@@ -31,6 +31,7 @@ use std::convert::Infallible;
 use std::future::Future;
 
 use jaus::component::{self, Builder, Component, Kind};
+use jaus::link::custom::CustomLink;
 use jaus::node::{Node, Port, time_of_day};
 use jaus::service::TimeOfDay;
 
@@ -74,6 +75,12 @@ pub use velocity_sensor::VelocitySensor;
 /// # }
 /// ```
 pub trait Part: Send + 'static {
+    /// The links that its node needs besides those of the node's settings. Called once, before the
+    /// node starts; a part with links of its own cannot attach to the node of another process.
+    fn links(&mut self) -> Vec<Box<dyn CustomLink>> {
+        Vec::new()
+    }
+
     /// Runs the component. Ends only when it cannot continue. Dropping the future stops the
     /// component.
     fn run(self, slot: Slot) -> impl Future<Output = Result<Infallible, PartError>> + Send;

@@ -1,0 +1,190 @@
+//! Which ids may come from the zenoh side, and what each may do.
+
+use std::fmt;
+use std::str::FromStr;
+
+use jaus::address::JausId;
+use jaus::wire::Frame;
+use jaus_secure::rules::{Refusal, RuleError, Rules};
+
+/// Ids of the other side, and their rights.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Grant {
+    /// The ids, with wildcards.
+    pub ids: JausId,
+    /// Their rights.
+    pub rules: Rules,
+}
+
+/// Why a text is no grant.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GrantError {
+    /// The ids are missing or malformed.
+    #[error(
+        "`{0}` are no ids: write a subsystem or ids first, such as 60 or 60.255.255, and then \
+         rights, such as control=127"
+    )]
+    Ids(String),
+    /// A word is no right.
+    #[error(transparent)]
+    Rule(#[from] RuleError),
+}
+
+impl FromStr for Grant {
+    type Err = GrantError;
+
+    /// Reads ids and then rights, separated by white space, as in `60 control=127`. The rights are
+    /// the words of [`Rules`].
+    fn from_str(text: &str) -> Result<Self, GrantError> {
+        let text = text.trim();
+        let (ids, rules) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+        let rules = rules.parse()?;
+        Ok(Self {
+            ids: one_or_more(ids).ok_or_else(|| GrantError::Ids(ids.chars().take(60).collect()))?,
+            rules,
+        })
+    }
+}
+
+/// Reads an id with wildcards, or the number of a subsystem for all of its components.
+pub(crate) fn one_or_more(text: &str) -> Option<JausId> {
+    let subsystem = text.parse().ok();
+    let all_of = |subsystem| JausId::new(subsystem, JausId::ANY_NODE, JausId::ANY_COMPONENT);
+    let ids = subsystem.map_or_else(|| text.parse().ok(), |it| Some(all_of(it)))?;
+    (!ids.has_zero()).then_some(ids)
+}
+
+impl fmt::Display for Grant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.ids, self.rules)
+    }
+}
+
+/// The ids that may come from the zenoh side.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Acceptance(Vec<Grant>);
+
+/// The most grants.
+pub(crate) const MOST_GRANTS: usize = 256;
+
+impl Default for Acceptance {
+    /// All ids, which may observe.
+    fn default() -> Self {
+        Self(vec![Grant {
+            ids: JausId::EVERYONE,
+            rules: Rules::default(),
+        }])
+    }
+}
+
+/// Why a message is not accepted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unaccepted {
+    /// Its source is in no grant.
+    Source,
+    /// The rights of its source forbid it.
+    Rule(Refusal),
+}
+
+impl Acceptance {
+    /// Accepts the ids of these grants alone. The first one that an id matches counts. Grants after
+    /// the 256th are ignored.
+    #[must_use]
+    pub fn new(grants: impl IntoIterator<Item = Grant>) -> Self {
+        Self(grants.into_iter().take(MOST_GRANTS).collect())
+    }
+
+    fn grant(&self, id: JausId) -> Option<&Grant> {
+        self.0.iter().find(|grant| grant.ids.matches(id))
+    }
+
+    /// Whether messages of this component are accepted at all.
+    #[must_use]
+    pub fn accepts(&self, id: JausId) -> bool {
+        self.grant(id).is_some()
+    }
+
+    /// Checks a message from the other side.
+    pub(crate) fn check(&self, frame: &Frame) -> Result<(), Unaccepted> {
+        let grant = self.grant(frame.source).ok_or(Unaccepted::Source)?;
+        grant.rules.check(frame).map_err(Unaccepted::Rule)
+    }
+
+    /// The ids to subscribe to: none is part of another.
+    #[must_use]
+    pub fn patterns(&self) -> Vec<JausId> {
+        let ids: Vec<_> = self.0.iter().map(|grant| grant.ids).collect();
+        let covers = |wide: JausId, narrow: JausId| wide.intersection(narrow) == Some(narrow);
+        let is_needed = |&(at, id): &(usize, JausId)| {
+            let others = ids.iter().enumerate().filter(|&(other, _)| other != at);
+            // Of two equal ones the first is needed.
+            !others
+                .into_iter()
+                .any(|(other, &wide)| covers(wide, id) && (wide != id || other < at))
+        };
+        let needed = ids.iter().copied().enumerate().filter(is_needed);
+        needed.map(|(_, id)| id).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytes::Bytes;
+
+    use super::*;
+
+    fn acceptance(grants: &[&str]) -> Acceptance {
+        Acceptance::new(grants.iter().map(|text| text.parse().unwrap()))
+    }
+
+    fn frame(source: JausId, payload: &'static [u8]) -> Frame {
+        Frame::new(source, JausId::new(101, 1, 33), Bytes::from_static(payload))
+    }
+
+    const OPERATOR: JausId = JausId::new(60, 1, 1);
+    const QUERY: &[u8] = b"\x04\x24\xFF\xFF";
+    const RESUME: &[u8] = b"\x04\x00";
+    const REQUEST_CONTROL: &[u8] = b"\x0D\x00\x64";
+
+    #[test]
+    fn without_grants_everybody_may_observe_and_nobody_may_command() {
+        let all = Acceptance::default();
+        assert_eq!(all.check(&frame(OPERATOR, QUERY)), Ok(()));
+        for command in [RESUME, REQUEST_CONTROL] {
+            let refused = all.check(&frame(OPERATOR, command));
+            assert!(matches!(refused, Err(Unaccepted::Rule(_))), "{refused:?}");
+        }
+    }
+
+    #[test]
+    fn a_grant_gives_its_ids_its_rights_and_excludes_all_others() {
+        let some = acceptance(&["60.1.1 control=127", "60 observe"]);
+        assert_eq!(some.check(&frame(OPERATOR, REQUEST_CONTROL)), Ok(()));
+        let colleague = JausId::new(60, 2, 1);
+        assert_eq!(some.check(&frame(colleague, QUERY)), Ok(()));
+        let refused = some.check(&frame(colleague, REQUEST_CONTROL));
+        assert_eq!(refused, Err(Unaccepted::Rule(Refusal::Control)));
+        let stranger = JausId::new(61, 1, 1);
+        assert_eq!(some.check(&frame(stranger, QUERY)), Err(Unaccepted::Source));
+    }
+
+    #[test]
+    fn a_malformed_grant_is_refused_with_an_example() {
+        for text in ["", "0", "60.1", "rover control=1", "60.0.1", "70000"] {
+            let error = text.parse::<Grant>().unwrap_err().to_string();
+            assert!(error.contains("60.255.255"), "{text}: {error}");
+        }
+        let error = "60 drive".parse::<Grant>().unwrap_err().to_string();
+        assert!(error.contains("control=AUTHORITY"), "{error}");
+    }
+
+    #[test]
+    fn no_message_is_subscribed_to_twice() {
+        let some = acceptance(&["60.1.1 command", "60", "60", "61.1.1"]);
+        let patterns = some.patterns();
+        let expected = ["60.255.255", "61.1.1"].map(|id| id.parse().unwrap());
+        assert_eq!(patterns, expected);
+        assert_eq!(Acceptance::default().patterns(), [JausId::EVERYONE]);
+    }
+}

@@ -1,0 +1,193 @@
+//! What a bridge does not accept: commands without the right, foreign ids, malformed samples.
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// A sample as another bridge publishes it.
+fn sample(frame: &Frame, from: BridgeId) -> (String, Bytes) {
+    let key = Key::Raw {
+        source: frame.source,
+        label: Label::of(frame).unwrap(),
+        from,
+        to: Recipient::All,
+    };
+    let octets = datagram(std::slice::from_ref(frame));
+    (Prefix::default().key(&key), octets)
+}
+
+#[test]
+fn by_default_the_other_side_observes_and_its_commands_are_refused() {
+    let now = Instant::now();
+    let mut vehicle = bridge(THERE, &[]);
+    for (payload, passes) in [(QUERY, true), (RESUME, false)] {
+        let (key, octets) = sample(&frame(OPERATOR, DRIVER, payload), HERE);
+        vehicle.handle_sample(now, &key, &octets);
+        assert_eq!(arrivals(&mut vehicle).len(), usize::from(passes));
+    }
+    assert_eq!(vehicle.counters().get(Counter::RuleForbids), 1);
+}
+
+#[test]
+fn a_refused_request_for_control_is_answered_as_by_the_component() {
+    let now = Instant::now();
+    let mut vehicle = bridge(THERE, &[]);
+    vehicle.handle_local(now, DRIVER, now);
+    samples(now, &mut vehicle);
+    let (key, octets) = sample(&frame(OPERATOR, DRIVER, REQUEST_CONTROL), HERE);
+    vehicle.handle_sample(now, &key, &octets);
+    assert!(arrivals(&mut vehicle).is_empty());
+    let answers = samples(now, &mut vehicle);
+    assert_eq!(
+        answers[0].key,
+        "jaus/101/1/33/raw/000F/0000000000000002/0000000000000001"
+    );
+    let answer = only_frame(&answers[0].payload).unwrap();
+    let confirm = ConfirmControl::decode(&answer.payload).unwrap();
+    let expected = ResponseCode::INSUFFICIENT_AUTHORITY;
+    assert_eq!(confirm.response_code, expected);
+    assert_eq!((answer.source, answer.destination), (DRIVER, OPERATOR));
+}
+
+#[test]
+fn with_the_right_commands_and_control_pass_up_to_its_authority() {
+    let now = Instant::now();
+    let mut vehicle = bridge(THERE, &["60 control=100"]);
+    let too_much: &[u8] = b"\x0D\x00\x65";
+    for (payload, passes) in [(RESUME, true), (REQUEST_CONTROL, true), (too_much, false)] {
+        let (key, octets) = sample(&frame(OPERATOR, DRIVER, payload), HERE);
+        vehicle.handle_sample(now, &key, &octets);
+        assert_eq!(arrivals(&mut vehicle).len(), usize::from(passes));
+    }
+}
+
+#[test]
+fn an_id_that_is_not_accepted_neither_sends_nor_appears() {
+    let now = Instant::now();
+    let mut vehicle = bridge(THERE, &["60"]);
+    let stranger = JausId::new(61, 1, 1);
+    let (key, octets) = sample(&frame(stranger, DRIVER, QUERY), HERE);
+    vehicle.handle_sample(now, &key, &octets);
+    let token = bridge(HERE, &[]).token_key(stranger);
+    vehicle.handle_token(now, &token, true);
+    assert!(arrivals(&mut vehicle).is_empty());
+    assert_eq!(vehicle.counters().get(Counter::NotAccepted), 2);
+    assert_eq!(
+        vehicle.subscriptions(),
+        [
+            "jaus/60/*/*/raw/*/*/all",
+            "jaus/60/*/*/raw/*/*/0000000000000002"
+        ]
+    );
+    assert_eq!(vehicle.presences(), ["jaus/60/*/*/live/*"]);
+}
+
+#[test]
+fn nobody_speaks_for_a_component_of_this_side_or_of_another_bridge() {
+    let now = Instant::now();
+    let mut vehicle = bridge(THERE, &[]);
+    vehicle.handle_local(now, DRIVER, now);
+    let (key, octets) = sample(&frame(DRIVER, DRIVER, QUERY), HERE);
+    vehicle.handle_sample(now, &key, &octets);
+    vehicle.handle_token(now, &bridge(HERE, &[]).token_key(DRIVER), true);
+    assert_eq!(vehicle.counters().get(Counter::OwnId), 2);
+
+    vehicle.handle_token(now, &bridge(HERE, &[]).token_key(OPERATOR), true);
+    let (key, octets) = sample(&frame(OPERATOR, DRIVER, QUERY), BridgeId::new(3));
+    vehicle.handle_sample(now, &key, &octets);
+    assert_eq!(vehicle.counters().get(Counter::OtherBridge), 1);
+    assert!(arrivals(&mut vehicle).is_empty());
+}
+
+#[test]
+fn a_key_must_agree_with_its_message() {
+    let now = Instant::now();
+    let mut vehicle = bridge(THERE, &[]);
+    let query = frame(OPERATOR, DRIVER, QUERY);
+    let (_, octets) = sample(&query, HERE);
+    for key in [
+        "jaus/61/1/1/raw/2404/0000000000000001/all",
+        "jaus/60/1/1/raw/2402/0000000000000001/all",
+        "jaus/60/1/1/raw/ack/0000000000000001/all",
+    ] {
+        vehicle.handle_sample(now, key, &octets);
+    }
+    assert_eq!(vehicle.counters().get(Counter::KeyMismatch), 3);
+    for key in [
+        "jaus/60/1/1/raw/2404/0000000000000001/0000000000000003",
+        "jaus/60/1/1/raw/2404/0000000000000002/all",
+        "jaus/60/1/1/json/2404",
+        "",
+    ] {
+        vehicle.handle_sample(now, key, &octets);
+    }
+    assert_eq!(vehicle.counters().get(Counter::UnknownKey), 4);
+    assert!(arrivals(&mut vehicle).is_empty());
+}
+
+#[test]
+fn a_payload_is_exactly_one_message_with_the_as5669a_header() {
+    let now = Instant::now();
+    let mut vehicle = bridge(THERE, &[]);
+    let query = frame(OPERATOR, DRIVER, QUERY);
+    let (key, octets) = sample(&query, HERE);
+    let two = datagram(&[query.clone(), query.clone()]);
+    let older = judp::encode(&Frame {
+        version: Version::As5669,
+        ..query
+    })
+    .unwrap();
+    let mut longer = octets.to_vec();
+    longer.push(0);
+    let cut = octets.slice(..octets.len() - 1);
+    let huge = Bytes::from(vec![2; LARGEST + 1]);
+    let all = [two, older, longer.into(), cut, huge, Bytes::new()];
+    for payload in &all {
+        vehicle.handle_sample(now, &key, payload);
+    }
+    let refused = vehicle.counters().get(Counter::InvalidPayload);
+    assert_eq!(refused, all.len() as u64);
+    assert!(arrivals(&mut vehicle).is_empty());
+}
+
+#[test]
+fn messages_that_the_node_does_not_take_have_a_bound() {
+    let now = Instant::now();
+    let mut vehicle = bridge(THERE, &[]);
+    let (key, octets) = sample(&frame(OPERATOR, DRIVER, QUERY), HERE);
+    for _ in 0..MOST_ARRIVALS + 3 {
+        vehicle.handle_sample(now, &key, &octets);
+    }
+    assert_eq!(vehicle.counters().get(Counter::InboxFull), 3);
+    assert_eq!(arrivals(&mut vehicle).len(), MOST_ARRIVALS);
+    vehicle.handle_sample(now, &key, &octets);
+    assert_eq!(arrivals(&mut vehicle).len(), 1);
+}
+
+#[test]
+fn the_table_of_this_sides_components_has_a_bound() {
+    let now = Instant::now();
+    let mut here = bridge(HERE, &[]);
+    for number in 0..=MOST_LOCAL {
+        let source = JausId::new(1 + number as u16, 1, 1);
+        here.transmit(now, &to_group(&[frame(source, JausId::EVERYONE, QUERY)]));
+        samples(now, &mut here);
+    }
+    assert_eq!(here.counters().get(Counter::LocalTableFull), 1);
+}
+
+proptest! {
+    #[test]
+    fn any_sample_is_passed_or_counted(
+        key in "jaus/60/1/1/raw/(2404|ack|part)/0000000000000001/all|.{0,60}",
+        payload in proptest::collection::vec(any::<u8>(), 0..64),
+        is_alive: bool,
+    ) {
+        let now = Instant::now();
+        let mut vehicle = bridge(THERE, &[]);
+        vehicle.handle_sample(now, &key, &payload.into());
+        let counted: u64 = vehicle.counters().iter().map(|(_, number)| number).sum();
+        prop_assert_eq!(counted, 1);
+        vehicle.handle_token(now, &key, is_alive);
+    }
+}

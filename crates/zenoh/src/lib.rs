@@ -1,0 +1,35 @@
+//! A bridge between JAUS systems over a zenoh network.
+//!
+//! To its JAUS node the bridge is a link like the others: a [`ZenohLink`] carries JUDP datagrams
+//! with one message each, and every bridge on the other side is a session of it. Discovery, events,
+//! control and the detection of dead peers therefore work as over any other link, from end to end.
+//!
+//! * [`key`]: the key expressions of messages, presence and views.
+//! * [`Exchange`]: which messages pass, which bridge speaks for which id, and what to publish. It does
+//!   no I/O and reads no clock.
+//! * [`ZenohLink`]: the exchange as a link of a node.
+//! * [`Bridge`]: the component that runs it, with a zenoh session and the JSON view.
+//!
+//! `docs/zenoh.md` is the guide to the program.
+#![forbid(unsafe_code)]
+
+mod accept;
+mod bridge;
+mod counters;
+mod exchange;
+pub mod key;
+mod link;
+mod network;
+mod queue;
+mod remotes;
+mod thin;
+mod view;
+
+pub use accept::{Acceptance, Grant, GrantError};
+pub use bridge::Bridge;
+pub use counters::{Counter, Counters};
+pub use exchange::{Exchange, Settings};
+pub use link::ZenohLink;
+pub use network::{NetworkError, NetworkSettings};
+pub use queue::{Command, Publication};
+pub use thin::{MinPeriod, MinPeriodError};
