@@ -71,7 +71,10 @@ enum Phase {
 /// The longest call that is kept, in octets. Calls have less than twenty.
 const LONGEST_CALL: usize = 64;
 
-/// The bridge's tables and queues. See the [module](self).
+/// The tables and queues of a bridge, without I/O.
+///
+/// Feed it with `handle_*`, [`transmit`](Self::transmit) and [`expire`](Self::expire); then poll
+/// commands for the zenoh session and arrivals for the node until there are none.
 #[derive(Debug)]
 pub struct Exchange {
     id: BridgeId,
