@@ -48,6 +48,7 @@ impl Part for Communicator {
         let news = (node.events(), node.component_events());
         let _journal = self.start_journal(&node)?;
         let component = slot.component("Communicator").live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         tell_place(&node, self.log.as_ref());
         let view = self.serve(&node, &component).await?;
         tokio::pin!(view);
