@@ -9,7 +9,8 @@ use clap::builder::Resettable;
 use clap::{ArgMatches, Args, Command, CommandFactory, FromArgMatches, Parser};
 
 use super::failure::{Failure, Outcome};
-use super::logging::Logging;
+use super::logging::{self, LevelRequests, Logging};
+use super::metrics::{Metrics, MetricsFlags};
 use super::network::{self, Network};
 use super::runtime::RunFor;
 use super::systemd::Systemd;
@@ -63,6 +64,9 @@ struct Program<F: Args> {
     network: Network,
 
     #[command(flatten)]
+    metrics: MetricsFlags,
+
+    #[command(flatten)]
     logging: Logging,
 }
 
@@ -113,6 +117,7 @@ impl<F: Ready> Program<F> {
         let for_node = self.flags.for_node();
         let part = self.flags.part()?;
         runtime::run(async {
+            let levels = LevelRequests::accept(self.network.file());
             let place = self.network.join(F::ID, for_node);
             let until = self.run_for.end();
             tokio::pin!(until);
@@ -120,13 +125,16 @@ impl<F: Ready> Program<F> {
                 place = place => place?,
                 () = &mut until => return Ok(Outcome::Done),
             };
+            logging::use_level(place.identity.log_level);
+            let metrics = Metrics::open(self.metrics, place.identity.metrics).await?;
             let node = place.stay.node();
             let port = place.port;
             tell_place(port.id(), node.as_ref());
             let kind = place.identity.kind.map_or(F::KIND, Kind::from);
             let name = self.name.or(place.identity.name);
             let name = name.unwrap_or_else(|| F::SUBSYSTEM.to_owned());
-            let slot = Slot::new(port, node, kind, name);
+            let slot = Slot::new(port, node.clone(), kind, name);
+            let telemetry = slot.telemetry.clone();
             let systemd = Systemd::from_environment();
             let outcome = tokio::select! {
                 result = part.run(slot) => {
@@ -139,9 +147,12 @@ impl<F: Ready> Program<F> {
                     outcome
                 }
                 () = systemd.watch() => Outcome::Done,
+                () = metrics.run(node, telemetry.clone()) => Outcome::Done,
+                () = levels.follow() => Outcome::Done,
                 () = &mut until => Outcome::Done,
             };
             systemd.stopping();
+            telemetry.release();
             place.stay.end().await;
             Ok(outcome)
         })
