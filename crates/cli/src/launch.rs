@@ -116,6 +116,7 @@ impl<F: Ready> Program<F> {
     fn run(self) -> Result<Outcome, Failure> {
         let for_node = self.flags.for_node();
         let part = self.flags.part()?;
+        logging::use_level(self.network.log_level()?);
         runtime::run(async {
             let levels = LevelRequests::accept(self.network.file());
             let place = self.network.join(F::ID, for_node);
@@ -125,7 +126,6 @@ impl<F: Ready> Program<F> {
                 place = place => place?,
                 () = &mut until => return Ok(Outcome::Done),
             };
-            logging::use_level(place.identity.log_level);
             let metrics = Metrics::open(self.metrics, place.identity.metrics).await?;
             let node = place.stay.node();
             let port = place.port;

@@ -81,6 +81,7 @@ impl<'a> PlannerTask<'a> {
         wake: &'a Notify,
         telemetry: Telemetry,
     ) -> Self {
+        telemetry.set_stage(Stage::default());
         Self {
             settings,
             component,
