@@ -211,11 +211,9 @@ fn a_watch_prints_the_findings_once_and_then_differences_until_a_signal() {
     node.read_until("Ctrl-C");
     let over = next_with(&mut watch, &["\"neighbours\"", "\"over\""]);
     assert_eq!(over["what"], alone["what"]);
-    let found = next_with(&mut watch, &["\"new\"", "109.1.9 of "]);
-    assert_eq!(found["verdict"], "ok", "{found}");
-    assert!(found["seconds"].as_f64() > over["seconds"].as_f64().map(|it| it - 1.0));
+    next_with(&mut watch, &["\"new\"", "109.1.9"]);
     drop(node);
-    next_with(&mut watch, &["\"over\"", "109.1.9 of "]);
+    next_with(&mut watch, &["\"over\"", "109.1.9"]);
     // No other node was heard: a warning.
     assert_eq!(watch.terminate(), Some(1));
 }
