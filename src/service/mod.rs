@@ -23,6 +23,7 @@
 mod audience;
 mod call;
 mod client;
+mod clock_offset;
 #[cfg(test)]
 mod contest;
 mod context;
@@ -67,6 +68,7 @@ pub use client::{
     Retake, SessionId, SessionLoss, SessionOrder, SessionSettings, SessionState, SubscriptionEnd,
     SubscriptionId, SubscriptionNews, TargetState, Topic, When,
 };
+pub use clock_offset::{Age, ClockEstimator, ClockOffset, Drift, Exchange};
 pub use context::Context;
 pub use control::{AccessControl, Condition, Management};
 pub use directory::{

@@ -191,7 +191,7 @@ fn wanted(now: i64, set: &SetTime) -> Option<i64> {
     Some(day * DAY + of_day)
 }
 
-fn milliseconds_of_day(stamp: TimeStamp) -> Option<i64> {
+pub(super) fn milliseconds_of_day(stamp: TimeStamp) -> Option<i64> {
     let [hour, minutes, seconds] = [stamp.hour(), stamp.minutes(), stamp.seconds()].map(i64::from);
     let milliseconds = i64::from(stamp.milliseconds());
     let real = hour < 24 && minutes < 60 && seconds < 60 && milliseconds < 1000;
@@ -209,8 +209,19 @@ fn day_of(stamp: DateStamp) -> Option<i64> {
         .and_then(|days| i64::try_from(days).ok())
 }
 
+/// The day of a report, in days after 1 January 1970. A peer that reads its clock twice may send
+/// the date of one side of midnight and the time of the other; the time's day of the month then
+/// counts.
+pub(super) fn reported_day(date: DateStamp, time: TimeStamp) -> Option<i64> {
+    let day = day_of(date)?;
+    let is_of_time =
+        |day: &i64| date_on(*day).is_some_and(|date| date.day == u64::from(time.day()));
+    let nearest = [day, day - 1, day + 1].into_iter().find(is_of_time);
+    Some(nearest.unwrap_or(day))
+}
+
 /// The day closest to now with this day of the month; today if there is none.
-fn nearest_day(now: i64, of_day: i64, number: u8) -> i64 {
+pub(super) fn nearest_day(now: i64, of_day: i64, number: u8) -> i64 {
     let today = now.div_euclid(DAY);
     // One of any two consecutive months has this day, so the range contains it.
     (today - 61..=today + 61)
@@ -223,13 +234,13 @@ fn date_on(day: i64) -> Option<Date> {
     u64::try_from(day).ok().map(Date::after_1970)
 }
 
-fn time_stamp(now: i64) -> Option<TimeStamp> {
+pub(super) fn time_stamp(now: i64) -> Option<TimeStamp> {
     let since_1970 = Duration::from_millis(u64::try_from(now).ok()?);
     Some(TimeStamp::at(since_1970))
 }
 
 /// `None` before 2000 and after 2127, which the field cannot hold.
-fn date_stamp(now: i64) -> Option<DateStamp> {
+pub(super) fn date_stamp(now: i64) -> Option<DateStamp> {
     let date = date_on(now.div_euclid(DAY))?;
     let stamp = DateStamp::default();
     let stamp = stamp.with_day(u8::try_from(date.day).ok()?).ok()?;

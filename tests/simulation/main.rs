@@ -15,6 +15,7 @@
 //! | [`judges`] | invariants of endpoints: bounds, and silence when all is quiet |
 //! | [`totals`] | events over all seeds |
 //! | [`answers`] | a large answer over a slow wire |
+//! | [`clocks`] | clocks of two hosts, measured over JAUS Time |
 //! | [`large`], [`streams`], [`control`], [`directories`] | separate scenarios: a large message, subscriptions, operators, discovery |
 //!
 //! `JAUS_SEEDS=n` runs n seeds, `JAUS_SEED=n` only seed n, and `JAUS_TRACE=1` prints its events. A
@@ -27,6 +28,7 @@
 #![expect(clippy::expect_used, clippy::panic, reason = "tests")]
 
 mod answers;
+mod clocks;
 mod control;
 mod directories;
 mod faults;

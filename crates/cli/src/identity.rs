@@ -5,6 +5,8 @@ use std::str::FromStr;
 use clap::ValueEnum;
 use serde::Deserialize;
 
+use super::logging::LogLevel;
+use super::metrics::MetricsAddress;
 use jaus::address::JausId;
 use jaus::component::Kind;
 
@@ -17,6 +19,11 @@ pub struct Identity {
     pub name: Option<String>,
     /// The kind of our subsystem.
     pub kind: Option<SubsystemKind>,
+    /// Where metrics for Prometheus are served: an address with its port, or a port of 127.0.0.1.
+    pub metrics: Option<MetricsAddress>,
+    /// The log level: error, warn, info, debug or trace, or levels by module such as
+    /// `warn,jaus::endpoint=trace`. SIGUSR1 reads it again.
+    pub log_level: Option<LogLevel>,
 }
 
 /// A single component without wildcards: `101.1.33`, or `101.1`, which means component 1.

@@ -9,7 +9,8 @@ use clap::builder::Resettable;
 use clap::{ArgMatches, Args, Command, CommandFactory, FromArgMatches, Parser};
 
 use super::failure::{Failure, Outcome};
-use super::logging::Logging;
+use super::logging::{self, LevelRequests, Logging};
+use super::metrics::{Metrics, MetricsFlags};
 use super::network::{self, Network};
 use super::runtime::RunFor;
 use super::systemd::Systemd;
@@ -63,6 +64,9 @@ struct Program<F: Args> {
     network: Network,
 
     #[command(flatten)]
+    metrics: MetricsFlags,
+
+    #[command(flatten)]
     logging: Logging,
 }
 
@@ -113,7 +117,9 @@ impl<F: Ready> Program<F> {
     fn run(self) -> Result<Outcome, Failure> {
         let for_node = self.flags.for_node();
         let mut part = self.flags.part()?;
+        logging::use_level(self.network.log_level()?);
         runtime::run(async {
+            let levels = LevelRequests::accept(self.network.file());
             let place = self.network.join(F::ID, for_node, part.links());
             let until = self.run_for.end();
             tokio::pin!(until);
@@ -121,13 +127,15 @@ impl<F: Ready> Program<F> {
                 place = place => place?,
                 () = &mut until => return Ok(Outcome::Done),
             };
+            let metrics = Metrics::open(self.metrics, place.identity.metrics).await?;
             let node = place.stay.node();
             let port = place.port;
             tell_place(port.id(), node.as_ref());
             let kind = place.identity.kind.map_or(F::KIND, Kind::from);
             let name = self.name.or(place.identity.name);
             let name = name.unwrap_or_else(|| F::SUBSYSTEM.to_owned());
-            let slot = Slot::new(port, node, kind, name);
+            let slot = Slot::new(port, node.clone(), kind, name);
+            let telemetry = slot.telemetry.clone();
             let systemd = Systemd::from_environment();
             let outcome = tokio::select! {
                 result = part.run(slot) => {
@@ -140,9 +148,12 @@ impl<F: Ready> Program<F> {
                     outcome
                 }
                 () = systemd.watch() => Outcome::Done,
+                () = metrics.run(node, telemetry.clone()) => Outcome::Done,
+                () = levels.follow() => Outcome::Done,
                 () = &mut until => Outcome::Done,
             };
             systemd.stopping();
+            telemetry.release();
             place.stay.end().await;
             Ok(outcome)
         })

@@ -8,6 +8,7 @@
     reason = "they panic when the reader is gone; see `output`"
 )]
 
+pub mod clocks;
 pub mod failure;
 mod fence;
 pub mod folders;
@@ -16,6 +17,7 @@ pub mod https;
 mod identity;
 mod launch;
 pub mod logging;
+pub mod metrics;
 pub mod network;
 pub mod output;
 pub mod reference;

@@ -1,15 +1,27 @@
-//! Sends the library's tracing to standard error, at the chosen level.
+//! Sends the library's tracing to standard error or the journal, at a level that can change while
+//! the program runs.
 
 use std::io::{self, Write};
+use std::path::Path;
+#[cfg(unix)]
+use std::path::PathBuf;
+use std::sync::OnceLock;
 
-use clap::Args;
 use clap::builder::Resettable;
+use clap::{Args, ValueEnum};
+use serde::Deserialize;
+#[cfg(unix)]
+use tokio::signal::unix::{Signal, SignalKind, signal};
 use tracing_subscriber::filter::Targets;
-use tracing_subscriber::layer::SubscriberExt as _;
+use tracing_subscriber::layer::{Layer, SubscriberExt as _};
+use tracing_subscriber::registry::LookupSpan;
 use tracing_subscriber::util::SubscriberInitExt as _;
+use tracing_subscriber::{Registry, reload};
 
 use super::failure::Failure;
 use super::output::{colours_wanted, harmless};
+#[cfg(unix)]
+use super::settings;
 
 /// The verbosity flag of every program.
 #[derive(Args, Debug, Clone, Copy)]
@@ -26,6 +38,57 @@ pub struct Logging {
         help_heading = Resettable::Reset
     )]
     verbose: u8,
+
+    /// How events are logged
+    #[arg(
+        long,
+        value_enum,
+        default_value_t,
+        global = true,
+        help_heading = Resettable::Reset
+    )]
+    log_format: LogFormat,
+}
+
+/// Forms of the log.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum LogFormat {
+    /// Lines for people, on standard error
+    #[default]
+    Text,
+    /// An object a line, on standard error
+    Json,
+    /// Fields in systemd's journal
+    Journald,
+}
+
+/// A log level, or levels by module: `debug`, or `warn,jaus::endpoint=trace`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(try_from = "String")]
+pub struct LogLevel(Targets);
+
+impl TryFrom<String> for LogLevel {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse().map(Self).map_err(|error| {
+            format!(
+                "{error}: write error, warn, info, debug or trace, or levels by module such as \
+                     warn,jaus::endpoint=trace"
+            )
+        })
+    }
+}
+
+/// The level of this process, which has one log.
+static LEVEL: OnceLock<Level> = OnceLock::new();
+
+struct Level {
+    handle: reload::Handle<Targets, Registry>,
+    /// The level at the start.
+    first: Targets,
+    /// Whether a flag or the environment chose it.
+    is_chosen: bool,
 }
 
 /// Environment variable with the log filter.
@@ -50,17 +113,120 @@ impl Logging {
         let filter: Targets = wanted
             .parse()
             .map_err(|error| Failure::new(format!("{LOG}={wanted}: {error}")))?;
-        let told = tracing_subscriber::fmt::layer()
-            .with_writer(|| OneLine(io::stderr()))
-            .with_ansi(colours_wanted(&io::stderr()))
-            .with_target(self.verbose > 1)
-            // Otherwise it reports on standard error that standard error is closed, and panics.
-            .log_internal_errors(false);
+        let output = self.layer()?;
+        let (level, handle) = reload::Layer::new(filter.clone());
+        let is_chosen = self.verbose > 0 || std::env::var_os(LOG).is_some();
+        // A process has one log, so nothing else has set it.
+        let _ = LEVEL.set(Level {
+            handle,
+            first: filter,
+            is_chosen,
+        });
         tracing_subscriber::registry()
-            .with(filter)
-            .with(told)
+            .with(level)
+            .with(output)
             .init();
         Ok(())
+    }
+
+    /// What writes the events.
+    fn layer<S>(&self) -> Result<Box<dyn Layer<S> + Send + Sync>, Failure>
+    where
+        S: tracing::Subscriber + for<'s> LookupSpan<'s>,
+    {
+        // With internal errors, a layer reports on standard error that standard error is closed,
+        // and panics.
+        let layer = tracing_subscriber::fmt::layer().log_internal_errors(false);
+        Ok(match self.log_format {
+            LogFormat::Text => layer
+                .with_writer(|| OneLine(io::stderr()))
+                .with_ansi(colours_wanted(&io::stderr()))
+                .with_target(self.verbose > 1)
+                .boxed(),
+            LogFormat::Json => layer
+                .with_writer(io::stderr)
+                .json()
+                .flatten_event(true)
+                .boxed(),
+            LogFormat::Journald => tracing_journald::layer()
+                .map_err(|error| {
+                    Failure::new(format!(
+                        "--log-format journald: no journal of systemd on this host ({error}); \
+                         choose text or json"
+                    ))
+                })?
+                .with_field_prefix(Some("JAUS".to_owned()))
+                .boxed(),
+        })
+    }
+}
+
+/// Logs at the level of the settings file from now on, unless a flag or the environment chose one.
+pub fn use_level(level: Option<LogLevel>) {
+    if let (Some(current), Some(LogLevel(level))) = (LEVEL.get(), level)
+        && !current.is_chosen
+    {
+        set(current, level);
+    }
+}
+
+/// Requests to read the log level again: SIGUSR1.
+pub struct LevelRequests {
+    #[cfg(unix)]
+    file: Option<PathBuf>,
+    #[cfg(unix)]
+    signals: Option<Signal>,
+}
+
+impl LevelRequests {
+    /// Accepts requests from now on. `file` is the settings file with the level.
+    pub fn accept(file: Option<&Path>) -> Self {
+        #[cfg(not(unix))]
+        let _ = file;
+        Self {
+            #[cfg(unix)]
+            file: file.map(Path::to_owned),
+            #[cfg(unix)]
+            signals: signal(SignalKind::user_defined1()).ok(),
+        }
+    }
+
+    /// Reads the level again at each request. Never returns.
+    pub async fn follow(self) {
+        #[cfg(unix)]
+        if let Some(mut signals) = self.signals {
+            while signals.recv().await.is_some() {
+                read_level(self.file.clone()).await;
+            }
+        }
+        std::future::pending::<()>().await;
+    }
+}
+
+#[cfg(unix)]
+async fn read_level(file: Option<PathBuf>) {
+    let Some(file) = file else {
+        tracing::warn!("there is no settings file to read the log level from: start with --config");
+        return;
+    };
+    // A slow disk must not delay the component.
+    let read = tokio::task::spawn_blocking(move || settings::read(&file));
+    match (LEVEL.get(), read.await) {
+        (Some(current), Ok(Ok((identity, _)))) => {
+            let level = identity.log_level.map(|LogLevel(level)| level);
+            let level = level.unwrap_or_else(|| current.first.clone());
+            tracing::warn!("the log level is now {level}");
+            set(current, level);
+        }
+        (_, Ok(Err(error))) => tracing::error!("the log level is unchanged: {error}"),
+        (_, Err(error)) => tracing::error!("the log level is unchanged: {error}"),
+        (None, _) => {}
+    }
+}
+
+fn set(current: &Level, level: Targets) {
+    if let Err(error) = current.handle.reload(level) {
+        tracing::error!("the log level is unchanged: {error}");
     }
 }
 

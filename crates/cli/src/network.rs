@@ -19,6 +19,7 @@ use jaus::node::{Address, Config, Host, HostError, Node, PeerAddress, Port, Send
 use super::failure::Failure;
 use super::identity::OwnId;
 pub use super::identity::{Identity, SubsystemKind};
+use super::logging::LogLevel;
 #[cfg(feature = "secure")]
 use super::secure::{Secure, SecureFlags};
 use super::settings;
@@ -193,6 +194,15 @@ impl Network {
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
         self.config.as_deref()
+    }
+
+    /// The log level of the settings file.
+    ///
+    /// # Errors
+    /// An unreadable file.
+    pub fn log_level(&self) -> Result<Option<LogLevel>, Failure> {
+        let (identity, _) = self.settings()?;
+        Ok(identity.log_level)
     }
 
     /// Attaches a permanent component: to the host's node or to its own. `usual` is the id if none

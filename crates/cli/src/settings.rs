@@ -14,7 +14,7 @@ use super::failure::Failure;
 use super::identity::Identity;
 
 /// Keys of the programs; all others are the node's.
-const OWN: [&str; 3] = ["id", "name", "kind"];
+const OWN: [&str; 5] = ["id", "name", "kind", "metrics", "log_level"];
 
 /// The table with the flags of a single-component program.
 const COMPONENT: &str = "component";

@@ -210,6 +210,7 @@ impl Part for OpenStation {
         }
         let node = slot.node.clone();
         let component = slot.component("Operator").live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         let trail = Trail::new(station.audit, component.id());
         let gate = match (station.users, station.token) {
             (Some(users), _) => {

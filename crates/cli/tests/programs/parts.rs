@@ -1,11 +1,9 @@
 //! Single-component programs as processes: their default log, their reports to systemd, and their
 //! stop input.
 
-use std::io::{BufRead, BufReader};
 use std::os::unix::net::UnixDatagram;
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::process::Command;
 use std::time::Duration;
 
 use jaus::address::JausId;
@@ -16,70 +14,9 @@ use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::LIMIT;
 
+use crate::program::Program;
+
 const DRIVER: JausId = JausId::new(101, 33, 33);
-
-/// A running program and its standard error.
-struct Program {
-    child: Child,
-    lines: Receiver<String>,
-}
-
-impl Program {
-    fn start(flags: &[&str], environment: &[(&str, &str)]) -> Self {
-        let driver = env!("CARGO_BIN_EXE_jaus-primitive-driver");
-        Self::start_as(driver, flags, environment)
-    }
-
-    fn start_as(program: &str, flags: &[&str], environment: &[(&str, &str)]) -> Self {
-        let mut command = Command::new(program);
-        command.arg("--loopback").args(flags).stderr(Stdio::piped());
-        command.stdout(Stdio::piped());
-        command.env_remove("JAUS_LOG");
-        command.envs(environment.iter().copied());
-        let mut child = command.spawn().unwrap();
-        let errors = BufReader::new(child.stderr.take().unwrap());
-        let (tell, lines) = channel();
-        std::thread::spawn(move || {
-            for line in errors.lines().map_while(Result::ok) {
-                let _ = tell.send(line);
-            }
-        });
-        Self { child, lines }
-    }
-
-    fn signal(&self, name: &str) {
-        let id = self.child.id().to_string();
-        let sent = Command::new("kill").args(["-s", name, &id]).status();
-        assert!(sent.unwrap().success());
-    }
-
-    /// Waits for a line with this text, and returns all lines up to it.
-    fn says(&self, text: &str) -> String {
-        let mut said = String::new();
-        while let Ok(line) = self.lines.recv_timeout(LIMIT) {
-            said += &(line + "\n");
-            if said.contains(text) {
-                return said;
-            }
-        }
-        panic!("it does not say \"{text}\": {said}");
-    }
-
-    /// The first line of its standard output, or all of it if that has no line.
-    fn prints(&mut self) -> String {
-        let mut line = String::new();
-        let output = self.child.stdout.take().unwrap();
-        BufReader::new(output).read_line(&mut line).unwrap();
-        line
-    }
-}
-
-impl Drop for Program {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
 
 fn group_flag(group: Group) -> String {
     match group {
@@ -150,7 +87,7 @@ async fn emergencies_and_the_stop_input_are_logged_without_a_flag() {
     program.says("the stop input is closed again");
     program.signal("TERM");
     let mut program = program;
-    assert!(program.child.wait().unwrap().success());
+    assert_eq!(program.ends(), Some(0));
     std::fs::remove_dir_all(directory).unwrap();
 }
 

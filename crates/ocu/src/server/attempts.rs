@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
 use super::bounds::{Buckets, Rate};
-use super::places::Source;
+use crate::places::Source;
 
 /// Failed logins of one address, by password or token.
 const BY_SOURCE: Rate = Rate {

@@ -21,7 +21,7 @@ use tokio::task::JoinSet;
 use tokio::time::{Instant, Sleep, sleep, timeout};
 use tower::ServiceExt;
 
-use super::places::{Place, Places, Source};
+use crate::places::{Place, Places, Source};
 use crate::tls::Tls;
 
 /// Connection limit: more than all pages need, and far below the usual limit of open files.

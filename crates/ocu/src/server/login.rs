@@ -14,9 +14,9 @@ use tokio::time::timeout;
 
 use super::gate::{LoginError, UserGate};
 use super::logins::{Ending, LoginId};
-use super::places::Source;
 use super::visitor::Visitor;
 use super::{Refusal, Shared};
+use crate::places::Source;
 use crate::users::UserRole;
 
 /// Deadline of a login's body.

@@ -12,7 +12,7 @@ use std::net::SocketAddr;
 
 use super::{Part, PartError, Slot};
 use crate::messages;
-use jaus::component::{Component, Watch};
+use jaus::component::{AccessControl, Component, Time, Watch};
 use jaus::endpoint::{Event, Remote};
 use jaus::node::{ComponentEvents, Events, Node};
 use jaus_view::debug::{self, DebugView};
@@ -26,6 +26,8 @@ pub const DEBUG_ADDRESS: SocketAddr =
 const MOST_CONFLICTS: usize = 256;
 
 /// Settings of the vehicle's node beyond routing.
+///
+/// It offers Time, so that other hosts can measure the clock of this one, with Access Control.
 #[derive(Debug, Clone, Default)]
 pub struct Communicator {
     /// Address of the debug view, if it is served.
@@ -47,7 +49,12 @@ impl Part for Communicator {
         };
         let news = (node.events(), node.component_events());
         let _journal = self.start_journal(&node)?;
-        let component = slot.component("Communicator").live_on(slot.port)?;
+        let component = slot
+            .component("Communicator")
+            .access_control(AccessControl::new())
+            .offer(Time::new(slot.time.clone()))
+            .live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         tell_place(&node, self.log.as_ref());
         let view = self.serve(&node, &component).await?;
         tokio::pin!(view);

@@ -87,6 +87,7 @@ impl Part for GlobalDriver {
             .offer(vehicle.global_waypoint_driver())
             .offer(board.service())
             .live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         let poses = Sense::global_pose(&component, Self::HZ)?;
         let zones = Sense::zones(&component)?;
         let local_poses = Sense::pose(&component, Self::HZ)?;

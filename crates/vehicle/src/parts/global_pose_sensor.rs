@@ -10,7 +10,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::drivers::Sense;
 use super::navigation_inputs;
 use super::turn_rates::TurnRates;
-use super::{Gyro, IioDevice, Part, PartError, Readings, Slot};
+use super::{Gyro, IioDevice, Part, PartError, Readings, Slot, Telemetry};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::Vehicle;
 use crate::motion::{Frame, GlobalPose, Motion, Observed, Pilot, Pose, WheelCount};
@@ -96,6 +96,7 @@ impl GlobalPoseSensor {
             .access_control(AccessControl::new())
             .offer(vehicle.global_pose_sensor())
             .live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         let query = QueryWheelOdometry {};
         let urn = wheel_odometry::URN;
         let counts = Sense::of(&component, urn, &query, self.hz, "wheel travel")?;
@@ -106,6 +107,7 @@ impl GlobalPoseSensor {
         };
         let sensor = Running {
             component,
+            telemetry: slot.telemetry,
             vehicle,
             observed,
             navigator: Navigator::new(self.navigator),
@@ -117,6 +119,7 @@ impl GlobalPoseSensor {
 
 struct Running {
     component: Component,
+    telemetry: Telemetry,
     vehicle: Vehicle,
     observed: Observed,
     navigator: Navigator,
@@ -175,6 +178,8 @@ impl Running {
         }
         let motion = match pose {
             Ok(estimate) => {
+                self.telemetry
+                    .set_sampled("global pose", estimate.sampled_at);
                 let GlobalPose {
                     latitude,
                     longitude,

@@ -57,6 +57,7 @@ impl Part for ImuSensor {
             builder = builder.offer(acceleration_service());
         }
         let component = builder.live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         let mut is_lost = false;
         loop {
             let sample = match timeout(self.silence, next_reading(&mut samples)).await {
@@ -71,6 +72,9 @@ impl Part for ImuSensor {
             }
             is_lost = sample.is_none();
             let age = sample.map_or(Duration::ZERO, |it| it.at.elapsed());
+            if let Some(sample) = &sample {
+                slot.telemetry.set_sampled("inertial", sample.at);
+            }
             let now = slot.time.system_time();
             let sampled_at = now.checked_sub(age).unwrap_or(now);
             let InertialSample {

@@ -114,6 +114,7 @@ impl Part for KnowledgeStore {
             .offer(store.raster_maps())
             .offer(zones.clone())
             .live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         // A remaining copy of the store would keep the file open after the component's end.
         drop(store);
         tokio::select! {

@@ -22,6 +22,7 @@ mod pose_sensor;
 mod primitive_driver;
 mod range_sensor;
 mod stop_line;
+mod telemetry;
 pub mod tester;
 mod turn_rates;
 mod vector_driver;
@@ -53,6 +54,7 @@ pub use planner::Planner;
 pub use pose_sensor::PoseSensor;
 pub use primitive_driver::PrimitiveDriver;
 pub use range_sensor::RangeSensor;
+pub use telemetry::{MissionCounts, Readout, Telemetry};
 pub use turn_rates::Gyro;
 pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
@@ -99,6 +101,8 @@ pub struct Slot {
     pub name: String,
     /// The clock for the time stamps of samples.
     pub time: TimeOfDay,
+    /// Where the part shows its values to monitoring.
+    pub telemetry: Telemetry,
 }
 
 impl Slot {
@@ -116,6 +120,7 @@ impl Slot {
             kind,
             name: name.into(),
             time: TimeOfDay::new(time_of_day),
+            telemetry: Telemetry::default(),
         }
     }
 

@@ -84,6 +84,7 @@ impl Part for PathDriver {
             .offer(vehicle.local_path_segment_driver())
             .offer(board.service())
             .live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         let poses = Sense::pose(&component, Self::HZ)?;
         let zones = Sense::zones(&component)?;
         let scans = Sense::scans(&component, Self::SCANS)?;

@@ -77,8 +77,9 @@ impl Part for Planner {
             .offer(missions.service())
             .offer(Handoff::new())
             .live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         let (tell, news) = mpsc::channel(PlannerTask::NEWS);
-        let task = PlannerTask::new(&self, &component, missions, &wake);
+        let task = PlannerTask::new(&self, &component, missions, &wake, slot.telemetry);
         let watch = |link| chain::watch(&component, link, &tell);
         let poses = Sense::pose(&component, POSES)?;
         let scans = Sense::scans(&component, SCANS)?;

@@ -13,7 +13,7 @@ use tokio::time::timeout;
 use super::drivers::Sense;
 use super::keeper::{Keeper, keeper};
 use super::pose_file::{self, Kept};
-use super::{Part, PartError, Slot};
+use super::{Part, PartError, Slot, Telemetry};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::Vehicle;
 use crate::motion::{DeadReckoning, Frame, Freshness, Motion, Observed, Pilot, Pose, WheelCount};
@@ -60,6 +60,7 @@ impl Part for PoseSensor {
             .access_control(AccessControl::new())
             .offer(vehicle.local_pose_sensor())
             .live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         let query = QueryWheelOdometry {};
         let counts = Sense::of(
             &component,
@@ -71,6 +72,7 @@ impl Part for PoseSensor {
         let (keeper, kept) = keeper();
         let sensor = Running {
             component,
+            telemetry: slot.telemetry,
             observed,
             reckoning,
             keeper: self.file.is_some().then_some(keeper),
@@ -110,6 +112,7 @@ impl PoseSensor {
 
 struct Running {
     component: Component,
+    telemetry: Telemetry,
     observed: Observed,
     reckoning: DeadReckoning,
     keeper: Option<Keeper<Kept>>,
@@ -139,6 +142,7 @@ impl Running {
                     self.reckoning.handle_count(count);
                     if let Some(at) = freshness.handle(now, Some(read_at)) {
                         sampled_at = Some(at);
+                        self.telemetry.set_sampled("pose", at);
                     }
                     self.reckoning.pose()
                 }

@@ -10,7 +10,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::drivers::{FaultMonitor, Sense, Watchman, guard, shut_down};
 use super::hardware::{Drives, Hardware, Motors, SteeringGear, Stop};
 use super::stop_line::StopLine;
-use super::{Part, PartError, Slot};
+use super::{Part, PartError, Slot, Telemetry};
 use crate::actuator::{Interlock, MotorConfig, Odometer, WheelsConfig};
 use crate::ground::{StageBoard, StageReport, StageState, WheelOdometry};
 use crate::handoff::Handoff;
@@ -123,10 +123,12 @@ impl PrimitiveDriver {
             .offer(board.service())
             .offer(Handoff::new())
             .live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         let poses = Sense::pose(&component, Self::HZ)?;
         let zones = Sense::zones(&component)?;
         let driver = Running {
             component,
+            telemetry: slot.telemetry,
             fence: fence.clone(),
             vehicle,
             odometer,
@@ -161,6 +163,7 @@ async fn pressed(stop: &mut Option<StopLine>) {
 
 struct Running {
     component: Component,
+    telemetry: Telemetry,
     vehicle: Vehicle,
     fence: Fence,
     odometer: Odometer,
@@ -185,6 +188,7 @@ impl Running {
             watchman.note(*standings.borrow_and_update());
             self.check_stop().await;
             self.check_motors(&mut faults).await;
+            self.telemetry.set_speed(self.vehicle.motion().velocity.x);
             if self.board.tell(self.stage(&watchman)) {
                 self.component.changed::<QueryStage>().await;
             }

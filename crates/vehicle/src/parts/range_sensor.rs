@@ -15,6 +15,7 @@ use crate::ground;
 use crate::messages::environment_sensing::QueryRangeSensorData;
 use crate::sensing::{RangerConfig, Scenery, SimulatedRanger};
 use jaus::component::AccessControl;
+use jaus::node::now;
 
 /// Measures the distances to the obstacles of a simulation, as seen from the vehicle's pose.
 ///
@@ -52,6 +53,7 @@ impl Part for RangeSensor {
             .access_control(AccessControl::new())
             .offer(sensor.service())
             .live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         let mut poses = Sense::pose(&component, self.hz)?;
         loop {
             let pose = match timeout(PATIENCE, poses.next()).await {
@@ -59,6 +61,9 @@ impl Part for RangeSensor {
                 Err(_) => None,
             };
             let scan = pose.map(|pose| ranger.scan(&pose));
+            if scan.is_some() {
+                slot.telemetry.set_sampled("scan", now());
+            }
             sensor.publish(scan.as_ref(), slot.time.system_time());
             component.changed::<QueryRangeSensorData>().await;
         }

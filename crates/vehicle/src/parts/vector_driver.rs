@@ -82,6 +82,7 @@ impl Part for VectorDriver {
             .offer(vehicle.local_vector_driver())
             .offer(board.service())
             .live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         let poses = Sense::pose(&component, Self::HZ)?;
         let zones = Sense::zones(&component)?;
         let scans = Sense::scans(&component, Self::SCANS)?;

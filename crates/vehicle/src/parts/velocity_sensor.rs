@@ -53,6 +53,7 @@ impl Part for VelocitySensor {
             .component("Velocity State Sensor")
             .offer(sensor)
             .live_on(slot.port)?;
+        slot.telemetry.attach(&component);
         let query = QueryWheelOdometry {};
         let mut counts: Sense<ReportWheelOdometry> = Sense::of(
             &component,
@@ -75,6 +76,7 @@ impl Part for VelocitySensor {
                     let count = WheelCount::from(&report?);
                     let read_at = Duration::from_millis(count.time_ms.into());
                     if let Some(at) = freshness.handle(now, Some(read_at)) {
+                        slot.telemetry.set_sampled("velocity", at);
                         sampled_at = slot.time.system_time() - now.saturating_duration_since(at);
                     }
                     speedometer.handle_count(count)
@@ -86,6 +88,7 @@ impl Part for VelocitySensor {
                 }
             };
             let velocity = velocity.unwrap_or_else(unknown);
+            slot.telemetry.set_speed(velocity.x);
             let report = ReportVelocityState::from(velocity);
             component.publish(report, sampled_at).await?;
             let report = ReportVelocityStateExt::from(velocity);

@@ -9,10 +9,13 @@ use jaus::component::{Change, Component, Kind};
 use jaus::endpoint::Event;
 use jaus::node::{ComponentEvents, Events, LinkReport, Local, Node, units};
 use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::logging::{self, LevelRequests};
+use jaus_cli::metrics::{Metrics, MetricsFlags};
 use jaus_cli::network::{self, Network, SubsystemKind};
 use jaus_cli::runtime::{self, RunFor};
 use jaus_cli::statistics::{self, DropWatch};
 use jaus_cli::tree;
+use jaus_vehicle::parts::Telemetry;
 use serde_json::json;
 use tokio::time::{MissedTickBehavior, interval};
 
@@ -67,6 +70,9 @@ pub(crate) struct NodeCommand {
 
     #[command(flatten)]
     network: Network,
+
+    #[command(flatten)]
+    metrics: MetricsFlags,
 }
 
 /// Interval of drop reports in the log.
@@ -85,7 +91,10 @@ impl NodeCommand {
         let kind = kind.map_or(Kind::OtherSubsystem, Kind::from);
         let name = self.name.clone().or(identity.name);
         let name = name.unwrap_or_else(|| "jaus node".to_owned());
+        logging::use_level(identity.log_level);
         runtime::run(async {
+            let levels = LevelRequests::accept(self.network.file());
+            let metrics = Metrics::open(self.metrics, identity.metrics).await?;
             let node = self.network.start(config)?;
             let events = (node.events(), node.component_events());
             let component = Component::builder(kind, name)
@@ -93,7 +102,14 @@ impl NodeCommand {
                 .map_err(Failure::of)?;
             let mut printer = self.format.printer();
             introduce(&node, &component, &mut printer)?;
-            let outcome = self.watch(&node, &component, events, &mut printer).await;
+            let telemetry = Telemetry::default();
+            telemetry.attach(&component);
+            let outcome = tokio::select! {
+                outcome = self.watch(&node, &component, events, &mut printer) => outcome,
+                () = metrics.run(Some(node.clone()), telemetry.clone()) => Ok(Outcome::Done),
+                () = levels.follow() => Ok(Outcome::Done),
+            };
+            telemetry.release();
             if self.stats.is_some() {
                 print_statistics(&node, &mut printer)?;
             }

@@ -11,11 +11,14 @@ use jaus::component::{
 use jaus::node::time_of_day;
 use jaus::service::{MotionPolicy, StopCause};
 use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::logging::{self, LevelRequests};
+use jaus_cli::metrics::{Metrics, MetricsFlags};
 use jaus_cli::network::Network;
 use jaus_cli::runtime::{self, RunFor, between, control_timeout};
 use jaus_vehicle::handoff::Handoff;
 use jaus_vehicle::mobility::Vehicle;
 use jaus_vehicle::motion::{Frame, Limits, Motion, Pilot, SkidSteer, SkidSteerConfig};
+use jaus_vehicle::parts::Telemetry;
 use serde_json::{Value as Json, json};
 use tokio::time::{MissedTickBehavior, interval};
 
@@ -79,6 +82,9 @@ pub(crate) struct VehicleCommand {
 
     #[command(flatten)]
     network: Network,
+
+    #[command(flatten)]
+    metrics: MetricsFlags,
 }
 
 /// How clients are expected to behave.
@@ -133,7 +139,10 @@ impl VehicleCommand {
         let name = self.name.clone().or(identity.name);
         let name = name.unwrap_or_else(|| "Rover".to_owned());
         let navigation = self.navigation(id)?;
+        logging::use_level(identity.log_level);
         runtime::run(async {
+            let levels = LevelRequests::accept(self.network.file());
+            let metrics = Metrics::open(self.metrics, identity.metrics).await?;
             let node = self.network.start(config)?;
             let time = TimeOfDay::new(time_of_day);
             let vehicle = self.simulation.vehicle().with_clock(time.clone());
@@ -161,7 +170,14 @@ impl VehicleCommand {
                 ))?;
             }
             node::introduce(&node, &driver, &mut printer)?;
-            let outcome = self.watch(&driver, &vehicle, &mut printer).await;
+            let telemetry = Telemetry::default();
+            telemetry.attach(&driver);
+            let outcome = tokio::select! {
+                outcome = self.watch(&driver, &vehicle, &telemetry, &mut printer) => outcome,
+                () = metrics.run(Some(node.clone()), telemetry.clone()) => Ok(Outcome::Done),
+                () = levels.follow() => Ok(Outcome::Done),
+            };
+            telemetry.release();
             drop((manager, driver));
             node.shutdown().await;
             if let Some(cause @ StopCause::Ended) = vehicle.last_stop() {
@@ -204,6 +220,7 @@ impl VehicleCommand {
         &self,
         component: &Component,
         vehicle: &Vehicle,
+        telemetry: &Telemetry,
         printer: &mut EventPrinter,
     ) -> Result<Outcome, Failure> {
         let mut changes = component.watch();
@@ -231,6 +248,7 @@ impl VehicleCommand {
                 }
                 _ = looks.tick() => {
                     let motion = vehicle.motion();
+                    telemetry.set_speed(motion.velocity.x);
                     let is_news = motion.pose != told.pose;
                     told = motion;
                     if is_news {

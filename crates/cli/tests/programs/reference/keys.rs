@@ -9,7 +9,7 @@ use serde_json::{Value as Json, json};
 use super::source::{Definition, Kind, Shape, Source, Variant};
 
 /// The sources of the settings.
-const FILES: [&str; 16] = [
+const FILES: [&str; 18] = [
     "src/node/config/mod.rs",
     "src/node/config/delivery.rs",
     "src/node/config/tcp.rs",
@@ -26,6 +26,8 @@ const FILES: [&str; 16] = [
     "src/peer/mod.rs",
     "src/address.rs",
     "crates/cli/src/identity.rs",
+    "crates/cli/src/logging.rs",
+    "crates/cli/src/metrics/mod.rs",
 ];
 
 /// Where the type `SerialLine` of a configuration is, and its name there.

@@ -95,10 +95,14 @@ impl Running {
     }
 
     pub fn command(name: &str, flags: &[&str]) -> Self {
+        Self::endless(name, &[flags, &["--for", "60s"]].concat())
+    }
+
+    /// A command without a limit of its time.
+    pub fn endless(name: &str, flags: &[&str]) -> Self {
         let mut child = jaus()
             .arg(name)
             .args(flags)
-            .args(["--for", "60s"])
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();

@@ -186,3 +186,34 @@ fn with_mistakes_in_the_settings_it_cannot_run() {
     assert!(run.stderr.contains("did you mean `port`?"), "{run:?}");
     assert_eq!((run.status, &*run.stdout), (2, ""));
 }
+
+/// The next line with these words in its JSON.
+#[track_caller]
+fn next_with(watch: &mut Running, words: &[&str]) -> Json {
+    loop {
+        let line = watch.read_until("\n");
+        let event: Json = serde_json::from_str(&line).unwrap();
+        if words.iter().all(|word| line.contains(word)) {
+            return event;
+        }
+    }
+}
+
+#[test]
+fn a_watch_prints_the_findings_once_and_then_differences_until_a_signal() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let flags = [&["--json", "--watch=200ms"], &*network].concat();
+    let mut watch = Running::endless("doctor", &[&flags, &["--for", "1s"][..]].concat());
+    let alone = next_with(&mut watch, &["\"neighbours\""]);
+    assert_eq!(alone["event"], "new", "{alone}");
+    let mut node = Running::node(&[&["--id", "109.1.9", "--name", "Mule"], &*network].concat());
+    node.read_until("Ctrl-C");
+    let over = next_with(&mut watch, &["\"neighbours\"", "\"over\""]);
+    assert_eq!(over["what"], alone["what"]);
+    next_with(&mut watch, &["\"new\"", "109.1.9"]);
+    drop(node);
+    next_with(&mut watch, &["\"over\"", "109.1.9"]);
+    // No other node was heard: a warning.
+    assert_eq!(watch.terminate(), Some(1));
+}

@@ -102,3 +102,26 @@ fn a_node_tells_its_statistics_now_and_then() {
     let wrong = run(&[&["node", "--stats=5"], &*network].concat(), b"");
     assert!(wrong.stderr.contains("`5` is not a time"), "{wrong:?}");
 }
+
+#[test]
+fn the_clock_of_a_neighbour_with_the_time_service_is_measured() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let mut vehicle = Running::command("vehicle", &[&["--id", "115.1.1"], &*network].concat());
+    vehicle.read_until("Ctrl-C");
+    let flags = [
+        "monitor",
+        "--once",
+        "--clocks",
+        "--json",
+        "--interval",
+        "3s",
+    ];
+    let seen = run(&[&flags, &*network].concat(), b"");
+    let clock = &seen.only_line()["peers"][0]["clock"];
+    let number = |key: &str| clock[key].as_f64().unwrap_or(f64::NAN);
+    // Both are of this host.
+    let (ahead, uncertainty) = (number("ahead_ms"), number("uncertainty_ms"));
+    assert!(ahead.abs() <= uncertainty, "{seen:?}");
+    assert_eq!(clock["steps"], 0, "{seen:?}");
+}

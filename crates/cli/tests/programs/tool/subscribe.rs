@@ -124,3 +124,24 @@ fn a_report_as_text_has_units_and_names_of_values() {
     let status = asked("QueryStatus");
     assert!(status.contains("  Status STANDBY"), "{status}");
 }
+
+#[test]
+fn the_age_of_samples_follows_from_their_time_stamps_and_the_clock_of_the_component() {
+    let (_vehicle, group) = vehicle("107.1.6");
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let flags = [
+        "107.1.6",
+        "QueryLocalPose",
+        "--hz",
+        "10",
+        "--clock",
+        "--json",
+    ];
+    let mut subscriber = Running::command("subscribe", &[&flags, &*network].concat());
+    // A report with a stamp, once the clock is measured.
+    let read = subscriber.read_until("\"sampled\":");
+    let report: serde_json::Value = serde_json::from_str(read.lines().last().unwrap()).unwrap();
+    let number = |key: &str| report["sampled"][key].as_f64().unwrap();
+    let (age, uncertainty) = (number("age"), number("uncertainty"));
+    assert!(age >= -uncertainty && age < 5.0, "{report}");
+}

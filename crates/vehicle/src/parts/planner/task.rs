@@ -21,6 +21,7 @@ use crate::messages::ground::{QueryMission, QueryPlannedPath, QueryStage, Report
 use crate::mission::{
     self, Action, Destination, Link, LinkState, Mission, NotPlanned, Path, Run, Stage, Terrain,
 };
+use crate::parts::Telemetry;
 use crate::sensing::Lookout;
 use crate::zones::Zones;
 use jaus::address::JausId;
@@ -66,6 +67,7 @@ pub(super) struct PlannerTask<'a> {
     controllers: [Option<JausId>; 3],
     /// The last logged stage.
     logged: Option<(Run, Stage)>,
+    telemetry: Telemetry,
 }
 
 impl<'a> PlannerTask<'a> {
@@ -77,7 +79,9 @@ impl<'a> PlannerTask<'a> {
         component: &'a Component,
         missions: Missions,
         wake: &'a Notify,
+        telemetry: Telemetry,
     ) -> Self {
+        telemetry.set_stage(Stage::default());
         Self {
             settings,
             component,
@@ -93,6 +97,7 @@ impl<'a> PlannerTask<'a> {
             peers: [None; 3],
             controllers: [None; 3],
             logged: None,
+            telemetry,
         }
     }
 
@@ -151,6 +156,7 @@ impl<'a> PlannerTask<'a> {
             return;
         }
         self.logged = now;
+        self.telemetry.set_stage(report.stage);
         let Run { mission, attempt } = report.run;
         let reason = match report.reason.as_str() {
             "" => String::new(),

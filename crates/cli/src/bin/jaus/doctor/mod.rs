@@ -1,6 +1,10 @@
 //! `jaus doctor`: checks everything that keeps nodes from finding each other, and suggests
 //! remedies. One file per check; a check returns [`Finding`]s. [`examine`](crate::examine) examines
 //! one peer.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "pauses between rounds in real time"
+)]
 
 mod finding;
 mod group;
@@ -12,6 +16,7 @@ mod port;
 mod ra;
 #[cfg(feature = "secure")]
 mod secure;
+mod watch;
 
 use std::time::Duration;
 
@@ -19,11 +24,12 @@ use clap::Args;
 use serde_json::json;
 
 use self::finding::{Finding, Mark};
+use self::watch::Rounds;
 use jaus::node::Config;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::output::{Output, colours_wanted, counted, say};
-use jaus_cli::runtime;
+use jaus_cli::runtime::{self, Clock};
 
 /// Find out why nodes do not find each other
 ///
@@ -33,6 +39,10 @@ use jaus_cli::runtime;
 /// privileges. Give it the flags or the settings file of the node that does not work.
 /// Exit status 1 means that there are warnings or failures, for instance that no other node was
 /// heard. `jaus examine` examines one peer.
+///
+/// With --watch it repeats all checks until Ctrl-C or SIGTERM, and prints the findings of the first
+/// round, then only differences. The exit status is that of the last complete round, and 1 if there
+/// was none.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus doctor\n  \
@@ -40,11 +50,26 @@ use jaus_cli::runtime;
     jaus doctor --id 101.1.1              and whether that id is taken\n  \
     jaus doctor --interface eth0 --for 10s\n  \
     jaus doctor --secure-peer 192.168.7.2 and whether a secure link stands\n  \
-    jaus doctor --json | jq '.findings[] | select(.verdict != \"ok\")'")]
+    jaus doctor --json | jq '.findings[] | select(.verdict != \"ok\")'\n  \
+    jaus doctor --watch                   repeats the checks, prints differences\n\n\
+    With --watch, --json prints an object a line: \"event\" (\"new\" or \"over\"), \"seconds\" since \
+    the start, and the finding.")]
 pub(crate) struct Doctor {
     /// How long to listen to the network; up to 30s if a node is there whose multicasts do not arrive
     #[arg(long = "for", value_name = "DURATION", default_value = "3s", value_parser = runtime::duration)]
     duration: Duration,
+
+    /// Repeat the checks after this pause until Ctrl-C, and print only differences [pause without a
+    /// value: 10s]
+    #[arg(
+        long,
+        value_name = "PAUSE",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "10s",
+        value_parser = runtime::duration,
+    )]
+    watch: Option<Duration>,
 
     /// Print the findings as one JSON object
     #[arg(long)]
@@ -56,14 +81,42 @@ pub(crate) struct Doctor {
 
 impl Doctor {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        let mut report = Report {
-            output: Output::new(),
-            colours: colours_wanted(&std::io::stdout()),
-            json: self.json,
-            findings: Vec::new(),
-        };
+        if let Some(pause) = self.watch {
+            return runtime::run(self.watch(pause));
+        }
+        let mut report = Report::new(self.json, true);
         runtime::run(self.examine(&mut report))?;
         report.close()
+    }
+
+    /// Repeats the checks until a signal.
+    async fn watch(&self, pause: Duration) -> Result<Outcome, Failure> {
+        let clock = Clock::start();
+        let mut output = Output::new();
+        let mut rounds = Rounds::default();
+        let mut outcome = Outcome::Incomplete;
+        let end = runtime::end(None);
+        tokio::pin!(end);
+        loop {
+            let mut report = Report::new(self.json, false);
+            tokio::select! {
+                () = &mut end => return Ok(outcome),
+                examined = self.examine(&mut report) => examined?,
+            }
+            outcome = report.outcome();
+            let colours = report.colours;
+            for difference in rounds.handle_round(report.findings) {
+                if self.json {
+                    output.line(difference.to_json(clock.elapsed()))?;
+                } else {
+                    output.line(format_args!("{clock}  {}", difference.in_words(colours)))?;
+                }
+            }
+            tokio::select! {
+                () = &mut end => return Ok(outcome),
+                () = tokio::time::sleep(pause) => {}
+            }
+        }
     }
 
     async fn examine(&self, report: &mut Report) -> Result<(), Failure> {
@@ -87,7 +140,7 @@ impl Doctor {
         report.add_all(ways(&config))?;
         report.add_all(port::check_tcp(&config))?;
         let listen = self.duration;
-        if !self.json {
+        if !self.json && self.watch.is_none() {
             let seconds = listen.as_secs_f64();
             say(format_args!("listening on the network for {seconds} s …"));
         }
@@ -115,12 +168,24 @@ struct Report {
     output: Output,
     colours: bool,
     json: bool,
+    /// Whether findings are printed as they are added.
+    is_live: bool,
     findings: Vec<Finding>,
 }
 
 impl Report {
+    fn new(json: bool, prints: bool) -> Self {
+        Self {
+            output: Output::new(),
+            colours: colours_wanted(&std::io::stdout()),
+            json,
+            is_live: prints && !json,
+            findings: Vec::new(),
+        }
+    }
+
     fn add(&mut self, finding: Finding) -> Result<(), Failure> {
-        if !self.json {
+        if self.is_live {
             self.output.line(finding.in_words(self.colours))?;
         }
         self.findings.push(finding);
@@ -147,7 +212,11 @@ impl Report {
         } else {
             self.output.line(format_args!("\n{conclusion}"))?;
         }
-        Ok(Outcome::complete_if((problems, warnings) == (0, 0)))
+        Ok(self.outcome())
+    }
+
+    fn outcome(&self) -> Outcome {
+        Outcome::complete_if(self.counts() == (0, 0))
     }
 
     fn count(&self, mark: Mark) -> usize {

@@ -13,6 +13,7 @@ use jaus::component::{Component, Kind};
 use jaus::endpoint::Outgoing;
 use jaus::messages::core::QueryHeartbeatPulse;
 use jaus::node::{Node, Sender};
+use jaus_cli::clocks::PeerClocks;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::runtime::{self, RunFor};
@@ -32,11 +33,12 @@ use self::table::Screen;
     jaus monitor\n  \
     jaus monitor --sort received --interval 5s\n  \
     jaus monitor --probe                  measures round trips\n  \
+    jaus monitor --clocks                 measures how far peers' clocks are ahead\n  \
     jaus monitor --once --json | jq '.peers[].id'\n  \
     jaus monitor --peer 192.168.7.2       for a host that multicast does not reach\n\n\
     Columns: messages and payload octets per second from a peer; messages per second to it; lost \
     (not acknowledged); rep (duplicates received); round trip (--probe) in ms; seconds since its \
-    last message.")]
+    last message; with --clocks how far its clock is ahead.")]
 pub(crate) struct Monitor {
     /// The interval between tables
     #[arg(long, short, default_value = "1s", value_parser = runtime::duration)]
@@ -62,6 +64,11 @@ pub(crate) struct Monitor {
     /// Query heartbeats of some peers in each interval, and measure the round trips
     #[arg(long)]
     probe: bool,
+
+    /// Query the time of peers that offer the Time service, and measure how far their clocks are
+    /// ahead of this host's
+    #[arg(long)]
+    clocks: bool,
 
     #[command(flatten)]
     run_for: RunFor,
@@ -100,8 +107,12 @@ impl Monitor {
             let component = Component::builder(Kind::OtherSubsystem, "jaus monitor")
                 .live_on(port)
                 .map_err(Failure::of)?;
+            let clocks = PeerClocks::default();
             let mut screen = Screen::open(self.json, self.once, self.limit);
-            let outcome = self.watch(&node, &component, &mut probe, &mut screen).await;
+            let outcome = tokio::select! {
+                outcome = self.watch(&node, &component, &mut probe, &clocks, &mut screen) => outcome,
+                () = clocks.measure(&component), if self.clocks => Ok(Outcome::Done),
+            };
             screen.close();
             drop((component, probe));
             node.shutdown().await;
@@ -114,6 +125,7 @@ impl Monitor {
         node: &Node,
         component: &Component,
         probe: &mut Option<Probe>,
+        clocks: &PeerClocks,
         screen: &mut Screen,
     ) -> Result<Outcome, Failure> {
         let end = self.run_for.end();
@@ -123,10 +135,10 @@ impl Monitor {
         turns.tick().await;
         let mut before = Sample::take(node);
         if !self.once {
-            screen.show(&self.view(&before, &before, component))?;
+            screen.show(&self.view(&before, &before, component, clocks))?;
         }
         // The only table waits for the answers to the probes.
-        let mut waits_for_answers = self.once && probe.is_some();
+        let mut waits_for_answers = self.once && (probe.is_some() || self.clocks);
         loop {
             tokio::select! {
                 () = &mut end => return Ok(Outcome::Done),
@@ -140,7 +152,7 @@ impl Monitor {
                 before = sample;
                 continue;
             }
-            let view = self.view(&before, &sample, component);
+            let view = self.view(&before, &sample, component, clocks);
             screen.show(&view)?;
             if self.once {
                 return Ok(Outcome::complete_if(!view.peers.is_empty()));
@@ -149,8 +161,17 @@ impl Monitor {
         }
     }
 
-    fn view(&self, before: &Sample, now: &Sample, component: &Component) -> View {
+    fn view(
+        &self,
+        before: &Sample,
+        now: &Sample,
+        component: &Component,
+        clocks: &PeerClocks,
+    ) -> View {
         let mut view = now.since(before, &component.directory(), component.id());
+        for peer in &mut view.peers {
+            peer.clock = clocks.offset(peer.id);
+        }
         view.peers.sort_by(|a, b| {
             let most = |one: f64, other: f64| other.total_cmp(&one);
             match self.sort {

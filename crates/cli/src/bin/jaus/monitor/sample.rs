@@ -8,6 +8,7 @@ use jaus::address::JausId;
 use jaus::component::{Directory, Identification, Level};
 use jaus::endpoint::{Counter, Peer};
 use jaus::node::{LinkReport, Node};
+use jaus::service::ClockOffset;
 use serde_json::{Value as Json, json};
 use tokio::time::Instant;
 
@@ -45,6 +46,7 @@ pub(super) struct PeerRow {
     resent: u64,
     pub(super) round_trip: Option<Duration>,
     pub(super) silent: Duration,
+    pub(super) clock: Option<ClockOffset>,
 }
 
 pub(super) struct LinkRow {
@@ -132,6 +134,7 @@ impl Sample {
                 .time
                 .into_std()
                 .saturating_duration_since(peer.last_heard),
+            clock: None,
         }
     }
 }
@@ -187,6 +190,7 @@ impl View {
                 "resent": peer.resent,
                 "round_trip_ms": peer.round_trip.map(|time| rounded(time.as_secs_f64() * 1e3)),
                 "silent_s": rounded(peer.silent.as_secs_f64()),
+                "clock": peer.clock.map(clock_json),
             })
         });
         let links = self.links.iter().map(|link| {
@@ -208,6 +212,17 @@ impl View {
             "drops": drops.collect::<Vec<_>>(),
         })
     }
+}
+
+fn clock_json(clock: ClockOffset) -> Json {
+    let drift = clock.drift;
+    json!({
+        "ahead_ms": rounded(clock.seconds * 1e3),
+        "uncertainty_ms": rounded(clock.uncertainty * 1e3),
+        "drift_ppm": drift.map(|it| rounded(it.ratio * 1e6)),
+        "drift_uncertainty_ppm": drift.map(|it| rounded(it.uncertainty * 1e6)),
+        "steps": clock.steps,
+    })
 }
 
 /// Rounds to three decimals: the rest is noise.

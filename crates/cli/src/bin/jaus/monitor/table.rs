@@ -107,6 +107,8 @@ fn size() -> (usize, usize) {
 
 /// The width of all columns of peers but the name, with the spaces between them.
 const OTHER_COLUMNS: usize = 72;
+/// The width of the column of clocks, with the space before it.
+const CLOCKS: usize = 8;
 /// The narrowest and the widest column of names.
 const NAMES: (usize, usize) = (8, 26);
 
@@ -129,11 +131,17 @@ fn name(peer: &PeerRow) -> &str {
 /// The whole table, with at most `most` peers, for a screen of this width.
 fn lines(view: &View, most: usize, screen: usize) -> Vec<String> {
     let names = view.peers.iter().map(|peer| name(peer).chars().count());
-    let width = name_width(names.max().unwrap_or(0), screen);
-    let mut lines = vec![format!(
+    let has_clocks = view.peers.iter().any(|peer| peer.clock.is_some());
+    let clocks = if has_clocks { CLOCKS } else { 0 };
+    let width = name_width(names.max().unwrap_or(0), screen.saturating_sub(clocks));
+    let mut heading = format!(
         "{:12} {:width$} {:20} {:>5} {:>6} {:>5} {:>4} {:>3} {:>5} {:>3}",
         "ID", "NAME", "ADDRESS", "in/s", "oct/s", "out/s", "lost", "rep", "ms", "ago"
-    )];
+    );
+    if has_clocks {
+        heading.push_str("   clock");
+    }
+    let mut lines = vec![heading];
     lines.extend(
         view.peers
             .iter()
@@ -164,7 +172,7 @@ fn peer_line(peer: &PeerRow, width: usize) -> String {
         || "-".to_owned(),
         |time| format!("{:.2}", time.as_secs_f64() * 1e3),
     );
-    format!(
+    let mut line = format!(
         "{:12} {:width$} {:20} {:>5} {:>6} {:>5} {:>4} {:>3} {:>5} {:>3}",
         peer.id.to_string(),
         clipped(name(peer), width),
@@ -176,7 +184,26 @@ fn peer_line(peer: &PeerRow, width: usize) -> String {
         short(peer.repeated as f64),
         clipped(&round_trip, 5),
         short(peer.silent.as_secs() as f64),
-    )
+    );
+    if let Some(clock) = peer.clock {
+        line.push_str(&format!(" {:>7}", ahead(clock.seconds)));
+    }
+    line
+}
+
+/// How far a clock is ahead, in at most seven characters: `+3ms`, `-1.5s`, `-120min`, `+40d`.
+fn ahead(seconds: f64) -> String {
+    let (number, unit) = match seconds.abs() {
+        size if size < 0.9995 => return format!("{:+.0}ms", seconds * 1e3),
+        size if size < 600.0 => (seconds, "s"),
+        size if size < 36_000.0 => (seconds / 60.0, "min"),
+        size if size < 864_000.0 => (seconds / 3600.0, "h"),
+        _ => (seconds / 86_400.0, "d"),
+    };
+    match number.abs() < 9.95 {
+        true => format!("{number:+.1}{unit}"),
+        false => format!("{number:+.0}{unit}"),
+    }
 }
 
 fn link_line(link: &LinkRow) -> String {
@@ -243,6 +270,21 @@ mod tests {
             (16, 0, 8),
         ] {
             assert_eq!(name_width(longest, screen), width, "{longest} on {screen}");
+        }
+    }
+
+    #[test]
+    fn clocks_fit_their_column() {
+        for (seconds, text) in [
+            (0.0034, "+3ms"),
+            (-0.9994, "-999ms"),
+            (-1.5, "-1.5s"),
+            (599.0, "+599s"),
+            (-7200.0, "-120min"),
+            (3e7, "+347d"),
+        ] {
+            assert_eq!(ahead(seconds), text);
+            assert!(text.len() <= 7, "{text}");
         }
     }
 

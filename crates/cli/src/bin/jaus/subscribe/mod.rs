@@ -1,6 +1,7 @@
 //! `jaus subscribe`: prints the reports of subscriptions as they arrive.
 
 mod rate;
+mod sampled;
 mod topic;
 
 use clap::Args;
@@ -9,6 +10,7 @@ use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::component::{Component, SubscribeError, Undecoded, Update, When};
 use jaus::messages::core::CreateEvent;
+use jaus_cli::clocks::PeerClocks;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::{self, Network};
 use jaus_cli::output::say;
@@ -32,8 +34,8 @@ use crate::queries::{Fields, Named};
     jaus subscribe 101.1.34 QueryLocalPose QueryStatus --on-change --for 1min\n  \
     jaus subscribe 101.1.34 QueryLocalPose --hz 5 --json | jq .body.X\n\n\
     With --json each line is an object: a report as of `jaus query`, with the measured rate \
-    (\"hz\"), its age in seconds (\"age\") and the number of lost reports (\"lost\"); or an \"event\": \
-    \"up\", \"down\" or \"end\".")]
+    (\"hz\"), its age in seconds (\"age\") and the number of lost reports (\"lost\"), with --clock \
+    the age of its sample (\"sampled\"); or an \"event\": \"up\", \"down\" or \"end\".")]
 pub(crate) struct Subscribe {
     /// The component that reports: SUBSYSTEM.NODE.COMPONENT
     #[arg(value_name = "ID", value_parser = network::one_component)]
@@ -58,6 +60,11 @@ pub(crate) struct Subscribe {
     #[command(flatten)]
     run_for: RunFor,
 
+    /// Measure the clock of the component, which must offer the Time service, and print how long
+    /// ago samples with a time stamp were taken
+    #[arg(long)]
+    clock: bool,
+
     /// Print JSON, one object for each report
     #[arg(long)]
     json: bool,
@@ -77,7 +84,11 @@ impl Subscribe {
         runtime::run(async {
             let joined = self.network.component_for_a_moment("jaus subscribe");
             let (component, _, stay) = joined.await?;
-            let outcome = self.follow(&component, queries, &dictionary).await;
+            let clocks = PeerClocks::default();
+            let outcome = tokio::select! {
+                outcome = self.follow(&component, queries, &dictionary, &clocks) => outcome,
+                () = clocks.measure(&component), if self.clock => Ok(Outcome::Done),
+            };
             drop(component);
             stay.end().await;
             outcome
@@ -90,10 +101,12 @@ impl Subscribe {
         component: &Component,
         queries: Vec<EncodedQuery>,
         dictionary: &Dictionary,
+        clocks: &PeerClocks,
     ) -> Result<Outcome, Failure> {
         let end = self.run_for.end();
         tokio::pin!(end);
-        let mut printer = Printer::new(self.json, dictionary);
+        let clocks = self.clock.then(|| clocks.clone());
+        let mut printer = Printer::new(self.json, dictionary, clocks);
         let subscribed = tokio::select! {
             () = &mut end => {
                 say(format_args!("{} has confirmed no subscription. {}", self.address, network::REMEDY));

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::component::{Subscription, Undecoded, Update};
+use jaus_cli::clocks::PeerClocks;
 use jaus_cli::failure::Failure;
 use jaus_cli::output::Output;
 use jaus_cli::runtime::Clock;
@@ -13,6 +14,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::rate::Rate;
+use super::sampled::time_stamp;
 use crate::queries::in_words;
 
 /// A subscription to one query.
@@ -56,6 +58,8 @@ pub(super) struct Printer<'d> {
     is_json: bool,
     dictionary: &'d Dictionary,
     clock: Clock,
+    /// The clocks of the peers, if they are measured.
+    peer_clocks: Option<PeerClocks>,
 }
 
 /// A report with the figures of its subscription.
@@ -66,17 +70,43 @@ struct Report<'d> {
     line: Line<'d>,
     hz: Option<f64>,
     age: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sampled: Option<Sampled>,
     lost: u64,
 }
 
+/// How long ago the sample of a report was taken.
+#[derive(Serialize)]
+struct Sampled {
+    /// Seconds since the time stamp of the report.
+    age: f64,
+    /// The true age differs by this many seconds at most.
+    uncertainty: f64,
+}
+
 impl<'d> Printer<'d> {
-    pub(super) fn new(is_json: bool, dictionary: &'d Dictionary) -> Self {
+    pub(super) fn new(
+        is_json: bool,
+        dictionary: &'d Dictionary,
+        peer_clocks: Option<PeerClocks>,
+    ) -> Self {
         Self {
             output: Output::new(),
             is_json,
             dictionary,
             clock: Clock::start(),
+            peer_clocks,
         }
+    }
+
+    /// The age of a report by its time stamp, if the clock of its sender is known.
+    fn sampled(&self, topic: &Topic, line: &Line<'_>) -> Option<Sampled> {
+        let clocks = self.peer_clocks.as_ref()?;
+        let age = clocks.age(topic.subscription.peer(), time_stamp(line)?)?;
+        Some(Sampled {
+            age: rounded(age.seconds),
+            uncertainty: rounded(age.uncertainty),
+        })
     }
 
     pub(super) fn report(&mut self, topic: &mut Topic, octets: &Bytes) -> Result<(), Failure> {
@@ -84,14 +114,21 @@ impl<'d> Printer<'d> {
         topic.rate.count(self.clock.elapsed());
         let line = self.dictionary.line(octets);
         topic.unreadable += u64::from(line.is_error());
+        let sampled = self.sampled(topic, &line);
         if !self.is_json {
-            return self.timed(in_words(self.dictionary, octets));
+            let age = sampled.map_or_else(String::new, |sampled| {
+                let Sampled { age, uncertainty } = sampled;
+                format!("  ({age:.3} s old, ±{uncertainty:.3} s)")
+            });
+            let words = in_words(self.dictionary, octets);
+            return self.timed(format_args!("{words}{age}"));
         }
         let report = Report {
             source: topic.subscription.peer().to_string(),
             line,
             hz: topic.rate.hz().map(rounded),
             age: topic.age().map(rounded),
+            sampled,
             lost: topic.subscription.lost(),
         };
         let text = serde_json::to_string(&report).map_err(Failure::of)?;

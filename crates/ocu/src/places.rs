@@ -7,13 +7,15 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use jaus::endpoint::quota_address;
 
-/// The network address of a browser, as far as limits tell addresses apart: of IPv6 the first 64
+/// The network address of a client, as far as limits tell addresses apart: of IPv6 the first 64
 /// bits, because a host chooses the others at will.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Source(IpAddr);
+pub struct Source(IpAddr);
 
 impl Source {
-    pub(super) fn of(address: SocketAddr) -> Self {
+    /// The network address that counts for a socket address.
+    #[must_use]
+    pub fn of(address: SocketAddr) -> Self {
         Self(quota_address(address.ip()))
     }
 }
@@ -26,7 +28,7 @@ impl fmt::Display for Source {
 
 /// Why there is no place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum NoPlace {
+pub enum NoPlace {
     /// All are taken.
     Full,
     /// The address has its share.
@@ -35,7 +37,7 @@ pub(super) enum NoPlace {
 
 /// A number of places, and how many of them one address gets.
 #[derive(Clone, Debug)]
-pub(super) struct Places(Arc<Inner>);
+pub struct Places(Arc<Inner>);
 
 #[derive(Debug)]
 struct Inner {
@@ -45,13 +47,18 @@ struct Inner {
 }
 
 impl Places {
-    pub(super) fn new(most: usize, share: usize) -> Self {
+    /// `most` places in all, and `share` for one address.
+    #[must_use]
+    pub fn new(most: usize, share: usize) -> Self {
         let taken = Mutex::new(HashMap::new());
         Self(Arc::new(Inner { most, share, taken }))
     }
 
     /// Takes a place, until it is dropped.
-    pub(super) fn take(&self, source: Source) -> Result<Place, NoPlace> {
+    ///
+    /// # Errors
+    /// [`NoPlace`] says whether all places are taken, or the share of the address.
+    pub fn take(&self, source: Source) -> Result<Place, NoPlace> {
         let mut taken = self.0.taken();
         if taken.get(&source).is_some_and(|it| *it >= self.0.share) {
             return Err(NoPlace::Share);
@@ -65,7 +72,8 @@ impl Places {
     }
 
     /// Number of places taken.
-    pub(super) fn taken(&self) -> usize {
+    #[must_use]
+    pub fn taken(&self) -> usize {
         self.0.taken().values().sum()
     }
 }
@@ -78,7 +86,7 @@ impl Inner {
 
 /// A place that is taken.
 #[derive(Debug)]
-pub(super) struct Place {
+pub struct Place {
     places: Arc<Inner>,
     source: Source,
 }

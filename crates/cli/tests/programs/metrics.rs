@@ -1,0 +1,163 @@
+//! The metrics of programs as processes: the endpoint, the dashboard, and the guide.
+
+use std::collections::BTreeSet;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::time::{Duration, Instant};
+
+use jaus_test_kit::group::own_group;
+use jaus_test_kit::tools::workspace;
+use jaus_test_kit::waiting::LIMIT;
+use serde_json::Value as Json;
+
+use crate::program::Program;
+
+const PLANNER: &str = env!("CARGO_BIN_EXE_jaus-planner");
+
+/// A program with its metrics at any free port, and their address.
+fn start(program: &str, flags: &[&str]) -> (Program, String) {
+    let group = own_group().to_string();
+    let flags = [&["--group", &group, "--metrics", "0"], flags].concat();
+    let program = Program::start_as(program, &flags, &[]);
+    let said = program.says("metrics at http://");
+    let (_, address) = said.split_once("metrics at http://").unwrap();
+    let (address, _) = address.split_once("/metrics").unwrap();
+    (program, address.to_owned())
+}
+
+/// The answer to a request.
+fn ask(address: &str, request: &str) -> String {
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream.write_all(request.as_bytes()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    answer
+}
+
+fn scrape(address: &str) -> String {
+    ask(address, "GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n")
+}
+
+/// Scrapes until a line is there.
+#[track_caller]
+fn scrape_until(address: &str, line: &str) -> String {
+    let start = Instant::now();
+    loop {
+        let metrics = scrape(address);
+        if metrics.lines().any(|it| it == line) {
+            return metrics;
+        }
+        assert!(start.elapsed() < LIMIT, "no `{line}`: {metrics}");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+/// The names of all metrics of a program with a node and a component.
+fn names() -> BTreeSet<String> {
+    let (_planner, address) = start(PLANNER, &[]);
+    let metrics = scrape_until(&address, "jaus_mission_under_way 0");
+    let name = |line: &str| {
+        let name = line.strip_prefix("# TYPE ")?.split(' ').next()?;
+        Some(name.to_owned())
+    };
+    metrics.lines().filter_map(name).collect()
+}
+
+/// The words in a query that name metrics of ours.
+fn mentioned(query: &str) -> BTreeSet<String> {
+    let words = query.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+    let ours = words.filter(|word| word.starts_with("jaus_"));
+    ours.map(str::to_owned).collect()
+}
+
+/// The texts of all keys `expr` and `definition` in a dashboard.
+fn queries(value: &Json, into: &mut Vec<String>) {
+    match value {
+        Json::Object(entries) => {
+            for (key, value) in entries {
+                match value.as_str() {
+                    Some(query) if matches!(key.as_str(), "expr" | "definition") => {
+                        into.push(query.to_owned());
+                    }
+                    _ => queries(value, into),
+                }
+            }
+        }
+        Json::Array(values) => values.iter().for_each(|value| queries(value, into)),
+        _ => {}
+    }
+}
+
+#[test]
+fn the_dashboard_queries_metrics_that_exist_and_the_guide_describes_all() {
+    let names = names();
+    assert!(names.len() > 40, "{names:?}");
+    let dashboard = std::fs::read_to_string(workspace("packaging/grafana/jaus.json")).unwrap();
+    let mut asked = Vec::new();
+    queries(&serde_json::from_str(&dashboard).unwrap(), &mut asked);
+    assert!(asked.len() > 20, "{asked:?}");
+    for query in asked {
+        let unknown: Vec<_> = mentioned(&query).difference(&names).cloned().collect();
+        assert!(unknown.is_empty(), "`{query}` asks for {unknown:?}");
+    }
+    let guide = std::fs::read_to_string(workspace("docs/metrics.md")).unwrap();
+    let described = mentioned(&guide);
+    let missing: Vec<_> = names.difference(&described).collect();
+    assert!(missing.is_empty(), "docs/metrics.md lacks {missing:?}");
+    let outdated: Vec<_> = described.difference(&names).collect();
+    assert!(outdated.is_empty(), "docs/metrics.md has {outdated:?}");
+}
+
+#[test]
+fn state_services_and_counters_of_a_program_are_served() {
+    let driver = env!("CARGO_BIN_EXE_jaus-primitive-driver");
+    let (_driver, address) = start(driver, &["--id", "131.1.33"]);
+    let state = "jaus_component_state{component=\"131.1.33\",state=\"standby\"} 1";
+    let metrics = scrape_until(&address, state);
+    for expected in [
+        "jaus_node_info{node=\"131.1\"} 1",
+        "jaus_component_controlled{component=\"131.1.33\"} 0",
+        "jaus_component_emergencies_total{component=\"131.1.33\"} 0",
+        "jaus_dropped_total{reason=\"malformed\"} 0",
+        "jaus_vehicle_speed_meters_per_second 0",
+    ] {
+        assert!(
+            metrics.lines().any(|it| it == expected),
+            "{expected}: {metrics}"
+        );
+    }
+    let service = "jaus_service_info{component=\"131.1.33\",service=\"urn:jaus:jss:mobility:\
+        PrimitiveDriver\",version=\"";
+    assert!(metrics.contains(service), "{metrics}");
+}
+
+#[test]
+fn openmetrics_is_complete_for_clients_that_accept_it() {
+    let (_planner, address) = start(PLANNER, &[]);
+    let request = "GET /metrics HTTP/1.1\r\nHost: localhost\r\n\
+        Accept: application/openmetrics-text; version=1.0.0\r\n\r\n";
+    let answer = ask(&address, request);
+    assert!(answer.contains("application/openmetrics-text"), "{answer}");
+    assert!(answer.ends_with("# EOF\n"), "{answer}");
+    assert!(
+        answer.contains("# UNIT jaus_sample_age_seconds seconds\n"),
+        "{answer}"
+    );
+}
+
+#[test]
+fn the_settings_file_may_name_the_address_and_a_taken_one_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("planner.toml");
+    std::fs::write(&file, "metrics = \"127.0.0.1:0\"\n").unwrap();
+    let group = own_group().to_string();
+    let config = ["--group", &group, "--config", file.to_str().unwrap()];
+    let program = Program::start_as(PLANNER, &config, &[]);
+    program.says("metrics at http://127.0.0.1:");
+
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let mut program = Program::start_as(PLANNER, &["--group", &group, "--metrics", &address], &[]);
+    program.says(&format!("no metrics at {address}: "));
+    assert_eq!(program.ends(), Some(2));
+}
