@@ -65,8 +65,10 @@ fn names() -> BTreeSet<String> {
 
 /// The words in a query that name metrics of ours.
 fn mentioned(query: &str) -> BTreeSet<String> {
-    let words = query.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
-    let ours = words.filter(|word| word.starts_with("jaus_"));
+    // A `::` belongs to the path of a module, the target of a log line.
+    let words = query.split(|c: char| !c.is_ascii_alphanumeric() && c != '_' && c != ':');
+    let ours = words.filter(|word| word.starts_with("jaus_") && !word.contains("::"));
+    let ours = ours.map(|word| word.trim_end_matches(':'));
     ours.map(str::to_owned).collect()
 }
 

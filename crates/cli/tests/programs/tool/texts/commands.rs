@@ -8,6 +8,9 @@ use super::{split, texts};
 /// Flags of features that tests are built without.
 const OF_FEATURES: [&str; 2] = ["--stop-line", "--can"];
 
+/// The program of a package that this one does not build; `.ci/zenoh` has its tests.
+const OF_OTHER_PACKAGES: [&str; 1] = ["jaus-zenoh"];
+
 /// The commands of our programs in a line of a shell, without redirections and what follows them.
 fn commands(line: &str) -> Vec<Vec<String>> {
     let words = words(line);
@@ -119,11 +122,12 @@ fn key() -> String {
     format!("{}=", "A".repeat(43))
 }
 
-/// Whether the flags of a command can be checked: `jaus help` has none, and some need features.
+/// Whether the flags of a command can be checked: `jaus help` has none, and some need features or another package.
 fn is_checked(command: &[String]) -> bool {
+    let is_of_other = program(&command[0]).is_some_and(|it| OF_OTHER_PACKAGES.contains(&it));
     let is_help = command.get(1).is_some_and(|it| it == "help");
     let mut flags = command.iter();
-    !is_help && !flags.any(|it| OF_FEATURES.contains(&it.as_str()))
+    !is_help && !is_of_other && !flags.any(|it| OF_FEATURES.contains(&it.as_str()))
 }
 
 /// The first line of the error if a program does not have the flags of a command.
