@@ -35,7 +35,7 @@ fn the_level_is_that_of_the_settings_file_and_read_again_at_sigusr1() {
     let said = program.says("the log level is now ");
     assert!(said.contains("jaus::endpoint=trace"), "{said}");
     // A mistake leaves the level, and the program runs on.
-    std::fs::write(&file, "log_level = \"loud=\"\n").unwrap();
+    std::fs::write(&file, "log_level = \"jaus=loud\"\n").unwrap();
     program.signal("USR1");
     program.says("the log level is unchanged: ");
     std::fs::write(&file, "name = \"Rover\"\n").unwrap();
