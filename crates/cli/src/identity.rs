@@ -5,7 +5,7 @@ use std::str::FromStr;
 use clap::ValueEnum;
 use serde::Deserialize;
 
-use super::logging::LogLevel;
+use super::log_level::LogLevel;
 use super::metrics::MetricsAddress;
 use jaus::address::JausId;
 use jaus::component::Kind;

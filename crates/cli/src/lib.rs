@@ -16,6 +16,7 @@ pub mod folders;
 pub mod https;
 mod identity;
 mod launch;
+pub mod log_level;
 pub mod logging;
 pub mod metrics;
 pub mod network;

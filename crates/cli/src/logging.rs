@@ -9,7 +9,6 @@ use std::sync::OnceLock;
 
 use clap::builder::Resettable;
 use clap::{Args, ValueEnum};
-use serde::Deserialize;
 #[cfg(unix)]
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tracing_subscriber::filter::Targets;
@@ -19,6 +18,7 @@ use tracing_subscriber::util::SubscriberInitExt as _;
 use tracing_subscriber::{Registry, reload};
 
 use super::failure::Failure;
+use super::log_level::LogLevel;
 use super::output::{colours_wanted, harmless};
 #[cfg(unix)]
 use super::settings;
@@ -60,24 +60,6 @@ enum LogFormat {
     Json,
     /// Fields in systemd's journal
     Journald,
-}
-
-/// A log level, or levels by module: `debug`, or `warn,jaus::endpoint=trace`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(try_from = "String")]
-pub struct LogLevel(Targets);
-
-impl TryFrom<String> for LogLevel {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse().map(Self).map_err(|error| {
-            format!(
-                "{error}: write error, warn, info, debug or trace, or levels by module such as \
-                     warn,jaus::endpoint=trace"
-            )
-        })
-    }
 }
 
 /// The level of this process, which has one log.

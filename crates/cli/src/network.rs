@@ -19,7 +19,7 @@ use jaus::node::{Address, Config, Host, HostError, Node, PeerAddress, Port, Send
 use super::failure::Failure;
 use super::identity::OwnId;
 pub use super::identity::{Identity, SubsystemKind};
-use super::logging::LogLevel;
+use super::log_level::LogLevel;
 #[cfg(feature = "secure")]
 use super::secure::{Secure, SecureFlags};
 use super::settings;

@@ -7,6 +7,7 @@ use jaus_view::{Dictionary, Entry, Timestamp};
 use serde_json::{Map, Value as Json};
 
 use crate::schema::{MessageSchema, Schema};
+use crate::topic::topic;
 use crate::well_known;
 
 /// Limit of channels. The messages of further ones are counted.
@@ -207,11 +208,6 @@ impl<'d> Channels<'d> {
         }
         Some((topic, definition))
     }
-}
-
-/// `/jaus/101/1/40/ReportLocalPose`: slashes instead of points, which viewers take for fields.
-pub(crate) fn topic(source: &str, name: &str) -> String {
-    format!("/jaus/{}/{name}", source.replace('.', "/"))
 }
 
 /// `core.Management.ReportStatus`, or `core.Management.1.0.ReportStatus`.

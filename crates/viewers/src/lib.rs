@@ -20,6 +20,7 @@ mod recorder;
 mod recording;
 mod schema;
 mod server;
+mod topic;
 mod well_known;
 
 pub use black_box::{

@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use jaus::endpoint::Transmit;
 use jaus::link::custom::{Arrival, CustomLink};
+use zenoh::query::Query;
 
 use crate::exchange::Exchange;
-use crate::view::Answer;
 
 /// The name of the link in logs and reports.
 pub(crate) const NAME: &str = "zenoh";
@@ -37,6 +37,14 @@ pub(crate) struct State {
     waker: Option<Waker>,
     /// Whether the session is to close.
     pub(crate) is_closing: bool,
+}
+
+/// The answer to a request for a view.
+#[derive(Debug)]
+pub(crate) struct Answer {
+    pub(crate) query: Query,
+    /// JSON, or why there is none.
+    pub(crate) result: Result<String, String>,
 }
 
 impl Shared {

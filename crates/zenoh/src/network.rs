@@ -22,9 +22,9 @@ use zenoh::sample::{Locality, Sample, SampleKind};
 use zenoh::{Session, Wait as _};
 
 use crate::key::Key;
-use crate::link::Shared;
+use crate::link::{Answer, Shared};
 use crate::queue::{Command, Publication};
-use crate::view::{Answer, Request};
+use crate::view::Request;
 
 /// How the zenoh session finds the network.
 #[derive(Clone, Debug, Default)]

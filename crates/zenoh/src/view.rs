@@ -21,7 +21,7 @@ use tokio::sync::watch;
 use tokio::task::{AbortHandle, JoinSet};
 use zenoh::query::{Parameters, Query};
 
-use crate::link::Shared;
+use crate::link::{Answer, Shared};
 
 /// The most requests that wait for the bridge's task.
 pub(crate) const MOST_WAITING: usize = 64;
@@ -39,14 +39,6 @@ pub(crate) struct Request {
     component: JausId,
     report: u16,
     query: Query,
-}
-
-/// The answer to a request.
-#[derive(Debug)]
-pub(crate) struct Answer {
-    pub(crate) query: Query,
-    /// JSON, or why there is none.
-    pub(crate) result: Result<String, String>,
 }
 
 impl Request {

@@ -22,8 +22,8 @@ use std::sync::Arc;
 
 use serde_json::{Value as Json, json};
 
-use crate::channels::topic;
 use crate::schema::Schema;
+use crate::topic::topic;
 use geometry::{Quaternion, Vector};
 
 /// A message that may have samples here.

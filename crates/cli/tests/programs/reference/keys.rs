@@ -26,7 +26,7 @@ const FILES: [&str; 18] = [
     "src/peer/mod.rs",
     "src/address.rs",
     "crates/cli/src/identity.rs",
-    "crates/cli/src/logging.rs",
+    "crates/cli/src/log_level.rs",
     "crates/cli/src/metrics/mod.rs",
 ];
 
