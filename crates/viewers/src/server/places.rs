@@ -1,8 +1,11 @@
-//! The places of connections: a limit in all, and half of them for one address.
+//! The places of connections: a limit in all, and half of them for one address. Of IPv6 the first 64 bits count,
+//! because a host chooses the others at will.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, PoisonError};
+
+use jaus::endpoint::quota_address;
 
 /// Counts connections.
 #[derive(Debug, Clone)]
@@ -28,7 +31,7 @@ impl Places {
 
     /// A place for a connection from this address, if one is free.
     pub(super) fn take(&self, address: IpAddr) -> Option<Place> {
-        let address = address.to_canonical();
+        let address = quota_address(address);
         let mut taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
         let of_address = taken.get(&address).copied().unwrap_or(0);
         if taken.values().sum::<usize>() >= self.most || of_address >= self.most / 2 {
