@@ -12,7 +12,6 @@ mod georeference;
 mod missing;
 pub(crate) mod page;
 mod picture;
-pub mod places;
 mod report;
 pub mod request;
 mod role;

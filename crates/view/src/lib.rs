@@ -19,6 +19,7 @@ mod line;
 mod log;
 mod named;
 mod network;
+pub mod places;
 mod query;
 mod request;
 mod stream;

@@ -282,7 +282,7 @@ impl Exchange {
         self.locals.get(&id).is_some_and(is_recent)
     }
 
-    /// A component of this side was heard at `heard`, or is attached to the node.
+    /// Notes a component of this side: `heard` is when its latest message arrived, or now if it is attached to the node.
     pub fn handle_local(&mut self, now: Instant, id: JausId, heard: Instant) {
         let is_recent = now.saturating_duration_since(heard) < LOCAL_FOR;
         if is_recent && self.offers(id) && !self.remotes.contains(id) {

@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
+use jaus_view::places::Source;
+
 use super::bounds::{Buckets, Rate};
-use crate::places::Source;
 
 /// Failed logins of one address, by password or token.
 const BY_SOURCE: Rate = Rate {

@@ -9,6 +9,7 @@ use axum::body::{Body, to_bytes};
 use axum::extract::{ConnectInfo, Path, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use jaus_view::places::Source;
 use serde::{Deserialize, Serialize};
 use tokio::time::timeout;
 
@@ -16,7 +17,6 @@ use super::gate::{LoginError, UserGate};
 use super::logins::{Ending, LoginId};
 use super::visitor::Visitor;
 use super::{Refusal, Shared};
-use crate::places::Source;
 use crate::users::UserRole;
 
 /// Deadline of a login's body.

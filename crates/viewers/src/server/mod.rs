@@ -6,7 +6,6 @@
 
 mod client;
 mod handshake;
-mod places;
 
 use std::convert::Infallible;
 use std::io;
@@ -15,6 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::Duration;
 
+use jaus_view::places::{Place, Places, Source};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
@@ -22,7 +22,6 @@ use tokio::task::JoinSet;
 use crate::channels::{Channel, Channels, Sample};
 use crate::protocol;
 use client::Client;
-use places::{Place, Places};
 
 /// Limit of connections, including those whose handshake is not complete.
 pub const MOST_CLIENTS: usize = 32;
@@ -110,7 +109,7 @@ impl Server {
 
     /// Serves clients for as long as the future lives.
     pub async fn serve(self, listener: TcpListener) -> Infallible {
-        let places = Places::new(MOST_CLIENTS);
+        let places = Places::new(MOST_CLIENTS, MOST_CLIENTS / 2);
         let mut tasks = JoinSet::new();
         loop {
             let accepted = tokio::select! {
@@ -118,11 +117,11 @@ impl Server {
                 Some(_) = tasks.join_next() => continue,
             };
             match accepted {
-                Ok((stream, address)) => match places.take(address.ip()) {
-                    Some(place) => {
+                Ok((stream, address)) => match places.take(Source::of(address)) {
+                    Ok(place) => {
                         tasks.spawn(serve(self.shared.clone(), stream, address, place));
                     }
-                    None => refuse(&stream, address),
+                    Err(_) => refuse(&stream, address),
                 },
                 Err(error) => pause_after(&error).await,
             }

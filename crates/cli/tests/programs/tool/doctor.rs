@@ -214,6 +214,6 @@ fn a_watch_prints_the_findings_once_and_then_differences_until_a_signal() {
     next_with(&mut watch, &["\"new\"", "109.1.9"]);
     drop(node);
     next_with(&mut watch, &["\"over\"", "109.1.9"]);
-    // No other node was heard: a warning.
+    // A warning, because there is no other node.
     assert_eq!(watch.terminate(), Some(1));
 }

@@ -1,4 +1,5 @@
-//! Limited numbers of connections and pages, of which one network address gets only a share.
+//! Limits of a server that shows traffic or values: numbers of connections and pages, of which one network address
+//! gets only a share.
 
 use std::collections::HashMap;
 use std::fmt;
