@@ -34,6 +34,8 @@ export class Mission {
   #mission = null;
   #furthest = { mission: null, index: -1 };
   #operable = false;
+  /** Whether the vehicle has reported an emergency since a mission was under way, or may have before this page looked. */
+  #hadEmergency = true;
 
   /** `ask` sends a request and shows a refusal; `map` shows the chosen place. */
   constructor(ask, map) {
@@ -61,8 +63,9 @@ export class Mission {
     this.#draft({ x, y });
   }
 
-  /** Forgets the place that was chosen, because it was meant for another vehicle. */
+  /** Forgets what belongs to another vehicle. */
   forget() {
+    this.#hadEmergency = true;
     this.#draft(null);
   }
 
@@ -84,6 +87,7 @@ export class Mission {
     this.#operable = operable;
     const lost = mission?.lost ?? null;
     const stage = lost ? "lost" : plain(mission?.stage ?? "idle", 30);
+    this.#hadEmergency = state.vehicle?.emergency === true || (OVER.includes(stage) && this.#hadEmergency);
     this.#showStages(mission, stage);
     this.#showLine(mission, stage, state.vehicle);
     const progress = mission ? Math.round(Math.min(100, Math.max(0, number(mission.progress) ?? 0))) : 0;
@@ -119,9 +123,12 @@ export class Mission {
     });
   }
 
-  /** Whether an emergency that ended the mission is over. */
+  /**
+   * Whether an emergency that ended the mission is over. The planner may report the end before the vehicle has
+   * reported its emergency: then it is not.
+   */
   #isCleared(stage, vehicle, reason) {
-    return ["stopped", "failed"].includes(stage) && /emergency/.test(plain(reason, 255)) && vehicle?.emergency === false;
+    return ["stopped", "failed"].includes(stage) && /emergency/.test(plain(reason, 255)) && this.#hadEmergency && vehicle?.emergency === false;
   }
 
   #showLine(mission, stage, vehicle) {

@@ -55,6 +55,7 @@ fn a_mission_through_the_page_ends_by_the_death_of_the_planner_and_by_a_key() {
 
         says_when_the_emergency_of_a_mission_is_cleared(page);
         shows_no_position_without_a_driver(system, page);
+        says_cleared_only_after_a_reported_emergency(page);
     });
 }
 
@@ -237,6 +238,21 @@ fn says_when_the_emergency_of_a_mission_is_cleared(page: &mut Browser) {
     page.wait("document.body.dataset.emergency === 'ready'");
     page.wait(&format!("{line}.includes('the emergency is cleared')"));
     assert!(!page.text("#mission-line").contains(&reason));
+}
+
+/// The planner may report the end of a mission before the vehicle has reported its emergency.
+fn says_cleared_only_after_a_reported_emergency(page: &mut Browser) {
+    let said = page.value(
+        "import('/mission.js').then(({ Mission }) => { \
+         const mission = new Mission(() => {}, {}); \
+         const said = (stage, emergency) => { \
+             const reason = 'emergency of 101.1.33'; \
+             mission.update({ mission: { mission: 9, stage, reason }, vehicle: { emergency } }, true); \
+             return document.querySelector('#mission-line').textContent.includes('cleared'); }; \
+         said('driving', false); \
+         return [said('stopped', false), said('stopped', true), said('stopped', false)]; })",
+    );
+    assert_eq!(said, serde_json::json!([false, false, true]));
 }
 
 /// While the primitive driver is dead, the page shows the last position as old or none, and never
