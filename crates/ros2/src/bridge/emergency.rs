@@ -1,0 +1,171 @@
+//! Emergency stops: sent to every part of the vehicle until its state confirms it. It does no I/O and
+//! reads no clock.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+
+/// An emergency, or the end of one, on its way to the parts of a vehicle.
+#[derive(Debug, Default)]
+pub struct Emergency {
+    request: Option<Request>,
+    /// Parts with a delivery in progress.
+    busy: BTreeSet<JausId>,
+}
+
+#[derive(Debug)]
+struct Request {
+    on: bool,
+    since: Instant,
+    /// The parts that have not confirmed it.
+    left: BTreeSet<JausId>,
+}
+
+/// The state of a part as it reported it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reported {
+    /// Whether it is in an emergency.
+    pub is_emergency: bool,
+    /// When the report arrived.
+    pub at: Instant,
+}
+
+impl Emergency {
+    /// How long it is repeated to a part that does not confirm it.
+    pub const PATIENCE: Duration = Duration::from_secs(10);
+
+    /// Sets or clears an emergency of these parts.
+    pub fn request(&mut self, now: Instant, on: bool, parts: impl IntoIterator<Item = JausId>) {
+        let left = parts.into_iter().collect();
+        self.request = Some(Request {
+            on,
+            since: now,
+            left,
+        });
+    }
+
+    /// Handles the end of a delivery, acknowledged or not.
+    pub fn handle_delivered(&mut self, part: JausId) {
+        self.busy.remove(&part);
+    }
+
+    /// The parts to which the emergency, or its end, has to be delivered now: whether it is one, and
+    /// to which. A part that has confirmed is left alone from then on, so that another client can
+    /// clear the emergency.
+    pub fn poll(
+        &mut self,
+        now: Instant,
+        reported: &BTreeMap<JausId, Reported>,
+    ) -> Option<(bool, Vec<JausId>)> {
+        let request = self.request.as_mut()?;
+        let is_confirmed = |part: &JausId| {
+            reported
+                .get(part)
+                .is_some_and(|it| it.is_emergency == request.on && it.at > request.since)
+        };
+        request.left.retain(|part| !is_confirmed(part));
+        let on = request.on;
+        let is_over = now >= request.since + Self::PATIENCE;
+        if request.left.is_empty() || is_over {
+            for part in &request.left {
+                let what = if on {
+                    "the emergency"
+                } else {
+                    "the end of the emergency"
+                };
+                tracing::warn!("{part} has not confirmed {what}");
+            }
+            self.request = None;
+            return None;
+        }
+        let due: Vec<_> = request.left.difference(&self.busy).copied().collect();
+        self.busy.extend(&due);
+        Some((on, due))
+    }
+
+    /// Whether an emergency is being set.
+    #[must_use]
+    pub fn is_being_set(&self) -> bool {
+        self.request.as_ref().is_some_and(|it| it.on)
+    }
+}
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
+mod tests {
+    use super::*;
+
+    const ONE: JausId = JausId::new(101, 1, 33);
+    const OTHER: JausId = JausId::new(101, 1, 44);
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    fn state(is_emergency: bool, at: Instant) -> Reported {
+        Reported { is_emergency, at }
+    }
+
+    #[test]
+    fn an_emergency_is_repeated_until_every_part_has_reported_it_since() {
+        let now = Instant::now();
+        let mut emergency = Emergency::default();
+        // The report of before does not count.
+        let mut reported = BTreeMap::from([(ONE, state(true, now))]);
+        emergency.request(now, true, [ONE, OTHER]);
+        let sent = emergency.poll(now, &reported);
+        assert_eq!(sent, Some((true, vec![ONE, OTHER])));
+        assert_eq!(emergency.poll(now, &reported), Some((true, vec![])));
+        emergency.handle_delivered(ONE);
+        emergency.handle_delivered(OTHER);
+        reported.insert(OTHER, state(true, now + ms(10)));
+        let sent = emergency.poll(now + ms(20), &reported);
+        assert_eq!(sent, Some((true, vec![ONE])));
+        reported.insert(ONE, state(true, now + ms(30)));
+        assert_eq!(emergency.poll(now + ms(40), &reported), None);
+        assert!(!emergency.is_being_set());
+    }
+
+    #[test]
+    fn another_client_can_clear_an_emergency_that_was_confirmed() {
+        let now = Instant::now();
+        let mut emergency = Emergency::default();
+        emergency.request(now, true, [ONE, OTHER]);
+        let mut reported = BTreeMap::from([(ONE, state(true, now + ms(1)))]);
+        assert_eq!(
+            emergency.poll(now + ms(1), &reported),
+            Some((true, vec![OTHER]))
+        );
+        reported.insert(ONE, state(false, now + ms(2)));
+        emergency.handle_delivered(OTHER);
+        assert_eq!(
+            emergency.poll(now + ms(2), &reported),
+            Some((true, vec![OTHER]))
+        );
+    }
+
+    #[test]
+    fn a_part_that_never_confirms_is_given_up_after_ten_seconds() {
+        let now = Instant::now();
+        let mut emergency = Emergency::default();
+        emergency.request(now, true, [ONE]);
+        let reported = BTreeMap::new();
+        let end = now + Emergency::PATIENCE;
+        assert!(emergency.poll(end - ms(1), &reported).is_some());
+        assert_eq!(emergency.poll(end, &reported), None);
+    }
+
+    #[test]
+    fn a_later_request_replaces_the_one_before() {
+        let now = Instant::now();
+        let mut emergency = Emergency::default();
+        emergency.request(now, true, [ONE]);
+        emergency.request(now, false, [ONE]);
+        let sent = emergency.poll(now, &BTreeMap::new());
+        assert_eq!(sent, Some((false, vec![ONE])));
+    }
+}
