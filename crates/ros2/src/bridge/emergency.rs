@@ -1,7 +1,7 @@
 //! Emergency stops: sent to every part of the vehicle until its state confirms it. It does no I/O and
 //! reads no clock.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
@@ -20,15 +20,6 @@ struct Request {
     since: Instant,
     /// The parts that have not confirmed it.
     left: BTreeSet<JausId>,
-}
-
-/// The state of a part as it reported it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Reported {
-    /// Whether it is in an emergency.
-    pub is_emergency: bool,
-    /// When the report arrived.
-    pub at: Instant,
 }
 
 impl Emergency {
@@ -50,29 +41,27 @@ impl Emergency {
         self.busy.remove(&part);
     }
 
+    /// Handles the state that a part reports. A part that has confirmed is left alone from then on, so
+    /// that another client can clear the emergency.
+    pub fn handle_status(&mut self, part: JausId, is_emergency: bool) {
+        if let Some(request) = &mut self.request
+            && request.on == is_emergency
+        {
+            request.left.remove(&part);
+        }
+    }
+
     /// The parts to which the emergency, or its end, has to be delivered now: whether it is one, and
-    /// to which. A part that has confirmed is left alone from then on, so that another client can
-    /// clear the emergency.
-    pub fn poll(
-        &mut self,
-        now: Instant,
-        reported: &BTreeMap<JausId, Reported>,
-    ) -> Option<(bool, Vec<JausId>)> {
-        let request = self.request.as_mut()?;
-        let is_confirmed = |part: &JausId| {
-            reported
-                .get(part)
-                .is_some_and(|it| it.is_emergency == request.on && it.at > request.since)
-        };
-        request.left.retain(|part| !is_confirmed(part));
+    /// to which.
+    pub fn poll(&mut self, now: Instant) -> Option<(bool, Vec<JausId>)> {
+        let request = self.request.as_ref()?;
         let on = request.on;
         let is_over = now >= request.since + Self::PATIENCE;
         if request.left.is_empty() || is_over {
             for part in &request.left {
-                let what = if on {
-                    "the emergency"
-                } else {
-                    "the end of the emergency"
+                let what = match on {
+                    true => "the emergency",
+                    false => "the end of the emergency",
                 };
                 tracing::warn!("{part} has not confirmed {what}");
             }
@@ -102,31 +91,20 @@ mod tests {
     const ONE: JausId = JausId::new(101, 1, 33);
     const OTHER: JausId = JausId::new(101, 1, 44);
 
-    fn ms(ms: u64) -> Duration {
-        Duration::from_millis(ms)
-    }
-
-    fn state(is_emergency: bool, at: Instant) -> Reported {
-        Reported { is_emergency, at }
-    }
-
     #[test]
-    fn an_emergency_is_repeated_until_every_part_has_reported_it_since() {
+    fn an_emergency_is_repeated_until_every_part_has_reported_it() {
         let now = Instant::now();
         let mut emergency = Emergency::default();
-        // The report of before does not count.
-        let mut reported = BTreeMap::from([(ONE, state(true, now))]);
         emergency.request(now, true, [ONE, OTHER]);
-        let sent = emergency.poll(now, &reported);
-        assert_eq!(sent, Some((true, vec![ONE, OTHER])));
-        assert_eq!(emergency.poll(now, &reported), Some((true, vec![])));
+        assert_eq!(emergency.poll(now), Some((true, vec![ONE, OTHER])));
+        assert_eq!(emergency.poll(now), Some((true, vec![])), "on their way");
         emergency.handle_delivered(ONE);
         emergency.handle_delivered(OTHER);
-        reported.insert(OTHER, state(true, now + ms(10)));
-        let sent = emergency.poll(now + ms(20), &reported);
-        assert_eq!(sent, Some((true, vec![ONE])));
-        reported.insert(ONE, state(true, now + ms(30)));
-        assert_eq!(emergency.poll(now + ms(40), &reported), None);
+        emergency.handle_status(ONE, false);
+        emergency.handle_status(OTHER, true);
+        assert_eq!(emergency.poll(now), Some((true, vec![ONE])));
+        emergency.handle_status(ONE, true);
+        assert_eq!(emergency.poll(now), None);
         assert!(!emergency.is_being_set());
     }
 
@@ -135,17 +113,9 @@ mod tests {
         let now = Instant::now();
         let mut emergency = Emergency::default();
         emergency.request(now, true, [ONE, OTHER]);
-        let mut reported = BTreeMap::from([(ONE, state(true, now + ms(1)))]);
-        assert_eq!(
-            emergency.poll(now + ms(1), &reported),
-            Some((true, vec![OTHER]))
-        );
-        reported.insert(ONE, state(false, now + ms(2)));
-        emergency.handle_delivered(OTHER);
-        assert_eq!(
-            emergency.poll(now + ms(2), &reported),
-            Some((true, vec![OTHER]))
-        );
+        emergency.handle_status(ONE, true);
+        emergency.handle_status(ONE, false);
+        assert_eq!(emergency.poll(now), Some((true, vec![OTHER])));
     }
 
     #[test]
@@ -153,10 +123,9 @@ mod tests {
         let now = Instant::now();
         let mut emergency = Emergency::default();
         emergency.request(now, true, [ONE]);
-        let reported = BTreeMap::new();
         let end = now + Emergency::PATIENCE;
-        assert!(emergency.poll(end - ms(1), &reported).is_some());
-        assert_eq!(emergency.poll(end, &reported), None);
+        assert!(emergency.poll(end - Duration::from_millis(1)).is_some());
+        assert_eq!(emergency.poll(end), None);
     }
 
     #[test]
@@ -165,7 +134,6 @@ mod tests {
         let mut emergency = Emergency::default();
         emergency.request(now, true, [ONE]);
         emergency.request(now, false, [ONE]);
-        let sent = emergency.poll(now, &BTreeMap::new());
-        assert_eq!(sent, Some((false, vec![ONE])));
+        assert_eq!(emergency.poll(now), Some((false, vec![ONE])));
     }
 }

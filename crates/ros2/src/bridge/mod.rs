@@ -26,6 +26,7 @@ pub mod vehicle;
 pub mod velocity;
 
 use jaus::component::Component;
+use jaus::service::TimeOfDay;
 use jaus_vehicle::parts::PartError;
 use tokio::sync::mpsc;
 
@@ -74,15 +75,16 @@ impl Settings {
 }
 
 /// Runs the JAUS side until the component or the ROS side stops. Outputs that the ROS side does not
-/// take in time are dropped and counted.
+/// take in time are dropped and counted. `time` stamps what has no time stamp of its own.
 pub async fn run(
     component: Component,
+    time: TimeOfDay,
     settings: Settings,
     reports: Reports,
     inputs: mpsc::Receiver<Input>,
     outputs: mpsc::Sender<Output>,
 ) -> PartError {
-    runner::Runner::new(component, settings, reports, inputs, outputs)
+    runner::Runner::new(component, time, settings, reports, inputs, outputs)
         .run()
         .await
 }

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
 use jaus::component::Component;
-use jaus::node::{now, time_of_day};
-use jaus::service::Directory;
+use jaus::node::now;
+use jaus::service::{Directory, State, TimeOfDay};
 use jaus_vehicle::parts::PartError;
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
@@ -32,6 +32,7 @@ use super::{Reports, Settings};
 /// The vehicle's side of the bridge.
 pub(super) struct Runner {
     component: Component,
+    time: TimeOfDay,
     settings: Settings,
     reports: Reports,
     vehicle: Vehicle,
@@ -65,6 +66,7 @@ impl Runner {
 
     pub(super) fn new(
         component: Component,
+        time: TimeOfDay,
         settings: Settings,
         reports: Reports,
         inputs: mpsc::Receiver<Input>,
@@ -86,6 +88,7 @@ impl Runner {
             published: None,
             logged: BTreeSet::new(),
             component,
+            time,
             settings,
             reports,
             sightings,
@@ -105,7 +108,10 @@ impl Runner {
                     return PartError::NodeStopped;
                 },
                 input = self.inputs.recv() => match input {
-                    Some(input) => self.handle_input(now(), input),
+                    Some(input) => {
+                        self.handle_input(now(), input);
+                        self.command(now());
+                    }
                     None => return PartError::Broken("the ROS side has ended".to_owned()),
                 },
                 Some((by, report)) = self.sightings.recv() => {
@@ -113,7 +119,10 @@ impl Runner {
                     continue;
                 }
                 finished = self.jobs.finished() => self.handle_finished(now(), finished),
-                _ = beat.tick() => self.handle_beat(now()),
+                _ = beat.tick() => {
+                    self.handle_beat(now());
+                    self.command(now());
+                }
             }
             self.settle(now());
         }
@@ -230,9 +239,9 @@ impl Runner {
     }
 
     fn handle_report(&mut self, now: Instant, by: JausId, report: Report) {
-        let received = time_of_day();
+        let received = self.time.now();
         match report {
-            Report::Status(code) => self.vehicle.handle_status(now, by, code),
+            Report::Status(code) => self.handle_status(now, by, code),
             Report::Control(controller) => self.vehicle.handle_controller(by, controller),
             Report::Mission(mission) => self.navigation.handle_mission(now, mission),
             Report::LocalPose(report) => match PoseSample::of(&report, received) {
@@ -267,6 +276,12 @@ impl Runner {
         }
     }
 
+    fn handle_status(&mut self, now: Instant, by: JausId, code: u8) {
+        self.vehicle.handle_status(now, by, code);
+        let is_emergency = code == State::Emergency as u8;
+        self.emergency.handle_status(by, is_emergency);
+    }
+
     fn handle_finished(&mut self, now: Instant, finished: Finished) {
         match finished {
             Finished::Begun {
@@ -297,7 +312,7 @@ impl Runner {
             Finished::Alarmed { peer, status } => {
                 self.emergency.handle_delivered(peer);
                 if let Some(status) = status {
-                    self.vehicle.handle_status(now, peer, status.status.0);
+                    self.handle_status(now, peer, status.status.0);
                 }
             }
         }
@@ -323,16 +338,21 @@ impl Runner {
         entries.flat_map(|entry| self.reports.of(entry)).collect()
     }
 
-    /// Brings control, commands and emergencies up to date.
+    /// Brings control, goals and the status up to date.
     fn settle(&mut self, now: Instant) {
         self.settle_drive(now);
         self.settle_goal(now);
-        if let Some((on, due)) = self.emergency.poll(now, &self.vehicle.reported()) {
+        self.publish_status(now);
+    }
+
+    /// Sends what is to be repeated: the velocity, and an emergency.
+    fn command(&mut self, now: Instant) {
+        self.steer(now);
+        if let Some((on, due)) = self.emergency.poll(now) {
             for part in due {
                 self.jobs.alarm(part, on);
             }
         }
-        self.publish_status(now);
     }
 
     fn settle_drive(&mut self, now: Instant) {
@@ -349,10 +369,14 @@ impl Runner {
         {
             self.jobs.begin(true, peer, authority);
         }
+    }
+
+    fn steer(&mut self, now: Instant) {
         let Some(velocity) = self.drive.poll_velocity(now) else {
             return;
         };
-        if let (Some(session), Some((_, role))) = (self.drive_lease.session(), driver) {
+        if let (Some(session), Some((_, role))) = (self.drive_lease.session(), self.vehicle.drive())
+        {
             let limits = self.settings.drive.limits;
             self.jobs.steer(now, session, role, velocity, limits);
         }
@@ -402,7 +426,7 @@ impl Runner {
             counters: &self.counters,
         };
         let diagnostics = diagnostics(now, &self.vehicle, &bridge);
-        let stamp = time_of_day();
+        let stamp = self.time.now();
         self.publish(Output::Status { stamp, diagnostics });
         self.published = Some((now, control));
     }

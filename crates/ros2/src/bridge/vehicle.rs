@@ -12,8 +12,6 @@ use jaus::messages::mobility::{
 use jaus::service::{ComponentEntry, Directory, State};
 use jaus_vehicle::messages::ground::mission_planner;
 
-use super::emergency::Reported;
-
 /// A service by which ROS sees or commands the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
@@ -207,24 +205,5 @@ impl Vehicle {
     #[must_use]
     pub fn goal(&self) -> Option<(JausId, Role)> {
         self.first(Role::GOAL)
-    }
-
-    /// Which components are in an emergency, as they reported it.
-    #[must_use]
-    pub fn reported(&self) -> BTreeMap<JausId, Reported> {
-        let reported = self.parts.iter().filter_map(|(id, part)| {
-            let (code, at) = part.status?;
-            let is_emergency = code == State::Emergency as u8;
-            Some((*id, Reported { is_emergency, at }))
-        });
-        reported.collect()
-    }
-
-    /// Whether a component that drives is in an emergency.
-    #[must_use]
-    pub fn is_in_emergency(&self) -> bool {
-        let code = State::Emergency as u8;
-        let mut parts = self.parts.values();
-        parts.any(|part| part.status.is_some_and(|(it, _)| it == code))
     }
 }
