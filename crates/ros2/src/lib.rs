@@ -9,15 +9,15 @@
 //! * [`cdr`]: the encoding of messages.
 //! * [`graph`]: keys of topics, liveliness tokens, quality of service, attachments.
 //!
-//! None of these does I/O.
+//! * [`session`]: nodes, publishers and subscriptions in a zenoh network. The others do no I/O.
 //!
 //! # Sources
 //! The keys, tokens, texts of quality of service and attachments follow rmw_zenoh_cpp 0.2.4 and newer
-//! (its `docs/design.md` and its sources up to 0.2.5). Before 0.2.3 its default durability was another one,
-//! and before 0.2.4 its attachment had another form, so that older versions do not work. The type hashes
-//! follow REP 2016 (`RIHS01`), and the texts of types ROS's page on interfaces. The encoding is the plain CDR of OMG's
-//! DDS-XTypes, version 1. `tests` compare with hashes that ROS publishes, and with other implementations
-//! of CDR and zenoh; ROS 2 itself is not part of them.
+//! (its `docs/design.md`, and its sources up to 0.2.5). Before 0.2.3 its default durability was another
+//! one, and before 0.2.4 its attachment had another form, so that older versions do not work. The type
+//! hashes follow REP 2016 (`RIHS01`), and the texts of types ROS's page on interfaces. The encoding is
+//! the plain CDR of OMG's DDS-XTypes, version 1. `tests` compare with hashes that ROS publishes, and with
+//! other implementations of CDR and zenoh; ROS 2 itself is not part of them.
 #![forbid(unsafe_code)]
 
 pub mod cdr;
@@ -25,9 +25,11 @@ pub mod graph;
 mod hash;
 pub mod interface;
 pub mod message;
+pub mod session;
 pub mod value;
 
 pub use graph::{Attachment, Gid, Qos, TopicName};
 pub use interface::{Interface, InterfaceError, Interfaces, TypeName};
 pub use message::{Message, ValueError};
+pub use session::{Ros, SessionError};
 pub use value::Value;

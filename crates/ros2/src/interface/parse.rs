@@ -8,7 +8,7 @@ const LONGEST_TEXT: usize = 1 << 18;
 /// The most fields and the most constants of a message type.
 const MOST_FIELDS: usize = 4096;
 /// The greatest size of an array, and of the bound of a sequence or a text.
-const GREATEST_SIZE: usize = 1 << 20;
+const GREATEST_SIZE: usize = u32::MAX as usize;
 
 /// A message type as its `.msg` text says it: nested types are names.
 #[derive(Clone, Debug, PartialEq)]
