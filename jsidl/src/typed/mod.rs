@@ -8,6 +8,7 @@
 //! same layout, and the set itself for the newest layout, refer to that definition. An additional
 //! definition therefore never renames a type of a version.
 
+pub(crate) mod keywords;
 pub(crate) mod lines;
 pub(crate) mod names;
 pub(crate) mod notes;
