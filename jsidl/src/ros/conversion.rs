@@ -17,9 +17,9 @@ pub enum Value {
     Float(f64),
     /// `string`, without zeros.
     String(String),
-    /// `uint8[]`
+    /// `uint8[]`, from raw octets.
     Octets(Vec<u8>),
-    /// The elements of an array or a sequence of any other type, bounded or not.
+    /// The elements of any other array or sequence, bounded or not.
     Sequence(Vec<Self>),
     /// The fields of a message, in the order of its `.msg` file; none if the message is empty.
     Message(Vec<Self>),
