@@ -4,9 +4,7 @@
 use std::time::{Duration, Instant};
 
 use super::velocity::{InvalidVelocity, Limits, Twist, Velocity};
-
-/// The GID of a publisher, as its messages carry it.
-pub type Gid = [u8; 16];
+use crate::graph::Gid;
 
 /// The times and limits of driving.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -260,8 +258,8 @@ impl Drive {
 mod tests {
     use super::*;
 
-    const ONE: Gid = [1; 16];
-    const OTHER: Gid = [2; 16];
+    const ONE: Gid = Gid([1; 16]);
+    const OTHER: Gid = Gid([2; 16]);
 
     fn ms(ms: u64) -> Duration {
         Duration::from_millis(ms)

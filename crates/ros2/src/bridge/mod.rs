@@ -1,4 +1,4 @@
-//! The JAUS side of the bridge: one vehicle, seen and commanded from ROS.
+//! The bridge: one vehicle, seen and commanded from ROS.
 //!
 //! * [`frames`], [`stamp`], [`samples`]: poses, velocities and positions in the frames of ROS.
 //! * [`velocity`], [`drive`], [`goal`], [`emergency`]: what ROS commands, as state machines without
@@ -6,6 +6,7 @@
 //! * [`vehicle`], [`diagnostics`]: the vehicle as Discovery and its own reports describe it.
 //! * [`run`]: the task that joins them with a JAUS component. It exchanges [`Input`]s and [`Output`]s
 //!   with the ROS side, and knows neither CDR nor zenoh.
+//! * [`Bridge`]: the same with the topics of ROS, as a component.
 
 mod counters;
 pub mod diagnostics;
@@ -16,12 +17,16 @@ pub mod frames;
 pub mod goal;
 mod jobs;
 mod lease;
+mod messages;
+mod part;
 mod ports;
 mod report;
+mod report_topics;
 mod reports;
 mod runner;
 pub mod samples;
 pub mod stamp;
+mod topics;
 pub mod vehicle;
 pub mod velocity;
 
@@ -31,8 +36,11 @@ use jaus_vehicle::parts::PartError;
 use tokio::sync::mpsc;
 
 pub use counters::{Counter, Counters};
+pub use messages::Frames;
+pub use part::{Bridge, BridgeError};
 pub use ports::{GoalPose, Input, Output};
 pub use reports::{Definition, Reports, UnknownReport};
+pub use topics::TopicSettings;
 
 use drive::DriveSettings;
 use vehicle::Selection;

@@ -6,11 +6,11 @@ use bytes::Bytes;
 use jaus::address::JausId;
 
 use super::diagnostics::Diagnostic;
-use super::drive::Gid;
 use super::frames::Quaternion;
 use super::reports::Definition;
 use super::samples::{FixSample, OdometrySample, PoseSample, TwistSample};
 use super::velocity::Twist;
+use crate::graph::Gid;
 
 /// What arrives from ROS.
 #[derive(Debug, Clone, PartialEq)]

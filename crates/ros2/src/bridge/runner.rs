@@ -15,7 +15,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use super::counters::{Counter, Counters};
 use super::diagnostics::{BridgeState, diagnostics};
-use super::drive::{Access, Drive, Gid, Refusal};
+use super::drive::{Access, Drive, Refusal};
 use super::emergency::Emergency;
 use super::following::{Extra, Following, Sighting};
 use super::frames::between_local_and_map;
@@ -28,6 +28,7 @@ use super::samples::{FixSample, Odometry, PoseSample, TwistSample};
 use super::vehicle::{Role, Vehicle};
 use super::velocity::{Twist, Velocity};
 use super::{Reports, Settings};
+use crate::graph::Gid;
 
 /// The vehicle's side of the bridge.
 pub(super) struct Runner {

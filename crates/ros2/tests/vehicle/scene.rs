@@ -12,7 +12,7 @@ use jaus::link::Group;
 use jaus::messages::core::QueryControl;
 use jaus::node::{Config, Node, now};
 use jaus::service::TimeOfDay;
-use jaus_ros2::bridge::drive::Gid;
+use jaus_ros2::Gid;
 use jaus_ros2::bridge::samples::OdometrySample;
 use jaus_ros2::bridge::vehicle::Selection;
 use jaus_ros2::bridge::velocity::Twist;
@@ -37,7 +37,7 @@ const STORE: JausId = JausId::new(101, 61, 61);
 /// Time of day at the beginning of a test, since the beginning of 1970.
 const BEGIN: Duration = Duration::from_secs(1_700_000_000);
 
-pub(crate) const PUBLISHER: Gid = [7; 16];
+pub(crate) const PUBLISHER: Gid = Gid([7; 16]);
 
 /// A network with a vehicle, a bridge, and an operator of JAUS.
 pub(crate) struct Scene {
