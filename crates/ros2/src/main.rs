@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
-use jaus::node::units;
+use jaus_cli::runtime::{between, duration_within};
 use jaus_cli::{Failure, Ready, launch};
 use jaus_ros2::bridge::vehicle::Selection;
 use jaus_ros2::bridge::{Bridge, Reports, Settings, TopicSettings};
@@ -52,7 +52,7 @@ struct Flags {
     domain: u32,
 
     /// The rate of poses, velocities, positions and further reports, in hertz
-    #[arg(long, value_name = "HZ", default_value_t = 10.0, value_parser = rate)]
+    #[arg(long, value_name = "HZ", default_value = "10", value_parser = |text: &str| between(text, 0.1, 1000.0))]
     rate: f64,
 
     /// Let ROS command the vehicle with this authority, from 0 to 255; the higher one wins
@@ -66,24 +66,24 @@ struct Flags {
 
     /// The highest speed of cmd_vel, and the speed that a primitive driver reaches with full effort,
     /// in m/s
-    #[arg(long, value_name = "M/S", default_value_t = 2.0, value_parser = positive)]
+    #[arg(long, value_name = "M/S", default_value = "2", value_parser = |text: &str| between(text, 0.05, 100.0))]
     max_speed: f64,
 
     /// The highest yaw rate of cmd_vel, and the one that a primitive driver reaches with full effort,
     /// in rad/s
-    #[arg(long, value_name = "RAD/S", default_value_t = 1.5, value_parser = positive)]
+    #[arg(long, value_name = "RAD/S", default_value = "1.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
     max_yaw_rate: f64,
 
     /// Stop the vehicle after this time without a cmd_vel
-    #[arg(long, value_name = "TIME", default_value = "500ms", value_parser = timeout)]
+    #[arg(long, value_name = "DURATION", default_value = "500ms", value_parser = |text: &str| duration_within(text, "50ms", "60s"))]
     timeout: Duration,
 
     /// Release control after this time without a cmd_vel that moves
-    #[arg(long, value_name = "TIME", default_value = "5s", value_parser = timeout)]
+    #[arg(long, value_name = "DURATION", default_value = "5s", value_parser = |text: &str| duration_within(text, "50ms", "60s"))]
     hold: Duration,
 
     /// The speed on the way to a goal, in m/s
-    #[arg(long, value_name = "M/S", default_value_t = 1.0, value_parser = positive)]
+    #[arg(long, value_name = "M/S", default_value = "1", value_parser = |text: &str| between(text, 0.05, 100.0))]
     goal_speed: f64,
 
     /// Take cmd_vel as geometry_msgs/TwistStamped instead of geometry_msgs/Twist
@@ -110,28 +110,6 @@ struct Flags {
     /// Publish all reports that a query answers, but those about the network itself
     #[arg(long)]
     all_reports: bool,
-}
-
-/// Parses a number above 0.
-fn positive(text: &str) -> Result<f64, String> {
-    let number: Option<f64> = text.parse().ok();
-    let number = number.filter(|it| it.is_finite() && *it > 0.0);
-    number.ok_or_else(|| "write a number above 0, such as 1.5".to_owned())
-}
-
-/// Parses a rate that an event can have.
-fn rate(text: &str) -> Result<f64, String> {
-    let rate = positive(text).ok().filter(|it| (0.1..=1000.0).contains(it));
-    rate.ok_or_else(|| "write a rate from 0.1 to 1000 Hz, such as 10".to_owned())
-}
-
-/// Parses a time from 50 ms to a minute.
-fn timeout(text: &str) -> Result<Duration, String> {
-    let time = units::duration(text).map_err(|error| error.to_string())?;
-    let is_possible = (Duration::from_millis(50)..=Duration::from_secs(60)).contains(&time);
-    is_possible
-        .then_some(time)
-        .ok_or_else(|| "write a time from 50ms to 60s, such as 500ms".to_owned())
 }
 
 impl Flags {

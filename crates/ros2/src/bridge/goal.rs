@@ -130,7 +130,7 @@ impl Navigation {
         }
         match self.phase {
             Phase::None | Phase::Arrived { .. } | Phase::Stopping { .. } => {
-                self.phase = Phase::None
+                self.phase = Phase::None;
             }
             _ => self.end(Progress::Failed(why.to_owned())),
         }
