@@ -7,6 +7,8 @@
     reason = "the tests use a clock that is paused, and fail by panicking"
 )]
 
+#[path = "../rover/mod.rs"]
+mod rover;
 mod scene;
 
 use std::time::Duration;
@@ -15,7 +17,8 @@ use jaus_ros2::bridge::frames::Quaternion;
 use jaus_ros2::bridge::{GoalPose, Input};
 use jaus_test_kit::waiting::within_limit;
 
-use scene::{PRIMITIVE, PUBLISHER, Scene};
+use rover::PRIMITIVE;
+use scene::{PUBLISHER, Scene};
 
 /// A vehicle and a bridge with authority 127.
 fn driveable() -> Scene {

@@ -1,55 +1,47 @@
-//! A vehicle of real parts and the JAUS side of a bridge, each on its own node on loopback, in virtual
-//! time.
+//! A vehicle of real parts with the JAUS side of a bridge, in virtual time.
 
-use std::convert::Infallible;
+use std::ops::{Deref, DerefMut};
 use std::panic::Location;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::component::{Component, Kind};
-use jaus::link::Group;
-use jaus::messages::core::QueryControl;
-use jaus::node::{Config, Node, now};
-use jaus::service::TimeOfDay;
+use jaus::node::now;
 use jaus_ros2::Gid;
 use jaus_ros2::bridge::samples::OdometrySample;
 use jaus_ros2::bridge::vehicle::Selection;
 use jaus_ros2::bridge::velocity::Twist;
 use jaus_ros2::bridge::{Input, Output, Reports, Settings, run};
-use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::LIMIT;
-use jaus_vehicle::parts::{
-    KnowledgeStore, Part, PartError, PathDriver, Planner, PoseSensor, PrimitiveDriver, Slot,
-    VectorDriver, VelocitySensor,
-};
 use tokio::sync::mpsc;
-use tokio::task::JoinHandle;
 
-pub(crate) const PRIMITIVE: JausId = JausId::new(101, 33, 33);
-const PLANNER: JausId = JausId::new(101, 36, 36);
-const POSE: JausId = JausId::new(101, 41, 41);
-const VELOCITY: JausId = JausId::new(101, 42, 42);
-const VECTOR: JausId = JausId::new(101, 44, 44);
-const PATH: JausId = JausId::new(101, 48, 48);
-const STORE: JausId = JausId::new(101, 61, 61);
+use crate::rover::Rover;
 
 /// Time of day at the beginning of a test, since the beginning of 1970.
 const BEGIN: Duration = Duration::from_secs(1_700_000_000);
 
 pub(crate) const PUBLISHER: Gid = Gid([7; 16]);
 
-/// A network with a vehicle, a bridge, and an operator of JAUS.
+/// A vehicle, a bridge, and an operator of JAUS.
 pub(crate) struct Scene {
-    group: Group,
-    /// The time of day, in virtual time.
-    time: TimeOfDay,
-    pub(crate) operator: Component,
-    nodes: Vec<Node>,
-    parts: Vec<JoinHandle<()>>,
+    rover: Rover,
     inputs: Option<mpsc::Sender<Input>>,
     seen: Arc<Mutex<Seen>>,
-    folder: tempfile::TempDir,
+}
+
+impl Deref for Scene {
+    type Target = Rover;
+
+    fn deref(&self) -> &Rover {
+        &self.rover
+    }
+}
+
+impl DerefMut for Scene {
+    fn deref_mut(&mut self) -> &mut Rover {
+        &mut self.rover
+    }
 }
 
 /// The last outputs of the bridge.
@@ -62,63 +54,11 @@ struct Seen {
 
 impl Scene {
     pub(crate) fn new() -> Self {
-        let group = own_group();
-        let node = Node::start(Config::loopback(60, 1).group(group)).unwrap();
-        let operator = Component::builder(Kind::OperatorControlUnit, "Operator");
-        let begin = now();
         Self {
-            group,
-            time: TimeOfDay::new(move || BEGIN + (now() - begin)),
-            operator: operator.attach(&node, 1).unwrap(),
-            nodes: vec![node],
-            parts: Vec::new(),
+            rover: Rover::new(BEGIN),
             inputs: None,
             seen: Arc::default(),
-            folder: tempfile::tempdir().unwrap(),
         }
-    }
-
-    fn node(&mut self, id: JausId) -> Node {
-        let config = Config::loopback(id.subsystem(), id.node()).group(self.group);
-        let node = Node::start(config).unwrap();
-        self.nodes.push(node.clone());
-        node
-    }
-
-    fn part<F>(&mut self, id: JausId, run: impl FnOnce(Slot) -> F)
-    where
-        F: Future<Output = Result<Infallible, PartError>> + Send + 'static,
-    {
-        let node = self.node(id);
-        let port = node.attach(id.component()).unwrap();
-        let part = run(Slot {
-            time: self.time.clone(),
-            ..Slot::new(port, node, Kind::Vehicle, "Rover")
-        });
-        self.parts.push(tokio::spawn(async move {
-            let Err(error) = part.await;
-            panic!("{id} cannot go on: {error}");
-        }));
-    }
-
-    /// Starts what a vehicle needs to be driven by hand.
-    pub(crate) fn start_vehicle(&mut self) {
-        self.part(PRIMITIVE, |slot| PrimitiveDriver::default().run(slot));
-        self.part(VELOCITY, |slot| VelocitySensor::default().run(slot));
-        self.part(POSE, |slot| PoseSensor::default().run(slot));
-    }
-
-    /// Starts what it needs besides to drive to goals.
-    pub(crate) fn start_planner(&mut self) {
-        let store = KnowledgeStore {
-            file: self.folder.path().join(KnowledgeStore::FILE),
-            map: Some(KnowledgeStore::demo_map()),
-            ..KnowledgeStore::default()
-        };
-        self.part(STORE, |slot| store.run(slot));
-        self.part(VECTOR, |slot| VectorDriver::default().run(slot));
-        self.part(PATH, |slot| PathDriver::default().run(slot));
-        self.part(PLANNER, |slot| Planner::default().run(slot));
     }
 
     /// Starts a bridge with this authority.
@@ -136,14 +76,14 @@ impl Scene {
         let (outputs, mut published) = mpsc::channel(256);
         let seen = self.seen.clone();
         self.inputs = Some(inputs);
-        self.parts.push(tokio::spawn(async move {
+        self.tasks.push(tokio::spawn(async move {
             while let Some(output) = published.recv().await {
                 seen.lock().unwrap().note(output);
             }
         }));
         let bridge = bridge.unwrap();
         let time = self.time.clone();
-        self.parts.push(tokio::spawn(async move {
+        self.tasks.push(tokio::spawn(async move {
             run(bridge, time, settings, Reports::none(), received, outputs).await;
         }));
     }
@@ -220,21 +160,8 @@ impl Scene {
         self.seen.lock().unwrap().status.clone()
     }
 
-    /// The subsystem that controls the primitive driver; 0 for none.
-    pub(crate) async fn controller(&self) -> u16 {
-        let asked = self.operator.query(PRIMITIVE, &QueryControl {}).await;
-        asked.unwrap().subsystem_id
-    }
-
     pub(crate) async fn end(self) {
-        for part in self.parts {
-            part.abort();
-            let _ = part.await;
-        }
-        drop(self.operator);
-        for node in self.nodes {
-            node.shutdown().await;
-        }
+        self.rover.end().await;
     }
 }
 
