@@ -4,7 +4,8 @@ ros.py ENDPOINT publish            publishes every sample until its standard inp
 ros.py ENDPOINT subscribe COUNT    prints `ready`, then `ok TYPE` for each sample that arrives as it is known, or what
                                    differs, until so many have arrived
 ros.py ENDPOINT tokens             prints the liveliness tokens of domain 0
-ros.py ENDPOINT spoil              publishes to the topic of each sample octets that are no message
+ros.py ENDPOINT spoil              publishes to the topic of each sample octets that are no message, prints `ready`, and
+                                   waits for the end of its standard input
 """
 
 import json
@@ -140,13 +141,18 @@ def tokens(session):
 
 
 def spoil(session):
-    for name in SAMPLES:
-        session.put(key(name), b"no message", attachment=struct.pack("<qqB16s", 1, 0, 16, bytes(16)))
-        session.put(key(name), encode(SAMPLES[name]))
-        session.put(key(name), encode(SAMPLES[name]), attachment=b"no attachment")
-        session.put(key(name), bytes(1 << 20) + b"0", attachment=struct.pack("<qqB16s", 1, 0, 16, bytes(16)))
+    good = struct.pack("<qqB16s", 1, 0, 16, bytes(16))
+    for name, message in SAMPLES.items():
+        for payload, attachment in [
+            (b"no message", good),
+            (encode(message), None),
+            (encode(message), b"no attachment"),
+            (bytes((1 << 20) + 1), good),
+        ]:
+            block = zenoh.CongestionControl.BLOCK
+            session.put(key(name), payload, attachment=attachment, congestion_control=block)
     print("ready", flush=True)
-    time.sleep(0.2)
+    sys.stdin.read()
 
 
 def main(endpoint, action, count=None):

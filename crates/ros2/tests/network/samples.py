@@ -26,7 +26,7 @@ SAMPLES = {
         header, NavSatStatus(-1, 9), 48.137, 11.575, 519.5, [n + 0.5 for n in range(9)], 2
     ),
     "sensor_msgs/msg/BatteryState": BatteryState(
-        header, 24.5, 31.25, -3.5, 17.0, 20.0, 22.0, 0.85, 2, 1, 3, True, [4.0, 4.125, 4.25], [], "slot 1", "A-7"
+        header, 24.5, 31.25, -3.5, 17.0, 20.0, 22.0, 0.875, 2, 1, 3, True, [4.0, 4.125, 4.25], [], "slot 1", "A-7"
     ),
     "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray(
         header,

@@ -91,7 +91,7 @@ fn battery() -> Message {
         ("charge", 17.0),
         ("capacity", 20.0),
         ("design_capacity", 22.0),
-        ("percentage", 0.85),
+        ("percentage", 0.875),
     ] {
         message.set(field, value).unwrap();
     }
