@@ -25,7 +25,10 @@ fn a_mistake_in_a_flag_is_refused_with_its_remedy() {
         (&["--max-speed", "-1"], "0.05 to 100"),
         (&["--timeout", "1h"], "60 s"),
         (&["--report", "ReportWrenchEfort"], "ReportWrenchEffort?"),
-        (&["--report", "ReportStatus", "--all-reports"], "--all-reports"),
+        (
+            &["--report", "ReportStatus", "--all-reports"],
+            "--all-reports",
+        ),
     ] {
         let (status, text) = run(&[&vehicle, flags].concat());
         assert_eq!(status, 2, "{flags:?}: {text}");
@@ -41,5 +44,8 @@ fn the_help_begins_with_what_it_is_and_ends_with_examples() {
     let (status, text) = run(&["--help"]);
     assert_eq!(status, 0, "{text}");
     assert!(text.starts_with("Bridge between a JAUS vehicle"), "{text}");
-    assert!(text.contains("jaus-ros2 --vehicle 101 --control 127"), "{text}");
+    assert!(
+        text.contains("jaus-ros2 --vehicle 101 --control 127"),
+        "{text}"
+    );
 }

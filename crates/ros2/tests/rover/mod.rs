@@ -7,6 +7,7 @@ use jaus::address::JausId;
 use jaus::component::{Component, Kind};
 use jaus::link::Group;
 use jaus::messages::core::QueryControl;
+use jaus::messages::mobility::QueryVelocityState;
 use jaus::node::{Config, Node, now};
 use jaus::service::TimeOfDay;
 use jaus_test_kit::group::own_group;
@@ -98,6 +99,13 @@ impl Rover {
     pub(crate) async fn controller(&self) -> u16 {
         let asked = self.operator.query(PRIMITIVE, &QueryControl {}).await;
         asked.unwrap().subsystem_id
+    }
+
+    /// Forward, in m/s, as the vehicle reports it.
+    pub(crate) async fn reported_speed(&self) -> f64 {
+        let query = QueryVelocityState::all();
+        let report = self.operator.query(VELOCITY, &query).await.unwrap();
+        report.velocity_x_m_per_s().unwrap_or_default()
     }
 
     pub(crate) async fn end(self) {

@@ -97,7 +97,7 @@ async fn without_control_nothing_is_commanded_but_an_emergency_stop_is() {
         scene.drive(1.0, 0.0).await;
         tokio::time::sleep(Duration::from_millis(100)).await;
     }
-    assert!(scene.speed().abs() < 0.01);
+    assert!(scene.reported_speed().await.abs() < 0.01);
     assert_eq!(scene.controller().await, 0);
     scene.until(|it| it.says("--control)=20")).await;
     scene.input(Input::EmergencyStop(true)).await;
