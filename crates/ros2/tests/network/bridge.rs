@@ -11,7 +11,7 @@ use crate::rover::Rover;
 use crate::scene::{Script, endpoint};
 
 /// The program, which is killed when it is dropped.
-struct Bridge(Child);
+pub(crate) struct Bridge(pub(crate) Child);
 
 impl Drop for Bridge {
     fn drop(&mut self) {
