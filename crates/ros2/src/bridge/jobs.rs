@@ -52,7 +52,7 @@ pub(super) struct Jobs {
     steering: Option<Steering>,
 }
 
-/// The last velocity sent, until it is acknowledged or replaced.
+/// The last velocity sent.
 struct Steering {
     velocity: Velocity,
     sent: Instant,
@@ -61,6 +61,10 @@ struct Steering {
 
 /// A velocity without acknowledgement for this time is replaced by a newer one.
 const STEERING_PATIENCE: Duration = Duration::from_millis(100);
+/// The same velocity is sent again after this time: at each beat.
+const REPETITION: Duration = Duration::from_millis(40);
+/// Another velocity follows after this time at the earliest.
+const SHORTEST: Duration = Duration::from_millis(10);
 /// Timeout of an emergency before it is repeated, and of the query for the state.
 const ALARM_PATIENCE: Duration = Duration::from_millis(700);
 /// Timeout of an order about a goal.
@@ -99,8 +103,8 @@ impl Jobs {
         });
     }
 
-    /// Sends a velocity to the driver. The newest one counts: an older one still on its way is
-    /// dropped when it is late, and immediately if the vehicle has to stop.
+    /// Sends a velocity to the driver, unless it is too early for it. The newest one counts: an older
+    /// one still on its way is dropped when it is late, and immediately if the vehicle has to stop.
     pub(super) fn steer(
         &mut self,
         now: Instant,
@@ -109,11 +113,10 @@ impl Jobs {
         velocity: Velocity,
         limits: Limits,
     ) {
-        if let Some(last) = self.steering.take_if(|it| !it.task.is_finished()) {
-            let stops = velocity == Velocity::ZERO && last.velocity != Velocity::ZERO;
-            let is_late = now.saturating_duration_since(last.sent) >= STEERING_PATIENCE;
-            if !stops && !is_late {
-                self.steering = Some(last);
+        if let Some(last) = &self.steering {
+            let since = now.saturating_duration_since(last.sent);
+            let is_underway = !last.task.is_finished();
+            if !may_follow(last.velocity, since, is_underway, velocity) {
                 return;
             }
             last.task.abort();
@@ -161,6 +164,18 @@ impl Jobs {
             Finished::Alarmed { peer, status }
         });
     }
+}
+
+/// Whether a velocity may follow the last one after this time, so that a fast publisher does not
+/// flood the vehicle. A stop never waits.
+fn may_follow(last: Velocity, since: Duration, is_underway: bool, next: Velocity) -> bool {
+    let stops = next == Velocity::ZERO && last != Velocity::ZERO;
+    let pause = match (is_underway, next == last) {
+        (true, _) => STEERING_PATIENCE,
+        (false, true) => REPETITION,
+        (false, false) => SHORTEST,
+    };
+    stops || since >= pause
 }
 
 /// The result of a future, unless it takes longer.
@@ -230,4 +245,31 @@ fn waypoint(goal: Goal) -> Result<SetLocalWaypoint, OutOfRange> {
     waypoint.set_yaw_rad(goal.heading)?;
     waypoint.set_waypoint_tolerance_m(Navigation::TOLERANCE)?;
     Ok(waypoint)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fast_publisher_does_not_flood_the_vehicle_and_a_stop_does_not_wait() {
+        let at = |forward| Velocity {
+            forward,
+            ..Velocity::ZERO
+        };
+        let ms = Duration::from_millis;
+        for (last, since, is_underway, next, expected) in [
+            (at(1.0), ms(39), false, at(1.0), false),
+            (at(1.0), ms(40), false, at(1.0), true),
+            (at(1.0), ms(9), false, at(1.1), false),
+            (at(1.0), ms(10), false, at(1.1), true),
+            (at(1.0), ms(99), true, at(1.1), false),
+            (at(1.0), ms(100), true, at(1.1), true),
+            (at(1.0), ms(0), true, Velocity::ZERO, true),
+            (Velocity::ZERO, ms(39), false, Velocity::ZERO, false),
+        ] {
+            let may = may_follow(last, since, is_underway, next);
+            assert_eq!(may, expected, "{last:?} {since:?} {is_underway} {next:?}");
+        }
+    }
 }

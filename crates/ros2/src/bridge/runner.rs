@@ -228,6 +228,9 @@ impl Runner {
             tracing::info!("the emergency is cleared from ROS");
         }
         let parts: Vec<_> = self.vehicle.all(Role::Management).collect();
+        if parts.is_empty() {
+            tracing::warn!("no component of the vehicle is known that takes emergencies");
+        }
         self.emergency.request(now, on, parts);
     }
 
