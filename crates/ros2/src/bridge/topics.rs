@@ -241,14 +241,9 @@ async fn watch(ros: Ros, topic: String, inputs: mpsc::Sender<Input>) {
     loop {
         changes.borrow_and_update();
         let is_connected = ros.is_connected();
-        if std::mem::replace(&mut was_connected, is_connected) != is_connected {
-            match is_connected {
-                true => tracing::info!("connected to the ROS network"),
-                false => tracing::warn!("the ROS network was lost"),
-            }
-            if !is_connected && inputs.send(Input::Disconnected).await.is_err() {
-                return;
-            }
+        let is_lost = std::mem::replace(&mut was_connected, is_connected) && !is_connected;
+        if is_lost && inputs.send(Input::Disconnected).await.is_err() {
+            return;
         }
         let publishers = ros.publishers(&topic);
         let present = publishers.iter().map(crate::graph::Token::gid).collect();
