@@ -23,7 +23,7 @@ fn a_mistake_in_a_flag_is_refused_with_its_remedy() {
         (&["--namespace", "v101"], "`v101`"),
         (&["--rate", "0"], "0.1 to 1000"),
         (&["--max-speed", "0"], "0.05 to 100"),
-        (&["--timeout", "1h"], "60 s"),
+        (&["--timeout", "1h"], "50ms to 60s"),
         (&["--report", "ReportWrenchEfort"], "ReportWrenchEffort?"),
         (
             &["--report", "ReportStatus", "--all-reports"],

@@ -10,6 +10,7 @@
 )]
 
 mod bridge;
+mod figures;
 #[path = "../rover/mod.rs"]
 mod rover;
 #[path = "../samples/mod.rs"]
