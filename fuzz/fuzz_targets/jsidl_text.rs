@@ -6,7 +6,10 @@
 use jaus_fuzz::{octets_come_back, with_code};
 use jsidl::docs::{self, Format};
 use jsidl::model::Service;
-use jsidl::{Library, Loader, cpp, diff, explain, format, lua, machine, rust, schema, typescript};
+use jsidl::ros::{Package, PackageName};
+use jsidl::{
+    Library, Loader, cpp, diff, dynamic, explain, format, lua, machine, rust, schema, typescript,
+};
 use libfuzzer_sys::fuzz_target;
 
 /// Message bodies to try: zeros satisfy most fields, ones request large counts.
@@ -15,8 +18,8 @@ const BODIES: [[u8; 32]; 3] = [[0; 32], [1; 32], [0xFF; 32]];
 /// Most octets of text that is passed to the emitters: their output is many times as long.
 const LONGEST: usize = 16 << 10;
 
-/// Runs every emitter: for Rust, C++, TypeScript, Wireshark, pages, JSON Schema, drawings of machines, explanations of
-/// messages, and the comparison with nothing and with itself.
+/// Runs every emitter: for Rust, C++, TypeScript, ROS 2, Wireshark, pages, JSON Schema, drawings of machines,
+/// explanations of messages, and the comparison with nothing and with itself.
 fn emit(library: &Library) {
     let services: Vec<&Service> = library.services().map(AsRef::as_ref).collect();
     let module = rust::module(library, services.iter().copied(), "::jaus::codec");
@@ -39,6 +42,7 @@ fn emit(library: &Library) {
     }
     assert!(!cpp::files(library, |_| true).is_empty());
     assert!(!typescript::files(library, |_| true).is_empty());
+    ros(library);
     for service in &services {
         for machine in library.machines(service) {
             assert!(!machine::dot(&machine).is_empty() && !machine::mermaid(&machine).is_empty());
@@ -55,6 +59,23 @@ fn emit(library: &Library) {
     let nothing = Library::default();
     diff::compare(&nothing, library, |_| true);
     diff::compare(library, &nothing, |_| true);
+}
+
+/// Every message has a type in the ROS 2 package, and whatever can be decoded has a value.
+fn ros(library: &Library) {
+    let package = Package::of(library, |_| true, &PackageName::default());
+    assert!(package.files().len() >= 2);
+    for service in library.services() {
+        for message in service.messages() {
+            let interface = package.interface(&service.id, message);
+            let interface = interface.expect("every service was selected");
+            for body in BODIES {
+                if let Ok(value) = dynamic::decode(message, &with_code(message.code, &body)) {
+                    assert!(interface.value(&value).is_ok(), "{}", message.name);
+                }
+            }
+        }
+    }
 }
 
 /// A formatted text has the same format, and the same definitions.

@@ -45,6 +45,7 @@ pub mod model;
 pub mod presence;
 pub mod python;
 mod resolve;
+pub mod ros;
 pub mod rust;
 #[cfg(feature = "json")]
 pub mod schema;

@@ -246,7 +246,7 @@ impl Writer {
 }
 
 /// The slots of a group value, if their number matches the definition.
-pub(super) fn slots(
+pub(crate) fn slots(
     value: &Value,
     expected: u64,
 ) -> Result<&[Option<Value>], Fault<EncodeProblem>> {
@@ -261,7 +261,7 @@ pub(super) fn slots(
     }
 }
 
-pub(super) fn mismatch(expected: &'static str, value: &Value) -> Fault<EncodeProblem> {
+pub(crate) fn mismatch(expected: &'static str, value: &Value) -> Fault<EncodeProblem> {
     EncodeProblem::Kind {
         expected,
         found: value.kind(),
@@ -273,7 +273,7 @@ pub(super) fn missing(member: &Item) -> Fault<EncodeProblem> {
     Fault::from(EncodeProblem::Missing).member(&member.name)
 }
 
-pub(super) fn unfit(number: Raw, kind: Number) -> Fault<EncodeProblem> {
+pub(crate) fn unfit(number: Raw, kind: Number) -> Fault<EncodeProblem> {
     EncodeProblem::Number {
         number,
         kind: kind.name(),

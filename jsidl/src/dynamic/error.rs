@@ -237,7 +237,7 @@ pub(super) fn write_place(f: &mut fmt::Formatter<'_>, message: &str, path: &Path
 
 /// A problem that is being returned: each level adds a step.
 #[derive(Debug)]
-pub(super) struct Fault<P> {
+pub(crate) struct Fault<P> {
     problem: P,
     offset: usize,
     /// Innermost first.
@@ -253,12 +253,12 @@ impl<P> Fault<P> {
         }
     }
 
-    pub(super) fn under(mut self, step: Step) -> Self {
+    pub(crate) fn under(mut self, step: Step) -> Self {
         self.steps.push(step);
         self
     }
 
-    pub(super) fn member(self, name: &str) -> Self {
+    pub(crate) fn member(self, name: &str) -> Self {
         self.under(Step::Member(name.to_owned()))
     }
 
@@ -287,7 +287,7 @@ impl Fault<DecodeProblem> {
 }
 
 impl Fault<EncodeProblem> {
-    pub(super) fn encoding(self, message: &str) -> EncodeError {
+    pub(crate) fn encoding(self, message: &str) -> EncodeError {
         let (path, _, problem) = self.path();
         EncodeError {
             message: message.to_owned(),

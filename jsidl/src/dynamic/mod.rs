@@ -24,6 +24,8 @@ pub use arbitrary::arbitrary;
 pub(crate) use decode::decode_traced;
 pub use decode::{decode, decode_with};
 pub use encode::{encode, encode_with};
+pub(crate) use encode::{mismatch, slots, unfit};
+pub(crate) use error::Fault;
 pub use error::{DecodeError, DecodeProblem, EncodeError, EncodeProblem, Path, Step};
 #[cfg(feature = "json")]
 pub use json::{JsonError, JsonProblem, Leaf, for_each_number, from_json, to_json};

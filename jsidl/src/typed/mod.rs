@@ -1,13 +1,15 @@
 //! Plan of typed code in any language: sets, versions, names and nested types.
 //!
 //! [`sets`] walks the resolved services once. The generators of [`typescript`](crate::typescript),
-//! [`cpp`](crate::cpp) and [`python`](crate::python) write its result in their syntax.
+//! [`cpp`](crate::cpp), [`python`](crate::python) and [`ros`](crate::ros) write its result in their
+//! syntax.
 //!
 //! Services are grouped into sets by their URN without the last part. A message is defined once for
 //! each layout, in the namespace of the oldest version that declares it. Later versions with the
 //! same layout, and the set itself for the newest layout, refer to that definition. An additional
 //! definition therefore never renames a type of a version.
 
+pub(crate) mod keywords;
 pub(crate) mod lines;
 pub(crate) mod names;
 pub(crate) mod notes;

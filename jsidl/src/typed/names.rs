@@ -13,9 +13,10 @@ pub(crate) struct Spelling {
     pub(crate) member: fn(&str) -> String,
     /// A named value.
     pub(crate) value: fn(&str) -> String,
-    /// Words that cannot be identifiers, or that the generated code uses itself. Such a name gets
-    /// `_` appended.
-    pub(crate) reserved: &'static [&'static str],
+    /// Words that cannot be identifiers, or that the generated code uses itself.
+    pub(crate) reserved: &'static [&'static [&'static str]],
+    /// What such a word gets appended.
+    pub(crate) suffix: &'static str,
 }
 
 /// The identifiers of one namespace, without duplicates.
@@ -75,9 +76,9 @@ impl Names {
     }
 
     fn unique(&mut self, ident: String) -> String {
-        let is_reserved = self.spelling.reserved.contains(&ident.as_str());
-        let base = if is_reserved {
-            format!("{ident}_")
+        let mut reserved = self.spelling.reserved.iter();
+        let base = if reserved.any(|words| words.contains(&ident.as_str())) {
+            format!("{ident}{}", self.spelling.suffix)
         } else {
             ident
         };
@@ -141,7 +142,8 @@ mod tests {
     static SPELLING: Spelling = Spelling {
         member: |name| name.to_snake_case(),
         value: |name| name.to_upper_camel_case(),
-        reserved: &["class"],
+        reserved: &[&["class"]],
+        suffix: "_",
     };
 
     #[test]

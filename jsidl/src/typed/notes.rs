@@ -86,11 +86,20 @@ pub(crate) fn members(fields: &[Field<'_>]) -> Vec<Vec<String>> {
             let bit = bits.next().unwrap_or(0);
             facts.push(format!("bit {bit} of the presence vector"));
         }
-        let mut notes = vec![stated(field.name, &facts)];
-        notes.extend(text(&field.item.interpretation));
-        notes
+        described(field.name, &facts, field.item)
     });
     notes.collect()
+}
+
+/// The paragraphs about an item that is no member, such as the element of a list.
+pub(crate) fn item(item: &Item) -> Vec<String> {
+    described(&item.name, &facts(&item.shape), item)
+}
+
+fn described(name: &str, facts: &[String], item: &Item) -> Vec<String> {
+    let mut notes = vec![stated(name, facts)];
+    notes.extend(text(&item.interpretation));
+    notes
 }
 
 /// The accessor of a member in its unit.
@@ -123,7 +132,7 @@ pub(crate) fn value(value: &NamedValue) -> Vec<String> {
 }
 
 /// Unit and range of a choice.
-fn choice(index: u8, scalar: &Scalar) -> String {
+pub(crate) fn choice(index: u8, scalar: &Scalar) -> String {
     stated(&format!("Index {index}"), &scalar_facts(scalar))
 }
 

@@ -22,7 +22,8 @@ static SPELLING: Spelling = Spelling {
     member: |name| name.to_lower_camel_case(),
     value: |name| name.to_upper_camel_case(),
     // Of the base classes, and the name of the codec.
-    reserved: &["codec", "constructor", "encode", "toString", "valueOf"],
+    reserved: &[&["codec", "constructor", "encode", "toString", "valueOf"]],
+    suffix: "_",
 };
 
 /// The codec, by file name.

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use jsidl::docs::{self, Format};
 use jsidl::model::Service;
+use jsidl::ros::{Package, PackageName};
 use jsidl::{Library, Loader, cpp, lua, machine, rust, schema, typescript};
 
 use crate::chance::Chance;
@@ -141,6 +142,7 @@ fn written(library: &Library) -> usize {
         lua::dissector(library).len(),
         files(cpp::files(library, |_| true)),
         files(typescript::files(library, |_| true)),
+        files(Package::of(library, |_| true, &PackageName::default()).files()),
         pages(Format::Html),
         pages(Format::Markdown),
         schemas.map(|(_, schema)| schema.to_string().len()).sum(),

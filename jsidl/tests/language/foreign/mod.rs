@@ -35,7 +35,7 @@ fn write_all(directory: &Path, files: &[(String, String)]) {
 }
 
 /// Definitions with texts that look like code, and the least and the greatest named values.
-fn awkward() -> Library {
+pub(crate) fn awkward() -> Library {
     let value = |index: &str, name: &str, text: &str| {
         format!(r#"<value_enum enum_index="{index}" enum_const="{name}" interpretation="{text}"/>"#)
     };

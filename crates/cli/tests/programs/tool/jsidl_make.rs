@@ -1,4 +1,4 @@
-//! `jaus jsidl lua`, `rust`, `cpp`, `typescript` and `python`: output files, and errors.
+//! `jaus jsidl lua`, `rust`, `cpp`, `typescript`, `python` and `msg`: output files, and errors.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -133,6 +133,12 @@ fn code_of_other_languages_has_the_users_messages_or_the_built_in_ones() {
         ),
         ("typescript", "example.d.ts", "core.d.ts", Some("codec.js")),
         ("python", "example.pyi", "core.pyi", None),
+        (
+            "msg",
+            "jaus_msgs/msg/ExampleSetLampV1p0.msg",
+            "jaus_msgs/msg/CoreReportStatusV1p0.msg",
+            Some("jaus_msgs/package.xml"),
+        ),
     ] {
         let (all, only) = (out(&format!("{command}-all")), out(command));
         assert_eq!(jsidl(&[command, "-o", &all]).status, 0);
@@ -152,7 +158,7 @@ fn code_of_other_languages_has_the_users_messages_or_the_built_in_ones() {
 fn code_of_other_languages_is_not_written_if_a_definition_has_errors() {
     let directory = directory("foreign-broken");
     let (path, out) = (broken(&directory), directory.join("out"));
-    for command in ["cpp", "typescript", "python"] {
+    for command in ["cpp", "typescript", "python", "msg"] {
         let ran = jsidl(&[command, &path, "-o", out.to_str().unwrap()]);
         assert_eq!(ran.status, 1);
         assert!(ran.stderr.contains("nothing was written"), "{ran:?}");
@@ -161,8 +167,21 @@ fn code_of_other_languages_is_not_written_if_a_definition_has_errors() {
 }
 
 #[test]
+fn a_ros_package_has_the_name_that_the_user_gives_if_ros_permits_it() {
+    let directory = directory("msg-name");
+    let (path, out) = (lamp(), directory.to_str().unwrap());
+    let ran = jsidl(&["msg", &path, "-o", out, "--package", "lamp_msgs"]);
+    assert_eq!(ran.status, 0, "{ran:?}");
+    let manifest = fs::read_to_string(directory.join("lamp_msgs/package.xml")).unwrap();
+    assert!(manifest.contains("<name>lamp_msgs</name>"), "{manifest}");
+    let ran = jsidl(&["msg", &path, "-o", out, "--package", "../lamp"]);
+    assert_eq!(ran.status, 2, "{ran:?}");
+    assert!(ran.stderr.contains("for example jaus_msgs"), "{ran:?}");
+}
+
+#[test]
 fn paths_that_are_not_there_are_named() {
-    for command in ["lua", "rust", "cpp", "typescript", "python"] {
+    for command in ["lua", "rust", "cpp", "typescript", "python", "msg"] {
         let ran = jsidl(&[command, "nowhere.xml", "-o", "nowhere"]);
         assert_eq!(ran.status, 2);
         assert!(ran.stderr.contains("nowhere.xml: No such file"), "{ran:?}");

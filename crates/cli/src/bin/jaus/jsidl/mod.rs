@@ -10,6 +10,7 @@ mod docs;
 mod explain;
 mod fmt;
 mod lua;
+mod msg;
 mod python;
 mod ra;
 mod rust;
@@ -42,6 +43,7 @@ enum Command {
     #[command(name = "typescript")]
     TypeScript(typescript::Arguments),
     Python(python::Arguments),
+    Msg(msg::Arguments),
     Lua(lua::Arguments),
     Docs(docs::Arguments),
     Schema(schema::Arguments),
@@ -59,6 +61,7 @@ impl Jsidl {
             Command::Cpp(arguments) => cpp::run(&arguments),
             Command::TypeScript(arguments) => typescript::run(&arguments),
             Command::Python(arguments) => python::run(&arguments),
+            Command::Msg(arguments) => msg::run(&arguments),
             Command::Lua(arguments) => lua::run(&arguments),
             Command::Docs(arguments) => docs::run(&arguments),
             Command::Schema(arguments) => schema::run(&arguments),
