@@ -74,6 +74,7 @@
 
 mod builder;
 mod clients;
+mod clocks;
 mod command;
 mod control;
 mod directories;
@@ -100,6 +101,7 @@ pub use crate::service::{
 };
 pub use crate::wire::Priority;
 pub use builder::{AttachError, Builder};
+pub use clocks::PeerClocks;
 pub use command::RunningCommand;
 pub use control::Control;
 pub use error::{

@@ -13,13 +13,12 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use super::time::{milliseconds_of_day, nearest_day, reported_day};
+use super::time::{DAY, milliseconds_of_day, nearest_day, reported_day};
 use crate::messages::core::ReportTime;
 use crate::messages::core::report_time::TimeStamp;
 
 /// Nanoseconds in a millisecond, the resolution of JAUS time stamps.
 const MILLISECOND: i128 = 1_000_000;
-const DAY_IN_MILLISECONDS: i64 = 86_400_000;
 
 /// Result of an exchange.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +62,16 @@ pub struct Age {
     pub seconds: f64,
     /// The true value differs by this many seconds at most.
     pub uncertainty: f64,
+    /// When the offset of the clock was last measured.
+    pub measured_at: Instant,
+}
+
+impl Age {
+    /// What the age is at least.
+    #[must_use]
+    pub fn at_least(&self) -> Duration {
+        Duration::try_from_secs_f64(self.seconds - self.uncertainty).unwrap_or_default()
+    }
 }
 
 /// Bounds of the offset in seconds.
@@ -203,11 +212,12 @@ impl ClockEstimator {
         let near = i64::try_from(peer_now / MILLISECOND).ok()?;
         let of_day = milliseconds_of_day(stamp)?;
         let day = nearest_day(near, of_day, stamp.day());
-        let sampled = i128::from(day * DAY_IN_MILLISECONDS + of_day) * MILLISECOND;
+        let sampled = i128::from(day * DAY + of_day) * MILLISECOND;
         // The stamp is cut off at the millisecond.
         Some(Age {
             seconds: seconds(peer_now - sampled - MILLISECOND / 2),
             uncertainty: offset.uncertainty + seconds(MILLISECOND / 2),
+            measured_at: offset.measured_at,
         })
     }
 }
@@ -224,7 +234,7 @@ fn reported_milliseconds(report: &ReportTime, time_of_day: Duration) -> Option<i
             nearest_day(own, of_day, stamp.day())
         }
     };
-    Some(day * DAY_IN_MILLISECONDS + of_day)
+    Some(day * DAY + of_day)
 }
 
 fn nanoseconds(duration: Duration) -> i128 {

@@ -22,7 +22,7 @@ use crate::endpoint::Received;
 use crate::messages::core::report_time::{DateStamp, TimeStamp};
 use crate::messages::core::{self, QueryTime, ReportTime, SetTime};
 
-const DAY: i64 = 86_400_000;
+pub(super) const DAY: i64 = 86_400_000;
 
 /// A component's time of day: a clock and the correction from Set Time. Cheap to clone. All clones
 /// share one time, so that a vehicle's reports are stamped with the time that [`Time`] reports.

@@ -8,7 +8,6 @@
     reason = "they panic when the reader is gone; see `output`"
 )]
 
-pub mod clocks;
 pub mod failure;
 mod fence;
 pub mod folders;

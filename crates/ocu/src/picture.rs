@@ -12,7 +12,7 @@ use super::georeference::Georeference;
 use super::missing::{Absence, GonePart, GoneParts};
 use super::report::{Mission, MissionStage, Report};
 use super::role::Role;
-use super::sample_clock::{SampleClock, Stamp};
+use super::sample_clock::SampleClock;
 use super::state::{self, age};
 use jaus::address::JausId;
 use jaus::service::{ComponentEntry, Directory, State};
@@ -198,8 +198,8 @@ impl Picture {
             Report::Status(what) => part.status = Some(Sample { what, by, at: now }),
             Report::Control(what) => part.controller = Some(Sample { what, by, at: now }),
             Report::Stage(stage) => part.stage = Some(stage),
-            Report::Pose(what, stamp) => {
-                let at = sampled_at(&mut part.pose_clock, now, stamp);
+            Report::Pose(what, sampled) => {
+                let at = SampleClock::sampled_at(&mut part.pose_clock, now, sampled);
                 self.pose = Some(Sample { what, by, at });
             }
             Report::GlobalPose(fix) => {
@@ -207,8 +207,8 @@ impl Picture {
                 let local = self.pose.as_ref().filter(fresh).map(|it| &it.what);
                 self.georeference.handle_fix(now, fix, local);
             }
-            Report::Velocity(what, stamp) => {
-                let at = sampled_at(&mut part.velocity_clock, now, stamp);
+            Report::Velocity(what, sampled) => {
+                let at = SampleClock::sampled_at(&mut part.velocity_clock, now, sampled);
                 // An inertial measurement unit reports turn rates without a speed.
                 let source = self.velocity.map(|known| known.by);
                 if what.x.is_some() || source.is_none_or(|source| source == by) {
@@ -486,21 +486,6 @@ impl Picture {
 
 /// Condition of a component without a known state.
 pub(super) const PRESENT: &str = "present";
-
-/// Sample time of a report that arrives now.
-fn sampled_at(clock: &mut Option<SampleClock>, now: Instant, stamp: Option<Stamp>) -> Instant {
-    match (stamp, clock) {
-        (None, clock) => {
-            *clock = None;
-            now
-        }
-        (Some(stamp), Some(clock)) => clock.handle_sample(now, stamp),
-        (Some(stamp), clock) => {
-            *clock = Some(SampleClock::new(now, stamp));
-            now
-        }
-    }
-}
 
 fn state_name(code: u8) -> &'static str {
     State::from_code(code).map_or("unknown", State::name)

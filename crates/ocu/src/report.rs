@@ -1,7 +1,7 @@
 //! Reports of vehicle parts, decoded from messages into SI units.
 
 use super::georeference::Fix;
-use super::sample_clock::Stamp;
+use super::sample_clock::Sampled;
 use super::state;
 use jaus::address::JausId;
 use jaus::messages::core::{ReportControl, ReportStatus};
@@ -19,12 +19,10 @@ pub(super) enum Report {
     /// The client in control, with its authority.
     Control(Option<(JausId, u8)>),
     Stage(state::Stage),
-    /// The pose, with the time stamp of the sample if present.
-    Pose(state::Pose, Option<Stamp>),
+    Pose(state::Pose, Sampled),
     /// The position on the globe; `None` if it is unknown.
     GlobalPose(Option<Fix>),
-    /// The velocity, with the time stamp of the sample if present.
-    Velocity(state::Velocity, Option<Stamp>),
+    Velocity(state::Velocity, Sampled),
     Mission(Mission),
     Path(Vec<[f64; 2]>),
     Maps(Vec<state::Map>),
@@ -32,6 +30,16 @@ pub(super) enum Report {
     Subscription {
         is_up: bool,
     },
+}
+
+impl Report {
+    /// The time of its sample, if the report is of a kind that has one.
+    pub(super) const fn sampled(&mut self) -> Option<&mut Sampled> {
+        match self {
+            Self::Pose(_, sampled) | Self::Velocity(_, sampled) => Some(sampled),
+            _ => None,
+        }
+    }
 }
 
 /// State of the planner's mission.
@@ -136,7 +144,7 @@ impl From<ReportLocalPose> for Report {
             yaw: report.yaw_rad(),
             age_ms: 0,
         };
-        Self::Pose(pose, report.time_stamp.and_then(Stamp::read))
+        Self::Pose(pose, Sampled::new(report.time_stamp))
     }
 }
 
@@ -153,7 +161,7 @@ impl From<ReportVelocityState> for Report {
             yaw_rate: report.yaw_rate_rad_per_s(),
             age_ms: 0,
         };
-        Self::Velocity(velocity, report.time_stamp.and_then(Stamp::read))
+        Self::Velocity(velocity, Sampled::new(report.time_stamp))
     }
 }
 
@@ -247,7 +255,7 @@ mod tests {
         };
         assert_eq!(
             Report::from(ReportLocalPose::default()),
-            Report::Pose(pose, None)
+            Report::Pose(pose, Sampled::new(None))
         );
         let velocity = state::Velocity {
             x: None,
@@ -256,7 +264,7 @@ mod tests {
         };
         assert_eq!(
             Report::from(ReportVelocityState::default()),
-            Report::Velocity(velocity, None)
+            Report::Velocity(velocity, Sampled::new(None))
         );
     }
 

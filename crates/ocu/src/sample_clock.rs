@@ -1,12 +1,34 @@
-//! Age of samples from their own time stamps, with unsynchronised clocks.
+//! Age of samples from their own time stamps, with unsynchronised clocks: by comparison of the samples with each other,
+//! and by the measured offset of the sender's clock if the sender offers the Time service. The former does not see a
+//! delay that all samples have.
 
 use std::time::{Duration, Instant};
 
 use jaus::messages::mobility::report_local_pose::TimeStamp;
+use jaus::service::Age;
+
+/// What is known of the time of a sample when its report arrives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sampled {
+    stamp: Option<TimeStamp>,
+    /// By the measured offset of the sender's clock.
+    age: Option<Age>,
+}
+
+impl Sampled {
+    pub(super) const fn new(stamp: Option<TimeStamp>) -> Self {
+        Self { stamp, age: None }
+    }
+
+    /// Enters the age that `measured` gives for the stamp.
+    pub(super) fn measure(&mut self, measured: impl FnOnce(TimeStamp) -> Option<Age>) {
+        self.age = self.stamp.and_then(measured);
+    }
+}
 
 /// Milliseconds since the start of the sender's month.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Stamp(u64);
+struct Stamp(u64);
 
 /// Estimates when the samples of one sender were taken, by the local clock.
 ///
@@ -22,11 +44,13 @@ pub(super) struct SampleClock {
     taken: Instant,
     /// Arrival time of the newest sample.
     received: Instant,
+    /// When the sender's clock was last seen to be set. Offsets measured before do not hold.
+    since: Instant,
 }
 
 impl Stamp {
     /// Reads a stamp; `None` if it is not a valid time.
-    pub(super) fn read(stamp: TimeStamp) -> Option<Self> {
+    fn read(stamp: TimeStamp) -> Option<Self> {
         let [day, hour, minutes, seconds] =
             [stamp.day(), stamp.hour(), stamp.minutes(), stamp.seconds()].map(u64::from);
         let milliseconds = u64::from(stamp.milliseconds());
@@ -44,18 +68,33 @@ impl SampleClock {
     /// Clocks differ by less than one part in this number.
     const DRIFT: u32 = 1000;
 
+    /// Handles the sample of a report that arrives now, and returns the time when it was taken. Without a stamp, that
+    /// is now.
+    pub(super) fn sampled_at(clock: &mut Option<Self>, now: Instant, sampled: Sampled) -> Instant {
+        let Some(stamp) = sampled.stamp.and_then(Stamp::read) else {
+            *clock = None;
+            return now;
+        };
+        let clock = clock.get_or_insert_with(|| Self::new(now, stamp));
+        let taken = clock.handle_sample(now, stamp);
+        let age = sampled.age.filter(|age| age.measured_at > clock.since);
+        let measured = age.and_then(|age| now.checked_sub(age.at_least()));
+        measured.map_or(taken, |measured| measured.min(taken))
+    }
+
     /// Starts with the first sample of a sender.
-    pub(super) const fn new(now: Instant, stamp: Stamp) -> Self {
+    const fn new(now: Instant, stamp: Stamp) -> Self {
         Self {
             reference: (stamp, now),
             newest: stamp,
             taken: now,
             received: now,
+            since: now,
         }
     }
 
     /// Handles a sample that arrives now. Returns the time when it was taken.
-    pub(super) fn handle_sample(&mut self, now: Instant, stamp: Stamp) -> Instant {
+    fn handle_sample(&mut self, now: Instant, stamp: Stamp) -> Instant {
         if stamp == self.newest {
             return self.taken;
         }
@@ -145,6 +184,74 @@ mod tests {
             let taken = clock.handle_sample(now, Stamp(1000 * second - second / 2));
             assert!(now - taken < ms(2), "after {second} s: {:?}", now - taken);
         }
+    }
+
+    /// Reports of samples from 10 s after midnight on, each `delay` old on arrival, with the age that a measurement gives
+    /// at `measured_at`.
+    struct Delayed {
+        start: Instant,
+        clock: Option<SampleClock>,
+        measured_at: Instant,
+    }
+
+    impl Delayed {
+        fn new(start: Instant) -> Self {
+            let (clock, measured_at) = (None, start);
+            Self {
+                start,
+                clock,
+                measured_at,
+            }
+        }
+
+        /// The age of a sample that is reported after `after`, by a sender whose clock is at `after` + `ahead`.
+        fn age(&mut self, after: u64, ahead: i64, delay: u64) -> Duration {
+            let now = self.start + ms(after);
+            let stamp = (10_000 + after - delay).saturating_add_signed(ahead);
+            let (seconds, milliseconds) = (stamp / 1000 % 60, stamp % 1000);
+            let stamp = TimeStamp::default()
+                .with_minutes((stamp / 60_000) as u8)
+                .unwrap();
+            let stamp = stamp.with_seconds(seconds as u8).unwrap();
+            let stamp = stamp.with_milliseconds(milliseconds as u16).unwrap();
+            let mut sampled = Sampled::new(Some(stamp));
+            sampled.measure(|_| {
+                Some(Age {
+                    seconds: (delay as f64 - ahead as f64) / 1e3 + 0.01,
+                    uncertainty: 0.01,
+                    measured_at: self.measured_at,
+                })
+            });
+            now - SampleClock::sampled_at(&mut self.clock, now, sampled)
+        }
+    }
+
+    #[test]
+    fn a_delay_that_all_samples_have_shows_once_the_clock_is_measured() {
+        let start = Instant::now();
+        let mut reports = Delayed::new(start);
+        assert_eq!(
+            reports.age(3000, 0, 2000),
+            ms(0),
+            "not measured since it began"
+        );
+        reports.measured_at = start + ms(3500);
+        for after in [4000, 5000, 9000] {
+            let age = reports.age(after, 0, 2000);
+            assert!((ms(1999)..=ms(2001)).contains(&age), "{age:?}");
+        }
+    }
+
+    #[test]
+    fn a_clock_that_is_set_back_counts_again_once_it_is_measured() {
+        let start = Instant::now();
+        let mut reports = Delayed::new(start);
+        reports.age(100, 0, 0);
+        reports.measured_at = start + ms(200);
+        assert!(reports.age(6000, 0, 0) < ms(1));
+        // The sender's clock is now 5 s behind, and the measurement does not know it yet.
+        assert_eq!(reports.age(6100, -5000, 0), ms(0));
+        assert_eq!(reports.age(6200, -5000, 0), ms(0));
     }
 
     #[test]

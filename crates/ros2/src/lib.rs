@@ -12,6 +12,17 @@
 //! * [`session`]: nodes, publishers and subscriptions in a zenoh network. Those above do no I/O.
 //! * [`bridge`]: the vehicle, seen and commanded from ROS. `docs/ros2.md` is the guide to the program.
 //!
+//! ```
+//! use jaus_ros2::{Interfaces, Message, cdr};
+//!
+//! let twist = Interfaces::bundled()?.get("geometry_msgs/msg/Twist")?;
+//! let mut message = Message::new(&twist);
+//! message.set("linear.x", 0.5)?;
+//! let octets = cdr::encode(&message);
+//! assert_eq!(cdr::decode(&twist, &octets)?.float("linear.x")?, 0.5);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! # Sources
 //! The keys, tokens, texts of quality of service and attachments follow rmw_zenoh_cpp 0.2.4 and newer
 //! (its `docs/design.md`, and its sources up to 0.2.5). Before 0.2.3 its default durability was another

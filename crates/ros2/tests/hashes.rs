@@ -150,3 +150,37 @@ fn bounds_arrays_and_texts_are_part_of_the_hash_and_values_are_not() {
     assert_eq!(hashes.len(), texts.len());
     assert_eq!(hash("uint8 x"), hash("# comment\nuint8 C=1\nchar x 7"));
 }
+
+/// `char` is not among them: rosbags gives it another hash than ROS.
+#[test]
+fn a_type_with_every_kind_of_field_has_the_hash_that_rosbags_computes() {
+    let mut interfaces = Interfaces::bundled().unwrap();
+    let every = "uint8 LIMIT=7\nbool[] a\nbyte[3] b\nuint8[<=4] c\nstring<=8 d\nstring<=9[] e\n\
+        string[<=2] f\nstring<=3[5] g\nint64 h -3\ngeometry_msgs/Pose[<=6] i\n\
+        nav_msgs/Odometry[2] j\nfloat32 k 1.5\n";
+    for (name, text, hash) in [
+        (
+            "test_msgs/msg/Every",
+            every,
+            "b5f2f09403114841e73c395312fac193d6b8588561b4e13c07094bec1552b71a",
+        ),
+        (
+            "test_msgs/msg/Nothing",
+            "uint8 A=1\n",
+            "a56c5ec7a81d58b3db0dd15b9da0f88790e3a63215d39def403ef908aa6c38e4",
+        ),
+    ] {
+        interfaces.add(name, text).unwrap();
+        let interface = interfaces.get(name).unwrap();
+        assert_eq!(interface.hash(), format!("RIHS01_{hash}"), "{name}");
+    }
+}
+
+#[test]
+fn a_char_has_the_hash_of_a_uint8_as_ros_publishes_it() {
+    let mut interfaces = Interfaces::default();
+    interfaces.add("std_msgs/msg/Char", "char data").unwrap();
+    let hash = interfaces.get("std_msgs/msg/Char").unwrap().hash();
+    let published = "3ad2d04dd29ba19d04b16659afa3ccaedd691914b02a64e82e252f2fa6a586a9";
+    assert_eq!(hash, format!("RIHS01_{published}"));
+}

@@ -25,8 +25,7 @@ pub(crate) fn check(modules: &[String]) -> Result<(), String> {
 /// The compiler's errors, or what the program printed before it failed.
 pub(crate) fn execute(module: &str, main: &str) -> Result<(), String> {
     let codec = codec();
-    let program = PathBuf::from(env!("CARGO_TARGET_TMPDIR"))
-        .join(format!("generated_program_{}", std::process::id()));
+    let program = unused_path();
     let source = program.with_extension("rs");
     let text = format!("#![allow(dead_code)]\nmod case {{\n{module}\n}}\n{main}");
     fs::write(&source, text).unwrap();
@@ -81,15 +80,17 @@ fn codec() -> PathBuf {
         .expect("the codec's library is a dependency of this test")
 }
 
+/// A path for the files of one compilation, beside those of the tests that run at the same time.
+fn unused_path() -> PathBuf {
+    static PATHS: AtomicU32 = AtomicU32::new(0);
+    let number = PATHS.fetch_add(1, Ordering::Relaxed);
+    let name = format!("generated_{}_{number}", std::process::id());
+    PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name)
+}
+
 fn run(text: &str, codec: &Path) -> Result<(), String> {
-    static RUNS: AtomicU32 = AtomicU32::new(0);
-    let run = RUNS.fetch_add(1, Ordering::Relaxed);
-    let directory = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
-    let name = format!("generated_{}_{run}", std::process::id());
-    let (source, metadata) = (
-        directory.join(format!("{name}.rs")),
-        directory.join(format!("lib{name}.rmeta")),
-    );
+    let source = unused_path().with_extension("rs");
+    let metadata = source.with_extension("rmeta");
     fs::write(&source, text).unwrap();
     let output = compiler(codec)
         .args(["--crate-type", "lib", "--emit", "metadata", "-o"])

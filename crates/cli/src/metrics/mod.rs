@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use clap::Args;
-use jaus::component::{Standing, State};
+use jaus::component::{PeerClocks, Standing, State};
 use jaus::node::Node;
 use jaus_vehicle::parts::Telemetry;
 use serde::Deserialize;
@@ -28,7 +28,6 @@ use tokio::time::Instant;
 
 use self::exposition::{Exposition, Format, Unit};
 use self::server::Server;
-use super::clocks::PeerClocks;
 use super::failure::Failure;
 
 // The flag `--metrics`: where the metrics are served.
@@ -164,7 +163,7 @@ async fn watch_component(telemetry: &Telemetry, emergencies: &AtomicU64, clocks:
     };
     tokio::select! {
         () = count_emergencies(component.watch_standing(), emergencies) => {}
-        () = clocks.measure(&component) => {}
+        never = clocks.measure(&component) => match never {},
     }
 }
 

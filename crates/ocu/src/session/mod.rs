@@ -31,7 +31,8 @@ use super::request::OperatorRequest;
 use super::state::{Control, Drive, State, Tree};
 use super::stick::PageId;
 use super::stick::{Push, Stick};
-use jaus::component::{Component, Handlers};
+use jaus::component::{Component, Handlers, PeerClocks};
+use jaus::messages::core::report_time::TimeStamp;
 use jaus::node::time_of_day;
 use jaus_vehicle::parts::PartError;
 use jaus_view::Timestamp;
@@ -138,6 +139,8 @@ pub(super) struct Session {
     client: Client,
     fleet: Fleet,
     stick: Stick,
+    /// The clocks of the vehicles' sensors, for the age of what they report.
+    clocks: PeerClocks,
     /// Deselected vehicles that are still being stopped and released. Until then no other one is
     /// driven.
     leaving: BTreeSet<u16>,
@@ -179,6 +182,7 @@ impl Session {
             fleet: Fleet::new(component.clone(), vehicles, sighted),
             client: Client::new(component, authority),
             stick: Stick::default(),
+            clocks: PeerClocks::default(),
             leaving: BTreeSet::new(),
             all_stopped: false,
             driver: None,
@@ -201,7 +205,10 @@ impl Session {
         {
             return PartError::Broken(error.to_string());
         }
-        let mut standing = self.client.component().watch_standing();
+        let (component, clocks) = (self.client.component().clone(), self.clocks.clone());
+        let measuring = clocks.measure(&component);
+        tokio::pin!(measuring);
+        let mut standing = component.watch_standing();
         let mut beat = interval(Self::BEAT);
         beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
@@ -210,7 +217,11 @@ impl Session {
                     return PartError::NodeStopped;
                 },
                 Some(order) = self.orders.recv() => self.handle_order(Instant::now(), order),
-                Some((by, report)) = self.sightings.recv() => {
+                never = &mut measuring => match never {},
+                Some((by, mut report)) = self.sightings.recv() => {
+                    if let Some(sampled) = report.sampled() {
+                        sampled.measure(|stamp| self.clocks.age(by, TimeStamp(stamp.0)));
+                    }
                     if let Some(vehicle) = self.fleet.get_mut(by.subsystem()) {
                         vehicle.handle_report(Instant::now(), by, report);
                     }

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-use std::time::Duration;
+use std::time::{Duration, UNIX_EPOCH};
 
-use jaus::component::{Component, Handlers, Kind, Management};
+use jaus::component::{Component, Handlers, Kind, Management, Time, TimeOfDay};
 use jaus_test_kit::waiting::within_limit;
 use jaus_vehicle::messages::ground::{QueryMission, ReportMission, mission_planner};
 use serde_json::{Value, json};
@@ -99,6 +99,26 @@ async fn a_pose_that_freezes_ends_manual_drive_although_it_is_still_reported() {
     scene.until(|scene| scene.speed() == 0.0).await;
     frozen.store(false, Ordering::Relaxed);
     page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+}
+
+#[tokio::test]
+async fn a_pose_that_always_arrives_late_by_the_clock_of_its_node_is_too_old_to_drive_by() {
+    let scene = Scene::new().await;
+    let mut page = scene.driver().await;
+    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+    let late = Duration::from_secs(3);
+    let clock = TimeOfDay::new(move || UNIX_EPOCH.elapsed().unwrap() + late);
+    let communicator = Component::builder(Kind::Vehicle, "Rover")
+        .management(Management::default())
+        .offer(Time::new(clock));
+    let _communicator = scene.attach(44, communicator);
+    let age = |state: &Value| state["vehicle"]["pose"]["age_ms"].as_u64();
+    let state = page.until(|state| age(state) >= Some(2900)).await;
+    assert!(age(&state) < Some(10_000), "{state}");
+    scene.until(|scene| scene.speed() == 0.0).await;
+    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
+    let refused = page.ask(push).await.unwrap_err();
+    assert!(refused.contains("stale"), "{refused}");
 }
 
 #[tokio::test]

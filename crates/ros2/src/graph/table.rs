@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{EntityKind, Token, TokenError};
 
 /// The most entities that are kept.
-const MOST_ENTITIES: usize = 1 << 16;
+const MOST_ENTITIES: usize = 1 << 14;
 
 /// The entities that exist, by their tokens.
 #[derive(Debug, Default)]

@@ -9,11 +9,10 @@ use bytes::Bytes;
 use clap::{Args, ValueEnum};
 use jaus::address::JausId;
 use jaus::codec::Message;
-use jaus::component::{Component, Kind};
+use jaus::component::{Component, Kind, PeerClocks};
 use jaus::endpoint::Outgoing;
 use jaus::messages::core::QueryHeartbeatPulse;
 use jaus::node::{Node, Sender};
-use jaus_cli::clocks::PeerClocks;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::runtime::{self, RunFor};
@@ -111,7 +110,7 @@ impl Monitor {
             let mut screen = Screen::open(self.json, self.once, self.limit);
             let outcome = tokio::select! {
                 outcome = self.watch(&node, &component, &mut probe, &clocks, &mut screen) => outcome,
-                () = clocks.measure(&component), if self.clocks => Ok(Outcome::Done),
+                never = clocks.measure(&component), if self.clocks => match never {},
             };
             screen.close();
             drop((component, probe));

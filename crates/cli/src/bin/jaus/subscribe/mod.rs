@@ -8,9 +8,8 @@ use clap::Args;
 use futures_util::future::select_all;
 use jaus::address::JausId;
 use jaus::codec::Message;
-use jaus::component::{Component, SubscribeError, Undecoded, Update, When};
+use jaus::component::{Component, PeerClocks, SubscribeError, Undecoded, Update, When};
 use jaus::messages::core::CreateEvent;
-use jaus_cli::clocks::PeerClocks;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::{self, Network};
 use jaus_cli::output::say;
@@ -87,7 +86,7 @@ impl Subscribe {
             let clocks = PeerClocks::default();
             let outcome = tokio::select! {
                 outcome = self.follow(&component, queries, &dictionary, &clocks) => outcome,
-                () = clocks.measure(&component), if self.clock => Ok(Outcome::Done),
+                never = clocks.measure(&component), if self.clock => match never {},
             };
             drop(component);
             stay.end().await;

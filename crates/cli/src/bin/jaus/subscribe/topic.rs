@@ -4,8 +4,7 @@ use std::fmt::Display;
 use std::time::Duration;
 
 use bytes::Bytes;
-use jaus::component::{Subscription, Undecoded, Update};
-use jaus_cli::clocks::PeerClocks;
+use jaus::component::{PeerClocks, Subscription, Undecoded, Update};
 use jaus_cli::failure::Failure;
 use jaus_cli::output::Output;
 use jaus_cli::runtime::Clock;

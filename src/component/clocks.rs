@@ -1,24 +1,38 @@
 //! The clocks of peers: asks those that offer the Time service, in turn, and estimates their
 //! offsets and drifts.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "measures round trips in real time"
-)]
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::convert::Infallible;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use futures_util::future::join_all;
-use jaus::address::JausId;
-use jaus::component::{Component, QueryOptions};
-use jaus::messages::core::report_time::TimeStamp;
-use jaus::messages::core::{QueryTime, ReportTime, time};
-use jaus::node::time_of_day;
-use jaus::service::{Age, ClockEstimator, ClockOffset, Exchange};
+use tokio::task::JoinSet;
 use tokio::time::{Instant, sleep};
 
+use super::{Component, QueryOptions};
+use crate::address::JausId;
+use crate::messages::core::report_time::TimeStamp;
+use crate::messages::core::{QueryTime, ReportTime, time};
+use crate::node::time_of_day;
+use crate::service::{Age, ClockEstimator, ClockOffset, Exchange};
+
 /// The clocks of a component's peers. Cheap to clone; all clones share one state.
+///
+/// ```no_run
+/// # use jaus::component::{Component, PeerClocks};
+/// # use jaus::messages::core::report_time::TimeStamp;
+/// # use jaus::messages::mobility::ReportLocalPose;
+/// # async fn example(operator: Component, rover: jaus::address::JausId, pose: ReportLocalPose) {
+/// let clocks = PeerClocks::default();
+/// let measuring = clocks.clone();
+/// let component = operator.clone();
+/// tokio::spawn(async move { measuring.measure(&component).await });
+/// // Later, when a report arrives:
+/// if let Some(age) = pose.time_stamp.and_then(|stamp| clocks.age(rover, TimeStamp(stamp.0))) {
+///     println!("{} s old, give or take {} s", age.seconds, age.uncertainty);
+/// }
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct PeerClocks(Arc<Mutex<Table>>);
 
@@ -48,10 +62,22 @@ impl PeerClocks {
         self.lock().peers.get(&peer)?.offset()
     }
 
-    /// The age of a report with this time stamp of a peer; `None` before the first answer.
+    /// The age of a report with this time stamp of a peer. A peer that does not offer the Time
+    /// service itself has the clock of a component of its node that does, since a node is one
+    /// computer. `None` before the first answer.
     #[must_use]
     pub fn age(&self, peer: JausId, stamp: TimeStamp) -> Option<Age> {
-        self.lock().peers.get(&peer)?.age(stamp, time_of_day())
+        let table = self.lock();
+        let neighbours = || {
+            let mut peers = table.peers.iter();
+            let neighbour = peers.find(|(id, clock)| {
+                let node = (id.subsystem(), id.node());
+                node == (peer.subsystem(), peer.node()) && clock.offset().is_some()
+            });
+            neighbour.map(|(_, clock)| clock)
+        };
+        let clock = table.peers.get(&peer).or_else(neighbours)?;
+        clock.age(stamp, time_of_day())
     }
 
     /// The estimates of all peers that have answered, in order of their ids.
@@ -63,7 +89,7 @@ impl PeerClocks {
     }
 
     /// Measures for as long as it is polled.
-    pub async fn measure(&self, component: &Component) {
+    pub async fn measure(&self, component: &Component) -> Infallible {
         loop {
             let pause = match self.round(component).await {
                 0 => Self::LOOK,
@@ -78,8 +104,10 @@ impl PeerClocks {
         let providers = providers(component);
         let asked = self.lock().next_peers(&providers);
         let number = asked.len();
-        let exchanges = asked.into_iter().map(|peer| exchange(component, peer));
-        for answer in join_all(exchanges).await.into_iter().flatten() {
+        let exchanges = asked.into_iter();
+        let exchanges = exchanges.map(|peer| exchange(component.clone(), peer));
+        let answers = exchanges.collect::<JoinSet<_>>().join_all().await;
+        for answer in answers.into_iter().flatten() {
             if self.lock().handle_answer(&answer) == Some(Exchange::Stepped) {
                 tracing::info!(
                     "the clock of {} was stepped, or that of this host",
@@ -140,7 +168,7 @@ struct Answer {
     report: ReportTime,
 }
 
-async fn exchange(component: &Component, peer: JausId) -> Option<Answer> {
+async fn exchange(component: Component, peer: JausId) -> Option<Answer> {
     let sent = Instant::now().into_std();
     let options = QueryOptions::default().within(PeerClocks::PATIENCE);
     let answered = component.query_with(options, peer, &QueryTime::all()).await;
