@@ -71,7 +71,13 @@ async fn figures_of_poses_and_velocities_through_the_bridge() {
     let mut figures = Figures::new("ros2", ".ci/ros2 --figures");
     figures.table(
         "From a report to a subscription of ROS",
-        ["rate (Hz)", "messages", "median (ms)", "p99 (ms)", "processor of the bridge (%)"],
+        [
+            "rate (Hz)",
+            "messages",
+            "median (ms)",
+            "p99 (ms)",
+            "processor of the bridge (%)",
+        ],
     );
     for rate in ["10", "100"] {
         let group = own_group();
@@ -85,7 +91,15 @@ async fn figures_of_poses_and_velocities_through_the_bridge() {
         let network = endpoint();
         let _router = Script::router(&network);
         let bridge = Command::new(env!("CARGO_BIN_EXE_jaus-ros2"))
-            .args(["--loopback", "--port", "0", "--id", "101.252.1", "--vehicle", "101"])
+            .args([
+                "--loopback",
+                "--port",
+                "0",
+                "--id",
+                "101.252.1",
+                "--vehicle",
+                "101",
+            ])
             .args(["--group", &group.to_string()])
             .args(["--connect", &network, "--rate", rate, "--tf"])
             .env_remove("ROS_DOMAIN_ID")
