@@ -85,7 +85,7 @@ fn frame(number: usize, octets: &[u8]) -> Frame<'_> {
 
 fn recordings(dictionary: &Dictionary, packets: &[Bytes], figures: &mut Figures) {
     let formats = [RecordingFormat::Pcapng, RecordingFormat::Mcap];
-    let (mut rates, mut octets) = ([vec![], vec![]], [0, 0]);
+    let (mut times, mut octets) = ([vec![], vec![]], [0, 0]);
     for _ in 0..RUNS {
         for (place, format) in formats.into_iter().enumerate() {
             let start = Instant::now();
@@ -97,7 +97,7 @@ fn recordings(dictionary: &Dictionary, packets: &[Bytes], figures: &mut Figures)
                 written.expect("memory is writable");
             }
             octets[place] = recorder.finish().expect("memory is writable");
-            rates[place].push(MESSAGES as f64 / start.elapsed().as_secs_f64());
+            times[place].push(start.elapsed().as_secs_f64() * 1e6 / MESSAGES as f64);
         }
     }
     let packet = packets.iter().map(Bytes::len).sum::<usize>() / MESSAGES;
@@ -106,19 +106,18 @@ fn recordings(dictionary: &Dictionary, packets: &[Bytes], figures: &mut Figures)
         [
             "format",
             "octets per message",
+            "per message (µs)",
             "messages/s",
-            "rate to pcapng",
         ],
     );
     figures.row(["IP packet", &packet.to_string(), "", ""]);
     for (place, format) in formats.iter().enumerate() {
         let per_message = octets[place] / MESSAGES as u64;
-        let ratio = median(&rates[place]) / median(&rates[0]);
         figures.row([
             &format.to_string(),
             &per_message.to_string(),
-            &spread(&rates[place]),
-            &format!("{ratio:.2} ×"),
+            &spread(&times[place]),
+            &format!("{:.0}", 1e6 / median(&times[place])),
         ]);
     }
 }
@@ -178,5 +177,5 @@ fn median(values: &[f64]) -> f64 {
 fn spread(values: &[f64]) -> String {
     let least = values.iter().copied().fold(f64::INFINITY, f64::min);
     let greatest = values.iter().copied().fold(0.0, f64::max);
-    format!("{:.0} [{least:.0}..{greatest:.0}]", median(values))
+    format!("{:.2} [{least:.2}..{greatest:.2}]", median(values))
 }
