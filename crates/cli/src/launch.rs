@@ -72,8 +72,7 @@ struct Program<F: Args> {
 
 /// Log filter without `-v`: warnings of every module, such as an emergency or an unwritable log,
 /// and the reports of the parts.
-const USUAL: &str =
-    "warn,jaus_vehicle=info,jaus_ocu=info,jaus_ra=info,jaus_zenoh=info,jaus_cli=info";
+const USUAL: &str = "warn,jaus_vehicle=info,jaus_ocu=info,jaus_ra=info,jaus_zenoh=info,jaus_ros2=info,jaus_cli=info";
 
 /// Runs a program: reads flags and settings, attaches to a node, runs the part until Ctrl-C or
 /// SIGTERM, and detaches.

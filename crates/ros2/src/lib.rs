@@ -1,4 +1,4 @@
-//! ROS 2 topics without ROS installed.
+//! A bridge between a JAUS vehicle and ROS 2, and what it needs to speak with ROS 2 without ROS installed.
 //!
 //! A session of this crate speaks with nodes of ROS 2 that use the middleware `rmw_zenoh_cpp`, which is
 //! available from ROS 2 Jazzy on. It uses the same keys, encoding and liveliness tokens:
@@ -9,7 +9,8 @@
 //! * [`cdr`]: the encoding of messages.
 //! * [`graph`]: keys of topics, liveliness tokens, quality of service, attachments.
 //!
-//! * [`session`]: nodes, publishers and subscriptions in a zenoh network. The others do no I/O.
+//! * [`session`]: nodes, publishers and subscriptions in a zenoh network. Those above do no I/O.
+//! * [`bridge`]: the vehicle, seen and commanded from ROS. `docs/ros2.md` is the guide to the program.
 //!
 //! ```
 //! use jaus_ros2::{Interfaces, Message, cdr};
@@ -31,6 +32,7 @@
 //! other implementations of CDR and zenoh; ROS 2 itself is not part of them.
 #![forbid(unsafe_code)]
 
+pub mod bridge;
 pub mod cdr;
 pub mod graph;
 mod hash;

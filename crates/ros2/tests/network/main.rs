@@ -2,12 +2,17 @@
 //! another implementation's package. Ignored, because packages have to be installed: `.ci/ros2` does so
 //! and runs them.
 #![allow(
+    clippy::disallowed_methods,
     clippy::expect_used,
     clippy::panic,
     clippy::unwrap_used,
     reason = "the tests fail by panicking"
 )]
 
+mod bridge;
+mod figures;
+#[path = "../rover/mod.rs"]
+mod rover;
 #[path = "../samples/mod.rs"]
 mod samples;
 mod scene;

@@ -68,6 +68,13 @@ class Pose(IdlStruct, typename="geometry_msgs.msg.dds_.Pose_"):
 
 @final
 @dataclass
+class PoseStamped(IdlStruct, typename="geometry_msgs.msg.dds_.PoseStamped_"):
+    header: Header = field(default_factory=Header)
+    pose: Pose = field(default_factory=Pose)
+
+
+@final
+@dataclass
 class PoseWithCovariance(IdlStruct, typename="geometry_msgs.msg.dds_.PoseWithCovariance_"):
     pose: Pose = field(default_factory=Pose)
     covariance: array[float64, 36] = field(default_factory=lambda: [0.0] * 36)

@@ -155,12 +155,17 @@ def spoil(session):
     sys.stdin.read()
 
 
-def main(endpoint, action, count=None):
+def connect(endpoint):
+    """A session that connects to a router."""
     config = zenoh.Config()
     config.insert_json5("mode", json.dumps("client"))
     config.insert_json5("connect/endpoints", json.dumps([endpoint]))
     config.insert_json5("scouting/multicast/enabled", "false")
-    with zenoh.open(config) as session:
+    return zenoh.open(config)
+
+
+def main(endpoint, action, count=None):
+    with connect(endpoint) as session:
         if action == "publish":
             publish(session)
         elif action == "subscribe":
@@ -171,4 +176,5 @@ def main(endpoint, action, count=None):
             spoil(session)
 
 
-main(*sys.argv[1:])
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -21,7 +21,7 @@ pub(crate) struct Script {
 }
 
 impl Script {
-    fn start(path: &str, arguments: &[&str]) -> Self {
+    pub(crate) fn start(path: &str, arguments: &[&str]) -> Self {
         let mut child = Command::new(python())
             .arg(workspace(path))
             .args(arguments)
@@ -33,7 +33,7 @@ impl Script {
         Self { child, lines }
     }
 
-    fn ready(mut self) -> Self {
+    pub(crate) fn ready(mut self) -> Self {
         assert_eq!(self.line().as_deref(), Some("ready"));
         self
     }

@@ -9,7 +9,7 @@ use super::{split, texts};
 const OF_FEATURES: [&str; 2] = ["--stop-line", "--can"];
 
 /// The program of a package that this one does not build; `.ci/zenoh` has its tests.
-const OF_OTHER_PACKAGES: [&str; 1] = ["jaus-zenoh"];
+const OF_OTHER_PACKAGES: [&str; 2] = ["jaus-ros2", "jaus-zenoh"];
 
 /// The commands of our programs in a line of a shell, without redirections and what follows them.
 fn commands(line: &str) -> Vec<Vec<String>> {

@@ -1,0 +1,19 @@
+//! Counts of what passed between the vehicle and the ROS network.
+
+jaus::counters! {
+    /// Counts of messages in both directions, and of what was refused or dropped, with the reasons.
+    pub struct Counters;
+    Published = "messages published for ROS",
+    NotPublished = "samples dropped because ROS did not take them in time",
+    Incomplete = "reports without the fields that ROS needs",
+    Velocities = "velocities received",
+    InvalidVelocity = "velocities refused because they are not finite or above the limits",
+    OtherPublisher = "velocities refused because another publisher drives",
+    Locked = "velocities refused after a loss of control, until the publisher stops or pauses",
+    ReadOnly = "commands refused because control was not allowed (--control)",
+    Goals = "goals received",
+    GoalRefused = "goals refused",
+    Emergencies = "emergency stops received",
+    ClearRefused = "ends of emergencies refused (--allow-clear)",
+    Undecoded = "messages of ROS that could not be read",
+}

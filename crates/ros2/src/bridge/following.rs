@@ -1,0 +1,176 @@
+//! The subscriptions to the vehicle's reports: started when a component offers them, ended when it
+//! does not any more.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::codec::Query;
+use jaus::component::{Component, SubscribeError, Undecoded, Update, When};
+use jaus::messages::core::{QueryControl, QueryStatus};
+use jaus::messages::mobility::{QueryGlobalPose, QueryLocalPose, QueryVelocityState};
+use jaus::node::{now, sleep_until};
+use jaus::service::Topic;
+use jaus_vehicle::messages::ground::QueryMission;
+use tokio::sync::mpsc;
+use tokio::task::{AbortHandle, JoinSet};
+
+use super::report::Report;
+use super::reports::Definition;
+use super::vehicle::{Role, Vehicle};
+
+/// A report with its sender.
+pub(super) type Sighting = (JausId, Report);
+
+/// A report that is subscribed to besides those that the bridge converts itself.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Extra {
+    pub(super) peer: JausId,
+    pub(super) query: Bytes,
+    pub(super) report: u16,
+    pub(super) definition: Definition,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum Wanted {
+    Status(JausId),
+    Control(JausId),
+    Mission(JausId),
+    LocalPose(JausId),
+    GlobalPose(JausId),
+    Velocity(JausId),
+    Extra(Extra),
+}
+
+/// The subscriptions.
+pub(super) struct Following {
+    component: Component,
+    sighted: mpsc::Sender<Sighting>,
+    /// The rate of poses, velocities and further reports.
+    rate: When,
+    running: BTreeMap<Wanted, Running>,
+    tasks: JoinSet<()>,
+}
+
+/// A subscription, which ends when this is dropped.
+struct Running(AbortHandle);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
+}
+
+/// The rate of states and of the client in control.
+const STATUS: When = When::hz(4.0);
+/// Delay before a failed subscription is retried.
+const PAUSE: Duration = Duration::from_secs(1);
+
+impl Following {
+    /// The most subscriptions; further ones are not started.
+    const MOST: usize = 1024;
+
+    pub(super) fn new(component: Component, sighted: mpsc::Sender<Sighting>, rate_hz: f64) -> Self {
+        Self {
+            component,
+            sighted,
+            rate: When::hz(rate_hz),
+            running: BTreeMap::new(),
+            tasks: JoinSet::new(),
+        }
+    }
+
+    /// Starts and ends subscriptions to match the vehicle.
+    pub(super) fn follow(&mut self, vehicle: &Vehicle, extras: impl IntoIterator<Item = Extra>) {
+        while self.tasks.try_join_next().is_some() {}
+        let mut wanted: BTreeSet<_> = extras.into_iter().map(Wanted::Extra).collect();
+        for part in vehicle.all(Role::Management) {
+            wanted.extend([Wanted::Status(part), Wanted::Control(part)]);
+        }
+        wanted.extend(vehicle.find(Role::Planner).map(Wanted::Mission));
+        wanted.extend(vehicle.find(Role::LocalPose).map(Wanted::LocalPose));
+        wanted.extend(vehicle.find(Role::GlobalPose).map(Wanted::GlobalPose));
+        wanted.extend(vehicle.find(Role::VelocityState).map(Wanted::Velocity));
+        self.running.retain(|running, _| wanted.contains(running));
+        for new in wanted {
+            if self.running.len() < Self::MOST && !self.running.contains_key(&new) {
+                let running = self.start(&new);
+                self.running.insert(new, running);
+            }
+        }
+    }
+
+    fn start(&mut self, wanted: &Wanted) -> Running {
+        let rate = self.rate;
+        Running(match wanted {
+            Wanted::Status(peer) => self.subscribe(*peer, QueryStatus {}, STATUS),
+            Wanted::Control(peer) => self.subscribe(*peer, QueryControl {}, STATUS),
+            Wanted::Mission(peer) => self.subscribe(*peer, QueryMission {}, STATUS),
+            Wanted::LocalPose(peer) => self.subscribe(*peer, QueryLocalPose::all(), rate),
+            Wanted::GlobalPose(peer) => self.subscribe(*peer, QueryGlobalPose::all(), rate),
+            Wanted::Velocity(peer) => self.subscribe(*peer, QueryVelocityState::all(), rate),
+            Wanted::Extra(extra) => self.subscribe_undecoded(extra.clone()),
+        })
+    }
+
+    /// Keeps one subscription until the task is aborted.
+    fn subscribe<Q: Query>(&mut self, peer: JausId, query: Q, when: When) -> AbortHandle
+    where
+        Q::Report: Into<Report>,
+    {
+        let (component, sighted) = (self.component.clone(), self.sighted.clone());
+        self.tasks.spawn(async move {
+            loop {
+                match component.subscribe(peer, &query, when).await {
+                    Ok(mut reports) => {
+                        // One sample is enough: a newer one is better.
+                        while let Some(update) = reports.next().await {
+                            let Update::Report(report) = update else {
+                                continue;
+                            };
+                            if sighted.send((peer, report.into())).await.is_err() {
+                                return;
+                            }
+                        }
+                    }
+                    Err(SubscribeError::Stopped) => return,
+                    Err(error) => tracing::debug!(%peer, %error, "not subscribed"),
+                }
+                sleep_until(Some(now() + PAUSE)).await;
+            }
+        })
+    }
+
+    fn subscribe_undecoded(&mut self, extra: Extra) -> AbortHandle {
+        let (component, sighted) = (self.component.clone(), self.sighted.clone());
+        let topic = Topic {
+            peer: extra.peer,
+            query: extra.query,
+            report: extra.report,
+            when: self.rate,
+        };
+        let definition = extra.definition;
+        self.tasks.spawn(async move {
+            loop {
+                match component.subscribe_undecoded(topic.clone()).await {
+                    Ok(mut reports) => {
+                        while let Some(update) = reports.next().await {
+                            let Update::Report(Undecoded(octets)) = update else {
+                                continue;
+                            };
+                            let definition = definition.clone();
+                            let report = Report::Undecoded { definition, octets };
+                            if sighted.send((topic.peer, report)).await.is_err() {
+                                return;
+                            }
+                        }
+                    }
+                    Err(SubscribeError::Stopped) => return,
+                    Err(error) => tracing::debug!(peer = %topic.peer, %error, "not subscribed"),
+                }
+                sleep_until(Some(now() + PAUSE)).await;
+            }
+        })
+    }
+}

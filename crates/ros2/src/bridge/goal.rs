@@ -1,0 +1,385 @@
+//! Driving to a goal: from the request until the vehicle has arrived, or why it does not. It does no
+//! I/O and reads no clock.
+
+use std::fmt;
+use std::time::{Duration, Instant};
+
+use super::drive::Access;
+
+/// A place in the local frame of JAUS.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goal {
+    /// Metres north.
+    pub x: f64,
+    /// Metres east.
+    pub y: f64,
+    /// The heading at the goal, in radians clockwise from north.
+    pub heading: f64,
+}
+
+/// What the vehicle has to be told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Order {
+    /// Drive there.
+    Go(Goal),
+    /// End it.
+    Stop,
+}
+
+/// How far the last goal is.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Progress {
+    /// No goal was set.
+    #[default]
+    None,
+    /// It waits for control of the planner or the waypoint driver.
+    Waiting,
+    /// The vehicle is under way.
+    Underway,
+    /// The vehicle is there.
+    Arrived,
+    /// It was not reached, for this reason.
+    Failed(String),
+    /// It was cancelled.
+    Cancelled,
+}
+
+/// The state of a mission as the planner reports it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mission {
+    /// Counts the destinations that were set.
+    pub number: u32,
+    /// How it ended; `None` while it goes on.
+    pub end: Option<MissionEnd>,
+}
+
+/// The end of a mission.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum MissionEnd {
+    /// At the destination.
+    Arrived,
+    /// Given up or stopped, for this reason.
+    Failed(String),
+}
+
+/// Driving to one goal at a time.
+#[derive(Debug, Default)]
+pub struct Navigation {
+    phase: Phase,
+    progress: Progress,
+    access: Option<Access>,
+    /// The number of the planner's last mission.
+    mission: u32,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+enum Phase {
+    #[default]
+    None,
+    /// Until control is granted, at most until then.
+    Waiting { goal: Goal, until: Instant },
+    /// Until the vehicle acknowledges it.
+    Sending { goal: Goal, is_sent: bool },
+    Underway {
+        goal: Goal,
+        /// The number of the planner's mission before this one.
+        before: u32,
+    },
+    /// The vehicle finishes, until then.
+    Arrived { until: Instant },
+    /// The vehicle is being stopped, until then at most.
+    Stopping { until: Instant, is_sent: bool },
+}
+
+impl Navigation {
+    /// How long control may take.
+    pub const PATIENCE: Duration = Duration::from_secs(10);
+    /// How long control is kept after the arrival, so that the vehicle comes to rest by itself.
+    pub const HOLD: Duration = Duration::from_secs(3);
+    /// Within this distance a waypoint counts as reached, in metres.
+    pub const TOLERANCE: f64 = 0.5;
+    /// How long the stop may take.
+    const STOPPING: Duration = Duration::from_secs(3);
+
+    /// Sets a goal. It replaces the one before.
+    pub fn set(&mut self, now: Instant, goal: Goal) {
+        let until = now + Self::PATIENCE;
+        self.phase = Phase::Waiting { goal, until };
+        self.progress = Progress::Waiting;
+    }
+
+    /// Cancels the goal, if the vehicle is not there yet.
+    pub fn cancel(&mut self, now: Instant) {
+        match self.phase {
+            Phase::Waiting { .. } => self.end(Progress::Cancelled),
+            Phase::Sending { .. } | Phase::Underway { .. } => {
+                let until = now + Self::STOPPING;
+                let is_sent = false;
+                self.phase = Phase::Stopping { until, is_sent };
+                self.progress = Progress::Cancelled;
+            }
+            Phase::None | Phase::Arrived { .. } | Phase::Stopping { .. } => {}
+        }
+    }
+
+    /// Handles how far control is. A goal whose control is lost is not resumed; `why` is for people.
+    pub fn handle_access(&mut self, access: Access, why: &str) {
+        self.access = Some(access);
+        if access != Access::Lost {
+            return;
+        }
+        match self.phase {
+            Phase::None | Phase::Arrived { .. } | Phase::Stopping { .. } => {
+                self.phase = Phase::None;
+            }
+            _ => self.end(Progress::Failed(why.to_owned())),
+        }
+    }
+
+    /// Handles the end of the control that was wanted.
+    pub const fn handle_released(&mut self) {
+        self.access = None;
+    }
+
+    /// Handles the acknowledgement of an order, or its failure.
+    pub fn handle_delivered(&mut self, order: Order, result: Result<(), String>) {
+        match (self.phase, order) {
+            (Phase::Sending { goal, .. }, Order::Go(sent)) if goal == sent => match result {
+                Ok(()) => {
+                    let before = self.mission;
+                    self.phase = Phase::Underway { goal, before };
+                    self.progress = Progress::Underway;
+                }
+                Err(why) => self.end(Progress::Failed(why)),
+            },
+            (Phase::Stopping { .. }, Order::Stop) => self.phase = Phase::None,
+            _ => {}
+        }
+    }
+
+    /// Handles a report of the planner.
+    pub fn handle_mission(&mut self, now: Instant, mission: Mission) {
+        if let Phase::Underway { before, .. } = self.phase
+            && mission.number != before
+            && let Some(end) = mission.end
+        {
+            match end {
+                MissionEnd::Arrived => self.arrive(now),
+                MissionEnd::Failed(why) => self.end(Progress::Failed(why)),
+            }
+        }
+        // While an order is on its way, the report may already be that of the new mission.
+        if !matches!(self.phase, Phase::Sending { is_sent: true, .. }) {
+            self.mission = mission.number;
+        }
+    }
+
+    /// Handles the position of a vehicle without a planner, in metres north and east.
+    pub fn handle_position(&mut self, now: Instant, x: f64, y: f64) {
+        if let Phase::Underway { goal, .. } = self.phase
+            && (goal.x - x).hypot(goal.y - y) <= Self::TOLERANCE
+        {
+            self.arrive(now);
+        }
+    }
+
+    /// The order to deliver now.
+    pub fn poll_order(&mut self, now: Instant) -> Option<Order> {
+        self.handle_time(now);
+        let is_ready = self.access == Some(Access::Ready);
+        match &mut self.phase {
+            Phase::Waiting { goal, .. } if is_ready => {
+                let goal = *goal;
+                self.phase = Phase::Sending {
+                    goal,
+                    is_sent: true,
+                };
+                Some(Order::Go(goal))
+            }
+            Phase::Stopping { is_sent, .. } if is_ready && !*is_sent => {
+                *is_sent = true;
+                Some(Order::Stop)
+            }
+            _ => None,
+        }
+    }
+
+    /// Applies the timeouts.
+    pub fn handle_time(&mut self, now: Instant) {
+        match self.phase {
+            Phase::Waiting { until, .. } if now >= until => {
+                let waited = Self::PATIENCE.as_secs();
+                self.end(Progress::Failed(format!("no control within {waited} s")));
+            }
+            Phase::Arrived { until } | Phase::Stopping { until, .. } if now >= until => {
+                self.phase = Phase::None;
+            }
+            _ => {}
+        }
+    }
+
+    fn arrive(&mut self, now: Instant) {
+        let until = now + Self::HOLD;
+        self.phase = Phase::Arrived { until };
+        self.progress = Progress::Arrived;
+    }
+
+    fn end(&mut self, progress: Progress) {
+        self.phase = Phase::None;
+        self.progress = progress;
+    }
+
+    /// Whether control of the planner or the waypoint driver is wanted.
+    #[must_use]
+    pub const fn wants_control(&self) -> bool {
+        !matches!(self.phase, Phase::None)
+    }
+
+    /// How far the last goal is.
+    #[must_use]
+    pub const fn progress(&self) -> &Progress {
+        &self.progress
+    }
+}
+
+impl fmt::Display for Progress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::None => f.write_str("none"),
+            Self::Waiting => f.write_str("waiting for control"),
+            Self::Underway => f.write_str("under way"),
+            Self::Arrived => f.write_str("arrived"),
+            Self::Failed(why) => write!(f, "failed: {why}"),
+            Self::Cancelled => f.write_str("cancelled"),
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
+mod tests {
+    use super::*;
+
+    const GOAL: Goal = Goal {
+        x: 10.0,
+        y: -5.0,
+        heading: 0.0,
+    };
+
+    fn going(number: u32) -> Mission {
+        Mission { number, end: None }
+    }
+
+    fn over(number: u32, end: MissionEnd) -> Mission {
+        Mission {
+            number,
+            end: Some(end),
+        }
+    }
+
+    /// Under way to the goal; the planner has had three missions before.
+    fn underway(now: Instant) -> Navigation {
+        let mut navigation = Navigation::default();
+        navigation.handle_mission(now, over(3, MissionEnd::Arrived));
+        navigation.set(now, GOAL);
+        assert!(navigation.wants_control());
+        assert_eq!(navigation.poll_order(now), None, "no control yet");
+        navigation.handle_access(Access::Ready, "");
+        assert_eq!(navigation.poll_order(now), Some(Order::Go(GOAL)));
+        assert_eq!(navigation.poll_order(now), None, "it is on its way");
+        navigation.handle_delivered(Order::Go(GOAL), Ok(()));
+        navigation
+    }
+
+    #[test]
+    fn the_end_of_an_earlier_mission_does_not_end_this_one() {
+        let now = Instant::now();
+        let mut navigation = underway(now);
+        navigation.handle_mission(now, over(3, MissionEnd::Arrived));
+        assert_eq!(*navigation.progress(), Progress::Underway);
+        navigation.handle_mission(now, going(4));
+        navigation.handle_mission(now, over(4, MissionEnd::Arrived));
+        assert_eq!(*navigation.progress(), Progress::Arrived);
+    }
+
+    #[test]
+    fn a_mission_that_is_reported_before_its_acknowledgement_is_this_one() {
+        let now = Instant::now();
+        let mut navigation = Navigation::default();
+        navigation.set(now, GOAL);
+        navigation.handle_access(Access::Ready, "");
+        assert!(navigation.poll_order(now).is_some());
+        navigation.handle_mission(now, going(1));
+        navigation.handle_delivered(Order::Go(GOAL), Ok(()));
+        let failed = MissionEnd::Failed("there is no path".to_owned());
+        navigation.handle_mission(now, over(1, failed));
+        let why = Progress::Failed("there is no path".to_owned());
+        assert_eq!(*navigation.progress(), why);
+        assert!(!navigation.wants_control());
+    }
+
+    #[test]
+    fn control_is_kept_for_a_moment_after_the_arrival() {
+        let now = Instant::now();
+        let mut navigation = underway(now);
+        navigation.handle_position(now, 10.0, -4.4);
+        assert_eq!(*navigation.progress(), Progress::Underway);
+        navigation.handle_position(now, 10.0, -4.6);
+        assert_eq!(*navigation.progress(), Progress::Arrived);
+        assert!(navigation.wants_control());
+        navigation.handle_time(now + Navigation::HOLD);
+        assert!(!navigation.wants_control());
+    }
+
+    #[test]
+    fn a_goal_without_control_fails_after_ten_seconds_and_is_never_sent_later() {
+        let now = Instant::now();
+        let mut navigation = Navigation::default();
+        navigation.set(now, GOAL);
+        let late = now + Navigation::PATIENCE;
+        assert_eq!(navigation.poll_order(late), None);
+        navigation.handle_access(Access::Ready, "");
+        assert_eq!(navigation.poll_order(late), None);
+        assert!(matches!(navigation.progress(), Progress::Failed(_)));
+    }
+
+    #[test]
+    fn a_loss_of_control_ends_the_goal_with_its_reason() {
+        let now = Instant::now();
+        let mut navigation = underway(now);
+        navigation.handle_access(Access::Lost, "60.1.1 is in control of it");
+        let why = Progress::Failed("60.1.1 is in control of it".to_owned());
+        assert_eq!(*navigation.progress(), why);
+        assert!(!navigation.wants_control());
+    }
+
+    #[test]
+    fn a_cancelled_goal_is_stopped_before_control_is_released() {
+        let now = Instant::now();
+        let mut navigation = underway(now);
+        navigation.cancel(now);
+        assert!(navigation.wants_control());
+        assert_eq!(navigation.poll_order(now), Some(Order::Stop));
+        assert_eq!(navigation.poll_order(now), None);
+        navigation.handle_delivered(Order::Stop, Ok(()));
+        assert!(!navigation.wants_control());
+        assert_eq!(*navigation.progress(), Progress::Cancelled);
+    }
+
+    #[test]
+    fn a_new_goal_replaces_the_one_that_is_under_way() {
+        let now = Instant::now();
+        let mut navigation = underway(now);
+        navigation.handle_mission(now, going(4));
+        let other = Goal { x: 0.0, ..GOAL };
+        navigation.set(now, other);
+        assert_eq!(navigation.poll_order(now), Some(Order::Go(other)));
+        navigation.handle_delivered(Order::Go(other), Ok(()));
+        let stopped = MissionEnd::Failed("replaced".to_owned());
+        navigation.handle_mission(now, over(4, stopped));
+        assert_eq!(*navigation.progress(), Progress::Underway);
+    }
+}

@@ -1,0 +1,275 @@
+//! What the bridge sends to the vehicle: each message is a task that reports its completion.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::codec::{Message, OutOfRange};
+use jaus::component::{Component, Priority, Session, SessionError};
+use jaus::messages::core::clear_emergency::EmergencyCode as ClearedCode;
+use jaus::messages::core::set_emergency::EmergencyCode;
+use jaus::messages::core::{ClearEmergency, QueryStatus, ReportStatus, SetEmergency};
+use jaus::messages::mobility::{SetLocalWaypoint, SetTravelSpeed};
+use jaus::node::{now, sleep_until};
+use jaus_vehicle::messages::ground::set_destination::Approved;
+use jaus_vehicle::messages::ground::{SetDestination, StopMission};
+use tokio::task::{AbortHandle, JoinSet};
+
+use super::goal::{Goal, Navigation, Order};
+use super::lease;
+use super::vehicle::Role;
+use super::velocity::{Limits, Velocity};
+
+/// Completion of a task.
+pub(super) enum Finished {
+    /// A session with the component that drives, or with the one that takes goals, has begun.
+    Begun {
+        is_drive: bool,
+        peer: JausId,
+        result: Result<Session, SessionError>,
+    },
+    /// The driver received a velocity, or did not acknowledge it.
+    Driven {
+        velocity: Velocity,
+        is_acknowledged: bool,
+    },
+    /// The component that takes goals received an order, or not, for this reason.
+    Ordered {
+        order: Order,
+        result: Result<(), String>,
+    },
+    /// A component received an emergency or its end, with its state afterwards.
+    Alarmed {
+        peer: JausId,
+        status: Option<ReportStatus>,
+    },
+}
+
+/// The tasks.
+pub(super) struct Jobs {
+    component: Component,
+    tasks: JoinSet<Finished>,
+    steering: Option<Steering>,
+}
+
+/// The last velocity sent.
+struct Steering {
+    velocity: Velocity,
+    sent: Instant,
+    task: AbortHandle,
+}
+
+/// A velocity without acknowledgement for this time is replaced by a newer one.
+const STEERING_PATIENCE: Duration = Duration::from_millis(100);
+/// The same velocity is sent again after this time: at each beat.
+const REPETITION: Duration = Duration::from_millis(40);
+/// Another velocity follows after this time at the earliest.
+const SHORTEST: Duration = Duration::from_millis(10);
+/// Timeout of an emergency before it is repeated, and of the query for the state.
+const ALARM_PATIENCE: Duration = Duration::from_millis(700);
+/// Timeout of an order about a goal.
+const ORDER_PATIENCE: Duration = Duration::from_secs(3);
+
+impl Jobs {
+    pub(super) fn new(component: Component) -> Self {
+        Self {
+            component,
+            tasks: JoinSet::new(),
+            steering: None,
+        }
+    }
+
+    /// The next completed task. Pending forever without tasks.
+    pub(super) async fn finished(&mut self) -> Finished {
+        loop {
+            match self.tasks.join_next().await {
+                Some(Ok(finished)) => return finished,
+                // A velocity replaced by a newer one.
+                Some(Err(_)) => {}
+                None => std::future::pending().await,
+            }
+        }
+    }
+
+    pub(super) fn begin(&mut self, is_drive: bool, peer: JausId, authority: u8) {
+        let component = self.component.clone();
+        self.tasks.spawn(async move {
+            let result = lease::begin(&component, peer, authority).await;
+            Finished::Begun {
+                is_drive,
+                peer,
+                result,
+            }
+        });
+    }
+
+    /// Sends a velocity to the driver, unless it is too early for it. The newest one counts: an older
+    /// one still on its way is dropped when it is late, and immediately if the vehicle has to stop.
+    pub(super) fn steer(
+        &mut self,
+        now: Instant,
+        session: &Arc<Session>,
+        role: Role,
+        velocity: Velocity,
+        limits: Limits,
+    ) {
+        if let Some(last) = &self.steering {
+            let since = now.saturating_duration_since(last.sent);
+            let is_underway = !last.task.is_finished();
+            if !may_follow(last.velocity, since, is_underway, velocity) {
+                return;
+            }
+            last.task.abort();
+        }
+        let session = Arc::clone(session);
+        let task = self.tasks.spawn(async move {
+            let is_acknowledged = match role {
+                Role::VelocityDriver => deliver(&session, velocity.command()).await,
+                _ => deliver(&session, velocity.effort(limits)).await,
+            }
+            .is_ok();
+            Finished::Driven {
+                velocity,
+                is_acknowledged,
+            }
+        });
+        self.steering = Some(Steering {
+            velocity,
+            sent: now,
+            task,
+        });
+    }
+
+    /// Sends an order about a goal to a planner or a waypoint driver.
+    pub(super) fn order(&mut self, session: &Arc<Session>, role: Role, order: Order, speed: f64) {
+        let session = Arc::clone(session);
+        self.tasks.spawn(async move {
+            let delivered = within(ORDER_PATIENCE, follow(&session, role, order, speed)).await;
+            let result = delivered.unwrap_or_else(|| {
+                let waited = ORDER_PATIENCE.as_secs();
+                Err(format!("the vehicle has not answered for {waited} s"))
+            });
+            Finished::Ordered { order, result }
+        });
+    }
+
+    /// Sends an emergency or its end to a component, then queries its state.
+    pub(super) fn alarm(&mut self, peer: JausId, on: bool) {
+        let component = self.component.clone();
+        self.tasks.spawn(async move {
+            // Some peers never acknowledge. Their state decides.
+            let _ = within(ALARM_PATIENCE, tell_emergency(&component, peer, on)).await;
+            let status = component.query(peer, &QueryStatus {});
+            let status = within(ALARM_PATIENCE, status).await.and_then(Result::ok);
+            Finished::Alarmed { peer, status }
+        });
+    }
+}
+
+/// Whether a velocity may follow the last one after this time, so that a fast publisher does not
+/// flood the vehicle. A stop never waits.
+fn may_follow(last: Velocity, since: Duration, is_underway: bool, next: Velocity) -> bool {
+    let stops = next == Velocity::ZERO && last != Velocity::ZERO;
+    let pause = match (is_underway, next == last) {
+        (true, _) => STEERING_PATIENCE,
+        (false, true) => REPETITION,
+        (false, false) => SHORTEST,
+    };
+    stops || since >= pause
+}
+
+/// The result of a future, unless it takes longer.
+async fn within<T>(limit: Duration, future: impl Future<Output = T>) -> Option<T> {
+    tokio::select! {
+        result = future => Some(result),
+        () = sleep_until(Some(now() + limit)) => None,
+    }
+}
+
+async fn tell_emergency(component: &Component, peer: JausId, on: bool) {
+    let priority = Priority::SafetyCritical;
+    let delivered = if on {
+        let emergency_code = EmergencyCode(1);
+        let set = SetEmergency { emergency_code };
+        component.deliver_with(priority, peer, &set).await
+    } else {
+        let emergency_code = ClearedCode(1);
+        let clear = ClearEmergency { emergency_code };
+        component.deliver_with(priority, peer, &clear).await
+    };
+    if let Err(error) = delivered {
+        tracing::debug!(%peer, %error, "not acknowledged");
+    }
+}
+
+async fn deliver<M: Message>(
+    session: &Session,
+    command: Result<M, OutOfRange>,
+) -> Result<(), String> {
+    let command = command.map_err(|error| error.to_string())?;
+    let delivered = session.deliver(&command).await;
+    delivered.map_err(|error| error.to_string())
+}
+
+async fn follow(session: &Session, role: Role, order: Order, speed: f64) -> Result<(), String> {
+    match (role, order) {
+        (Role::Planner, Order::Go(goal)) => deliver(session, Ok(destination(goal, speed))).await,
+        (Role::Planner, Order::Stop) => deliver(session, Ok(StopMission {})).await,
+        (_, Order::Go(goal)) => {
+            deliver(session, travel_speed(speed)).await?;
+            deliver(session, waypoint(goal)).await
+        }
+        (_, Order::Stop) => deliver(session, travel_speed(0.0)).await,
+    }
+}
+
+fn destination(goal: Goal, speed: f64) -> SetDestination {
+    SetDestination {
+        x: goal.x,
+        y: goal.y,
+        approved: Approved::YES,
+        speed: Some(speed as f32),
+    }
+}
+
+fn travel_speed(speed: f64) -> Result<SetTravelSpeed, OutOfRange> {
+    let mut command = SetTravelSpeed::default();
+    command.set_speed_m_per_s(speed)?;
+    Ok(command)
+}
+
+fn waypoint(goal: Goal) -> Result<SetLocalWaypoint, OutOfRange> {
+    let mut waypoint = SetLocalWaypoint::default();
+    waypoint.set_x_m(goal.x)?;
+    waypoint.set_y_m(goal.y)?;
+    waypoint.set_yaw_rad(goal.heading)?;
+    waypoint.set_waypoint_tolerance_m(Navigation::TOLERANCE)?;
+    Ok(waypoint)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fast_publisher_does_not_flood_the_vehicle_and_a_stop_does_not_wait() {
+        let at = |forward| Velocity {
+            forward,
+            ..Velocity::ZERO
+        };
+        let ms = Duration::from_millis;
+        for (last, since, is_underway, next, expected) in [
+            (at(1.0), ms(39), false, at(1.0), false),
+            (at(1.0), ms(40), false, at(1.0), true),
+            (at(1.0), ms(9), false, at(1.1), false),
+            (at(1.0), ms(10), false, at(1.1), true),
+            (at(1.0), ms(99), true, at(1.1), false),
+            (at(1.0), ms(100), true, at(1.1), true),
+            (at(1.0), ms(0), true, Velocity::ZERO, true),
+            (Velocity::ZERO, ms(39), false, Velocity::ZERO, false),
+        ] {
+            let may = may_follow(last, since, is_underway, next);
+            assert_eq!(may, expected, "{last:?} {since:?} {is_underway} {next:?}");
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! The messages between the vehicle's side of the bridge and the ROS side.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::address::JausId;
+
+use super::diagnostics::Diagnostic;
+use super::frames::Quaternion;
+use super::reports::Definition;
+use super::samples::{FixSample, OdometrySample, PoseSample, TwistSample};
+use super::velocity::Twist;
+use crate::graph::Gid;
+
+/// What arrives from ROS.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Input {
+    /// A `cmd_vel`.
+    Twist {
+        /// The publisher.
+        publisher: Gid,
+        /// The velocity.
+        twist: Twist,
+    },
+    /// A `goal_pose`.
+    Goal(GoalPose),
+    /// An `emergency_stop`: whether to set it or to clear it.
+    EmergencyStop(bool),
+    /// A `release`: give up control and cancel the goal.
+    Release,
+    /// A publisher of `cmd_vel` is gone.
+    PublisherGone(Gid),
+    /// A message could not be read.
+    Undecoded,
+    /// The ROS network was lost: no publisher can be heard.
+    Disconnected,
+}
+
+/// A geometry_msgs/PoseStamped.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GoalPose {
+    /// The frame of the pose.
+    pub frame: String,
+    /// Metres along its axes.
+    pub position: [f64; 3],
+    /// The orientation of `base_link` at the goal.
+    pub orientation: Quaternion,
+}
+
+/// What goes to ROS.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Output {
+    /// The pose in `map`.
+    Pose(PoseSample),
+    /// Pose and velocity.
+    Odometry(OdometrySample),
+    /// The velocity.
+    Twist(TwistSample),
+    /// The position on the globe.
+    Fix(FixSample),
+    /// The states of the vehicle and the bridge.
+    Status {
+        /// The time, since the beginning of 1970 (UTC).
+        stamp: Duration,
+        /// The states.
+        diagnostics: Vec<Diagnostic>,
+    },
+    /// Any report, as octets from its message code.
+    Report {
+        /// The component that sent it.
+        source: JausId,
+        /// The definition of the report.
+        definition: Definition,
+        /// The report.
+        octets: Bytes,
+    },
+}

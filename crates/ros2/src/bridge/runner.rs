@@ -1,0 +1,454 @@
+//! The bridge's task: it joins the state machines with the component, its subscriptions and its
+//! sessions. It never waits for the network.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::component::Component;
+use jaus::node::now;
+use jaus::service::{Directory, State, TimeOfDay};
+use jaus_vehicle::parts::PartError;
+use tokio::sync::mpsc;
+use tokio::time::{MissedTickBehavior, interval};
+
+use super::counters::{Counter, Counters};
+use super::diagnostics::{BridgeState, diagnostics};
+use super::drive::{Access, Drive, Refusal};
+use super::emergency::Emergency;
+use super::following::{Extra, Following, Sighting};
+use super::frames::between_local_and_map;
+use super::goal::{Goal, Navigation};
+use super::jobs::{Finished, Jobs};
+use super::lease::Lease;
+use super::ports::{GoalPose, Input, Output};
+use super::report::Report;
+use super::samples::{FixSample, Odometry, PoseSample, TwistSample};
+use super::vehicle::{Role, Vehicle};
+use super::velocity::{Twist, Velocity};
+use super::{Reports, Settings};
+use crate::graph::Gid;
+
+/// The vehicle's side of the bridge.
+pub(super) struct Runner {
+    component: Component,
+    time: TimeOfDay,
+    settings: Settings,
+    reports: Reports,
+    vehicle: Vehicle,
+    /// The directory that the vehicle and the subscriptions match.
+    known: Option<Arc<Directory>>,
+    following: Following,
+    jobs: Jobs,
+    drive: Drive,
+    drive_lease: Lease,
+    navigation: Navigation,
+    goal_lease: Lease,
+    emergency: Emergency,
+    odometry: Odometry,
+    sightings: mpsc::Receiver<Sighting>,
+    inputs: mpsc::Receiver<Input>,
+    outputs: mpsc::Sender<Output>,
+    counters: Counters,
+    /// When the status was last published, and what it said about control.
+    published: Option<(Instant, String)>,
+    /// Refusals that were logged.
+    logged: BTreeSet<Counter>,
+}
+
+impl Runner {
+    /// Period of the commands, and of all other periodic work.
+    const BEAT: Duration = Duration::from_millis(50);
+    /// Period of the status.
+    const STATUS: Duration = Duration::from_secs(1);
+    /// Capacity of the queue of reports.
+    const QUEUE: usize = 1024;
+
+    pub(super) fn new(
+        component: Component,
+        time: TimeOfDay,
+        settings: Settings,
+        reports: Reports,
+        inputs: mpsc::Receiver<Input>,
+        outputs: mpsc::Sender<Output>,
+    ) -> Self {
+        let (sighted, sightings) = mpsc::channel(Self::QUEUE);
+        Self {
+            vehicle: Vehicle::new(component.id(), settings.vehicle.clone()),
+            known: None,
+            following: Following::new(component.clone(), sighted, settings.rate_hz),
+            jobs: Jobs::new(component.clone()),
+            drive: Drive::new(settings.drive),
+            drive_lease: Lease::default(),
+            navigation: Navigation::default(),
+            goal_lease: Lease::default(),
+            emergency: Emergency::default(),
+            odometry: Odometry::default(),
+            counters: Counters::default(),
+            published: None,
+            logged: BTreeSet::new(),
+            component,
+            time,
+            settings,
+            reports,
+            sightings,
+            inputs,
+            outputs,
+        }
+    }
+
+    /// Runs until the component or the ROS side stops.
+    pub(super) async fn run(mut self) -> PartError {
+        let mut standing = self.component.watch_standing();
+        let mut beat = interval(Self::BEAT);
+        beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        loop {
+            tokio::select! {
+                changed = standing.changed() => if changed.is_err() {
+                    return PartError::NodeStopped;
+                },
+                input = self.inputs.recv() => match input {
+                    Some(input) => {
+                        self.handle_input(now(), input);
+                        self.command(now());
+                    }
+                    None => return PartError::Broken("the ROS side has ended".to_owned()),
+                },
+                Some((by, report)) = self.sightings.recv() => {
+                    self.handle_report(now(), by, report);
+                    continue;
+                }
+                finished = self.jobs.finished() => self.handle_finished(now(), finished),
+                _ = beat.tick() => {
+                    self.handle_beat(now());
+                    self.command(now());
+                }
+            }
+            self.settle(now());
+        }
+    }
+
+    fn handle_input(&mut self, now: Instant, input: Input) {
+        match input {
+            Input::Twist { publisher, twist } => self.handle_twist(now, publisher, &twist),
+            Input::Goal(pose) => self.handle_goal(now, &pose),
+            Input::EmergencyStop(on) => self.handle_emergency(now, on),
+            Input::Release => {
+                self.drive.release(now);
+                self.navigation.cancel(now);
+            }
+            Input::PublisherGone(publisher) => self.drive.handle_publisher_gone(now, publisher),
+            Input::Undecoded => self.refuse(Counter::Undecoded, "it has another type"),
+            Input::Disconnected => {
+                if self.drive.is_moving() || self.navigation.wants_control() {
+                    tracing::warn!("the ROS network was lost: stopping the vehicle");
+                }
+                self.drive.halt(now);
+                self.navigation.cancel(now);
+            }
+        }
+    }
+
+    fn handle_twist(&mut self, now: Instant, publisher: Gid, twist: &Twist) {
+        self.counters.add(Counter::Velocities);
+        if self.settings.control.is_none() {
+            return self.refuse(Counter::ReadOnly, "allow commands with --control AUTHORITY");
+        }
+        let refusal = match self.drive.handle_command(now, publisher, twist) {
+            Ok(()) => {
+                if self.drive.is_moving() {
+                    // Whoever drives by hand takes over from a goal.
+                    self.navigation.cancel(now);
+                }
+                return;
+            }
+            Err(refusal) => refusal,
+        };
+        let counter = match refusal {
+            Refusal::Invalid(_) => Counter::InvalidVelocity,
+            Refusal::OtherPublisher => Counter::OtherPublisher,
+            Refusal::Locked => Counter::Locked,
+        };
+        self.refuse(counter, &refusal.to_string());
+    }
+
+    fn handle_goal(&mut self, now: Instant, pose: &GoalPose) {
+        self.counters.add(Counter::Goals);
+        if self.settings.control.is_none() {
+            return self.refuse(Counter::ReadOnly, "allow commands with --control AUTHORITY");
+        }
+        match self.goal(pose) {
+            Ok(goal) => {
+                tracing::info!("goal: {:.1} m north, {:.1} m east", goal.x, goal.y);
+                self.drive.release(now);
+                self.navigation.set(now, goal);
+            }
+            Err(why) => self.refuse(Counter::GoalRefused, &why),
+        }
+    }
+
+    /// The goal in the frame of the vehicle, or why it cannot be one.
+    fn goal(&self, pose: &GoalPose) -> Result<Goal, String> {
+        let map = &self.settings.map_frame;
+        if pose.frame != *map {
+            return Err(format!(
+                "its frame_id is `{}` and has to be `{map}`",
+                pose.frame
+            ));
+        }
+        if !pose.position.iter().all(|it| it.is_finite()) {
+            return Err("its position is not finite".to_owned());
+        }
+        let attitude = pose.orientation.attitude();
+        let attitude = attitude.ok_or("its orientation is no quaternion of length 1")?;
+        if self.drive.is_moving() {
+            return Err("the vehicle is driven by cmd_vel".to_owned());
+        }
+        if self.vehicle.goal().is_none() {
+            return Err("the vehicle has no planner and no local waypoint driver".to_owned());
+        }
+        let [x, y, _] = between_local_and_map(pose.position);
+        let heading = attitude.yaw;
+        Ok(Goal { x, y, heading })
+    }
+
+    fn handle_emergency(&mut self, now: Instant, on: bool) {
+        if on {
+            self.counters.add(Counter::Emergencies);
+            if !self.emergency.is_being_set() {
+                tracing::warn!("emergency stop from ROS");
+            }
+            self.drive.halt(now);
+            self.navigation.cancel(now);
+        } else if !self.settings.allow_clear {
+            let why = "allow it with --allow-clear, or clear the emergency at the operator station";
+            return self.refuse(Counter::ClearRefused, why);
+        } else {
+            tracing::info!("the emergency is cleared from ROS");
+        }
+        let parts: Vec<_> = self.vehicle.all(Role::Management).collect();
+        if parts.is_empty() {
+            tracing::warn!("no component of the vehicle is known that takes emergencies");
+        }
+        self.emergency.request(now, on, parts);
+    }
+
+    /// Counts a refusal, and logs the first of its kind.
+    fn refuse(&mut self, counter: Counter, why: &str) {
+        self.counters.add(counter);
+        if self.logged.insert(counter) {
+            tracing::warn!("{counter}: {why} (further ones are only counted)");
+        }
+    }
+
+    fn handle_report(&mut self, now: Instant, by: JausId, report: Report) {
+        let received = self.time.now();
+        match report {
+            Report::Status(code) => self.handle_status(now, by, code),
+            Report::Control(controller) => self.vehicle.handle_controller(by, controller),
+            Report::Mission(mission) => self.navigation.handle_mission(now, mission),
+            Report::LocalPose(report) => match PoseSample::of(&report, received) {
+                Some(pose) => {
+                    if let Some((_, Role::WaypointDriver)) = self.vehicle.goal() {
+                        let [x, y, _] = between_local_and_map(pose.position);
+                        self.navigation.handle_position(now, x, y);
+                    }
+                    self.publish(Output::Pose(pose));
+                    if let Some(odometry) = self.odometry.with_pose(received, pose) {
+                        self.publish(Output::Odometry(odometry));
+                    }
+                }
+                None => self.counters.add(Counter::Incomplete),
+            },
+            Report::Velocity(report) => match TwistSample::of(&report, received) {
+                Some(twist) => {
+                    self.odometry.handle_twist(received, twist);
+                    self.publish(Output::Twist(twist));
+                }
+                None => self.counters.add(Counter::Incomplete),
+            },
+            Report::GlobalPose(report) => match FixSample::of(&report, received) {
+                Some(fix) => self.publish(Output::Fix(fix)),
+                None => self.counters.add(Counter::Incomplete),
+            },
+            Report::Undecoded { definition, octets } => self.publish(Output::Report {
+                source: by,
+                definition,
+                octets,
+            }),
+        }
+    }
+
+    fn handle_status(&mut self, now: Instant, by: JausId, code: u8) {
+        self.vehicle.handle_status(now, by, code);
+        let is_emergency = code == State::Emergency as u8;
+        self.emergency.handle_status(by, is_emergency);
+    }
+
+    fn handle_finished(&mut self, now: Instant, finished: Finished) {
+        match finished {
+            Finished::Begun {
+                is_drive,
+                peer,
+                result,
+            } => {
+                let lease = match is_drive {
+                    true => &mut self.drive_lease,
+                    false => &mut self.goal_lease,
+                };
+                lease.handle_begun(peer, result);
+            }
+            Finished::Driven {
+                velocity,
+                is_acknowledged,
+            } => {
+                if is_acknowledged && velocity == Velocity::ZERO {
+                    self.drive.handle_stopped();
+                }
+            }
+            Finished::Ordered { order, result } => {
+                if let Err(why) = &result {
+                    tracing::warn!("the goal was not delivered: {why}");
+                }
+                self.navigation.handle_delivered(order, result);
+            }
+            Finished::Alarmed { peer, status } => {
+                self.emergency.handle_delivered(peer);
+                if let Some(status) = status {
+                    self.handle_status(now, peer, status.status.0);
+                }
+            }
+        }
+    }
+
+    fn handle_beat(&mut self, now: Instant) {
+        let directory = self.component.directory();
+        let is_known = self.known.as_ref();
+        if !is_known.is_some_and(|known| Arc::ptr_eq(known, &directory)) {
+            self.vehicle.handle_directory(&directory);
+            let extras = self.extras(&directory);
+            self.following.follow(&self.vehicle, extras);
+            self.known = Some(directory);
+        }
+        self.drive.handle_time(now);
+        self.navigation.handle_time(now);
+    }
+
+    /// The further reports to subscribe to.
+    fn extras(&self, directory: &Directory) -> Vec<Extra> {
+        let parts = self.vehicle.parts().keys();
+        let entries = parts.filter_map(|id| directory.component(*id));
+        entries.flat_map(|entry| self.reports.of(entry)).collect()
+    }
+
+    /// Brings control, goals and the status up to date.
+    fn settle(&mut self, now: Instant) {
+        self.settle_drive(now);
+        self.settle_goal(now);
+        self.publish_status(now);
+    }
+
+    /// Sends what is to be repeated: the velocity, and an emergency.
+    fn command(&mut self, now: Instant) {
+        self.steer(now);
+        if let Some((on, due)) = self.emergency.poll(now) {
+            for part in due {
+                self.jobs.alarm(part, on);
+            }
+        }
+    }
+
+    fn settle_drive(&mut self, now: Instant) {
+        if let Some(access) = self.drive_lease.access() {
+            self.drive.handle_access(now, access);
+        } else {
+            self.drive.handle_access(now, Access::Pending);
+        }
+        let driver = self.vehicle.drive();
+        let wanted = driver.filter(|_| self.drive.wants_control());
+        let peer = wanted.map(|(id, _)| id);
+        if let Some(peer) = self.drive_lease.want(peer)
+            && let Some(authority) = self.settings.control
+        {
+            self.jobs.begin(true, peer, authority);
+        }
+    }
+
+    fn steer(&mut self, now: Instant) {
+        let Some(velocity) = self.drive.poll_velocity(now) else {
+            return;
+        };
+        if let (Some(session), Some((_, role))) = (self.drive_lease.session(), self.vehicle.drive())
+        {
+            let limits = self.settings.drive.limits;
+            self.jobs.steer(now, session, role, velocity, limits);
+        }
+    }
+
+    fn settle_goal(&mut self, now: Instant) {
+        match self.goal_lease.access() {
+            Some(access) => {
+                let why = self.goal_lease.obstacle();
+                self.navigation.handle_access(access, why);
+            }
+            None => self.navigation.handle_released(),
+        }
+        let target = self.vehicle.goal();
+        let wanted = target.filter(|_| self.navigation.wants_control());
+        if let Some(peer) = self.goal_lease.want(wanted.map(|(id, _)| id))
+            && let Some(authority) = self.settings.control
+        {
+            self.jobs.begin(false, peer, authority);
+        }
+        let (Some(session), Some((_, role))) = (self.goal_lease.session(), target) else {
+            return;
+        };
+        if let Some(order) = self.navigation.poll_order(now) {
+            self.jobs
+                .order(session, role, order, self.settings.goal_speed);
+        }
+    }
+
+    fn publish_status(&mut self, now: Instant) {
+        let control = format!(
+            "{}; {}",
+            self.drive_lease.words(),
+            self.navigation.progress()
+        );
+        let is_due = self.published.as_ref().is_none_or(|(at, said)| {
+            now.saturating_duration_since(*at) >= Self::STATUS || *said != control
+        });
+        if !is_due {
+            return;
+        }
+        let bridge = BridgeState {
+            authority: self.settings.control,
+            drive: self.drive_lease.words(),
+            obstacle: self.drive_lease.obstacle(),
+            goal: self.navigation.progress().to_string(),
+            counters: &self.counters,
+        };
+        let diagnostics = diagnostics(now, &self.vehicle, &bridge);
+        let stamp = self.time.now();
+        self.publish(Output::Status { stamp, diagnostics });
+        self.published = Some((now, control));
+    }
+
+    fn publish(&mut self, output: Output) {
+        // Newer samples follow, so none waits for ROS.
+        let counter = match self.outputs.try_send(output) {
+            Ok(()) => Counter::Published,
+            Err(_) => Counter::NotPublished,
+        };
+        self.counters.add(counter);
+    }
+}
+
+impl Drop for Runner {
+    fn drop(&mut self) {
+        for (counter, number) in self.counters.iter().filter(|(_, number)| *number > 0) {
+            tracing::info!("{number} {counter}");
+        }
+    }
+}
