@@ -12,15 +12,18 @@ const ARRAY: u32 = 48;
 const BOUNDED_SEQUENCE: u32 = 96;
 const SEQUENCE: u32 = 144;
 
-/// The type hash of a message type.
-pub(crate) fn of(interface: &Interface) -> String {
-    let digest = Sha256::digest(description(interface));
-    let mut hash = "RIHS01_".to_owned();
-    for octet in digest {
-        // Writing to a `String` does not fail.
-        let _ = write!(hash, "{octet:02x}");
+impl Interface {
+    /// The type hash of ROS 2 (REP 2016), such as `RIHS01_9c45bf16…`.
+    #[must_use]
+    pub fn hash(&self) -> String {
+        let digest = Sha256::digest(description(self));
+        let mut hash = "RIHS01_".to_owned();
+        for octet in digest {
+            // Writing to a `String` does not fail.
+            let _ = write!(hash, "{octet:02x}");
+        }
+        hash
     }
-    hash
 }
 
 /// The JSON text that is hashed: this type, and all that it contains in the order of their names.

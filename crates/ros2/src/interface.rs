@@ -1,6 +1,7 @@
 //! Message types of ROS 2: the model, the `.msg` text, and sets of types that refer to each other.
 
 mod bundled;
+mod fit;
 mod literal;
 mod parse;
 mod set;
@@ -9,6 +10,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
 
+pub(crate) use fit::{defaults, fit, zero_of};
 pub use parse::{Definition, ParseError};
 pub use set::{InterfaceError, Interfaces};
 
@@ -220,11 +222,5 @@ impl Interface {
     pub fn constant(&self, name: &str) -> Option<&Value> {
         let constant = self.constants.iter().find(|it| it.name == name)?;
         Some(&constant.value)
-    }
-
-    /// The type hash of ROS 2 (REP 2016), such as `RIHS01_9c45bf16…`.
-    #[must_use]
-    pub fn hash(&self) -> String {
-        crate::hash::of(self)
     }
 }

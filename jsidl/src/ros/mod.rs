@@ -34,7 +34,9 @@ mod conversion;
 mod definitions;
 mod nested;
 mod package;
+mod package_name;
 mod text;
 
 pub use conversion::Value;
-pub use package::{Interface, Package, PackageName, PackageNameError};
+pub use package::{Interface, Package};
+pub use package_name::{PackageName, PackageNameError};

@@ -1,7 +1,7 @@
 //! Text of the package's files.
 
 use super::definitions::{Arity, Constant, Definition, Definitions, Element, Field};
-use super::package::PackageName;
+use super::package_name::PackageName;
 use crate::model::{Number, Signed, Unsigned};
 use crate::typed::notes;
 

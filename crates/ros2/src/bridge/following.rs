@@ -16,8 +16,8 @@ use jaus_vehicle::messages::ground::QueryMission;
 use tokio::sync::mpsc;
 use tokio::task::{AbortHandle, JoinSet};
 
+use super::definition::Definition;
 use super::report::Report;
-use super::reports::Definition;
 use super::vehicle::{Role, Vehicle};
 
 /// A report with its sender.

@@ -9,6 +9,7 @@
 //! * [`Bridge`]: the same with the topics of ROS, as a component.
 
 mod counters;
+mod definition;
 pub mod diagnostics;
 pub mod drive;
 pub mod emergency;
@@ -36,10 +37,11 @@ use jaus_vehicle::parts::PartError;
 use tokio::sync::mpsc;
 
 pub use counters::{Counter, Counters};
+pub use definition::Definition;
 pub use messages::Frames;
 pub use part::{Bridge, BridgeError};
 pub use ports::{GoalPose, Input, Output};
-pub use reports::{Definition, Reports, UnknownReport};
+pub use reports::{Reports, UnknownReport};
 pub use topics::TopicSettings;
 
 use drive::DriveSettings;

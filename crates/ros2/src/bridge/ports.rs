@@ -5,9 +5,9 @@ use std::time::Duration;
 use bytes::Bytes;
 use jaus::address::JausId;
 
+use super::definition::Definition;
 use super::diagnostics::Diagnostic;
 use super::frames::Quaternion;
-use super::reports::Definition;
 use super::samples::{FixSample, OdometrySample, PoseSample, TwistSample};
 use super::velocity::Twist;
 use crate::graph::Gid;

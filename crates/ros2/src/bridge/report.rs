@@ -7,8 +7,8 @@ use jaus::messages::mobility::{ReportGlobalPose, ReportLocalPose, ReportVelocity
 use jaus_vehicle::messages::ground::ReportMission;
 use jaus_vehicle::messages::ground::report_mission::Stage;
 
+use super::definition::Definition;
 use super::goal::{Mission, MissionEnd};
-use super::reports::Definition;
 use super::vehicle::Controller;
 
 /// A report of a component.

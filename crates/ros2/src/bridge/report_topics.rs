@@ -8,7 +8,8 @@ use jaus::address::JausId;
 use jsidl::dynamic;
 use jsidl::ros::{Package, PackageName, Value as Generated};
 
-use super::reports::{Definition, Reports};
+use super::definition::Definition;
+use super::reports::Reports;
 use crate::graph::Qos;
 use crate::interface::Interfaces;
 use crate::message::Message;

@@ -1,25 +1,16 @@
 //! Which further reports of the vehicle are published, with their definitions.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
 use std::sync::Arc;
 
 use jaus::service::{ComponentEntry, Offer};
 use jaus_vehicle::messages;
 use jaus_view::{Dictionary, Request};
 use jsidl::Library;
-use jsidl::model::{Id, Message, Service};
+use jsidl::model::{Message, Service};
 
+use super::definition::Definition;
 use super::following::Extra;
-
-/// The definition of a report.
-#[derive(Clone)]
-pub struct Definition {
-    /// The service that declares it.
-    pub service: Id,
-    /// The report.
-    pub message: Arc<Message>,
-}
 
 /// No definition has a report with this name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -181,39 +172,6 @@ fn unknown<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> UnknownRepor
         |it| format!("did you mean {it}?"),
     );
     UnknownReport(format!("there is no report `{name}`: {hint}"))
-}
-
-impl fmt::Debug for Definition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} of {}", self.message.name, self.service)
-    }
-}
-
-impl PartialEq for Definition {
-    fn eq(&self, other: &Self) -> bool {
-        self.key() == other.key()
-    }
-}
-
-impl Eq for Definition {}
-
-impl PartialOrd for Definition {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Definition {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.key().cmp(&other.key())
-    }
-}
-
-impl Definition {
-    /// A service has one message of a code.
-    fn key(&self) -> (&Id, u16) {
-        (&self.service, self.message.code)
-    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! Values written in `.msg` text: of constants, and of fields in a new message.
 
+use super::fit;
 use super::{Kind, Primitive, Size};
-use crate::value::{Value, fit};
+use crate::value::Value;
 
 /// Reads a value of a field, which may be a list such as `[1, 2, 3]`.
 pub(super) fn of_field<N>(text: &str, kind: &Kind<N>, size: Size) -> Result<Value, String> {
