@@ -21,7 +21,7 @@ use super::reports::Definition;
 use super::vehicle::{Role, Vehicle};
 
 /// A report with its sender.
-pub(super) type Sighting = (JausId, Report);
+pub(super) type Received = (JausId, Report);
 
 /// A report that is subscribed to besides those that the bridge converts itself.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,7 +46,7 @@ enum Wanted {
 /// The subscriptions.
 pub(super) struct Following {
     component: Component,
-    sighted: mpsc::Sender<Sighting>,
+    received: mpsc::Sender<Received>,
     /// The rate of poses, velocities and further reports.
     rate: When,
     running: BTreeMap<Wanted, Running>,
@@ -71,18 +71,27 @@ impl Following {
     /// The most subscriptions; further ones are not started.
     const MOST: usize = 1024;
 
-    pub(super) fn new(component: Component, sighted: mpsc::Sender<Sighting>, rate_hz: f64) -> Self {
+    pub(super) fn new(
+        component: Component,
+        received: mpsc::Sender<Received>,
+        rate_hz: f64,
+    ) -> Self {
         Self {
             component,
-            sighted,
+            received,
             rate: When::hz(rate_hz),
             running: BTreeMap::new(),
             tasks: JoinSet::new(),
         }
     }
 
-    /// Starts and ends subscriptions to match the vehicle.
-    pub(super) fn follow(&mut self, vehicle: &Vehicle, extras: impl IntoIterator<Item = Extra>) {
+    /// Starts and ends subscriptions to match the vehicle. Returns how many were not started because
+    /// there are too many.
+    pub(super) fn follow(
+        &mut self,
+        vehicle: &Vehicle,
+        extras: impl IntoIterator<Item = Extra>,
+    ) -> u64 {
         while self.tasks.try_join_next().is_some() {}
         let mut wanted: BTreeSet<_> = extras.into_iter().map(Wanted::Extra).collect();
         for part in vehicle.all(Role::Management) {
@@ -93,12 +102,19 @@ impl Following {
         wanted.extend(vehicle.find(Role::GlobalPose).map(Wanted::GlobalPose));
         wanted.extend(vehicle.find(Role::VelocityState).map(Wanted::Velocity));
         self.running.retain(|running, _| wanted.contains(running));
+        let mut refused = 0;
         for new in wanted {
-            if self.running.len() < Self::MOST && !self.running.contains_key(&new) {
-                let running = self.start(&new);
-                self.running.insert(new, running);
+            if self.running.contains_key(&new) {
+                continue;
             }
+            if self.running.len() >= Self::MOST {
+                refused += 1;
+                continue;
+            }
+            let running = self.start(&new);
+            self.running.insert(new, running);
         }
+        refused
     }
 
     fn start(&mut self, wanted: &Wanted) -> Running {
@@ -119,7 +135,7 @@ impl Following {
     where
         Q::Report: Into<Report>,
     {
-        let (component, sighted) = (self.component.clone(), self.sighted.clone());
+        let (component, received) = (self.component.clone(), self.received.clone());
         self.tasks.spawn(async move {
             loop {
                 match component.subscribe(peer, &query, when).await {
@@ -129,7 +145,7 @@ impl Following {
                             let Update::Report(report) = update else {
                                 continue;
                             };
-                            if sighted.send((peer, report.into())).await.is_err() {
+                            if received.send((peer, report.into())).await.is_err() {
                                 return;
                             }
                         }
@@ -143,7 +159,7 @@ impl Following {
     }
 
     fn subscribe_undecoded(&mut self, extra: Extra) -> AbortHandle {
-        let (component, sighted) = (self.component.clone(), self.sighted.clone());
+        let (component, received) = (self.component.clone(), self.received.clone());
         let topic = Topic {
             peer: extra.peer,
             query: extra.query,
@@ -161,7 +177,7 @@ impl Following {
                             };
                             let definition = definition.clone();
                             let report = Report::Undecoded { definition, octets };
-                            if sighted.send((topic.peer, report)).await.is_err() {
+                            if received.send((topic.peer, report)).await.is_err() {
                                 return;
                             }
                         }

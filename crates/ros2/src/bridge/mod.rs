@@ -20,6 +20,7 @@ mod lease;
 mod messages;
 mod part;
 mod ports;
+mod publishers;
 mod report;
 mod report_topics;
 mod reports;
@@ -38,7 +39,8 @@ use tokio::sync::mpsc;
 pub use counters::{Counter, Counters};
 pub use messages::Frames;
 pub use part::{Bridge, BridgeError};
-pub use ports::{GoalPose, Input, Output};
+pub use ports::{Command, GoalPose, Input, Output};
+pub use publishers::Outdated;
 pub use reports::{Definition, Reports, UnknownReport};
 pub use topics::TopicSettings;
 
