@@ -124,7 +124,7 @@ impl Drive {
         if moves {
             self.moved = Some(now);
         } else if driver.is_none() {
-            // To stand still needs no control that the vehicle does not have to give anyway.
+            // The vehicle is not driven, so there is nothing to stop.
             return Ok(());
         }
         self.phase = Phase::Driven {
