@@ -62,6 +62,15 @@ impl Drop for Running {
     }
 }
 
+/// What is wanted, does not run yet, and has room, and how much has none.
+fn admit<W: Ord, R>(running: &BTreeMap<W, R>, wanted: BTreeSet<W>, most: usize) -> (Vec<W>, u64) {
+    let new = wanted.into_iter().filter(|it| !running.contains_key(it));
+    let mut admitted: Vec<_> = new.collect();
+    let room = most.saturating_sub(running.len()).min(admitted.len());
+    let refused = admitted.split_off(room).len();
+    (admitted, refused as u64)
+}
+
 /// The rate of states and of the client in control.
 const STATUS: When = When::hz(4.0);
 /// Delay before a failed subscription is retried.
@@ -102,15 +111,8 @@ impl Following {
         wanted.extend(vehicle.find(Role::GlobalPose).map(Wanted::GlobalPose));
         wanted.extend(vehicle.find(Role::VelocityState).map(Wanted::Velocity));
         self.running.retain(|running, _| wanted.contains(running));
-        let mut refused = 0;
-        for new in wanted {
-            if self.running.contains_key(&new) {
-                continue;
-            }
-            if self.running.len() >= Self::MOST {
-                refused += 1;
-                continue;
-            }
+        let (admitted, refused) = admit(&self.running, wanted, Self::MOST);
+        for new in admitted {
             let running = self.start(&new);
             self.running.insert(new, running);
         }
@@ -188,5 +190,19 @@ impl Following {
                 sleep_until(Some(now() + PAUSE)).await;
             }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn subscriptions_that_have_no_room_are_counted() {
+        let running = BTreeMap::from([(1, ()), (5, ())]);
+        let wanted = || BTreeSet::from([1, 2, 3, 4, 5]);
+        assert_eq!(admit(&running, wanted(), 4), (vec![2, 3], 1));
+        assert_eq!(admit(&running, wanted(), 9), (vec![2, 3, 4], 0));
+        assert_eq!(admit(&running, wanted(), 1), (vec![], 3));
     }
 }
