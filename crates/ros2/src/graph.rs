@@ -11,7 +11,7 @@ mod token;
 pub use attachment::{Attachment, AttachmentError};
 pub use name::{NameError, NodeName, TopicName};
 pub use qos::{Durability, History, Liveliness, Qos, QosError, Reliability};
-pub use table::Graph;
+pub use table::{Entity, Graph};
 pub use token::{Endpoint, EntityKind, Gid, Token, TokenError};
 
 use crate::interface::Interface;

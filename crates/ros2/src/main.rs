@@ -11,6 +11,7 @@ use jaus_cli::runtime::{between, duration_within};
 use jaus_cli::{Failure, Ready, launch};
 use jaus_ros2::bridge::vehicle::Selection;
 use jaus_ros2::bridge::{Bridge, Reports, Settings, TopicSettings};
+use jaus_ros2::graph::GREATEST_DOMAIN;
 use jaus_ros2::session;
 use jaus_vehicle::parts::Part;
 
@@ -46,9 +47,9 @@ struct Flags {
         long,
         value_name = "NUMBER",
         env = "ROS_DOMAIN_ID",
-        default_value_t = 0
+        default_value_t = 0,
+        value_parser = domain
     )]
-    #[arg(value_parser = clap::value_parser!(u32).range(0..=232))]
     domain: u32,
 
     /// The rate of poses, velocities, positions and further reports, in hertz
@@ -74,8 +75,9 @@ struct Flags {
     #[arg(long, value_name = "RAD/S", default_value = "1.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
     max_yaw_rate: f64,
 
-    /// Stop the vehicle after this time without a cmd_vel
-    #[arg(long, value_name = "DURATION", default_value = "500ms", value_parser = |text: &str| duration_within(text, "50ms", "60s"))]
+    /// Stop the vehicle after this time without a cmd_vel, at most 2s: until then the bridge repeats the
+    /// last one, so that the vehicle's own timeout does not stop it
+    #[arg(long, value_name = "DURATION", default_value = "500ms", value_parser = |text: &str| duration_within(text, "50ms", "2s"))]
     timeout: Duration,
 
     /// Release control after this time without a cmd_vel that moves
@@ -112,7 +114,31 @@ struct Flags {
     all_reports: bool,
 }
 
+/// Parses the domain. ROS takes an empty `ROS_DOMAIN_ID` as 0, too.
+fn domain(text: &str) -> Result<u32, String> {
+    if text.is_empty() {
+        return Ok(0);
+    }
+    let number = text.parse().ok().filter(|it| *it <= GREATEST_DOMAIN);
+    number.ok_or_else(|| format!("write a number from 0 to {GREATEST_DOMAIN}"))
+}
+
 impl Flags {
+    /// Checks that the components are parts of the vehicle.
+    fn check_components(&self) -> Result<(), Failure> {
+        let is_part = |id: &JausId| {
+            let subsystem = id.subsystem();
+            subsystem == self.vehicle || subsystem == JausId::ANY_SUBSYSTEM
+        };
+        match self.component.iter().find(|id| !is_part(id)) {
+            None => Ok(()),
+            Some(other) => Err(Failure::new(format!(
+                "--component {other} is not a part of --vehicle {}: start another bridge for it",
+                self.vehicle
+            ))),
+        }
+    }
+
     fn session(&self) -> session::Settings {
         let mut settings = session::Settings::default();
         settings.domain = self.domain;
@@ -175,6 +201,7 @@ impl Ready for Flags {
     const SUBSYSTEM: &'static str = "ROS 2 bridge";
 
     fn part(self) -> Result<impl Part, Failure> {
+        self.check_components()?;
         let reports = self.reports()?;
         Bridge::new(self.settings(), self.topics(), reports, &self.session()).map_err(Failure::of)
     }

@@ -17,7 +17,7 @@ use zenoh::config::Config;
 
 pub use entity::{Node, Publisher, Received, Subscription, SubscriptionCounters};
 
-use crate::graph::{EntityKind, GREATEST_DOMAIN, NameError, NodeName, Token};
+use crate::graph::{Entity, EntityKind, GREATEST_DOMAIN, NameError, NodeName};
 use crate::interface::TypeName;
 use shared::Shared;
 
@@ -125,25 +125,27 @@ impl Ros {
 
     /// The publishers of a topic in other sessions.
     #[must_use]
-    pub fn publishers(&self, topic: &str) -> Vec<Token> {
-        self.others(EntityKind::Publisher, topic)
+    pub fn publishers(&self, topic: &str) -> Vec<Entity> {
+        self.others(EntityKind::Publisher, topic, Entity::clone)
     }
 
     /// The subscriptions of a topic in other sessions.
     #[must_use]
-    pub fn subscriptions(&self, topic: &str) -> Vec<Token> {
-        self.others(EntityKind::Subscription, topic)
+    pub fn subscriptions(&self, topic: &str) -> Vec<Entity> {
+        self.others(EntityKind::Subscription, topic, Entity::clone)
     }
 
-    fn others(&self, kind: EntityKind, topic: &str) -> Vec<Token> {
+    /// A part of each entity of a topic in other sessions. The session waits meanwhile.
+    pub(crate) fn others<T, C: FromIterator<T>>(
+        &self,
+        kind: EntityKind,
+        topic: &str,
+        part: impl FnMut(&Entity) -> T,
+    ) -> C {
         let state = self.shared().lock();
         let entities = state.graph.of_topic(kind, topic);
-        let is_other = |token: &&Token| Some(&token.session) != state.session.as_ref();
-        entities
-            .map(|(_, token)| token)
-            .filter(is_other)
-            .cloned()
-            .collect()
+        let is_other = |it: &&Entity| Some(&it.token.session) != state.session.as_ref();
+        entities.filter(is_other).map(part).collect()
     }
 
     /// A number that changes when the connection, or the publishers and subscriptions of others change.

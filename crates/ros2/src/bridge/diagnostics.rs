@@ -55,6 +55,9 @@ pub struct BridgeState<'a> {
 /// A component whose last report is older than this is stale.
 const STALE: Duration = Duration::from_secs(3);
 
+/// What is wrong if ROS may drive a vehicle that cannot be driven.
+pub(super) const NO_DRIVER: &str = "the vehicle has no driver that cmd_vel can use: no velocity state driver and no primitive driver";
+
 /// The diagnostics of a vehicle and its bridge.
 #[must_use]
 pub fn diagnostics(now: Instant, vehicle: &Vehicle, bridge: &BridgeState<'_>) -> Vec<Diagnostic> {
@@ -103,10 +106,13 @@ const fn level(state: State) -> Level {
 
 impl BridgeState<'_> {
     fn diagnostic(&self, vehicle: &Vehicle) -> Diagnostic {
-        let (level, message) = match (vehicle.parts().is_empty(), self.obstacle) {
-            (true, _) => (Level::Error, "the vehicle is not known yet"),
-            (false, "") => (Level::Ok, "connected"),
-            (false, obstacle) => (Level::Warn, obstacle),
+        let is_known = !vehicle.parts().is_empty();
+        let cannot_drive = self.authority.is_some() && vehicle.drive().is_none();
+        let (level, message) = match self.obstacle {
+            _ if !is_known => (Level::Error, "the vehicle is not known yet"),
+            "" if cannot_drive => (Level::Warn, NO_DRIVER),
+            "" => (Level::Ok, "connected"),
+            obstacle => (Level::Warn, obstacle),
         };
         let authority = self.authority.map_or_else(
             || "none (--control allows commands)".to_owned(),
@@ -121,10 +127,13 @@ impl BridgeState<'_> {
         let refused = [
             Counter::InvalidVelocity,
             Counter::OtherPublisher,
+            Counter::Outdated,
             Counter::Locked,
             Counter::ReadOnly,
             Counter::GoalRefused,
             Counter::ClearRefused,
+            Counter::Malformed,
+            Counter::NotTaken,
         ];
         let counted = refused.into_iter().filter(|it| self.counters.get(*it) > 0);
         values.extend(counted.map(|it| (it.to_string(), self.counters.get(it).to_string())));

@@ -3,7 +3,9 @@
 
 use std::time::{Duration, Instant};
 
-use super::velocity::{InvalidVelocity, Limits, Twist, Velocity};
+use super::ports::Command;
+use super::publishers::{Outdated, Publishers};
+use super::velocity::{InvalidVelocity, Limits, Velocity};
 use crate::graph::Gid;
 
 /// The times and limits of driving.
@@ -31,7 +33,7 @@ impl Default for DriveSettings {
     }
 }
 
-/// How far control of the vehicle's driver is, as the bridge has it.
+/// The bridge's access to a component of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {
     /// It was requested, or the driver is being made ready.
@@ -51,8 +53,11 @@ pub enum Refusal {
     /// Another publisher drives.
     #[error("another publisher drives; it keeps the vehicle until it is silent")]
     OtherPublisher,
-    /// Control was lost, and the publisher has not paused since.
-    #[error("control was lost: publish zero or pause before driving again")]
+    /// The command is too old.
+    #[error("{0}")]
+    Outdated(#[from] Outdated),
+    /// Control was lost or driving was ended, and the publisher has not stopped or paused since.
+    #[error("driving was ended: publish zero or pause before driving again")]
     Locked,
 }
 
@@ -64,8 +69,7 @@ pub struct Drive {
     access: Access,
     /// The last command that moves; control is kept for some time after it.
     moved: Option<Instant>,
-    /// Since a loss of control: the last command that was refused because of it.
-    locked: Option<Instant>,
+    publishers: Publishers,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,7 +90,7 @@ impl Drive {
     /// timeout has stopped it.
     pub const STOPPING: Duration = Duration::from_secs(3);
 
-    /// Nobody drives.
+    /// At rest, without control.
     #[must_use]
     pub const fn new(settings: DriveSettings) -> Self {
         Self {
@@ -94,80 +98,74 @@ impl Drive {
             phase: Phase::Rest,
             access: Access::Pending,
             moved: None,
-            locked: None,
+            publishers: Publishers::new(settings.timeout),
         }
     }
 
     /// Handles a command.
     ///
     /// # Errors
-    /// The reason why it has no effect. If the publisher drives, the vehicle stops.
-    pub fn handle_command(
-        &mut self,
-        now: Instant,
-        publisher: Gid,
-        twist: &Twist,
-    ) -> Result<(), Refusal> {
+    /// The reason why it has no effect. If the publisher drives and the velocity is invalid, the
+    /// vehicle stops.
+    pub fn handle_command(&mut self, now: Instant, command: &Command) -> Result<(), Refusal> {
         self.handle_time(now);
+        let publisher = command.publisher;
+        let velocity = self.settings.limits.velocity(&command.twist);
+        let moves = velocity != Ok(Velocity::ZERO);
+        self.publishers.check(now, command, moves)?;
         let driver = self.publisher();
         if driver.is_some_and(|driver| driver != publisher) {
             return Err(Refusal::OtherPublisher);
         }
-        let velocity = self.settings.limits.velocity(twist).inspect_err(|_| {
-            self.stop(now);
-        })?;
-        if velocity == Velocity::ZERO {
-            self.locked = None;
-            // To stand still needs no control that the vehicle does not have to give anyway.
-            if driver.is_none() {
-                return Ok(());
-            }
-        } else if let Some(last) = &mut self.locked {
-            *last = now;
+        let velocity = velocity.inspect_err(|_| self.stop(now))?;
+        if self.publishers.is_blocked(publisher) {
             return Err(Refusal::Locked);
-        } else {
+        }
+        if moves {
             self.moved = Some(now);
+        } else if driver.is_none() {
+            // The vehicle is not driven, so there is nothing to stop.
+            return Ok(());
         }
         self.phase = Phase::Driven {
             publisher,
             velocity,
-            heard: now,
+            heard: command.arrival,
         };
         Ok(())
     }
 
-    /// Handles the end of a publisher. If it drives, the vehicle stops at once.
-    pub fn handle_publisher_gone(&mut self, now: Instant, publisher: Gid) {
-        if self.publisher() == Some(publisher) {
+    /// Handles the end of a publisher. If it drives, the vehicle stops at once. Returns whether it
+    /// drove.
+    pub fn handle_publisher_gone(&mut self, now: Instant, publisher: Gid) -> bool {
+        self.handle_time(now);
+        self.publishers.handle_gone(now, publisher);
+        let drove = self.publisher() == Some(publisher);
+        if drove {
             self.stop(now);
         }
+        drove
     }
 
-    /// Handles how far control of the driver is. After a loss, the publisher has to stop or pause
-    /// before it can drive again: a command of before must not move the vehicle later.
+    /// Handles a change of access to the driver. After a loss, each publisher that sends commands has
+    /// to stop or pause before it can drive again: a command of before must not move the vehicle
+    /// later.
     pub fn handle_access(&mut self, now: Instant, access: Access) {
         let is_new = self.access != access;
         self.access = access;
         if access == Access::Lost && is_new && self.moved.is_some() {
             self.phase = Phase::Rest;
             self.moved = None;
-            self.locked = Some(now);
+            self.publishers.block(now);
         }
     }
 
-    /// Ends driving and the need for control, whichever publisher drives.
-    pub fn release(&mut self, now: Instant) {
+    /// Ends driving and the need for control, for a reason for which each publisher has to stop or
+    /// pause before it drives again: a goal, a release, an emergency, or the loss of the ROS network.
+    pub fn halt(&mut self, now: Instant) {
+        self.publishers.block(now);
         self.stop(now);
         self.moved = None;
-    }
-
-    /// Ends driving, for a reason for which the publisher has to stop or pause before it drives again:
-    /// an emergency, or the loss of the ROS network.
-    pub fn halt(&mut self, now: Instant) {
-        if self.moved.is_some() {
-            self.locked = Some(now);
-        }
-        self.release(now);
     }
 
     /// Handles the vehicle's acknowledgement of a stop.
@@ -185,9 +183,6 @@ impl Drive {
             Phase::Stopping { since } if now >= since + Self::STOPPING => self.phase = Phase::Rest,
             _ => {}
         }
-        if self.locked.is_some_and(|last| now >= last + timeout) {
-            self.locked = None;
-        }
         let is_at_rest = self.publisher().is_none() || self.velocity() == Velocity::ZERO;
         if is_at_rest
             && self
@@ -195,7 +190,8 @@ impl Drive {
                 .is_some_and(|moved| now >= moved + self.settings.hold)
         {
             self.moved = None;
-            self.phase = Phase::Rest;
+            // With a short hold time, the zero of the publisher may not have reached the vehicle.
+            self.stop(now);
         }
     }
 
@@ -256,6 +252,10 @@ impl Drive {
     reason = "virtual time starts at any instant"
 )]
 mod tests {
+    use std::sync::OnceLock;
+    use std::sync::atomic::{AtomicI64, Ordering};
+
+    use super::super::velocity::Twist;
     use super::*;
 
     const ONE: Gid = Gid([1; 16]);
@@ -265,10 +265,20 @@ mod tests {
         Duration::from_millis(ms)
     }
 
-    fn twist(forward: f64) -> Twist {
-        Twist {
-            linear: [forward, 0.0, 0.0],
-            ..Twist::default()
+    /// A command forward that arrives now, later than all before.
+    fn command(now: Instant, publisher: Gid, forward: f64) -> Command {
+        static FIRST: OnceLock<Instant> = OnceLock::new();
+        static SEQUENCE: AtomicI64 = AtomicI64::new(1);
+        let passed = now.saturating_duration_since(*FIRST.get_or_init(|| now));
+        Command {
+            publisher,
+            sequence: SEQUENCE.fetch_add(1, Ordering::Relaxed),
+            stamp: i64::try_from(passed.as_nanos()).unwrap(),
+            arrival: now,
+            twist: Twist {
+                linear: [forward, 0.0, 0.0],
+                ..Twist::default()
+            },
         }
     }
 
@@ -282,7 +292,7 @@ mod tests {
     /// Under control and driven at 1 m/s since now.
     fn driven(now: Instant) -> Drive {
         let mut drive = Drive::new(DriveSettings::default());
-        drive.handle_command(now, ONE, &twist(1.0)).unwrap();
+        drive.handle_command(now, &command(now, ONE, 1.0)).unwrap();
         drive.handle_access(now, Access::Ready);
         assert_eq!(drive.poll_velocity(now), Some(ahead()));
         drive
@@ -293,7 +303,9 @@ mod tests {
         let start = Instant::now();
         let mut drive = Drive::new(DriveSettings::default());
         assert!(!drive.wants_control());
-        drive.handle_command(start, ONE, &twist(1.0)).unwrap();
+        drive
+            .handle_command(start, &command(start, ONE, 1.0))
+            .unwrap();
         assert!(drive.wants_control());
         assert_eq!(drive.poll_velocity(start + ms(100)), None);
         drive.handle_access(start + ms(200), Access::Ready);
@@ -304,7 +316,9 @@ mod tests {
     fn a_command_that_got_old_before_control_was_granted_is_never_sent() {
         let start = Instant::now();
         let mut drive = Drive::new(DriveSettings::default());
-        drive.handle_command(start, ONE, &twist(1.0)).unwrap();
+        drive
+            .handle_command(start, &command(start, ONE, 1.0))
+            .unwrap();
         assert_eq!(drive.poll_velocity(start + ms(500)), None);
         drive.handle_access(start + ms(600), Access::Ready);
         assert_eq!(drive.poll_velocity(start + ms(600)), None);
@@ -314,7 +328,9 @@ mod tests {
     fn to_stand_still_needs_no_control() {
         let start = Instant::now();
         let mut drive = Drive::new(DriveSettings::default());
-        drive.handle_command(start, ONE, &twist(0.0)).unwrap();
+        drive
+            .handle_command(start, &command(start, ONE, 0.0))
+            .unwrap();
         assert!(!drive.wants_control());
     }
 
@@ -347,8 +363,10 @@ mod tests {
         let mut drive = driven(start);
         for step in 1..=50 {
             let now = start + ms(100 * step);
-            drive.handle_command(now, ONE, &twist(0.0)).unwrap();
+            drive.handle_command(now, &command(now, ONE, 0.0)).unwrap();
             drive.handle_time(now);
+            // The vehicle acknowledges each zero.
+            drive.handle_stopped();
             assert_eq!(drive.wants_control(), step < 50, "{step}");
         }
     }
@@ -359,7 +377,7 @@ mod tests {
         let mut drive = driven(start);
         for step in 1..=100 {
             let now = start + ms(100 * step);
-            drive.handle_command(now, ONE, &twist(1.0)).unwrap();
+            drive.handle_command(now, &command(now, ONE, 1.0)).unwrap();
             assert_eq!(drive.poll_velocity(now), Some(ahead()));
             assert!(drive.wants_control());
         }
@@ -379,10 +397,10 @@ mod tests {
     fn a_command_that_is_refused_stops_the_vehicle_that_its_publisher_drives() {
         let start = Instant::now();
         let mut drive = driven(start);
-        let refused = drive.handle_command(start, OTHER, &twist(f64::NAN));
+        let refused = drive.handle_command(start, &command(start, OTHER, f64::NAN));
         assert_eq!(refused, Err(Refusal::OtherPublisher));
         assert_eq!(drive.poll_velocity(start), Some(ahead()));
-        let refused = drive.handle_command(start, ONE, &twist(9.0));
+        let refused = drive.handle_command(start, &command(start, ONE, 9.0));
         assert_eq!(refused, Err(InvalidVelocity::Speed.into()));
         assert_eq!(drive.poll_velocity(start), Some(Velocity::ZERO));
     }
@@ -391,10 +409,12 @@ mod tests {
     fn the_second_publisher_drives_once_the_first_is_silent() {
         let start = Instant::now();
         let mut drive = driven(start);
-        let early = drive.handle_command(start + ms(499), OTHER, &twist(-1.0));
+        let early = drive.handle_command(start + ms(499), &command(start + ms(499), OTHER, -1.0));
         assert_eq!(early, Err(Refusal::OtherPublisher));
         let later = start + ms(500);
-        drive.handle_command(later, OTHER, &twist(-1.0)).unwrap();
+        drive
+            .handle_command(later, &command(later, OTHER, -1.0))
+            .unwrap();
         assert_eq!(drive.publisher(), Some(OTHER));
     }
 
@@ -402,7 +422,7 @@ mod tests {
     fn after_a_loss_of_control_a_publisher_that_goes_on_moves_nothing_until_it_stops_or_pauses() {
         let start = Instant::now();
         let stops = |drive: &mut Drive, now| {
-            drive.handle_command(now, ONE, &twist(0.0)).unwrap();
+            drive.handle_command(now, &command(now, ONE, 0.0)).unwrap();
             now
         };
         let pauses = |_: &mut Drive, now| now + ms(500);
@@ -415,12 +435,12 @@ mod tests {
             assert!(!drive.wants_control(), "{name}");
             for step in 1..=50 {
                 let now = start + ms(100 * step);
-                let refused = drive.handle_command(now, ONE, &twist(1.0));
+                let refused = drive.handle_command(now, &command(now, ONE, 1.0));
                 assert_eq!(refused, Err(Refusal::Locked), "{name}");
                 assert!(!drive.wants_control(), "{name}");
             }
             let now = ends(&mut drive, start + ms(5000));
-            drive.handle_command(now, ONE, &twist(1.0)).unwrap();
+            drive.handle_command(now, &command(now, ONE, 1.0)).unwrap();
             assert!(drive.wants_control(), "{name}");
             assert_eq!(
                 drive.poll_velocity(now),
@@ -440,7 +460,7 @@ mod tests {
         drive.halt(start);
         assert_eq!(drive.poll_velocity(start), Some(Velocity::ZERO));
         assert!(drive.wants_control());
-        let refused = drive.handle_command(start, ONE, &twist(1.0));
+        let refused = drive.handle_command(start, &command(start, ONE, 1.0));
         assert_eq!(refused, Err(Refusal::Locked));
         drive.handle_stopped();
         assert!(!drive.wants_control());
@@ -450,10 +470,98 @@ mod tests {
     fn a_stop_that_is_never_confirmed_ends_after_three_seconds() {
         let start = Instant::now();
         let mut drive = driven(start);
-        drive.release(start);
+        drive.halt(start);
         let end = start + Drive::STOPPING;
         assert_eq!(drive.poll_velocity(end - ms(1)), Some(Velocity::ZERO));
         assert_eq!(drive.poll_velocity(end), None);
         assert!(!drive.wants_control());
+    }
+
+    #[test]
+    fn after_a_halt_no_publisher_that_goes_on_moves_the_vehicle_whatever_another_one_sends() {
+        let start = Instant::now();
+        let mut drive = driven(start);
+        let refused = drive.handle_command(start, &command(start, OTHER, -1.0));
+        assert_eq!(refused, Err(Refusal::OtherPublisher));
+        drive.halt(start);
+        for step in 1..=20 {
+            let now = start + ms(100 * step);
+            let idle = Gid([3; 16]);
+            let stands = drive.handle_command(now, &command(now, idle, 0.0));
+            assert_eq!(stands, Ok(()));
+            for publisher in [ONE, OTHER] {
+                let refused = drive.handle_command(now, &command(now, publisher, 1.0));
+                assert_eq!(refused, Err(Refusal::Locked), "{publisher}");
+            }
+            assert!(!drive.is_moving());
+        }
+        // A stop of one of them allows nothing to the other one.
+        let now = start + ms(2100);
+        drive
+            .handle_command(now, &command(now, OTHER, 0.0))
+            .unwrap();
+        let refused = drive.handle_command(now, &command(now, ONE, 1.0));
+        assert_eq!(refused, Err(Refusal::Locked));
+        drive
+            .handle_command(now, &command(now, OTHER, 1.0))
+            .unwrap();
+        assert_eq!(drive.publisher(), Some(OTHER));
+    }
+
+    #[test]
+    fn after_a_halt_a_publisher_that_begins_drives_at_once() {
+        let start = Instant::now();
+        let mut drive = driven(start);
+        drive.halt(start);
+        drive
+            .handle_command(start, &command(start, OTHER, 1.0))
+            .unwrap();
+        assert_eq!(drive.poll_velocity(start), Some(ahead()));
+    }
+
+    #[test]
+    fn a_hold_time_below_the_timeout_does_not_swallow_the_stop() {
+        let settings = DriveSettings {
+            hold: ms(50),
+            ..DriveSettings::default()
+        };
+        for last in [1.0, 0.0] {
+            let start = Instant::now();
+            let mut drive = Drive::new(settings);
+            drive
+                .handle_command(start, &command(start, ONE, 1.0))
+                .unwrap();
+            drive.handle_access(start, Access::Ready);
+            assert_eq!(drive.poll_velocity(start), Some(ahead()));
+            let now = start + ms(100);
+            drive.handle_command(now, &command(now, ONE, last)).unwrap();
+            let now = now + ms(500);
+            assert_eq!(drive.poll_velocity(now), Some(Velocity::ZERO), "{last}");
+            assert!(drive.wants_control(), "{last}");
+            drive.handle_stopped();
+            assert!(!drive.wants_control(), "{last}");
+        }
+    }
+
+    #[test]
+    fn a_command_is_valid_from_its_arrival_and_not_from_its_handling() {
+        let start = Instant::now();
+        let mut drive = driven(start);
+        let waited = Command {
+            arrival: start + ms(100),
+            ..command(start + ms(100), ONE, 1.0)
+        };
+        drive.handle_command(start + ms(400), &waited).unwrap();
+        assert_eq!(drive.poll_velocity(start + ms(600)), Some(Velocity::ZERO));
+    }
+
+    #[test]
+    fn the_last_command_of_a_publisher_that_is_gone_does_not_move_the_vehicle() {
+        let start = Instant::now();
+        let mut drive = driven(start);
+        assert!(drive.handle_publisher_gone(start, ONE));
+        let refused = drive.handle_command(start, &command(start, ONE, 1.0));
+        assert_eq!(refused, Err(Outdated::PublisherGone.into()));
+        assert_eq!(drive.poll_velocity(start), Some(Velocity::ZERO));
     }
 }

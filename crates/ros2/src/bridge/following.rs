@@ -21,7 +21,7 @@ use super::report::Report;
 use super::vehicle::{Role, Vehicle};
 
 /// A report with its sender.
-pub(super) type Sighting = (JausId, Report);
+pub(super) type Received = (JausId, Report);
 
 /// A report that is subscribed to besides those that the bridge converts itself.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,7 +46,7 @@ enum Wanted {
 /// The subscriptions.
 pub(super) struct Following {
     component: Component,
-    sighted: mpsc::Sender<Sighting>,
+    received: mpsc::Sender<Received>,
     /// The rate of poses, velocities and further reports.
     rate: When,
     running: BTreeMap<Wanted, Running>,
@@ -62,6 +62,15 @@ impl Drop for Running {
     }
 }
 
+/// What is wanted, does not run yet, and has room, and how much has none.
+fn admit<W: Ord, R>(running: &BTreeMap<W, R>, wanted: BTreeSet<W>, most: usize) -> (Vec<W>, u64) {
+    let new = wanted.into_iter().filter(|it| !running.contains_key(it));
+    let mut admitted: Vec<_> = new.collect();
+    let room = most.saturating_sub(running.len()).min(admitted.len());
+    let refused = admitted.split_off(room).len();
+    (admitted, refused as u64)
+}
+
 /// The rate of states and of the client in control.
 const STATUS: When = When::hz(4.0);
 /// Delay before a failed subscription is retried.
@@ -71,18 +80,27 @@ impl Following {
     /// The most subscriptions; further ones are not started.
     const MOST: usize = 1024;
 
-    pub(super) fn new(component: Component, sighted: mpsc::Sender<Sighting>, rate_hz: f64) -> Self {
+    pub(super) fn new(
+        component: Component,
+        received: mpsc::Sender<Received>,
+        rate_hz: f64,
+    ) -> Self {
         Self {
             component,
-            sighted,
+            received,
             rate: When::hz(rate_hz),
             running: BTreeMap::new(),
             tasks: JoinSet::new(),
         }
     }
 
-    /// Starts and ends subscriptions to match the vehicle.
-    pub(super) fn follow(&mut self, vehicle: &Vehicle, extras: impl IntoIterator<Item = Extra>) {
+    /// Starts and ends subscriptions to match the vehicle. Returns how many were not started because
+    /// there are too many.
+    pub(super) fn follow(
+        &mut self,
+        vehicle: &Vehicle,
+        extras: impl IntoIterator<Item = Extra>,
+    ) -> u64 {
         while self.tasks.try_join_next().is_some() {}
         let mut wanted: BTreeSet<_> = extras.into_iter().map(Wanted::Extra).collect();
         for part in vehicle.all(Role::Management) {
@@ -93,12 +111,12 @@ impl Following {
         wanted.extend(vehicle.find(Role::GlobalPose).map(Wanted::GlobalPose));
         wanted.extend(vehicle.find(Role::VelocityState).map(Wanted::Velocity));
         self.running.retain(|running, _| wanted.contains(running));
-        for new in wanted {
-            if self.running.len() < Self::MOST && !self.running.contains_key(&new) {
-                let running = self.start(&new);
-                self.running.insert(new, running);
-            }
+        let (admitted, refused) = admit(&self.running, wanted, Self::MOST);
+        for new in admitted {
+            let running = self.start(&new);
+            self.running.insert(new, running);
         }
+        refused
     }
 
     fn start(&mut self, wanted: &Wanted) -> Running {
@@ -119,7 +137,7 @@ impl Following {
     where
         Q::Report: Into<Report>,
     {
-        let (component, sighted) = (self.component.clone(), self.sighted.clone());
+        let (component, received) = (self.component.clone(), self.received.clone());
         self.tasks.spawn(async move {
             loop {
                 match component.subscribe(peer, &query, when).await {
@@ -129,7 +147,7 @@ impl Following {
                             let Update::Report(report) = update else {
                                 continue;
                             };
-                            if sighted.send((peer, report.into())).await.is_err() {
+                            if received.send((peer, report.into())).await.is_err() {
                                 return;
                             }
                         }
@@ -143,7 +161,7 @@ impl Following {
     }
 
     fn subscribe_undecoded(&mut self, extra: Extra) -> AbortHandle {
-        let (component, sighted) = (self.component.clone(), self.sighted.clone());
+        let (component, received) = (self.component.clone(), self.received.clone());
         let topic = Topic {
             peer: extra.peer,
             query: extra.query,
@@ -161,7 +179,7 @@ impl Following {
                             };
                             let definition = definition.clone();
                             let report = Report::Undecoded { definition, octets };
-                            if sighted.send((topic.peer, report)).await.is_err() {
+                            if received.send((topic.peer, report)).await.is_err() {
                                 return;
                             }
                         }
@@ -172,5 +190,19 @@ impl Following {
                 sleep_until(Some(now() + PAUSE)).await;
             }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn subscriptions_that_have_no_room_are_counted() {
+        let running = BTreeMap::from([(1, ()), (5, ())]);
+        let wanted = || BTreeSet::from([1, 2, 3, 4, 5]);
+        assert_eq!(admit(&running, wanted(), 4), (vec![2, 3], 1));
+        assert_eq!(admit(&running, wanted(), 9), (vec![2, 3, 4], 0));
+        assert_eq!(admit(&running, wanted(), 1), (vec![], 3));
     }
 }

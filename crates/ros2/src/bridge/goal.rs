@@ -17,7 +17,7 @@ pub struct Goal {
     pub heading: f64,
 }
 
-/// What the vehicle has to be told.
+/// A command about the goal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Order {
     /// Drive there.
@@ -26,7 +26,7 @@ pub enum Order {
     Stop,
 }
 
-/// How far the last goal is.
+/// The progress of the last goal.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Progress {
     /// No goal was set.
@@ -70,6 +70,10 @@ pub struct Navigation {
     access: Option<Access>,
     /// The number of the planner's last mission.
     mission: u32,
+    /// The order whose delivery has not ended.
+    delivery: Option<Order>,
+    /// Whether the vehicle may be under way because of an order.
+    may_move: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -79,7 +83,7 @@ enum Phase {
     /// Until control is granted, at most until then.
     Waiting { goal: Goal, until: Instant },
     /// Until the vehicle acknowledges it.
-    Sending { goal: Goal, is_sent: bool },
+    Sending { goal: Goal },
     Underway {
         goal: Goal,
         /// The number of the planner's mission before this one.
@@ -87,8 +91,9 @@ enum Phase {
     },
     /// The vehicle finishes, until then.
     Arrived { until: Instant },
-    /// The vehicle is being stopped, until then at most.
-    Stopping { until: Instant, is_sent: bool },
+    /// The vehicle is being stopped, until then at most. `next` is when to send the stop at the
+    /// earliest.
+    Stopping { until: Instant, next: Instant },
 }
 
 impl Navigation {
@@ -98,8 +103,10 @@ impl Navigation {
     pub const HOLD: Duration = Duration::from_secs(3);
     /// Within this distance a waypoint counts as reached, in metres.
     pub const TOLERANCE: f64 = 0.5;
-    /// How long the stop may take.
+    /// How long a stop is repeated that is not acknowledged.
     const STOPPING: Duration = Duration::from_secs(3);
+    /// Delay before a stop is repeated.
+    const PAUSE: Duration = Duration::from_millis(100);
 
     /// Sets a goal. It replaces the one before.
     pub fn set(&mut self, now: Instant, goal: Goal) {
@@ -111,23 +118,27 @@ impl Navigation {
     /// Cancels the goal, if the vehicle is not there yet.
     pub fn cancel(&mut self, now: Instant) {
         match self.phase {
-            Phase::Waiting { .. } => self.end(Progress::Cancelled),
-            Phase::Sending { .. } | Phase::Underway { .. } => {
-                let until = now + Self::STOPPING;
-                let is_sent = false;
-                self.phase = Phase::Stopping { until, is_sent };
-                self.progress = Progress::Cancelled;
+            Phase::Waiting { .. } if !self.may_move => self.end(Progress::Cancelled),
+            Phase::Waiting { .. } | Phase::Sending { .. } | Phase::Underway { .. } => {
+                self.stop(now, Progress::Cancelled);
             }
             Phase::None | Phase::Arrived { .. } | Phase::Stopping { .. } => {}
         }
     }
 
-    /// Handles how far control is. A goal whose control is lost is not resumed; `why` is for people.
+    fn stop(&mut self, now: Instant, progress: Progress) {
+        let until = now + Self::STOPPING;
+        self.phase = Phase::Stopping { until, next: now };
+        self.progress = progress;
+    }
+
+    /// Handles a change of access. A goal whose control is lost is not resumed; `why` is for people.
     pub fn handle_access(&mut self, access: Access, why: &str) {
         self.access = Some(access);
         if access != Access::Lost {
             return;
         }
+        self.may_move = false;
         match self.phase {
             Phase::None | Phase::Arrived { .. } | Phase::Stopping { .. } => {
                 self.phase = Phase::None;
@@ -142,17 +153,25 @@ impl Navigation {
     }
 
     /// Handles the acknowledgement of an order, or its failure.
-    pub fn handle_delivered(&mut self, order: Order, result: Result<(), String>) {
-        match (self.phase, order) {
-            (Phase::Sending { goal, .. }, Order::Go(sent)) if goal == sent => match result {
-                Ok(()) => {
-                    let before = self.mission;
-                    self.phase = Phase::Underway { goal, before };
-                    self.progress = Progress::Underway;
-                }
-                Err(why) => self.end(Progress::Failed(why)),
-            },
-            (Phase::Stopping { .. }, Order::Stop) => self.phase = Phase::None,
+    pub fn handle_delivered(&mut self, now: Instant, order: Order, result: Result<(), String>) {
+        if self.delivery == Some(order) {
+            self.delivery = None;
+        }
+        match (&mut self.phase, order, result) {
+            (Phase::Sending { goal }, Order::Go(sent), Ok(())) if *goal == sent => {
+                let (goal, before) = (sent, self.mission);
+                self.phase = Phase::Underway { goal, before };
+                self.progress = Progress::Underway;
+            }
+            // It may have arrived all the same.
+            (Phase::Sending { goal }, Order::Go(sent), Err(why)) if *goal == sent => {
+                self.stop(now, Progress::Failed(why));
+            }
+            (Phase::Stopping { .. }, Order::Stop, Ok(())) => {
+                self.may_move = false;
+                self.phase = Phase::None;
+            }
+            (Phase::Stopping { next, .. }, Order::Stop, Err(_)) => *next = now + Self::PAUSE,
             _ => {}
         }
     }
@@ -165,11 +184,14 @@ impl Navigation {
         {
             match end {
                 MissionEnd::Arrived => self.arrive(now),
-                MissionEnd::Failed(why) => self.end(Progress::Failed(why)),
+                MissionEnd::Failed(why) => {
+                    self.may_move = false;
+                    self.end(Progress::Failed(why));
+                }
             }
         }
         // While an order is on its way, the report may already be that of the new mission.
-        if !matches!(self.phase, Phase::Sending { is_sent: true, .. }) {
+        if !matches!(self.phase, Phase::Sending { .. }) {
             self.mission = mission.number;
         }
     }
@@ -183,25 +205,34 @@ impl Navigation {
         }
     }
 
-    /// The order to deliver now.
+    /// Whether an order is being delivered that the next one replaces: its delivery has to be ended.
+    #[must_use]
+    pub const fn is_superseded(&self) -> bool {
+        let is_current = match (self.delivery, self.phase) {
+            (None, _) => true,
+            (Some(Order::Go(_)), phase) => matches!(phase, Phase::Sending { .. }),
+            (Some(Order::Stop), phase) => matches!(phase, Phase::Stopping { .. }),
+        };
+        !is_current
+    }
+
+    /// The order to deliver now. Each one waits until the delivery of the one before has ended, so that
+    /// none overtakes another.
     pub fn poll_order(&mut self, now: Instant) -> Option<Order> {
         self.handle_time(now);
-        let is_ready = self.access == Some(Access::Ready);
-        match &mut self.phase {
-            Phase::Waiting { goal, .. } if is_ready => {
-                let goal = *goal;
-                self.phase = Phase::Sending {
-                    goal,
-                    is_sent: true,
-                };
+        if self.access != Some(Access::Ready) || self.delivery.is_some() {
+            return None;
+        }
+        self.delivery = match self.phase {
+            Phase::Waiting { goal, .. } => {
+                self.may_move = true;
+                self.phase = Phase::Sending { goal };
                 Some(Order::Go(goal))
             }
-            Phase::Stopping { is_sent, .. } if is_ready && !*is_sent => {
-                *is_sent = true;
-                Some(Order::Stop)
-            }
+            Phase::Stopping { next, .. } if now >= next => Some(Order::Stop),
             _ => None,
-        }
+        };
+        self.delivery
     }
 
     /// Applies the timeouts.
@@ -219,6 +250,7 @@ impl Navigation {
     }
 
     fn arrive(&mut self, now: Instant) {
+        self.may_move = false;
         let until = now + Self::HOLD;
         self.phase = Phase::Arrived { until };
         self.progress = Progress::Arrived;
@@ -235,10 +267,19 @@ impl Navigation {
         !matches!(self.phase, Phase::None)
     }
 
-    /// How far the last goal is.
+    /// The progress of the last goal.
     #[must_use]
     pub const fn progress(&self) -> &Progress {
         &self.progress
+    }
+}
+
+impl fmt::Display for Order {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Go(_) => "the goal",
+            Self::Stop => "the stop on the way to a goal",
+        })
     }
 }
 
@@ -290,7 +331,7 @@ mod tests {
         navigation.handle_access(Access::Ready, "");
         assert_eq!(navigation.poll_order(now), Some(Order::Go(GOAL)));
         assert_eq!(navigation.poll_order(now), None, "it is on its way");
-        navigation.handle_delivered(Order::Go(GOAL), Ok(()));
+        navigation.handle_delivered(now, Order::Go(GOAL), Ok(()));
         navigation
     }
 
@@ -313,7 +354,7 @@ mod tests {
         navigation.handle_access(Access::Ready, "");
         assert!(navigation.poll_order(now).is_some());
         navigation.handle_mission(now, going(1));
-        navigation.handle_delivered(Order::Go(GOAL), Ok(()));
+        navigation.handle_delivered(now, Order::Go(GOAL), Ok(()));
         let failed = MissionEnd::Failed("there is no path".to_owned());
         navigation.handle_mission(now, over(1, failed));
         let why = Progress::Failed("there is no path".to_owned());
@@ -364,7 +405,7 @@ mod tests {
         assert!(navigation.wants_control());
         assert_eq!(navigation.poll_order(now), Some(Order::Stop));
         assert_eq!(navigation.poll_order(now), None);
-        navigation.handle_delivered(Order::Stop, Ok(()));
+        navigation.handle_delivered(now, Order::Stop, Ok(()));
         assert!(!navigation.wants_control());
         assert_eq!(*navigation.progress(), Progress::Cancelled);
     }
@@ -377,9 +418,72 @@ mod tests {
         let other = Goal { x: 0.0, ..GOAL };
         navigation.set(now, other);
         assert_eq!(navigation.poll_order(now), Some(Order::Go(other)));
-        navigation.handle_delivered(Order::Go(other), Ok(()));
+        navigation.handle_delivered(now, Order::Go(other), Ok(()));
         let stopped = MissionEnd::Failed("replaced".to_owned());
         navigation.handle_mission(now, over(4, stopped));
         assert_eq!(*navigation.progress(), Progress::Underway);
+    }
+
+    #[test]
+    fn a_stop_or_another_goal_waits_until_the_delivery_of_the_goal_has_ended() {
+        let now = Instant::now();
+        let other = Goal { x: 0.0, ..GOAL };
+        for replacement in [None, Some(other)] {
+            let mut navigation = Navigation::default();
+            navigation.set(now, GOAL);
+            navigation.handle_access(Access::Ready, "");
+            assert_eq!(navigation.poll_order(now), Some(Order::Go(GOAL)));
+            assert!(!navigation.is_superseded());
+            match replacement {
+                None => navigation.cancel(now),
+                Some(goal) => navigation.set(now, goal),
+            }
+            assert!(navigation.is_superseded());
+            assert_eq!(navigation.poll_order(now), None, "the first is on its way");
+            navigation.handle_delivered(now, Order::Go(GOAL), Err("replaced".to_owned()));
+            assert!(!navigation.is_superseded());
+            let next = replacement.map_or(Order::Stop, Order::Go);
+            assert_eq!(navigation.poll_order(now), Some(next));
+        }
+    }
+
+    #[test]
+    fn a_goal_that_waits_to_replace_another_one_is_cancelled_with_a_stop() {
+        let now = Instant::now();
+        let mut navigation = underway(now);
+        navigation.set(now, Goal { x: 0.0, ..GOAL });
+        navigation.cancel(now);
+        assert_eq!(navigation.poll_order(now), Some(Order::Stop));
+    }
+
+    #[test]
+    fn a_stop_that_is_not_acknowledged_is_repeated_for_three_seconds() {
+        let now = Instant::now();
+        let mut navigation = underway(now);
+        navigation.cancel(now);
+        let mut at = now;
+        let mut stops = 0;
+        while navigation.wants_control() {
+            if navigation.poll_order(at) == Some(Order::Stop) {
+                stops += 1;
+                navigation.handle_delivered(at, Order::Stop, Err("no answer".to_owned()));
+            }
+            at += Duration::from_millis(50);
+        }
+        assert_eq!(stops, 30);
+        assert!(at >= now + Navigation::STOPPING);
+    }
+
+    #[test]
+    fn a_goal_that_was_not_acknowledged_is_stopped_because_it_may_have_arrived() {
+        let now = Instant::now();
+        let mut navigation = Navigation::default();
+        navigation.set(now, GOAL);
+        navigation.handle_access(Access::Ready, "");
+        assert!(navigation.poll_order(now).is_some());
+        navigation.handle_delivered(now, Order::Go(GOAL), Err("no answer".to_owned()));
+        assert_eq!(navigation.poll_order(now), Some(Order::Stop));
+        let why = Progress::Failed("no answer".to_owned());
+        assert_eq!(*navigation.progress(), why);
     }
 }

@@ -13,6 +13,7 @@ use jaus::messages::mobility::{SetLocalWaypoint, SetTravelSpeed};
 use jaus::node::{now, sleep_until};
 use jaus_vehicle::messages::ground::set_destination::Approved;
 use jaus_vehicle::messages::ground::{SetDestination, StopMission};
+use tokio::sync::oneshot;
 use tokio::task::{AbortHandle, JoinSet};
 
 use super::goal::{Goal, Navigation, Order};
@@ -41,6 +42,8 @@ pub(super) enum Finished {
     /// A component received an emergency or its end, with its state afterwards.
     Alarmed {
         peer: JausId,
+        /// The request that it belongs to.
+        request: u64,
         status: Option<ReportStatus>,
     },
 }
@@ -50,6 +53,11 @@ pub(super) struct Jobs {
     component: Component,
     tasks: JoinSet<Finished>,
     steering: Option<Steering>,
+    /// Ends the delivery of the last order when it is dropped.
+    order: Option<oneshot::Sender<()>>,
+    /// The number of the last request to set or clear an emergency, and its deliveries.
+    request: u64,
+    alarms: Vec<AbortHandle>,
 }
 
 /// The last velocity sent.
@@ -76,6 +84,9 @@ impl Jobs {
             component,
             tasks: JoinSet::new(),
             steering: None,
+            order: None,
+            request: 0,
+            alarms: Vec::new(),
         }
     }
 
@@ -83,8 +94,10 @@ impl Jobs {
     pub(super) async fn finished(&mut self) -> Finished {
         loop {
             match self.tasks.join_next().await {
+                // The end of a delivery of an earlier request says nothing about the last one.
+                Some(Ok(Finished::Alarmed { request, .. })) if request != self.request => {}
                 Some(Ok(finished)) => return finished,
-                // A velocity replaced by a newer one.
+                // A velocity or an emergency replaced by a newer one.
                 Some(Err(_)) => {}
                 None => std::future::pending().await,
             }
@@ -143,26 +156,50 @@ impl Jobs {
     /// Sends an order about a goal to a planner or a waypoint driver.
     pub(super) fn order(&mut self, session: &Arc<Session>, role: Role, order: Order, speed: f64) {
         let session = Arc::clone(session);
+        let (ends, end) = oneshot::channel();
+        self.order = Some(ends);
         self.tasks.spawn(async move {
-            let delivered = within(ORDER_PATIENCE, follow(&session, role, order, speed)).await;
-            let result = delivered.unwrap_or_else(|| {
-                let waited = ORDER_PATIENCE.as_secs();
-                Err(format!("the vehicle has not answered for {waited} s"))
-            });
+            let delivery = within(ORDER_PATIENCE, follow(&session, role, order, speed));
+            let result = tokio::select! {
+                delivered = delivery => delivered.unwrap_or_else(|| {
+                    let waited = ORDER_PATIENCE.as_secs();
+                    Err(format!("the vehicle has not answered for {waited} s"))
+                }),
+                _ = end => Err("it was replaced by another order".to_owned()),
+            };
             Finished::Ordered { order, result }
         });
     }
 
+    /// Ends the delivery of the last order, which reports its completion nevertheless.
+    pub(super) fn end_order(&mut self) {
+        self.order = None;
+    }
+
+    /// Ends the deliveries of an emergency or its end, before the next request.
+    pub(super) fn end_alarms(&mut self) {
+        self.request += 1;
+        for alarm in self.alarms.drain(..) {
+            alarm.abort();
+        }
+    }
+
     /// Sends an emergency or its end to a component, then queries its state.
     pub(super) fn alarm(&mut self, peer: JausId, on: bool) {
-        let component = self.component.clone();
-        self.tasks.spawn(async move {
+        let (component, request) = (self.component.clone(), self.request);
+        let alarm = self.tasks.spawn(async move {
             // Some peers never acknowledge. Their state decides.
-            let _ = within(ALARM_PATIENCE, tell_emergency(&component, peer, on)).await;
+            let _ = within(ALARM_PATIENCE, deliver_emergency(&component, peer, on)).await;
             let status = component.query(peer, &QueryStatus {});
             let status = within(ALARM_PATIENCE, status).await.and_then(Result::ok);
-            Finished::Alarmed { peer, status }
+            Finished::Alarmed {
+                peer,
+                request,
+                status,
+            }
         });
+        self.alarms.retain(|alarm| !alarm.is_finished());
+        self.alarms.push(alarm);
     }
 }
 
@@ -186,7 +223,7 @@ async fn within<T>(limit: Duration, future: impl Future<Output = T>) -> Option<T
     }
 }
 
-async fn tell_emergency(component: &Component, peer: JausId, on: bool) {
+async fn deliver_emergency(component: &Component, peer: JausId, on: bool) {
     let priority = Priority::SafetyCritical;
     let delivered = if on {
         let emergency_code = EmergencyCode(1);

@@ -9,6 +9,7 @@ use jaus::component::{
 };
 
 use super::drive::Access;
+use super::vehicle::Role;
 
 /// The control of a component that the bridge wants or has.
 #[derive(Debug, Default)]
@@ -25,9 +26,9 @@ enum Phase {
     #[default]
     Free,
     /// Until the session has begun.
-    Beginning(JausId),
+    Beginning(Target),
     Begun {
-        peer: JausId,
+        target: Target,
         session: Arc<Session>,
         /// Whether it was ready. From then on, the component is not made ready again: its standby
         /// has a reason.
@@ -35,32 +36,36 @@ enum Phase {
     },
 }
 
+/// A component, and the service by which it is commanded.
+pub(super) type Target = (JausId, Role);
+
 impl Lease {
     /// Requests or releases control. Returns the component with which a session has to be
     /// [begun](begin).
-    pub(super) fn want(&mut self, peer: Option<JausId>) -> Option<JausId> {
-        if self.peer() == peer {
+    pub(super) fn want(&mut self, target: Option<Target>) -> Option<JausId> {
+        if self.target() == target {
             return None;
         }
         // Dropping the session releases control.
-        self.phase = peer.map_or(Phase::Free, Phase::Beginning);
+        self.phase = target.map_or(Phase::Free, Phase::Beginning);
         self.logged = None;
-        if peer.is_some() {
+        if target.is_some() {
             self.obstacle.clear();
         }
-        peer
+        target.map(|(peer, _)| peer)
     }
 
     /// Handles the begin of a session.
     pub(super) fn handle_begun(&mut self, peer: JausId, begun: Result<Session, SessionError>) {
         // Otherwise it is no longer wanted, and dropping it releases control.
-        if !matches!(self.phase, Phase::Beginning(it) if it == peer) {
-            return;
-        }
+        let target = match self.phase {
+            Phase::Beginning(target) if target.0 == peer => target,
+            _ => return,
+        };
         match begun {
             Ok(session) => {
                 self.phase = Phase::Begun {
-                    peer,
+                    target,
                     session: Arc::new(session),
                     was_ready: false,
                 };
@@ -72,13 +77,13 @@ impl Lease {
         }
     }
 
-    /// How far control is; `None` if it is not wanted.
+    /// The access to the component; `None` if it is not wanted.
     pub(super) fn access(&mut self) -> Option<Access> {
         let Phase::Begun {
             session, was_ready, ..
         } = &mut self.phase
         else {
-            return self.peer().map(|_| Access::Pending);
+            return self.target().map(|_| Access::Pending);
         };
         let state = session.state();
         if self.logged.replace(state) != Some(state) {
@@ -104,18 +109,20 @@ impl Lease {
         Some(access)
     }
 
-    /// The session, if the component obeys.
-    pub(super) fn session(&self) -> Option<&Arc<Session>> {
+    /// The session if the component obeys, and the service by which it is commanded.
+    pub(super) fn session(&self) -> Option<(&Arc<Session>, Role)> {
         match &self.phase {
-            Phase::Begun { session, .. } if session.check().is_ok() => Some(session),
+            Phase::Begun {
+                session, target, ..
+            } if session.check().is_ok() => Some((session, target.1)),
             _ => None,
         }
     }
 
-    const fn peer(&self) -> Option<JausId> {
+    const fn target(&self) -> Option<Target> {
         match &self.phase {
             Phase::Free => None,
-            Phase::Beginning(peer) | Phase::Begun { peer, .. } => Some(*peer),
+            Phase::Beginning(target) | Phase::Begun { target, .. } => Some(*target),
         }
     }
 
@@ -125,11 +132,11 @@ impl Lease {
     }
 
     /// The state of control, for people.
-    pub(super) fn words(&self) -> String {
+    pub(super) fn description(&self) -> String {
         match &self.phase {
             Phase::Free if self.obstacle.is_empty() => "not wanted".to_owned(),
             Phase::Free => self.obstacle.clone(),
-            Phase::Beginning(peer) => format!("control of {peer} is requested"),
+            Phase::Beginning((peer, _)) => format!("control of {peer} is requested"),
             Phase::Begun { session, .. } => session.state().to_string(),
         }
     }
@@ -145,4 +152,22 @@ pub(super) async fn begin(
         .retake(Retake::Never)
         .target(TargetState::Ready);
     component.session(peer, settings).await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PEER: JausId = JausId::new(101, 1, 33);
+
+    #[test]
+    fn a_component_that_is_commanded_by_another_service_gets_another_session() {
+        let mut lease = Lease::default();
+        let primitive = Some((PEER, Role::PrimitiveDriver));
+        assert_eq!(lease.want(primitive), Some(PEER));
+        assert_eq!(lease.want(primitive), None);
+        assert_eq!(lease.want(Some((PEER, Role::VelocityDriver))), Some(PEER));
+        assert_eq!(lease.want(None), None);
+        assert_eq!(lease.target(), None);
+    }
 }

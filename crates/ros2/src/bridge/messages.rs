@@ -99,12 +99,16 @@ impl Types {
         set_header(&mut message, "header", sample.stamp, &frames.base)?;
         message.set("latitude", sample.latitude)?;
         message.set("longitude", sample.longitude)?;
+        message.set("status.status", HAS_FIX)?;
         // ROS says so for an unknown altitude.
         message.set("altitude", sample.altitude.unwrap_or(f64::NAN))?;
         if let Some(variance) = sample.variance {
             let mut covariance = [0.0; 9];
             for axis in 0..3 {
                 covariance[4 * axis] = variance;
+            }
+            if sample.altitude.is_none() {
+                covariance[8] = UNKNOWN_ALTITUDE;
             }
             message.set("position_covariance", covariance)?;
             message.set("position_covariance_type", APPROXIMATED)?;
@@ -150,6 +154,11 @@ impl Types {
 
 /// NavSatFix: the covariance is an estimate.
 const APPROXIMATED: u8 = 1;
+
+/// NavSatStatus: there is a position. JAUS reports none without one.
+const HAS_FIX: i8 = 0;
+/// The variance of an unknown altitude: a deviation of 10 km. m²
+const UNKNOWN_ALTITUDE: f64 = 1e8;
 
 /// A text without NUL, which ROS cannot have in a string.
 fn text(text: &str) -> Value {
@@ -302,7 +311,9 @@ mod tests {
         };
         let message = sent(&types.fix(&fix, &frames).unwrap());
         assert!(message.float("altitude").unwrap().is_nan());
-        assert_eq!(message.float("position_covariance[8]").unwrap(), 4.0);
+        assert_eq!(message.float("status.status").unwrap(), 0.0);
+        assert_eq!(message.float("position_covariance[4]").unwrap(), 4.0);
+        assert_eq!(message.float("position_covariance[8]").unwrap(), 1e8);
         let diagnostic = Diagnostic {
             level: Level::Error,
             name: "a\0b".to_owned(),

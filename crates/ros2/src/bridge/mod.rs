@@ -21,6 +21,7 @@ mod lease;
 mod messages;
 mod part;
 mod ports;
+mod publishers;
 mod report;
 mod report_topics;
 mod reports;
@@ -40,7 +41,8 @@ pub use counters::{Counter, Counters};
 pub use definition::Definition;
 pub use messages::Frames;
 pub use part::{Bridge, BridgeError};
-pub use ports::{GoalPose, Input, Output};
+pub use ports::{Command, GoalPose, Input, Output};
+pub use publishers::Outdated;
 pub use reports::{Reports, UnknownReport};
 pub use topics::TopicSettings;
 

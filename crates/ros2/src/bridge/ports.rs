@@ -1,6 +1,6 @@
 //! The messages between the vehicle's side of the bridge and the ROS side.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::address::JausId;
@@ -16,12 +16,7 @@ use crate::graph::Gid;
 #[derive(Debug, Clone, PartialEq)]
 pub enum Input {
     /// A `cmd_vel`.
-    Twist {
-        /// The publisher.
-        publisher: Gid,
-        /// The velocity.
-        twist: Twist,
-    },
+    Twist(Command),
     /// A `goal_pose`.
     Goal(GoalPose),
     /// An `emergency_stop`: whether to set it or to clear it.
@@ -30,10 +25,30 @@ pub enum Input {
     Release,
     /// A publisher of `cmd_vel` is gone.
     PublisherGone(Gid),
-    /// A message could not be read.
-    Undecoded,
+    /// Messages were lost on the ROS side.
+    Lost {
+        /// How many could not be read.
+        malformed: u64,
+        /// How many were not taken in time.
+        dropped: u64,
+    },
     /// The ROS network was lost: no publisher can be heard.
     Disconnected,
+}
+
+/// A `cmd_vel` with what rmw_zenoh attaches to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Command {
+    /// The publisher.
+    pub publisher: Gid,
+    /// The number of the message among those of its publisher.
+    pub sequence: i64,
+    /// When it was sent, in nanoseconds by the clock of the sender.
+    pub stamp: i64,
+    /// When the session received it.
+    pub arrival: Instant,
+    /// The velocity.
+    pub twist: Twist,
 }
 
 /// A geometry_msgs/PoseStamped.

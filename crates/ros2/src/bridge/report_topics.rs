@@ -22,6 +22,8 @@ pub(super) struct ReportTopics {
     interfaces: Interfaces,
     /// `None` for a report that cannot be published, which was logged.
     publishers: BTreeMap<(JausId, Definition), Option<Publisher>>,
+    /// How many reports were not published, because there are too many topics or they are malformed.
+    refused: u64,
 }
 
 impl ReportTopics {
@@ -49,6 +51,7 @@ impl ReportTopics {
             package,
             interfaces,
             publishers: BTreeMap::new(),
+            refused: 0,
         }))
     }
 
@@ -65,7 +68,10 @@ impl ReportTopics {
         let key = (source, definition.clone());
         let publisher = match self.publishers.entry(key) {
             Entry::Occupied(known) => known.into_mut(),
-            Entry::Vacant(_) if is_full => return,
+            Entry::Vacant(_) if is_full => {
+                self.refused += 1;
+                return;
+            }
             Entry::Vacant(new) => {
                 let topic = topic(namespace, source, &definition.message.name);
                 let made = publisher(&self.package, &self.interfaces, node, &topic, definition);
@@ -79,6 +85,28 @@ impl ReportTopics {
             && let Err(why) = publish(&self.package, publisher, definition, octets)
         {
             tracing::debug!(%source, "{}: {why}", definition.message.name);
+            self.refused += 1;
+        }
+    }
+}
+
+impl Drop for ReportTopics {
+    fn drop(&mut self) {
+        let publishers = self.publishers.values().flatten();
+        let dropped: u64 = publishers.map(Publisher::dropped).sum();
+        for (number, what) in [
+            (
+                dropped,
+                "further reports dropped because a link to ROS was congested",
+            ),
+            (
+                self.refused,
+                "further reports not published: malformed, or too many topics",
+            ),
+        ] {
+            if number > 0 {
+                tracing::info!("{number} {what}");
+            }
         }
     }
 }

@@ -14,21 +14,20 @@ use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::counters::{Counter, Counters};
-use super::diagnostics::{BridgeState, diagnostics};
+use super::diagnostics::{BridgeState, NO_DRIVER, diagnostics};
 use super::drive::{Access, Drive, Refusal};
 use super::emergency::Emergency;
-use super::following::{Extra, Following, Sighting};
+use super::following::{Extra, Following, Received};
 use super::frames::between_local_and_map;
 use super::goal::{Goal, Navigation};
 use super::jobs::{Finished, Jobs};
 use super::lease::Lease;
-use super::ports::{GoalPose, Input, Output};
+use super::ports::{Command, GoalPose, Input, Output};
 use super::report::Report;
 use super::samples::{FixSample, Odometry, PoseSample, TwistSample};
 use super::vehicle::{Role, Vehicle};
-use super::velocity::{Twist, Velocity};
+use super::velocity::Velocity;
 use super::{Reports, Settings};
-use crate::graph::Gid;
 
 /// The vehicle's side of the bridge.
 pub(super) struct Runner {
@@ -47,7 +46,7 @@ pub(super) struct Runner {
     goal_lease: Lease,
     emergency: Emergency,
     odometry: Odometry,
-    sightings: mpsc::Receiver<Sighting>,
+    received: mpsc::Receiver<Received>,
     inputs: mpsc::Receiver<Input>,
     outputs: mpsc::Sender<Output>,
     counters: Counters,
@@ -73,11 +72,11 @@ impl Runner {
         inputs: mpsc::Receiver<Input>,
         outputs: mpsc::Sender<Output>,
     ) -> Self {
-        let (sighted, sightings) = mpsc::channel(Self::QUEUE);
+        let (sender, received) = mpsc::channel(Self::QUEUE);
         Self {
             vehicle: Vehicle::new(component.id(), settings.vehicle.clone()),
             known: None,
-            following: Following::new(component.clone(), sighted, settings.rate_hz),
+            following: Following::new(component.clone(), sender, settings.rate_hz),
             jobs: Jobs::new(component.clone()),
             drive: Drive::new(settings.drive),
             drive_lease: Lease::default(),
@@ -92,7 +91,7 @@ impl Runner {
             time,
             settings,
             reports,
-            sightings,
+            received,
             inputs,
             outputs,
         }
@@ -115,7 +114,7 @@ impl Runner {
                     }
                     None => return PartError::Broken("the ROS side has ended".to_owned()),
                 },
-                Some((by, report)) = self.sightings.recv() => {
+                Some((by, report)) = self.received.recv() => {
                     self.handle_report(now(), by, report);
                     continue;
                 }
@@ -131,15 +130,22 @@ impl Runner {
 
     fn handle_input(&mut self, now: Instant, input: Input) {
         match input {
-            Input::Twist { publisher, twist } => self.handle_twist(now, publisher, &twist),
+            Input::Twist(command) => self.handle_twist(now, &command),
             Input::Goal(pose) => self.handle_goal(now, &pose),
             Input::EmergencyStop(on) => self.handle_emergency(now, on),
             Input::Release => {
-                self.drive.release(now);
+                self.drive.halt(now);
                 self.navigation.cancel(now);
             }
-            Input::PublisherGone(publisher) => self.drive.handle_publisher_gone(now, publisher),
-            Input::Undecoded => self.refuse(Counter::Undecoded, "it has another type"),
+            Input::PublisherGone(publisher) => {
+                if self.drive.handle_publisher_gone(now, publisher) {
+                    tracing::warn!("the publisher of cmd_vel is gone: stopping the vehicle");
+                }
+            }
+            Input::Lost { malformed, dropped } => {
+                self.counters.add_many(Counter::Malformed, malformed);
+                self.counters.add_many(Counter::NotTaken, dropped);
+            }
             Input::Disconnected => {
                 if self.drive.is_moving() || self.navigation.wants_control() {
                     tracing::warn!("the ROS network was lost: stopping the vehicle");
@@ -150,15 +156,23 @@ impl Runner {
         }
     }
 
-    fn handle_twist(&mut self, now: Instant, publisher: Gid, twist: &Twist) {
+    /// Logs once that no component takes the velocities.
+    fn warn_without_driver(&mut self) {
+        if self.vehicle.drive().is_none() && self.logged.insert(Counter::Velocities) {
+            tracing::warn!("{NO_DRIVER}");
+        }
+    }
+
+    fn handle_twist(&mut self, now: Instant, command: &Command) {
         self.counters.add(Counter::Velocities);
         if self.settings.control.is_none() {
             return self.refuse(Counter::ReadOnly, "allow commands with --control AUTHORITY");
         }
-        let refusal = match self.drive.handle_command(now, publisher, twist) {
+        self.warn_without_driver();
+        let refusal = match self.drive.handle_command(now, command) {
             Ok(()) => {
                 if self.drive.is_moving() {
-                    // Whoever drives by hand takes over from a goal.
+                    // A velocity replaces a goal.
                     self.navigation.cancel(now);
                 }
                 return;
@@ -168,6 +182,7 @@ impl Runner {
         let counter = match refusal {
             Refusal::Invalid(_) => Counter::InvalidVelocity,
             Refusal::OtherPublisher => Counter::OtherPublisher,
+            Refusal::Outdated(_) => Counter::Outdated,
             Refusal::Locked => Counter::Locked,
         };
         self.refuse(counter, &refusal.to_string());
@@ -181,7 +196,7 @@ impl Runner {
         match self.goal(pose) {
             Ok(goal) => {
                 tracing::info!("goal: {:.1} m north, {:.1} m east", goal.x, goal.y);
-                self.drive.release(now);
+                self.drive.halt(now);
                 self.navigation.set(now, goal);
             }
             Err(why) => self.refuse(Counter::GoalRefused, &why),
@@ -227,11 +242,8 @@ impl Runner {
         } else {
             tracing::info!("the emergency is cleared from ROS");
         }
-        let parts: Vec<_> = self.vehicle.all(Role::Management).collect();
-        if parts.is_empty() {
-            tracing::warn!("no component of the vehicle is known that takes emergencies");
-        }
-        self.emergency.request(now, on, parts);
+        self.jobs.end_alarms();
+        self.emergency.request(now, on);
     }
 
     /// Counts a refusal, and logs the first of its kind.
@@ -309,11 +321,11 @@ impl Runner {
             }
             Finished::Ordered { order, result } => {
                 if let Err(why) = &result {
-                    tracing::warn!("the goal was not delivered: {why}");
+                    tracing::warn!("{order} was not delivered: {why}");
                 }
-                self.navigation.handle_delivered(order, result);
+                self.navigation.handle_delivered(now, order, result);
             }
-            Finished::Alarmed { peer, status } => {
+            Finished::Alarmed { peer, status, .. } => {
                 self.emergency.handle_delivered(peer);
                 if let Some(status) = status {
                     self.handle_status(now, peer, status.status.0);
@@ -328,7 +340,8 @@ impl Runner {
         if !is_known.is_some_and(|known| Arc::ptr_eq(known, &directory)) {
             self.vehicle.handle_directory(&directory);
             let extras = self.extras(&directory);
-            self.following.follow(&self.vehicle, extras);
+            let refused = self.following.follow(&self.vehicle, extras);
+            self.counters.add_many(Counter::NotSubscribed, refused);
             self.known = Some(directory);
         }
         self.drive.handle_time(now);
@@ -352,7 +365,8 @@ impl Runner {
     /// Sends what is to be repeated: the velocity, and an emergency.
     fn command(&mut self, now: Instant) {
         self.steer(now);
-        if let Some((on, due)) = self.emergency.poll(now) {
+        let parts = self.vehicle.all(Role::Management);
+        if let Some((on, due)) = self.emergency.poll(now, parts) {
             for part in due {
                 self.jobs.alarm(part, on);
             }
@@ -367,8 +381,7 @@ impl Runner {
         }
         let driver = self.vehicle.drive();
         let wanted = driver.filter(|_| self.drive.wants_control());
-        let peer = wanted.map(|(id, _)| id);
-        if let Some(peer) = self.drive_lease.want(peer)
+        if let Some(peer) = self.drive_lease.want(wanted)
             && let Some(authority) = self.settings.control
         {
             self.jobs.begin(true, peer, authority);
@@ -379,8 +392,7 @@ impl Runner {
         let Some(velocity) = self.drive.poll_velocity(now) else {
             return;
         };
-        if let (Some(session), Some((_, role))) = (self.drive_lease.session(), self.vehicle.drive())
-        {
+        if let Some((session, role)) = self.drive_lease.session() {
             let limits = self.settings.drive.limits;
             self.jobs.steer(now, session, role, velocity, limits);
         }
@@ -396,12 +408,15 @@ impl Runner {
         }
         let target = self.vehicle.goal();
         let wanted = target.filter(|_| self.navigation.wants_control());
-        if let Some(peer) = self.goal_lease.want(wanted.map(|(id, _)| id))
+        if let Some(peer) = self.goal_lease.want(wanted)
             && let Some(authority) = self.settings.control
         {
             self.jobs.begin(false, peer, authority);
         }
-        let (Some(session), Some((_, role))) = (self.goal_lease.session(), target) else {
+        if self.navigation.is_superseded() {
+            self.jobs.end_order();
+        }
+        let Some((session, role)) = self.goal_lease.session() else {
             return;
         };
         if let Some(order) = self.navigation.poll_order(now) {
@@ -413,7 +428,7 @@ impl Runner {
     fn publish_status(&mut self, now: Instant) {
         let control = format!(
             "{}; {}",
-            self.drive_lease.words(),
+            self.drive_lease.description(),
             self.navigation.progress()
         );
         let is_due = self.published.as_ref().is_none_or(|(at, said)| {
@@ -424,7 +439,7 @@ impl Runner {
         }
         let bridge = BridgeState {
             authority: self.settings.control,
-            drive: self.drive_lease.words(),
+            drive: self.drive_lease.description(),
             obstacle: self.drive_lease.obstacle(),
             goal: self.navigation.progress().to_string(),
             counters: &self.counters,

@@ -2,18 +2,22 @@
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
+use std::time::Duration;
 
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
+use tokio::time::interval;
 
 use super::messages::{Frames, Types, read_goal, read_twist};
-use super::ports::{Input, Output};
+use super::ports::{Command, Input, Output};
 use super::report_topics::ReportTopics;
 use super::samples::PoseSample;
-use crate::graph::{Gid, Qos};
+use crate::graph::{Endpoint, Entity, EntityKind, Gid, Qos};
 use crate::interface::Interface;
 use crate::message::{Message, ValueError};
-use crate::session::{Node, Publisher, Received, Ros, SessionError, Subscription};
+use crate::session::{
+    Node, Publisher, Received, Ros, SessionError, Subscription, SubscriptionCounters,
+};
 
 /// The names and forms of the topics.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -120,9 +124,15 @@ impl Topics {
         };
         let cmd_vel = self.subscription("cmd_vel", twist)?;
         tasks.spawn(forward(cmd_vel, inputs.clone(), move |received| {
-            let publisher = received.attachment.gid;
-            let twist = read_twist(&received.message, path).ok()?;
-            Some(Input::Twist { publisher, twist })
+            // The stamp of a TwistStamped is not checked: with simulated time, it runs at another
+            // rate than the clock of the bridge.
+            Some(Input::Twist(Command {
+                publisher: received.attachment.gid,
+                sequence: received.attachment.sequence,
+                stamp: received.attachment.stamp,
+                arrival: received.arrival,
+                twist: read_twist(&received.message, path).ok()?,
+            }))
         }));
         let goal = self.subscription("goal_pose", &self.types.pose)?;
         tasks.spawn(forward(goal, inputs.clone(), |received| {
@@ -135,11 +145,13 @@ impl Topics {
         }));
         let release = self.subscription("release", &self.types.empty)?;
         tasks.spawn(forward(release, inputs.clone(), |_| Some(Input::Release)));
-        tasks.spawn(watch(
-            self.ros.clone(),
-            self.topic("cmd_vel"),
-            inputs.clone(),
-        ));
+        let watch = Watch {
+            ros: self.ros.clone(),
+            topic: self.topic("cmd_vel"),
+            interface: twist.clone(),
+            inputs: inputs.clone(),
+        };
+        tasks.spawn(watch.run());
         Ok(tasks)
     }
 
@@ -211,50 +223,165 @@ impl Topics {
     }
 }
 
+impl Drop for Topics {
+    fn drop(&mut self) {
+        let all = [
+            &self.odometry,
+            &self.pose,
+            &self.twist,
+            &self.fix,
+            &self.status,
+            &self.transform,
+        ];
+        let publishers = all.iter().filter_map(|lazy| lazy.0.as_ref());
+        let dropped: u64 = publishers.map(Publisher::dropped).sum();
+        if dropped > 0 {
+            tracing::info!("{dropped} messages dropped because a link to ROS was congested");
+        }
+    }
+}
+
+/// How often the messages that a subscription has lost are counted.
+const LOOK: Duration = Duration::from_secs(1);
+
 /// Sends the messages of a subscription as inputs, until the bridge ends.
 async fn forward(
     mut subscription: Subscription,
     inputs: mpsc::Sender<Input>,
     read: impl Fn(&Received) -> Option<Input>,
 ) {
-    let mut malformed = 0;
+    let mut counted = SubscriptionCounters::default();
+    let mut look = interval(LOOK);
     loop {
-        let received = subscription.receive().await;
-        let counted = subscription.counters().malformed;
-        if counted > std::mem::replace(&mut malformed, counted)
-            && inputs.send(Input::Undecoded).await.is_err()
-        {
-            return;
-        }
-        let input = read(&received).unwrap_or(Input::Undecoded);
+        let input = tokio::select! {
+            received = subscription.receive() => read(&received).unwrap_or(Input::Lost {
+                malformed: 1,
+                dropped: 0,
+            }),
+            _ = look.tick() => match lost(&mut counted, subscription.counters()) {
+                Some(input) => input,
+                None => continue,
+            },
+        };
         if inputs.send(input).await.is_err() {
             return;
         }
     }
 }
 
+/// What was lost since the counters were read before.
+fn lost(counted: &mut SubscriptionCounters, now: SubscriptionCounters) -> Option<Input> {
+    let before = std::mem::replace(counted, now);
+    (before != now).then(|| Input::Lost {
+        malformed: now.malformed - before.malformed,
+        dropped: now.dropped - before.dropped,
+    })
+}
+
 /// Reports publishers of `cmd_vel` that are gone, and the loss of the network.
-async fn watch(ros: Ros, topic: String, inputs: mpsc::Sender<Input>) {
-    let mut changes = ros.changes();
-    let mut known: BTreeSet<Gid> = BTreeSet::new();
-    let mut was_connected = false;
-    loop {
-        changes.borrow_and_update();
-        let is_connected = ros.is_connected();
-        let is_lost = std::mem::replace(&mut was_connected, is_connected) && !is_connected;
-        if is_lost && inputs.send(Input::Disconnected).await.is_err() {
-            return;
-        }
-        let publishers = ros.publishers(&topic);
-        let present = publishers.iter().map(crate::graph::Token::gid).collect();
-        let before = std::mem::replace(&mut known, present);
-        for gone in before.difference(&known) {
-            if inputs.send(Input::PublisherGone(*gone)).await.is_err() {
+struct Watch {
+    ros: Ros,
+    topic: String,
+    interface: Arc<Interface>,
+    inputs: mpsc::Sender<Input>,
+}
+
+impl Watch {
+    async fn run(self) {
+        let mut changes = self.ros.changes();
+        let mut known: BTreeSet<Gid> = BTreeSet::new();
+        let mut was_connected = false;
+        let mut has_warned = false;
+        loop {
+            changes.borrow_and_update();
+            let is_connected = self.ros.is_connected();
+            let is_lost = std::mem::replace(&mut was_connected, is_connected) && !is_connected;
+            if is_lost && self.inputs.send(Input::Disconnected).await.is_err() {
+                return;
+            }
+            let mut mismatch = None;
+            let gid = |entity: &Entity| {
+                let endpoint = entity.token.endpoint.as_ref();
+                mismatch = mismatch
+                    .take()
+                    .or_else(|| endpoint.and_then(|it| mismatch_of(it, &self.interface)));
+                entity.gid
+            };
+            let present = self.ros.others(EntityKind::Publisher, &self.topic, gid);
+            if let Some(mismatch) = mismatch
+                && !std::mem::replace(&mut has_warned, true)
+            {
+                tracing::warn!("a publisher of {} is not heard: {mismatch}", self.topic);
+            }
+            let before = std::mem::replace(&mut known, present);
+            for gone in before.difference(&known) {
+                let gone = Input::PublisherGone(*gone);
+                if self.inputs.send(gone).await.is_err() {
+                    return;
+                }
+            }
+            if changes.changed().await.is_err() {
                 return;
             }
         }
-        if changes.changed().await.is_err() {
-            return;
-        }
+    }
+}
+
+/// Why the messages of a publisher do not arrive, and the remedy; `None` if they do.
+fn mismatch_of(publisher: &Endpoint, ours: &Interface) -> Option<String> {
+    let name = ours.name();
+    if publisher.type_name != name.dds() {
+        let theirs = &publisher.type_name;
+        let remedy = match name.name() {
+            "Twist" => "use --stamped for TwistStamped",
+            _ => "do not use --stamped for Twist",
+        };
+        return Some(format!(
+            "it has the type {theirs} instead of {name}: {remedy}"
+        ));
+    }
+    let is_same = publisher.type_hash == ours.hash();
+    (!is_same).then(|| {
+        let theirs = &publisher.type_hash;
+        format!("its {name} has the hash {theirs}: use the definition of ROS 2 Jazzy or newer")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_publisher_of_another_type_is_reported_with_the_remedy() {
+        let types = Types::bundled().unwrap();
+        let topic = "/v101/cmd_vel".parse().unwrap();
+        let publisher = |interface| Endpoint::new(&topic, interface, Qos::default());
+        let stamped = publisher(&types.stamped_twist);
+        let why = mismatch_of(&stamped, &types.twist).unwrap();
+        assert!(why.contains("TwistStamped"), "{why}");
+        assert!(why.contains("use --stamped"), "{why}");
+        let mut plain = publisher(&types.twist);
+        assert_eq!(mismatch_of(&plain, &types.twist), None);
+        let why = mismatch_of(&plain, &types.stamped_twist).unwrap();
+        assert!(why.contains("do not use --stamped"), "{why}");
+        plain.type_hash = "TypeHashNotSupported".to_owned();
+        let why = mismatch_of(&plain, &types.twist).unwrap();
+        assert!(why.contains("hash TypeHashNotSupported"), "{why}");
+    }
+
+    #[test]
+    fn lost_messages_are_counted_once() {
+        let mut counted = SubscriptionCounters::default();
+        assert_eq!(lost(&mut counted, SubscriptionCounters::default()), None);
+        let now = SubscriptionCounters {
+            dropped: 2,
+            malformed: 3,
+        };
+        let input = Input::Lost {
+            malformed: 3,
+            dropped: 2,
+        };
+        assert_eq!(lost(&mut counted, now), Some(input));
+        assert_eq!(lost(&mut counted, now), None);
     }
 }

@@ -91,6 +91,9 @@ impl Velocity {
 impl Limits {
     /// What rounding may add to a number on its way.
     const ROUNDING: f64 = 1e-6;
+    /// The step of an effort on the wire, 16 bits for -100 % to 100 %, as a share of the limit. A smaller
+    /// velocity would move nothing, but release the brakes.
+    const STEP: f64 = 2.0 / 65_535.0;
 
     /// The velocity of a twist. A ground vehicle uses two of the six components; the others have no
     /// effect, but have to be finite.
@@ -111,9 +114,13 @@ impl Limits {
         if !within(yaw_rate, self.yaw_rate) {
             return Err(InvalidVelocity::YawRate);
         }
+        let carried = |value: f64, limit: f64| match value.abs() < limit * Self::STEP {
+            true => 0.0,
+            false => value.clamp(-limit, limit),
+        };
         Ok(Velocity {
-            forward: forward.clamp(-self.speed, self.speed),
-            yaw_rate: yaw_rate.clamp(-self.yaw_rate, self.yaw_rate),
+            forward: carried(forward, self.speed),
+            yaw_rate: carried(yaw_rate, self.yaw_rate),
         })
     }
 }
@@ -177,6 +184,26 @@ mod tests {
             ..Twist::default()
         };
         assert_eq!(LIMITS.velocity(&unused), Err(InvalidVelocity::NotFinite));
+    }
+
+    #[test]
+    fn a_velocity_that_the_wire_cannot_carry_is_zero_and_brakes() {
+        for (forward, yaw_rate) in [(1e-9, 0.0), (-6e-5, 4e-5), (f64::MIN_POSITIVE, -1e-12)] {
+            let velocity = LIMITS.velocity(&twist(forward, yaw_rate)).unwrap();
+            assert_eq!(velocity, Velocity::ZERO, "{forward} {yaw_rate}");
+        }
+        let zero = Velocity::ZERO.effort(LIMITS).unwrap();
+        for (forward, yaw_rate) in [(6.2e-5, 0.0), (-6.2e-5, 0.0), (0.0, 4.6e-5)] {
+            let effort = LIMITS.velocity(&twist(forward, yaw_rate)).unwrap();
+            let effort = effort.effort(LIMITS).unwrap();
+            let drives = |it: &SetWrenchEffort| {
+                (
+                    it.propulsive_linear_effort_x_percent(),
+                    it.propulsive_rotational_effort_z_percent(),
+                )
+            };
+            assert_ne!(drives(&effort), drives(&zero), "{forward} {yaw_rate}");
+        }
     }
 
     #[test]

@@ -175,29 +175,25 @@ fn parse(text: &str) -> Option<Qos> {
     let mut parts = text.split(':');
     let mut part = || parts.next();
     let reliability = match part()? {
-        "" | "1" => Reliability::Reliable,
         "2" => Reliability::BestEffort,
-        _ => return None,
+        other => unknown(other, Reliability::Reliable)?,
     };
     let durability = match part()? {
         "1" => Durability::TransientLocal,
-        "" | "2" => Durability::Volatile,
-        _ => return None,
+        other => unknown(other, Durability::Volatile)?,
     };
     let (history, depth) = part()?.split_once(',')?;
     let history = match history {
-        "" | "1" => History::KeepLast,
         "2" => History::KeepAll,
-        _ => return None,
+        other => unknown(other, History::KeepLast)?,
     };
     let depth = number(depth, DEFAULT_DEPTH)?;
     let deadline = time(part()?)?;
     let lifespan = time(part()?)?;
     let (liveliness, lease) = part()?.split_once(',')?;
     let liveliness = match liveliness {
-        "" | "1" => Liveliness::Automatic,
         "3" => Liveliness::ManualByTopic,
-        _ => return None,
+        other => unknown(other, Liveliness::Automatic)?,
     };
     Some(Qos {
         reliability,
@@ -209,6 +205,12 @@ fn parse(text: &str) -> Option<Qos> {
         liveliness,
         lease: time(lease)?,
     })
+}
+
+/// The default for any other number: ROS has numbers for "best available" and "unknown", and later
+/// versions may have more.
+fn unknown<T>(text: &str, default: T) -> Option<T> {
+    number(text, 0).map(|_| default)
 }
 
 fn number(text: &str, default: u64) -> Option<u64> {

@@ -1,17 +1,31 @@
 //! The known entities.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
-use super::{EntityKind, Token, TokenError};
+use super::{EntityKind, Gid, Token, TokenError};
 
 /// The most entities that are kept.
 const MOST_ENTITIES: usize = 1 << 14;
+/// The most entities that are kept of one topic or service.
+const MOST_OF_TOPIC: usize = 1 << 10;
 
 /// The entities that exist, by their tokens.
 #[derive(Debug, Default)]
 pub struct Graph {
-    entities: BTreeMap<String, Token>,
+    entities: BTreeMap<Arc<str>, Entity>,
+    /// The tokens of each topic or service.
+    topics: BTreeMap<String, BTreeSet<Arc<str>>>,
     dropped: u64,
+}
+
+/// A node, or a publisher, a subscription or a service of a node.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entity {
+    /// Its identity, from the key of the token as it was declared.
+    pub gid: Gid,
+    /// What the token says.
+    pub token: Token,
 }
 
 impl Graph {
@@ -23,33 +37,55 @@ impl Graph {
         if self.entities.contains_key(key) {
             return Ok(false);
         }
-        let token = key.parse().inspect_err(|_| self.dropped += 1)?;
-        if self.entities.len() >= MOST_ENTITIES {
+        let token: Token = key.parse().inspect_err(|_| self.dropped += 1)?;
+        if !self.has_room(&token) {
             self.dropped += 1;
             return Ok(false);
         }
-        self.entities.insert(key.to_owned(), token);
+        let key: Arc<str> = key.into();
+        if let Some(name) = token.topic() {
+            let keys = self.topics.entry(name.to_owned()).or_default();
+            keys.insert(key.clone());
+        }
+        let gid = Gid::of_token(&key);
+        self.entities.insert(key, Entity { gid, token });
         Ok(true)
+    }
+
+    fn has_room(&self, token: &Token) -> bool {
+        let of_topic = token.topic().and_then(|name| self.topics.get(name));
+        self.entities.len() < MOST_ENTITIES
+            && of_topic.is_none_or(|keys| keys.len() < MOST_OF_TOPIC)
     }
 
     /// Removes the entity of a token that was withdrawn. Returns whether the graph changed.
     pub fn remove(&mut self, key: &str) -> bool {
-        self.entities.remove(key).is_some()
+        let Some(Entity { token, .. }) = self.entities.remove(key) else {
+            return false;
+        };
+        if let Some(name) = token.topic()
+            && let Some(keys) = self.topics.get_mut(name)
+        {
+            keys.remove(key);
+            if keys.is_empty() {
+                self.topics.remove(name);
+            }
+        }
+        true
     }
 
     /// Every entity with its key, in the order of the keys.
-    pub fn entities(&self) -> impl Iterator<Item = (&str, &Token)> {
+    pub fn entities(&self) -> impl Iterator<Item = (&str, &Entity)> {
         self.entities
             .iter()
-            .map(|(key, token)| (key.as_str(), token))
+            .map(|(key, entity)| (key.as_ref(), entity))
     }
 
-    /// The entities of one kind that use a topic or a service, with their keys.
-    pub fn of_topic(&self, kind: EntityKind, topic: &str) -> impl Iterator<Item = (&str, &Token)> {
-        self.entities().filter(move |(_, token)| {
-            let name = token.endpoint.as_ref().map(|it| it.name.as_str());
-            token.kind == kind && name == Some(topic)
-        })
+    /// The entities of one kind that use a topic or a service.
+    pub fn of_topic(&self, kind: EntityKind, topic: &str) -> impl Iterator<Item = &Entity> {
+        let keys = self.topics.get(topic).into_iter().flatten();
+        keys.filter_map(|key| self.entities.get(key))
+            .filter(move |entity| entity.token.kind == kind)
     }
 
     /// How many tokens were malformed or too many.

@@ -147,10 +147,9 @@ impl Token {
         }
     }
 
-    /// The identity of the entity.
-    #[must_use]
-    pub fn gid(&self) -> Gid {
-        Gid::of_token(&self.to_string())
+    /// The name of its topic or service.
+    pub(super) fn topic(&self) -> Option<&str> {
+        self.endpoint.as_ref().map(|it| it.name.as_str())
     }
 
     /// The full name of the node, such as `/v101/bridge`.
@@ -235,8 +234,8 @@ fn parse(key: &str) -> Result<Token, &'static str> {
         EntityKind::Node => None,
         _ => {
             let [name, type_name, type_hash] = [chunk()?, chunk()?, chunk()?].map(demangled);
-            let qos = chunk()?.parse();
-            let qos = qos.map_err(|_| "its quality of service is malformed")?;
+            // The entity exists, whatever its quality of service is.
+            let qos = chunk()?.parse().unwrap_or_default();
             Some(Endpoint {
                 name,
                 type_name,

@@ -5,11 +5,11 @@
 )]
 
 use std::sync::Arc;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use super::SessionError;
 use super::backlog::Backlog;
-use super::shared::{Inbox, Outgoing, Role, Shared, Topic};
+use super::shared::{Inbox, Incoming, Outgoing, Role, Shared, Topic};
 use crate::cdr;
 use crate::graph::{
     Attachment, Durability, Endpoint, History, NodeName, Qos, TopicName, topic_key,
@@ -81,9 +81,10 @@ impl Node {
         interface: &Arc<Interface>,
         qos: Qos,
     ) -> Result<Subscription, SessionError> {
-        let inbox = Arc::new(Inbox::new(depth(&qos)));
+        let topic = self.topic(topic, interface, qos)?;
+        let inbox = Arc::new(Inbox::new(topic.key.clone(), depth(&qos)));
         let role = Role::Subscription {
-            topic: self.topic(topic, interface, qos)?,
+            topic,
             inbox: inbox.clone(),
         };
         Ok(Subscription {
@@ -190,6 +191,8 @@ pub struct Received {
     pub message: Message,
     /// Its number, its time of sending, and its publisher.
     pub attachment: Attachment,
+    /// When the session received it.
+    pub arrival: Instant,
 }
 
 /// What a subscription has lost.
@@ -221,10 +224,12 @@ impl Subscription {
     /// nothing.
     pub async fn receive(&mut self) -> Received {
         loop {
-            let (attachment, octets) = self.inbox.pop().await;
-            if let Some(received) = self.decode(attachment, &octets) {
+            let incoming = self.inbox.pop().await;
+            if let Some(received) = self.decode(&incoming) {
                 return received;
             }
+            // Otherwise a flood of malformed messages stops all other tasks of this thread.
+            tokio::task::yield_now().await;
         }
     }
 
@@ -232,8 +237,7 @@ impl Subscription {
     pub fn try_receive(&mut self) -> Option<Received> {
         loop {
             let next = self.inbox.lock().pop();
-            let (attachment, octets) = next?;
-            if let Some(received) = self.decode(attachment, &octets) {
+            if let Some(received) = self.decode(&next?) {
                 return Some(received);
             }
         }
@@ -248,16 +252,57 @@ impl Subscription {
         }
     }
 
-    fn decode(&self, attachment: Attachment, octets: &[u8]) -> Option<Received> {
-        match cdr::decode(&self.interface, octets) {
+    fn decode(&self, incoming: &Incoming) -> Option<Received> {
+        match cdr::decode(&self.interface, &incoming.octets) {
             Ok(message) => Some(Received {
                 message,
-                attachment,
+                attachment: incoming.attachment,
+                arrival: incoming.arrival,
             }),
             Err(error) => {
                 self.inbox.refuse(&error.to_string());
                 None
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::pin::pin;
+    use std::task::{Context, Waker};
+
+    use super::*;
+    use crate::graph::Gid;
+    use crate::interface::Interfaces;
+
+    #[test]
+    fn a_flood_of_malformed_messages_leaves_time_for_other_tasks() {
+        let node = Node::new(
+            Arc::new(Shared::new(0)),
+            NodeName::new("/", "rover").unwrap(),
+        );
+        let interfaces = Interfaces::bundled().unwrap();
+        let twist = interfaces.get("geometry_msgs/msg/Twist").unwrap();
+        let mut subscription = node.subscription("/a", &twist, Qos::default()).unwrap();
+        let inbox = subscription.inbox.clone();
+        for sequence in 1..=3 {
+            let gid = Gid([0; 16]);
+            inbox.push(Incoming {
+                attachment: Attachment {
+                    sequence,
+                    stamp: 0,
+                    gid,
+                },
+                arrival: jaus::node::now(),
+                octets: vec![0; 3],
+            });
+        }
+        let mut receive = pin!(subscription.receive());
+        let mut context = Context::from_waker(Waker::noop());
+        for malformed in 1..=3 {
+            assert!(receive.as_mut().poll(&mut context).is_pending());
+            assert_eq!(inbox.malformed(), malformed);
         }
     }
 }

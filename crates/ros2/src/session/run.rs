@@ -11,7 +11,7 @@ use zenoh::qos::CongestionControl;
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait as _};
 
-use super::shared::{Entity, Inbox, Outgoing, Role, Shared, State};
+use super::shared::{Entity, Inbox, Incoming, Outgoing, Role, Shared, State};
 use crate::cdr::LONGEST;
 use crate::graph::{Attachment, EntityKind, Gid, History, Qos, Reliability, Token, tokens_key};
 
@@ -22,16 +22,16 @@ const TURN: Duration = Duration::from_secs(1);
 
 /// Runs the session until it is closed.
 pub(super) fn run(shared: &Arc<Shared>, config: &Config) {
-    let mut is_told = false;
+    let mut is_logged = false;
     while !shared.lock().is_closing {
         match Running::open(shared.clone(), config.clone()) {
             Ok(running) => {
                 running.run();
                 break;
             }
-            Err(error) if !is_told => {
+            Err(error) if !is_logged => {
                 tracing::warn!(%error, "no zenoh network yet: trying again every second");
-                is_told = true;
+                is_logged = true;
             }
             Err(error) => tracing::debug!(%error, "no zenoh network yet"),
         }
@@ -130,7 +130,14 @@ impl Running {
     }
 
     fn close(mut self) {
-        self.shared.lock().session = None;
+        let dropped = {
+            let mut state = self.shared.lock();
+            state.session = None;
+            state.graph.dropped()
+        };
+        if dropped > 0 {
+            tracing::info!("{dropped} liveliness tokens left out: malformed or too many");
+        }
         // Those of nodes, which have lower numbers, last.
         while self.declared.pop_last().is_some() {}
         if let Err(error) = self.session.close().wait() {
@@ -288,7 +295,11 @@ fn receive_message(inbox: &Inbox, sample: &Sample) {
     let attachment = Attachment::decode(attachment.as_deref().unwrap_or_default());
     match attachment {
         Ok(attachment) if sample.payload().len() <= LONGEST => {
-            inbox.push(attachment, sample.payload().to_bytes().into_owned());
+            inbox.push(Incoming {
+                attachment,
+                arrival: jaus::node::now(),
+                octets: sample.payload().to_bytes().into_owned(),
+            });
         }
         Ok(_) => inbox.refuse("it is too long"),
         Err(error) => inbox.refuse(&error.to_string()),

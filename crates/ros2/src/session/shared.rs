@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::{Notify, watch};
 
@@ -75,48 +75,64 @@ pub(super) struct Outgoing {
 /// The received messages of a subscription.
 #[derive(Debug)]
 pub(super) struct Inbox {
-    backlog: Mutex<Backlog<(Attachment, Vec<u8>)>>,
-    arrival: Notify,
+    /// The key of the topic, for the log.
+    key: String,
+    backlog: Mutex<Backlog<Incoming>>,
+    filled: Notify,
     malformed: AtomicU64,
 }
 
+/// A message before it is decoded.
+#[derive(Debug)]
+pub(super) struct Incoming {
+    pub(super) attachment: Attachment,
+    pub(super) arrival: Instant,
+    pub(super) octets: Vec<u8>,
+}
+
 impl Inbox {
-    pub(super) fn new(depth: u64) -> Self {
+    pub(super) fn new(key: String, depth: u64) -> Self {
         Self {
+            key,
             backlog: Mutex::new(Backlog::new(depth)),
-            arrival: Notify::new(),
+            filled: Notify::new(),
             malformed: AtomicU64::new(0),
         }
     }
 
-    /// Counts a message that cannot be used.
+    /// Counts a message that cannot be used. The first one is a warning.
     pub(super) fn refuse(&self, reason: &str) {
-        self.malformed.fetch_add(1, Ordering::Relaxed);
-        tracing::debug!(reason, "a message of ROS 2 is left out");
+        let topic = &self.key;
+        if self.malformed.fetch_add(1, Ordering::Relaxed) == 0 {
+            let counted = "further ones are only counted";
+            tracing::warn!(%topic, "a message cannot be read: {reason} ({counted})");
+        } else {
+            tracing::debug!(%topic, "a message cannot be read: {reason}");
+        }
     }
 
     pub(super) fn malformed(&self) -> u64 {
         self.malformed.load(Ordering::Relaxed)
     }
 
-    pub(super) fn lock(&self) -> MutexGuard<'_, Backlog<(Attachment, Vec<u8>)>> {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Backlog<Incoming>> {
         self.backlog.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn push(&self, attachment: Attachment, octets: Vec<u8>) {
-        let length = octets.len();
-        self.lock().push((attachment, octets), length);
-        self.arrival.notify_one();
+    pub(super) fn push(&self, incoming: Incoming) {
+        let length = incoming.octets.len();
+        self.lock().push(incoming, length);
+        self.filled.notify_one();
     }
 
     /// Takes the oldest message, or waits for one.
-    pub(super) async fn pop(&self) -> (Attachment, Vec<u8>) {
+    pub(super) async fn pop(&self) -> Incoming {
         loop {
-            let arrival = self.arrival.notified();
+            let filled = self.filled.notified();
             let next = self.lock().pop();
             match next {
                 Some(next) => return next,
-                None => arrival.await,
+                None => filled.await,
             }
         }
     }

@@ -1,5 +1,6 @@
 //! The program with a vehicle of real parts on one side and Python as ROS 2 on the other.
 
+use std::io::{BufRead as _, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -27,6 +28,7 @@ struct Scene {
     network: String,
     router: Option<Script>,
     _bridge: Bridge,
+    log: Arc<Mutex<String>>,
     seen: Arc<Mutex<Seen>>,
     _watcher: JoinHandle<()>,
 }
@@ -67,8 +69,12 @@ impl Scene {
             .args(flags)
             .env_remove("ROS_DOMAIN_ID")
             .stdin(Stdio::null())
+            .stderr(Stdio::piped())
             .spawn()
             .unwrap();
+        let mut bridge = Bridge(bridge);
+        let log = Arc::default();
+        keep_log(&mut bridge, &log);
         let seen = Arc::new(Mutex::new(Seen::default()));
         let mut script = python(&network, &["watch"]);
         let notes = seen.clone();
@@ -81,7 +87,8 @@ impl Scene {
             rover,
             network,
             router: Some(router),
-            _bridge: Bridge(bridge),
+            _bridge: bridge,
+            log,
             seen,
             _watcher: watcher,
         }
@@ -105,6 +112,11 @@ impl Scene {
         seen.status.iter().any(|it| it.contains(text))
     }
 
+    /// Whether the program has logged this.
+    fn has_logged(&self, text: &str) -> bool {
+        self.log.lock().unwrap().contains(text)
+    }
+
     async fn is_seen(&self) {
         until(|| self.odometry().is_some() && self.says("primitive driver")).await;
     }
@@ -118,17 +130,30 @@ impl Scene {
     }
 }
 
+/// Keeps what the program logs, and prints it.
+fn keep_log(bridge: &mut Bridge, log: &Arc<Mutex<String>>) {
+    let (log, lines) = (log.clone(), BufReader::new(bridge.0.stderr.take().unwrap()));
+    std::thread::spawn(move || {
+        for line in lines.lines().map_while(Result::ok) {
+            eprintln!("{line}");
+            log.lock().unwrap().push_str(&line);
+        }
+    });
+}
+
 fn python(network: &str, arguments: &[&str]) -> Script {
     let arguments = [&[network], arguments].concat();
     Script::start("crates/ros2/tests/network/rover.py", &arguments).ready()
 }
 
 const CONTROL: [&str; 3] = ["--control", "127", "--allow-clear"];
+/// With the longest timeout, so that another reason stops the vehicle first.
+const PATIENT: [&str; 4] = ["--control", "127", "--timeout", "2s"];
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "needs packages of Python: run .ci/ros2"]
 async fn python_drives_the_vehicle_and_sees_it_move_and_it_stops_when_python_dies() {
-    let scene = Scene::start(&CONTROL);
+    let scene = Scene::start(&PATIENT);
     scene.is_seen().await;
     let [_, before, _] = scene.odometry().unwrap();
     let pilot = scene.python(&["drive", "1.0", "0.0"]);
@@ -142,6 +167,7 @@ async fn python_drives_the_vehicle_and_sees_it_move_and_it_stops_when_python_die
     .await;
     assert_eq!(scene.rover.controller().await, 101);
     drop(pilot);
+    until(|| scene.has_logged("the publisher of cmd_vel is gone: stopping")).await;
     scene.stands().await;
     scene.rover.end().await;
 }
@@ -149,11 +175,17 @@ async fn python_drives_the_vehicle_and_sees_it_move_and_it_stops_when_python_die
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "needs packages of Python: run .ci/ros2"]
 async fn the_death_of_the_router_stops_the_vehicle() {
-    let mut scene = Scene::start(&CONTROL);
+    let mut scene = Scene::start(&PATIENT);
     scene.is_seen().await;
     let _pilot = scene.python(&["drive", "1.0", "0.0"]);
     scene.drives().await;
     drop(scene.router.take());
+    // The tokens of all publishers may be withdrawn before the connection counts as lost.
+    until(|| {
+        scene.has_logged("the ROS network was lost: stopping")
+            || scene.has_logged("the publisher of cmd_vel is gone: stopping")
+    })
+    .await;
     // Python sees nothing any more, so the vehicle itself is asked.
     let end = tokio::time::Instant::now() + LIMIT;
     while scene.rover.reported_speed().await.abs() > 0.01 {

@@ -61,9 +61,9 @@ async fn messages_of_python_arrive_with_their_publisher_number_and_time() {
         assert!(second.attachment.stamp > first.attachment.stamp);
         until(|| !ros.publishers(&topic(sample)).is_empty()).await;
         let publishers = ros.publishers(&topic(sample));
-        let gids: Vec<_> = publishers.iter().map(Token::gid).collect();
+        let gids: Vec<_> = publishers.iter().map(|it| it.gid).collect();
         assert_eq!(gids, [first.attachment.gid]);
-        assert_eq!(publishers[0].node_name(), "/python_talker");
+        assert_eq!(publishers[0].token.node_name(), "/python_talker");
         assert_eq!(subscription.counters().malformed, 0);
     }
 }

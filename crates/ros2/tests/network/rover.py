@@ -36,7 +36,9 @@ class Publisher:
         typed = subscription_key(session, name)
         mangled = (NAMESPACE + name).replace("/", "%")
         self.publisher = session.declare_publisher(f"{DOMAIN}{NAMESPACE}{name}/{typed}")
-        self.gid = Node(session, "python_pilot").declare("MP", f"/{mangled}/{typed}/::,10:,:,:,,")
+        # The tokens are withdrawn with the node.
+        self.node = Node(session, "python_pilot")
+        self.gid = self.node.declare("MP", f"/{mangled}/{typed}/::,10:,:,:,,")
         self.sequence = 0
 
     def publish(self, message):
@@ -45,20 +47,26 @@ class Publisher:
         self.publisher.put(encode(message), attachment=attachment)
 
 
+def write(line):
+    """Writes a line at once: callbacks of zenoh run in several threads."""
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
 def watch(session):
     def odometry(sample):
         it = Odometry.deserialize(sample.payload.to_bytes())
         position = it.pose.pose.position
-        print("odom", position.x, position.y, it.twist.twist.linear.x, flush=True)
+        write(f"odom {position.x} {position.y} {it.twist.twist.linear.x}")
 
     def status(sample):
         for it in DiagnosticArray.deserialize(sample.payload.to_bytes()).status:
             values = ", ".join(f"{value.key}={value.value}" for value in it.values)
-            print(f"status {it.name}: {it.message}; {values}", flush=True)
+            write(f"status {it.name}: {it.message}; {values}")
 
+    write("ready")
     subscribers = [session.declare_subscriber(f"{DOMAIN}{NAMESPACE}/odom/**", odometry),
                    session.declare_subscriber(f"{DOMAIN}{NAMESPACE}/status/**", status)]
-    print("ready", flush=True)
     sys.stdin.read()
     del subscribers
 

@@ -1,9 +1,9 @@
 //! Routers and nodes in Python, on loopback.
 
 use std::io::{BufRead, BufReader, Lines};
-use std::net::{Ipv4Addr, TcpListener};
 use std::path::PathBuf;
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::{self, Child, ChildStdout, Command, Stdio};
+use std::sync::atomic::{AtomicU8, Ordering};
 
 use jaus_ros2::session::{Ros, Settings};
 use jaus_test_kit::tools::workspace;
@@ -76,11 +76,12 @@ impl Drop for Script {
     }
 }
 
-/// An endpoint on loopback at a free port.
+/// An endpoint at a loopback address that no other test and no outgoing connection uses.
 pub(crate) fn endpoint() -> String {
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-    let address = listener.local_addr().unwrap();
-    format!("tcp/{address}")
+    static NUMBER: AtomicU8 = AtomicU8::new(1);
+    let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+    let [.., high, low] = process::id().to_be_bytes();
+    format!("tcp/127.{high}.{low}.{number}:7447")
 }
 
 /// A session that connects to an endpoint.

@@ -77,7 +77,15 @@ impl Rover {
 
     /// Starts what a vehicle needs to be driven by hand.
     pub(crate) fn start_vehicle(&mut self) {
+        self.start_driver();
+        self.start_sensors();
+    }
+
+    pub(crate) fn start_driver(&mut self) {
         self.part(PRIMITIVE, |slot| PrimitiveDriver::default().run(slot));
+    }
+
+    pub(crate) fn start_sensors(&mut self) {
         self.part(VELOCITY, |slot| VelocitySensor::default().run(slot));
         self.part(POSE, |slot| PoseSensor::default().run(slot));
     }

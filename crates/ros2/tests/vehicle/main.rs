@@ -32,7 +32,7 @@ fn driveable() -> Scene {
 async fn cmd_vel_drives_the_vehicle_north_which_is_y_in_map_and_silence_stops_it() {
     let scene = driveable();
     scene.until(|it| it.odometry().is_some()).await;
-    assert_eq!(scene.controller().await, 0, "nobody has asked for control");
+    assert_eq!(scene.controller().await, 0, "no control before a command");
     scene.drive_until(1.0, |it| it.speed() > 0.5).await;
     let start = scene.odometry().unwrap();
     scene
@@ -123,6 +123,45 @@ async fn an_emergency_stops_the_vehicle_and_it_drives_again_only_after_a_clear_a
     }
     tokio::time::sleep(Duration::from_secs(1)).await;
     scene.drive_until(1.0, |it| it.speed() > 0.5).await;
+    scene.end().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_emergency_stop_reaches_a_vehicle_that_appears_after_it() {
+    let mut scene = Scene::new();
+    scene.start_bridge(None);
+    scene.input(Input::EmergencyStop(true)).await;
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    scene.start_vehicle();
+    scene.until(|it| it.says("Driver: emergency")).await;
+    scene.end().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_release_ends_driving_although_its_publisher_goes_on() {
+    let scene = driveable();
+    scene.drive_until(1.0, |it| it.speed() > 0.5).await;
+    scene.input(Input::Release).await;
+    scene
+        .drive_until(1.0, |it| it.says("control=not wanted"))
+        .await;
+    for _ in 0..20 {
+        scene.drive(1.0, 0.0).await;
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    assert!(scene.reported_speed().await.abs() < 0.01);
+    assert_eq!(scene.controller().await, 0, "{}", scene.status());
+    scene.end().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_vehicle_without_a_driver_is_reported_if_control_is_allowed() {
+    let mut scene = Scene::new();
+    scene.start_bridge(Some(127));
+    scene.start_sensors();
+    scene.until(|it| it.says("has no driver")).await;
+    scene.start_driver();
+    scene.until(|it| it.says("jaus-ros2: connected")).await;
     scene.end().await;
 }
 

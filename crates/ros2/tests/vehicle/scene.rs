@@ -2,6 +2,7 @@
 
 use std::ops::{Deref, DerefMut};
 use std::panic::Location;
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -12,7 +13,7 @@ use jaus_ros2::Gid;
 use jaus_ros2::bridge::samples::OdometrySample;
 use jaus_ros2::bridge::vehicle::Selection;
 use jaus_ros2::bridge::velocity::Twist;
-use jaus_ros2::bridge::{Input, Output, Reports, Settings, run};
+use jaus_ros2::bridge::{Command, Input, Output, Reports, Settings, run};
 use jaus_test_kit::waiting::LIMIT;
 use tokio::sync::mpsc;
 
@@ -27,6 +28,8 @@ pub(crate) const PUBLISHER: Gid = Gid([7; 16]);
 pub(crate) struct Scene {
     rover: Rover,
     inputs: Option<mpsc::Sender<Input>>,
+    /// The number of commands.
+    sequence: AtomicI64,
     seen: Arc<Mutex<Seen>>,
 }
 
@@ -57,6 +60,7 @@ impl Scene {
         Self {
             rover: Rover::new(BEGIN),
             inputs: None,
+            sequence: AtomicI64::new(0),
             seen: Arc::default(),
         }
     }
@@ -99,8 +103,15 @@ impl Scene {
             linear: [forward, 0.0, 0.0],
             angular: [0.0, 0.0, yaw_rate],
         };
-        let publisher = PUBLISHER;
-        self.input(Input::Twist { publisher, twist }).await;
+        let stamp = self.time.now().as_nanos();
+        let command = Command {
+            publisher: PUBLISHER,
+            sequence: self.sequence.fetch_add(1, Ordering::Relaxed),
+            stamp: i64::try_from(stamp).unwrap(),
+            arrival: now(),
+            twist,
+        };
+        self.input(Input::Twist(command)).await;
     }
 
     /// The last odometry.
