@@ -186,25 +186,28 @@ mod tests {
         }
     }
 
-    /// Reports of samples from 10 s after midnight on, each `delay` old on arrival, with the age that a measurement gives
-    /// at `measured_at`.
+    /// Reports of samples from 10 s after midnight on, with the age that the last measurement of the sender's clock
+    /// gives them.
     struct Delayed {
         start: Instant,
         clock: Option<SampleClock>,
         measured_at: Instant,
+        /// How far the sender's clock was ahead then, in milliseconds.
+        measured: i64,
     }
 
     impl Delayed {
         fn new(start: Instant) -> Self {
-            let (clock, measured_at) = (None, start);
             Self {
                 start,
-                clock,
-                measured_at,
+                clock: None,
+                measured_at: start,
+                measured: 0,
             }
         }
 
-        /// The age of a sample that is reported after `after`, by a sender whose clock is at `after` + `ahead`.
+        /// The age of a sample that arrives `after` the start with a delay, from a sender whose clock is `ahead`. All in
+        /// milliseconds.
         fn age(&mut self, after: u64, ahead: i64, delay: u64) -> Duration {
             let now = self.start + ms(after);
             let stamp = (10_000 + after - delay).saturating_add_signed(ahead);
@@ -217,7 +220,7 @@ mod tests {
             let mut sampled = Sampled::new(Some(stamp));
             sampled.measure(|_| {
                 Some(Age {
-                    seconds: (delay as f64 - ahead as f64) / 1e3 + 0.01,
+                    seconds: (delay as f64 + (self.measured - ahead) as f64) / 1e3 + 0.01,
                     uncertainty: 0.01,
                     measured_at: self.measured_at,
                 })
@@ -246,12 +249,15 @@ mod tests {
     fn a_clock_that_is_set_back_counts_again_once_it_is_measured() {
         let start = Instant::now();
         let mut reports = Delayed::new(start);
-        reports.age(100, 0, 0);
-        reports.measured_at = start + ms(200);
-        assert!(reports.age(6000, 0, 0) < ms(1));
+        reports.age(2000, 0, 2000);
+        reports.measured_at = start + ms(2100);
+        assert!(reports.age(6000, 0, 2000) > ms(1999));
         // The sender's clock is now 5 s behind, and the measurement does not know it yet.
-        assert_eq!(reports.age(6100, -5000, 0), ms(0));
-        assert_eq!(reports.age(6200, -5000, 0), ms(0));
+        assert_eq!(reports.age(6100, -5000, 2000), ms(0));
+        assert_eq!(reports.age(6200, -5000, 2000), ms(0));
+        (reports.measured_at, reports.measured) = (start + ms(6250), -5000);
+        let age = reports.age(6300, -5000, 2000);
+        assert!((ms(1999)..=ms(2001)).contains(&age), "{age:?}");
     }
 
     #[test]

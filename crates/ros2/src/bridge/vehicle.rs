@@ -100,7 +100,7 @@ impl Part {
         self.roles.contains(&role)
     }
 
-    /// Its state, if it has one and was heard within this time.
+    /// The state that it has reported within this time, if any.
     #[must_use]
     pub fn state(&self, now: Instant, within: Duration) -> Option<Result<State, u8>> {
         let (code, at) = self.status?;
