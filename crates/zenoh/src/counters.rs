@@ -19,6 +19,7 @@ jaus::counters! {
     FromOutside = "messages that came from another bridge and do not go back",
     LocalTableFull = "messages dropped because the table of components of this side is full",
     NotAs5669a = "messages to other bridges that are not AS5669A",
+    NotPresent = "messages for components that no bridge has announced",
     NoSession = "messages for a bridge that is gone",
     NotConnected = "messages dropped because the zenoh session is not open yet",
     TooLate = "messages dropped because they waited more than a second for the zenoh network",

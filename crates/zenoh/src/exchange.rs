@@ -371,11 +371,19 @@ impl Exchange {
         if self.phase != Phase::Open {
             return Err(Counter::NotConnected);
         }
-        // The node searches for a component whose route it does not know yet. Its token tells.
-        let owner = self.remotes.owner(frame.destination);
-        let to = owner.map_or(to, Recipient::Bridge);
+        let to = self.recipient(frame.destination, to)?;
         self.publish(now, frame, octets, to);
         Ok(())
+    }
+
+    /// The bridges for which a message is that the node sends to `to`: it searches everywhere for a
+    /// component whose route it does not know. Its token tells, and without one it is not there.
+    fn recipient(&self, destination: JausId, to: Recipient) -> Result<Recipient, Counter> {
+        match self.remotes.owner(destination) {
+            Some(owner) => Ok(Recipient::Bridge(owner)),
+            None if to == Recipient::All && !destination.has_wildcard() => Err(Counter::NotPresent),
+            None => Ok(to),
+        }
     }
 
     fn keep_call(&mut self, frame: &Frame) {

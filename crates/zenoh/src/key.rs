@@ -2,13 +2,18 @@
 //!
 //! | key | published by | contents |
 //! |---|---|---|
-//! | `PREFIX/S/N/C/raw/LABEL/FROM/TO` | the bridge `FROM`, for the bridge `TO` or for `all` | one message of the component S.N.C: a JUDP datagram |
-//! | `PREFIX/S/N/C/live/FROM` | the bridge `FROM`, as a liveliness token | the component S.N.C is reachable through it |
-//! | `PREFIX/S/N/C/json/CODE` | the bridge of S.N.C | a report of that component as JSON |
+//! | `PREFIX/raw/S/N/C/LABEL/FROM/TO` | the bridge `FROM`, for the bridge `TO` or for `all` | one message of the component S.N.C: a JUDP datagram |
+//! | `PREFIX/live/S/N/C/FROM` | the bridge `FROM`, as a liveliness token | the component S.N.C is reachable through it |
+//! | `PREFIX/json/S/N/C/CODE` | the bridge of S.N.C | a report of that component as JSON |
 //!
 //! S, N and C are decimal numbers. `CODE` is a message code: four upper-case hexadecimal digits.
 //! `LABEL` is a message code, `ack` for a transport acknowledgement, or `part` for a later fragment
 //! of a large message.
+//!
+//! For each message, zenoh (1.10) compares the key chunk by chunk with all declared keys that have
+//! begun alike, one after the other. So messages share their first chunk neither with the tokens nor
+//! with the views, of which a fleet has thousands, and the first two digits of `TO` are a chunk of
+//! their own: a thousand subscriptions are told apart by some hundred comparisons.
 
 use std::collections::hash_map::RandomState;
 use std::fmt;
@@ -137,7 +142,9 @@ impl fmt::Display for Recipient {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::All => f.write_str("all"),
-            Self::Bridge(id) => id.fmt(f),
+            Self::Bridge(BridgeId(id)) => {
+                write!(f, "{:02x}/{:014x}", id >> 56, id & (u64::MAX >> 8))
+            }
         }
     }
 }
@@ -180,10 +187,10 @@ impl fmt::Display for Key {
                 label,
                 from,
                 to,
-            } => write!(f, "{}/raw/{label}/{from}/{to}", chunks(*source)),
-            Self::Live { component, from } => write!(f, "{}/live/{from}", chunks(*component)),
+            } => write!(f, "raw/{}/{label}/{from}/{to}", chunks(*source)),
+            Self::Live { component, from } => write!(f, "live/{}/{from}", chunks(*component)),
             Self::Json { component, report } => {
-                write!(f, "{}/json/{report:04X}", chunks(*component))
+                write!(f, "json/{}/{report:04X}", chunks(*component))
             }
         }
     }
@@ -203,18 +210,18 @@ impl Prefix {
     pub fn parse(&self, text: &str) -> Option<Key> {
         let rest = text.strip_prefix(&self.0)?.strip_prefix('/')?;
         let mut parts = rest.split('/');
+        let kind = parts.next()?;
         let source = JausId::new(
             number(parts.next()?)?,
             number(parts.next()?)?,
             number(parts.next()?)?,
         );
-        let kind = parts.next()?;
         let key = match kind {
             "raw" => Key::Raw {
                 source,
                 label: Label::parse(parts.next()?)?,
                 from: BridgeId::parse(parts.next()?)?,
-                to: recipient(parts.next()?)?,
+                to: recipient(parts.next()?, parts.next())?,
             },
             "live" => Key::Live {
                 component: source,
@@ -232,19 +239,19 @@ impl Prefix {
     /// The messages of these components, which may have wildcards, for these bridges.
     #[must_use]
     pub fn messages_of(&self, components: JausId, to: Recipient) -> String {
-        format!("{}/{}/raw/*/*/{to}", self.0, chunks(components))
+        format!("{}/raw/{}/*/*/{to}", self.0, chunks(components))
     }
 
     /// The presence of these components, which may have wildcards.
     #[must_use]
     pub fn presence_of(&self, components: JausId) -> String {
-        format!("{}/{}/live/*", self.0, chunks(components))
+        format!("{}/live/{}/*", self.0, chunks(components))
     }
 
     /// The views of all components of a subsystem.
     #[must_use]
     pub fn views_of(&self, subsystem: u16) -> String {
-        format!("{}/{subsystem}/*/*/json/*", self.0)
+        format!("{}/json/{subsystem}/*/*/*", self.0)
     }
 }
 
@@ -274,10 +281,14 @@ fn code(text: &str) -> Option<u16> {
     (format!("{code:04X}") == text).then_some(code)
 }
 
-fn recipient(text: &str) -> Option<Recipient> {
-    match text {
-        "all" => Some(Recipient::All),
-        _ => BridgeId::parse(text).map(Recipient::Bridge),
+/// The recipient in one chunk or two. `None` if the second one is missing, or is one too many.
+fn recipient(first: &str, second: Option<&str>) -> Option<Recipient> {
+    match second {
+        None => (first == "all").then_some(Recipient::All),
+        Some(second) if first.len() == 2 => {
+            BridgeId::parse(&format!("{first}{second}")).map(Recipient::Bridge)
+        }
+        Some(_) => None,
     }
 }
 
@@ -302,32 +313,32 @@ mod tests {
         [
             (
                 raw(Label::Code(0x4404), Recipient::All),
-                "jaus/101/1/43/raw/4404/00000000000000ab/all",
+                "jaus/raw/101/1/43/4404/00000000000000ab/all",
             ),
             (
                 raw(
                     Label::Acknowledgement,
                     Recipient::Bridge(BridgeId::new(u64::MAX)),
                 ),
-                "jaus/101/1/43/raw/ack/00000000000000ab/ffffffffffffffff",
+                "jaus/raw/101/1/43/ack/00000000000000ab/ff/ffffffffffffff",
             ),
             (
                 raw(Label::Part, Recipient::All),
-                "jaus/101/1/43/raw/part/00000000000000ab/all",
+                "jaus/raw/101/1/43/part/00000000000000ab/all",
             ),
             (
                 Key::Live {
                     component: SENSOR,
                     from: BRIDGE,
                 },
-                "jaus/101/1/43/live/00000000000000ab",
+                "jaus/live/101/1/43/00000000000000ab",
             ),
             (
                 Key::Json {
                     component: SENSOR,
                     report: 0x4404,
                 },
-                "jaus/101/1/43/json/4404",
+                "jaus/json/101/1/43/4404",
             ),
         ]
     }
@@ -348,24 +359,24 @@ mod tests {
             "jaus",
             "jaus/",
             "jaus/101/1/43",
-            "other/101/1/43/json/4404",
-            "jausx/101/1/43/json/4404",
-            "jaus/0101/1/43/json/4404",
-            "jaus/+101/1/43/json/4404",
-            "jaus/65535/1/43/json/4404",
-            "jaus/101/255/43/json/4404",
-            "jaus/101/1/0/json/4404",
-            "jaus/101/1/256/json/4404",
-            "jaus/101/1/43/json/404",
-            "jaus/101/1/43/json/44O4",
-            "jaus/101/1/43/json/aaaa",
-            "jaus/101/1/43/json/4404/",
-            "jaus/101/1/43/json/4404/x",
-            "jaus/101/1/43/live/ab",
-            "jaus/101/1/43/live/00000000000000AB",
-            "jaus/101/1/43/raw/4404/00000000000000ab",
-            "jaus/101/1/43/raw/4404/00000000000000ab/ALL",
-            "jaus/*/1/43/json/4404",
+            "other/json/101/1/43/4404",
+            "jausx/json/101/1/43/4404",
+            "jaus/json/0101/1/43/4404",
+            "jaus/json/+101/1/43/4404",
+            "jaus/json/65535/1/43/4404",
+            "jaus/json/101/255/43/4404",
+            "jaus/json/101/1/0/4404",
+            "jaus/json/101/1/256/4404",
+            "jaus/json/101/1/43/404",
+            "jaus/json/101/1/43/44O4",
+            "jaus/json/101/1/43/aaaa",
+            "jaus/json/101/1/43/4404/",
+            "jaus/json/101/1/43/4404/x",
+            "jaus/live/101/1/43/ab",
+            "jaus/live/101/1/43/00000000000000AB",
+            "jaus/raw/101/1/43/4404/00000000000000ab",
+            "jaus/raw/101/1/43/4404/00000000000000ab/ALL",
+            "jaus/json/*/1/43/4404",
         ] {
             assert_eq!(Prefix::default().parse(text), None, "{text}");
         }
@@ -386,14 +397,14 @@ mod tests {
         let rover = JausId::new(101, 255, 255);
         assert_eq!(
             prefix.messages_of(rover, Recipient::All),
-            "jaus/101/*/*/raw/*/*/all"
+            "jaus/raw/101/*/*/*/*/all"
         );
         assert_eq!(
             prefix.messages_of(JausId::EVERYONE, Recipient::Bridge(BRIDGE)),
-            "jaus/*/*/*/raw/*/*/00000000000000ab"
+            "jaus/raw/*/*/*/*/*/00/000000000000ab"
         );
-        assert_eq!(prefix.presence_of(SENSOR), "jaus/101/1/43/live/*");
-        assert_eq!(prefix.views_of(101), "jaus/101/*/*/json/*");
+        assert_eq!(prefix.presence_of(SENSOR), "jaus/live/101/1/43/*");
+        assert_eq!(prefix.views_of(101), "jaus/json/101/*/*/*");
     }
 
     #[test]

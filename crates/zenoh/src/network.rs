@@ -145,13 +145,13 @@ const TURN: Duration = Duration::from_secs(1);
 
 /// Runs the session until the bridge closes it. A thread calls it.
 pub(crate) fn run(shared: &Arc<Shared>, config: &Config, requests: &mpsc::Sender<Request>) {
-    let mut is_told = false;
+    let mut has_warned = false;
     while !shared.lock().is_closing {
         match Running::open(shared.clone(), config.clone(), requests.clone()) {
             Ok(running) => return running.run(),
-            Err(error) if !is_told => {
+            Err(error) if !has_warned => {
                 tracing::warn!(%error, "no zenoh network yet: trying again every second");
-                is_told = true;
+                has_warned = true;
             }
             Err(error) => tracing::debug!(%error, "no zenoh network yet"),
         }

@@ -95,9 +95,9 @@ fn session_of(bridge: &mut Exchange) -> SessionId {
     }
 }
 
-/// The latest announcement of a component, as a key.
-fn token(bridge: &Exchange, component: JausId) -> String {
-    bridge.token_key(component)
+/// The bridge `THERE` announces a component.
+fn announce(now: Instant, to: &mut Exchange, component: JausId) {
+    to.handle_token(now, &bridge(THERE, &[]).token_key(component), true);
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn a_broadcast_reaches_the_other_side_unchanged_and_the_answer_its_sender() {
     let sent = samples(now, &mut there);
     assert_eq!(
         sent[0].key,
-        "jaus/101/1/33/raw/4B00/0000000000000002/0000000000000001"
+        "jaus/raw/101/1/33/4B00/0000000000000002/00/00000000000001"
     );
     assert_eq!(sent[0].payload, datagram(&[answer]));
 }
@@ -125,6 +125,7 @@ fn a_broadcast_reaches_the_other_side_unchanged_and_the_answer_its_sender() {
 fn messages_that_share_a_datagram_are_published_one_by_one() {
     let now = Instant::now();
     let mut here = bridge(HERE, &[]);
+    announce(now, &mut here, DRIVER);
     let frames = [
         frame(OPERATOR, DRIVER, QUERY),
         frame(JausId::new(60, 1, 2), DRIVER, RESUME),
@@ -135,8 +136,8 @@ fn messages_that_share_a_datagram_are_published_one_by_one() {
     assert_eq!(
         keys,
         [
-            "jaus/60/1/1/raw/2404/0000000000000001/all",
-            "jaus/60/1/2/raw/0004/0000000000000001/all",
+            "jaus/raw/60/1/1/2404/0000000000000001/00/00000000000002",
+            "jaus/raw/60/1/2/0004/0000000000000001/00/00000000000002",
         ]
     );
     for (sample, frame) in sent.iter().zip(frames) {
@@ -148,6 +149,7 @@ fn messages_that_share_a_datagram_are_published_one_by_one() {
 fn what_must_arrive_waits_for_a_congested_link_and_urgent_messages_overtake() {
     let now = Instant::now();
     let mut here = bridge(HERE, &[]);
+    announce(now, &mut here, DRIVER);
     let plain = frame(OPERATOR, DRIVER, QUERY);
     let acknowledged = Frame {
         flags: Flags::default().with_acknowledgement(Acknowledgement::Request),
@@ -171,6 +173,7 @@ fn what_must_arrive_waits_for_a_congested_link_and_urgent_messages_overtake() {
 fn a_component_is_announced_before_its_first_message_and_withdrawn_when_it_is_silent() {
     let start = Instant::now();
     let mut here = bridge(HERE, &[]);
+    announce(start, &mut here, DRIVER);
     here.transmit(start, &to_group(&[frame(OPERATOR, DRIVER, QUERY)]));
     assert_eq!(here.poll_command(start), Some(Command::Announce(OPERATOR)));
     assert_eq!(here.poll_command(start), Some(Command::Serve(60)));
@@ -193,11 +196,13 @@ fn a_session_ends_when_the_tokens_of_its_bridge_are_gone() {
     let now = Instant::now();
     let (mut here, mut there) = (bridge(HERE, &[]), bridge(THERE, &[]));
     there.handle_local(now, DRIVER, now);
-    here.handle_token(now, &token(&there, DRIVER), true);
+    here.handle_local(now, OPERATOR, now);
+    here.handle_token(now, &there.token_key(DRIVER), true);
+    there.handle_token(now, &here.token_key(OPERATOR), true);
     there.transmit(now, &to_group(&[frame(DRIVER, OPERATOR, QUERY)]));
     pass(now, &mut there, &mut here);
     let session = session_of(&mut here);
-    here.handle_token(now, &token(&there, DRIVER), false);
+    here.handle_token(now, &there.token_key(DRIVER), false);
     assert_eq!(arrivals(&mut here), [Arrival::Closed(session)]);
     here.transmit(now, &to_session(session, &[frame(OPERATOR, DRIVER, QUERY)]));
     assert_eq!(here.counters().get(Counter::NoSession), 1);
@@ -241,22 +246,21 @@ fn a_message_that_returns_to_its_own_side_is_refused() {
 }
 
 #[test]
-fn a_message_for_a_component_with_a_token_goes_to_its_bridge_alone() {
+fn a_message_goes_to_the_bridge_with_the_token_of_its_destination_alone() {
     let now = Instant::now();
     let mut here = bridge(HERE, &[]);
-    here.handle_token(now, &bridge(THERE, &[]).token_key(DRIVER), true);
+    announce(now, &mut here, DRIVER);
     let stranger = JausId::new(102, 1, 33);
+    // Before the node knows a route, it searches everywhere.
     let search = [DRIVER, stranger].map(|to| frame(OPERATOR, to, QUERY));
     here.transmit(now, &to_group(&search));
     let sent = samples(now, &mut here);
     let keys: Vec<_> = sent.iter().map(|it| it.key.as_str()).collect();
     assert_eq!(
         keys,
-        [
-            "jaus/60/1/1/raw/2404/0000000000000001/0000000000000002",
-            "jaus/60/1/1/raw/2404/0000000000000001/all",
-        ]
+        ["jaus/raw/60/1/1/2404/0000000000000001/00/00000000000002"]
     );
+    assert_eq!(here.counters().get(Counter::NotPresent), 1);
 }
 
 #[test]
@@ -268,15 +272,14 @@ fn a_bridge_that_is_found_hears_the_calls_that_it_has_missed() {
     here.transmit(now, &to_group(std::slice::from_ref(&call)));
     here.handle_open();
     assert!(samples(now, &mut here).is_empty());
-    here.handle_token(now, &bridge(THERE, &[]).token_key(DRIVER), true);
+    announce(now, &mut here, DRIVER);
     let sent = samples(now, &mut here);
     assert_eq!(
         sent[0].key,
-        "jaus/60/1/1/raw/2B00/0000000000000001/0000000000000002"
+        "jaus/raw/60/1/1/2B00/0000000000000001/00/00000000000002"
     );
     assert_eq!(sent[0].payload, datagram(&[call]));
-    let other = bridge(THERE, &[]).token_key(JausId::new(101, 1, 34));
-    here.handle_token(now, &other, true);
+    announce(now, &mut here, JausId::new(101, 1, 34));
     assert!(here.is_idle(), "it is found already");
 }
 
@@ -285,8 +288,7 @@ fn a_component_that_changes_sides_belongs_to_its_bridge_once_it_is_silent_here()
     let start = Instant::now();
     let mut here = bridge(HERE, &[]);
     here.handle_local(start, DRIVER, start);
-    let token = bridge(THERE, &[]).token_key(DRIVER);
-    here.handle_token(start, &token, true);
+    announce(start, &mut here, DRIVER);
     assert_eq!(here.counters().get(Counter::OwnId), 1);
     let later = start + LOCAL_FOR;
     here.expire(later);
@@ -306,8 +308,9 @@ fn only_offered_components_leave() {
     here.handle_open();
     here.handle_local(now, OPERATOR, now);
     assert!(here.is_idle());
-    here.transmit(now, &to_group(&[frame(OPERATOR, DRIVER, QUERY)]));
-    here.transmit(now, &to_group(&[frame(DRIVER, OPERATOR, QUERY)]));
+    let to_all = |from| to_group(&[frame(from, JausId::EVERYONE, QUERY)]);
+    here.transmit(now, &to_all(OPERATOR));
+    here.transmit(now, &to_all(DRIVER));
     assert_eq!(here.counters().get(Counter::NotOffered), 1);
     assert_eq!(samples(now, &mut here).len(), 1);
 }
@@ -316,6 +319,7 @@ fn only_offered_components_leave() {
 fn without_a_session_messages_are_dropped_instead_of_sent_late() {
     let now = Instant::now();
     let mut here = Exchange::new(HERE, Settings::default());
+    announce(now, &mut here, DRIVER);
     here.transmit(now, &to_group(&[frame(OPERATOR, DRIVER, RESUME)]));
     here.handle_open();
     assert!(samples(now, &mut here).is_empty());
@@ -326,6 +330,7 @@ fn without_a_session_messages_are_dropped_instead_of_sent_late() {
 fn a_bridge_that_stops_withdraws_its_components_and_sends_no_more() {
     let now = Instant::now();
     let mut here = bridge(HERE, &[]);
+    announce(now, &mut here, DRIVER);
     here.handle_local(now, OPERATOR, now);
     assert!(samples(now, &mut here).is_empty());
     here.close();
@@ -344,6 +349,7 @@ fn the_newest_of_the_held_messages_leaves_when_its_period_is_over() {
     };
     let mut here = Exchange::new(HERE, settings);
     here.handle_open();
+    announce(now, &mut here, DRIVER);
     for _ in 0..3 {
         here.transmit(now, &to_group(&[frame(OPERATOR, DRIVER, QUERY)]));
     }

@@ -122,8 +122,8 @@ async fn by_default_the_other_side_observes_and_gets_no_control() {
     let client = JausId::new(61, 1, 1);
     let request = Frame::new(client, driver, Bytes::from_static(b"\x0D\x00\x7F"));
     let request = jaus_view::to_hex(&judp::encode(&request).unwrap());
-    let key = "jaus/61/1/1/raw/000D/00000000000000aa/all";
-    for (key, octets) in [(key, &request[..]), (key, "02"), ("jaus/60/x/raw", "00")] {
+    let key = "jaus/raw/61/1/1/000D/00000000000000aa/all";
+    for (key, octets) in [(key, &request[..]), (key, "02"), ("jaus/raw/60/x", "00")] {
         Client::output(&network, &["put", key, octets]);
     }
     assert!(effort(&operator, driver).await < 0.1);
@@ -140,11 +140,11 @@ async fn a_zenoh_program_reads_reports_as_json_at_its_rate_and_sees_who_is_there
     let rover = rover(&node);
     let _bridge = vehicles.bridge("101.250.1", &["--connect", &network]);
 
-    let key = "jaus/101/1/33/live/*";
+    let key = "jaus/live/101/1/33/*";
     let is_there = || !Client::output(&network, &["tokens", key]).is_empty();
     until(is_there).await;
 
-    let key = "jaus/101/1/33/json/4405";
+    let key = "jaus/json/101/1/33/4405";
     let mut reports = Client::start(&network, &["subscribe", key, "3"]);
     assert_eq!(reports.line().as_deref(), Some("subscribed"));
     let answer = Client::output(&network, &["get", &format!("{key}?rate=20;for=30s")]);
@@ -159,9 +159,9 @@ async fn a_zenoh_program_reads_reports_as_json_at_its_rate_and_sees_who_is_there
     }
 
     for (selector, hint) in [
-        ("jaus/101/1/33/json/0405", "0405h"),
-        ("jaus/101/1/34/json/4405", "101.1.34"),
-        ("jaus/101/1/*/json/4405", "one component"),
+        ("jaus/json/101/1/33/0405", "0405h"),
+        ("jaus/json/101/1/34/4405", "101.1.34"),
+        ("jaus/json/101/1/*/4405", "one component"),
     ] {
         let answer = Client::output(&network, &["get", selector]).concat();
         assert!(

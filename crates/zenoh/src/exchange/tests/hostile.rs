@@ -40,7 +40,7 @@ fn a_refused_request_for_control_is_answered_as_by_the_component() {
     let answers = samples(now, &mut vehicle);
     assert_eq!(
         answers[0].key,
-        "jaus/101/1/33/raw/000F/0000000000000002/0000000000000001"
+        "jaus/raw/101/1/33/000F/0000000000000002/00/00000000000001"
     );
     let answer = only_frame(&answers[0].payload).unwrap();
     let confirm = ConfirmControl::decode(&answer.payload).unwrap();
@@ -75,11 +75,11 @@ fn an_id_that_is_not_accepted_neither_sends_nor_appears() {
     assert_eq!(
         vehicle.subscriptions(),
         [
-            "jaus/60/*/*/raw/*/*/all",
-            "jaus/60/*/*/raw/*/*/0000000000000002"
+            "jaus/raw/60/*/*/*/*/all",
+            "jaus/raw/60/*/*/*/*/00/00000000000002"
         ]
     );
-    assert_eq!(vehicle.presences(), ["jaus/60/*/*/live/*"]);
+    assert_eq!(vehicle.presences(), ["jaus/live/60/*/*/*"]);
 }
 
 #[test]
@@ -106,17 +106,17 @@ fn a_key_must_agree_with_its_message() {
     let query = frame(OPERATOR, DRIVER, QUERY);
     let (_, octets) = sample(&query, HERE);
     for key in [
-        "jaus/61/1/1/raw/2404/0000000000000001/all",
-        "jaus/60/1/1/raw/2402/0000000000000001/all",
-        "jaus/60/1/1/raw/ack/0000000000000001/all",
+        "jaus/raw/61/1/1/2404/0000000000000001/all",
+        "jaus/raw/60/1/1/2402/0000000000000001/all",
+        "jaus/raw/60/1/1/ack/0000000000000001/all",
     ] {
         vehicle.handle_sample(now, key, &octets);
     }
     assert_eq!(vehicle.counters().get(Counter::KeyMismatch), 3);
     for key in [
-        "jaus/60/1/1/raw/2404/0000000000000001/0000000000000003",
-        "jaus/60/1/1/raw/2404/0000000000000002/all",
-        "jaus/60/1/1/json/2404",
+        "jaus/raw/60/1/1/2404/0000000000000001/00/00000000000003",
+        "jaus/raw/60/1/1/2404/0000000000000002/all",
+        "jaus/json/60/1/1/2404",
         "",
     ] {
         vehicle.handle_sample(now, key, &octets);
@@ -179,7 +179,7 @@ fn the_table_of_this_sides_components_has_a_bound() {
 proptest! {
     #[test]
     fn any_sample_is_passed_or_counted(
-        key in "jaus/60/1/1/raw/(2404|ack|part)/0000000000000001/all|.{0,60}",
+        key in "jaus/raw/60/1/1/(2404|ack|part)/0000000000000001/all|.{0,60}",
         payload in proptest::collection::vec(any::<u8>(), 0..64),
         is_alive: bool,
     ) {
