@@ -40,7 +40,8 @@ impl Script {
 
     /// A router that listens at an endpoint.
     pub(crate) fn router(endpoint: &str) -> Self {
-        Self::start("crates/zenoh/tests/network/router.py", &[endpoint]).ready()
+        let flags = ["--no-multicast-scouting", "--listen", endpoint];
+        Self::start("crates/zenoh/tests/network/router.py", &flags).ready()
     }
 
     /// The node in Python, when it is ready; `ros.py` describes the arguments.

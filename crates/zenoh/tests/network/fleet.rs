@@ -18,7 +18,7 @@ use jaus_zenoh::{Acceptance, Bridge, NetworkSettings, Settings};
 use tokio::task::JoinSet;
 
 use super::numbered;
-use super::scene::{Process, endpoint, router, rover};
+use super::scene::{Process, endpoint, router, router_program, rover};
 
 /// The subsystem of the first vehicle.
 const FIRST: u16 = 1000;
@@ -174,8 +174,11 @@ impl Fleet {
         let places = [endpoint(), endpoint(), endpoint()];
         let routers = [
             router(&places[0], &[]),
-            router(&places[1], &[&places[0]]),
-            router(&places[2], &[&places[0], &places[1]]),
+            router(&places[1], &["--connect", &places[0]]),
+            router(
+                &places[2],
+                &["--connect", &places[0], "--connect", &places[1]],
+            ),
         ];
         let before = memory("self");
         // The operator is at the router that dies.
@@ -243,6 +246,7 @@ impl Fleet {
             .sum();
         figures.table("An idle fleet", ["figure", "value"]);
         figures.row(["vehicles", &count.to_string()]);
+        figures.row(["routers", &format!("3 of {}", router_program())]);
         let listed = format!("{:.1}", listed.as_secs_f64());
         figures.row(["all listed after the start (s)", &listed]);
         figures.row(["query and report, median (ms)", &percentile(&times, 50)]);

@@ -200,7 +200,7 @@ async fn deliver(operator: &Component, to: JausId, next: &mut u32, count: usize)
 async fn nothing_acknowledged_is_lost_when_a_router_dies_and_another_takes_over() {
     let (first, second) = (endpoint(), endpoint());
     let mut first_router = router(&first, &[]);
-    let _second_router = router(&second, &[&first]);
+    let _second_router = router(&second, &["--connect", &first]);
     let (vehicles, operators) = (System::new(), System::new());
     let (at_vehicle, at_operator) = (vehicles.node(101, 1), operators.node(60, 1));
     let (rover, operator) = (rover(&at_vehicle), operator(&at_operator));

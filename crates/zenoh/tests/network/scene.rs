@@ -1,9 +1,11 @@
 //! Routers, bridges and JAUS systems on this host, each system with a multicast group of its own.
 
+use std::ffi::OsString;
 use std::io::{BufRead, BufReader};
-use std::net::{Ipv4Addr, TcpListener};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::component::{Call, Component, Handlers, Kind, Management};
@@ -55,21 +57,44 @@ pub(crate) fn endpoint() -> String {
     format!("tcp/{address}")
 }
 
-/// Starts the router of the package `eclipse-zenoh`, connected to others.
-pub(crate) fn router(listen: &str, connect: &[&str]) -> Process {
-    let mut child = Command::new(python())
-        .arg(script("router.py"))
-        .arg(listen)
-        .args(connect)
+/// The program that is to be the router instead of that of the package `eclipse-zenoh`.
+fn zenohd() -> Option<OsString> {
+    std::env::var_os("JAUS_ZENOHD")
+}
+
+/// The name of the routers for figures.
+pub(crate) fn router_program() -> &'static str {
+    match zenohd() {
+        Some(_) => "zenohd",
+        None => "the Python package eclipse-zenoh",
+    }
+}
+
+/// Starts a router, with further flags of `zenohd`.
+pub(crate) fn router(listen: &str, flags: &[&str]) -> Process {
+    let mut router = match zenohd() {
+        Some(zenohd) => Command::new(zenohd),
+        None => {
+            let mut router = Command::new(python());
+            router.arg(script("router.py"));
+            router
+        }
+    };
+    router.args(["--no-multicast-scouting", "--listen", listen]);
+    let child = router
+        .args(flags)
+        .env("RUST_LOG", "error")
         .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut line = String::new();
-    let mut stdout = BufReader::new(child.stdout.take().unwrap());
-    stdout.read_line(&mut line).unwrap();
-    assert_eq!(line, "ready\n");
-    Process(child)
+        .stdout(Stdio::null())
+        .spawn();
+    let mut process = Process(child.unwrap());
+    let (_, address) = listen.split_once('/').unwrap();
+    while TcpStream::connect(address).is_err() {
+        let ended = process.0.try_wait().unwrap();
+        assert_eq!(ended, None, "the router does not listen at {listen}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    process
 }
 
 /// A zenoh program that knows nothing of JAUS, with its output.

@@ -80,7 +80,7 @@ async fn a_certificate_publishes_as_its_own_subsystem_and_as_no_other() {
     let settings = of_guide("router.json5").replacen("\n{", &format!("\n{tls}"), 1);
     let file = at(folder, "router.json5");
     std::fs::write(&file, settings).unwrap();
-    let _router = router(&network, &["--settings", &file]);
+    let _router = router(&network, &["--config", &file]);
 
     let (vehicles, operators) = (System::new(), System::new());
     let (own, foreign) = (vehicles.node(101, 1), vehicles.node(102, 1));
