@@ -62,22 +62,13 @@ impl PeerClocks {
         self.lock().peers.get(&peer)?.offset()
     }
 
-    /// The age of a report with this time stamp of a peer. A peer that does not offer the Time
-    /// service itself has the clock of a component of its node that does, since a node is one
-    /// computer. `None` before the first answer.
+    /// The age of a report with this time stamp of a peer. `None` before the peer's first answer.
+    ///
+    /// Only the peer's own Time service counts. Set Time sets the time of one component, and anybody
+    /// may be another component of the same node, so the time of a neighbour says nothing.
     #[must_use]
     pub fn age(&self, peer: JausId, stamp: TimeStamp) -> Option<Age> {
-        let table = self.lock();
-        let neighbours = || {
-            let mut peers = table.peers.iter();
-            let neighbour = peers.find(|(id, clock)| {
-                let node = (id.subsystem(), id.node());
-                node == (peer.subsystem(), peer.node()) && clock.offset().is_some()
-            });
-            neighbour.map(|(_, clock)| clock)
-        };
-        let clock = table.peers.get(&peer).or_else(neighbours)?;
-        clock.age(stamp, time_of_day())
+        self.lock().peers.get(&peer)?.age(stamp, time_of_day())
     }
 
     /// The estimates of all peers that have answered, in order of their ids.
@@ -186,6 +177,27 @@ async fn exchange(component: Component, peer: JausId) -> Option<Answer> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_time_of_another_component_of_its_node_says_nothing_about_a_peer() {
+        let (sensor, neighbour) = (JausId::new(101, 1, 41), JausId::new(101, 1, 35));
+        let clocks = PeerClocks::default();
+        clocks.lock().next_peers(&BTreeSet::from([neighbour]));
+        let now = Instant::now().into_std();
+        let answer = Answer {
+            peer: neighbour,
+            sent: now,
+            received: now,
+            time_of_day: time_of_day(),
+            report: ReportTime {
+                time_stamp: Some(TimeStamp::default()),
+                ..ReportTime::default()
+            },
+        };
+        clocks.lock().handle_answer(&answer);
+        assert!(clocks.age(neighbour, TimeStamp::default()).is_some());
+        assert!(clocks.age(sensor, TimeStamp::default()).is_none());
+    }
 
     #[test]
     fn all_peers_are_asked_in_turn_and_their_number_is_bounded() {

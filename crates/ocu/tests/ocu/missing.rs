@@ -102,16 +102,14 @@ async fn a_pose_that_freezes_ends_manual_drive_although_it_is_still_reported() {
 }
 
 #[tokio::test]
-async fn a_pose_that_always_arrives_late_by_the_clock_of_its_node_is_too_old_to_drive_by() {
+async fn a_pose_that_always_arrives_late_by_the_clock_of_its_sensor_is_too_old_to_drive_by() {
     let scene = Scene::new().await;
     let mut page = scene.driver().await;
     page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
     let late = Duration::from_secs(3);
     let clock = TimeOfDay::new(move || UNIX_EPOCH.elapsed().unwrap() + late);
-    let communicator = Component::builder(Kind::Vehicle, "Rover")
-        .management(Management::default())
-        .offer(Time::new(clock));
-    let _communicator = scene.attach(44, communicator);
+    let rover = scene.rover.as_ref().unwrap();
+    rover.offer(Time::new(clock)).await.unwrap();
     let age = |state: &Value| state["vehicle"]["pose"]["age_ms"].as_u64();
     let state = page.until(|state| age(state) >= Some(2900)).await;
     assert!(age(&state) < Some(10_000), "{state}");

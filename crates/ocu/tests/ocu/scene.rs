@@ -39,7 +39,7 @@ pub(crate) const ATTEMPTS: u32 = 20;
 /// A vehicle that is one component, and a station that observes it.
 pub(crate) struct Scene {
     pub(crate) vehicle: Vehicle,
-    rover: Option<Component>,
+    pub(crate) rover: Option<Component>,
     pub(crate) address: SocketAddr,
     group: Group,
     timeout: u8,

@@ -12,7 +12,7 @@ use std::net::SocketAddr;
 
 use super::{Part, PartError, Slot};
 use crate::messages;
-use jaus::component::{AccessControl, Component, Time, Watch};
+use jaus::component::{Component, Watch};
 use jaus::endpoint::{Event, Remote};
 use jaus::node::{ComponentEvents, Events, Node};
 use jaus_view::debug::{self, DebugView};
@@ -49,11 +49,7 @@ impl Part for Communicator {
         };
         let news = (node.events(), node.component_events());
         let _journal = self.start_journal(&node)?;
-        let component = slot
-            .component("Communicator")
-            .access_control(AccessControl::new())
-            .offer(Time::new(slot.time.clone()))
-            .live_on(slot.port)?;
+        let component = slot.timed_component("Communicator").live_on(slot.port)?;
         slot.telemetry.attach(&component);
         tell_place(&node, self.log.as_ref());
         let view = self.serve(&node, &component).await?;

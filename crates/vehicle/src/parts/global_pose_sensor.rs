@@ -15,7 +15,7 @@ use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odo
 use crate::mobility::Vehicle;
 use crate::motion::{Frame, GlobalPose, Motion, Observed, Pilot, Pose, WheelCount};
 use crate::navigation::{IioImu, Navigator, NavigatorConfig};
-use jaus::component::{AccessControl, Component};
+use jaus::component::Component;
 use jaus::messages::mobility::{QueryGlobalPose, QueryGlobalPoseExt};
 use jaus::node::now;
 
@@ -92,8 +92,7 @@ impl GlobalPoseSensor {
         let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
             .with_clock(slot.time.clone());
         let component = slot
-            .component("Global Pose Sensor")
-            .access_control(AccessControl::new())
+            .timed_component("Global Pose Sensor")
             .offer(vehicle.global_pose_sensor())
             .live_on(slot.port)?;
         slot.telemetry.attach(&component);

@@ -52,7 +52,7 @@ impl Part for ImuSensor {
         let device = self.device.open()?;
         let has_accelerometer = device.has_accelerometer();
         let mut samples = IioDevice::start(device, IioImu::sample)?;
-        let mut builder = slot.component("IMU Sensor").offer(velocity_service());
+        let mut builder = slot.timed_component("IMU Sensor").offer(velocity_service());
         if has_accelerometer {
             builder = builder.offer(acceleration_service());
         }

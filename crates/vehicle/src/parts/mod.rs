@@ -31,10 +31,10 @@ mod velocity_sensor;
 use std::convert::Infallible;
 use std::future::Future;
 
-use jaus::component::{self, Builder, Component, Kind};
+use jaus::component::{self, AccessControl, Builder, Component, Kind};
 use jaus::link::custom::CustomLink;
 use jaus::node::{Node, Port, time_of_day};
-use jaus::service::TimeOfDay;
+use jaus::service::{Time, TimeOfDay};
 
 pub use communicator::{Communicator, DEBUG_ADDRESS};
 pub use global_driver::GlobalDriver;
@@ -128,6 +128,14 @@ impl Slot {
     /// slot's port.
     pub fn component(&self, name: &str) -> Builder {
         Component::builder(self.kind, self.name.clone()).component_name(name)
+    }
+
+    /// Like [`component`](Self::component), and the component offers the slot's time as a service.
+    /// With that of a sensor, clients measure how old its samples are.
+    fn timed_component(&self, name: &str) -> Builder {
+        self.component(name)
+            .access_control(AccessControl::new())
+            .offer(Time::new(self.time.clone()))
     }
 }
 

@@ -17,7 +17,7 @@ use super::{Part, PartError, Slot, Telemetry};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::Vehicle;
 use crate::motion::{DeadReckoning, Frame, Freshness, Motion, Observed, Pilot, Pose, WheelCount};
-use jaus::component::{AccessControl, Component};
+use jaus::component::Component;
 use jaus::messages::mobility::{QueryLocalPose, QueryLocalPoseExt};
 use jaus::node::now;
 
@@ -56,8 +56,7 @@ impl Part for PoseSensor {
         let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
             .with_clock(slot.time.clone());
         let component = slot
-            .component("Local Pose Sensor")
-            .access_control(AccessControl::new())
+            .timed_component("Local Pose Sensor")
             .offer(vehicle.local_pose_sensor())
             .live_on(slot.port)?;
         slot.telemetry.attach(&component);

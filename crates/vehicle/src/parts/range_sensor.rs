@@ -14,7 +14,6 @@ use super::{Part, PartError, Slot};
 use crate::ground;
 use crate::messages::environment_sensing::QueryRangeSensorData;
 use crate::sensing::{RangerConfig, Scenery, SimulatedRanger};
-use jaus::component::AccessControl;
 use jaus::node::now;
 
 /// Measures the distances to the obstacles of a simulation, as seen from the vehicle's pose.
@@ -49,8 +48,7 @@ impl Part for RangeSensor {
         let sensor = ground::RangeSensor::new(self.ranger, self.hz);
         let mut ranger = SimulatedRanger::new(self.ranger, self.scenery);
         let component = slot
-            .component("Range Sensor")
-            .access_control(AccessControl::new())
+            .timed_component("Range Sensor")
             .offer(sensor.service())
             .live_on(slot.port)?;
         slot.telemetry.attach(&component);

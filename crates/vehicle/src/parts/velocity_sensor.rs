@@ -50,7 +50,7 @@ impl Part for VelocitySensor {
             .publishes::<QueryVelocityState>()
             .publishes::<QueryVelocityStateExt>();
         let component = slot
-            .component("Velocity State Sensor")
+            .timed_component("Velocity State Sensor")
             .offer(sensor)
             .live_on(slot.port)?;
         slot.telemetry.attach(&component);
