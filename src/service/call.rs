@@ -111,7 +111,7 @@ impl<'a> Call<'a> {
             Outcome::Handled => self.accepted |= moves,
             outcome => {
                 let source = received.source;
-                tracing::debug!(%source, message = M::NAME, ?outcome, "not accepted in this state");
+                tracing::debug!(%source, command = M::NAME, ?outcome, "not accepted in this state");
             }
         }
         Ok(())
@@ -145,7 +145,7 @@ impl<'a> Call<'a> {
         let received = self.received?;
         let source = received.source;
         if !may(self.standing(), source) {
-            tracing::debug!(%source, message = name, "ignored: sender not in control");
+            tracing::debug!(%source, command = name, "ignored: sender not in control");
             return None;
         }
         Some(received)

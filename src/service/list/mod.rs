@@ -195,7 +195,7 @@ fn requested<M: Message>(message: &Received, context: &Context<'_>) -> Option<M>
     if context.standing().obeys(message.source) {
         return read(message);
     }
-    tracing::debug!(source = %message.source, message = M::NAME, "ignored: sender not in control");
+    tracing::debug!(source = %message.source, command = M::NAME, "ignored: sender not in control");
     None
 }
 

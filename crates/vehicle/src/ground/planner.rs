@@ -90,7 +90,7 @@ impl MissionPlanner {
         carry_out: impl FnOnce(M, &mut Mission),
     ) {
         if !context.standing().acts_for(message.source) {
-            tracing::debug!(source = %message.source, message = M::NAME, "ignored: sender not in \
+            tracing::debug!(source = %message.source, command = M::NAME, "ignored: sender not in \
                 control");
         } else if let Some(command) = read(message) {
             self.tell(context, |mission| carry_out(command, mission));

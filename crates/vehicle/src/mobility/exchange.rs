@@ -96,7 +96,7 @@ impl Exchange<'_, '_> {
             return read(self.message);
         }
         let state = standing.state;
-        tracing::debug!(%source, message = M::NAME, %state, "ignored: sender not in control, or \
+        tracing::debug!(%source, command = M::NAME, %state, "ignored: sender not in control, or \
             not ready");
         None
     }
