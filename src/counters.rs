@@ -1,5 +1,19 @@
-//! Generates the counters with which a part of the stack reports what it received, sent and
-//! dropped. Every drop is counted with its reason, so that a flood shows up in the numbers.
+//! Counters with names, by which a part of the stack reports what it received, sent and dropped.
+//! Every drop is counted with its reason, so that a flood shows up in the numbers.
+
+/// The value of a counter, with its name and description, for reports and metrics.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Count {
+    /// An identifier in upper camel case, unique among the counters of its part:
+    /// `SessionsEstablished`.
+    pub name: &'static str,
+    /// What it counts: `sessions established`. Counters of the same events that differ in their
+    /// reason say so by a colon: `dropped: malformed`.
+    pub description: &'static str,
+    /// The number so far. It only grows.
+    pub value: u64,
+}
 
 /// Defines the enum `Counter`, with a short description of each counter, and the struct `Counters`
 /// with the values. The documentation of `Counters` comes first. A counter without documentation of
@@ -36,6 +50,12 @@ macro_rules! counters {
                     $(Self::$name => $text,)+
                 }
             }
+
+            const fn identifier(self) -> &'static str {
+                match self {
+                    $(Self::$name => stringify!($name),)+
+                }
+            }
         }
 
         impl std::fmt::Display for Counter {
@@ -70,6 +90,15 @@ macro_rules! counters {
             /// All counters with their values.
             pub fn iter(&self) -> impl Iterator<Item = (Counter, u64)> + '_ {
                 Counter::ALL.iter().copied().zip(self.values)
+            }
+
+            /// The same with names and descriptions, for reports and metrics.
+            pub fn counts(&self) -> impl Iterator<Item = $crate::counters::Count> + '_ {
+                self.iter().map(|(counter, value)| $crate::counters::Count {
+                    name: counter.identifier(),
+                    description: counter.name(),
+                    value,
+                })
             }
 
             pub(super) fn add(&mut self, counter: Counter) {

@@ -24,7 +24,7 @@ pub mod address;
 mod as_text;
 #[cfg(feature = "node")]
 pub mod component;
-mod counters;
+pub mod counters;
 pub mod endpoint;
 #[cfg(feature = "node")]
 pub mod link;

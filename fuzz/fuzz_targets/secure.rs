@@ -14,7 +14,7 @@ use bytes::Bytes;
 use jaus::codec::Message as _;
 use jaus::messages::mobility::SetTravelSpeed;
 use jaus::wire::{DataControl, judp};
-use jaus_secure::beacon::{LENGTH, Neighbors, Received};
+use jaus_secure::beacon::{Counter, LENGTH, Neighbors, Received};
 use jaus_secure::transport::{Inlet, framed};
 use jaus_secure::{Peer, PublicKey, Trust, TrustFile};
 use libfuzzer_sys::fuzz_target;
@@ -52,7 +52,7 @@ fn beacon(octets: &[u8]) {
     let later = now + Duration::from_secs(60);
     assert_eq!(neighbors.handle(later, from, octets), None);
     let Some(received) = Received::decode(octets) else {
-        assert_eq!(neighbors.counters().malformed, 2);
+        assert_eq!(neighbors.counters().get(Counter::Malformed), 2);
         return;
     };
     assert_eq!(octets.len(), LENGTH);

@@ -11,6 +11,7 @@ use std::time::Instant;
 
 use bytes::Bytes;
 
+use crate::counters::Count;
 use crate::endpoint::{SessionId, Transmit};
 
 /// A link of another crate.
@@ -18,8 +19,13 @@ use crate::endpoint::{SessionId, Transmit};
 /// None of the methods may block. Those that get a [`Context`] arrange a wake-up if they have more
 /// to do. `now` is the node's clock ([`node::now`](crate::node::now)).
 pub trait CustomLink: fmt::Debug + Send {
-    /// Its name in logs and reports.
+    /// Its name in logs, reports and metrics. It should differ from those of other kinds of links.
     fn name(&self) -> &str;
+
+    /// Its counters so far, for reports and metrics: always the same ones, even if they are zero.
+    fn counters(&self) -> Vec<Count> {
+        Vec::new()
+    }
 
     /// Queues a datagram from the endpoint: for one session, or for all of them
     /// ([`To::Group`](crate::endpoint::To::Group)).

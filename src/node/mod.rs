@@ -77,6 +77,7 @@ use self::link::Link;
 use self::links::Links;
 use self::local::serve;
 use crate::address::JausId;
+use crate::counters::Count;
 use crate::endpoint::{self, Event, LinkId};
 use crate::link::custom::CustomLink;
 use crate::link::interface::Changes;
@@ -265,6 +266,22 @@ impl Node {
         core.links.open.iter().filter_map(report).collect()
     }
 
+    /// The links of other crates ([`start_with`](Self::start_with)); none after the node has
+    /// stopped.
+    #[must_use]
+    pub fn custom_links(&self) -> Vec<CustomReport> {
+        let core = self.shared().lock();
+        let report = |(&id, link): (&LinkId, &Link)| match link {
+            Link::Custom(link) => Some(CustomReport {
+                link: id,
+                name: link.name().to_owned(),
+                counters: link.counters(),
+            }),
+            _ => None,
+        };
+        core.links.open.iter().filter_map(report).collect()
+    }
+
     /// The peers whose addresses are known, in order of their ids.
     #[must_use]
     pub fn peers(&self) -> Vec<endpoint::Peer> {
@@ -378,6 +395,17 @@ pub struct SerialReport {
     pub is_open: bool,
     /// Counts of traffic.
     pub counters: serial::Counters,
+}
+
+/// The current state of one link of another crate.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CustomReport {
+    /// Its number in [`Path`](endpoint::Path).
+    pub link: LinkId,
+    /// Its name.
+    pub name: String,
+    /// Its counters.
+    pub counters: Vec<Count>,
 }
 
 /// The current state of one UDP link of a node.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use jaus::counters::Count;
 use jaus::endpoint::Counter;
 use jaus::node::Node;
 
@@ -57,6 +58,12 @@ fn links(node: &Node) -> Vec<String> {
     }
     if let Some(tcp) = node.tcp() {
         lines.push(format!("link tcp: {} connections", tcp.connections.len()));
+    }
+    for link in node.custom_links() {
+        let counted = link.counters.iter().filter(|count| count.value > 0);
+        let line =
+            |count: &Count| format!("link {}: {} {}", link.name, count.value, count.description);
+        lines.extend(counted.map(line));
     }
     lines
 }

@@ -12,6 +12,7 @@ use std::num::NonZeroU32;
 use std::task::{Context, Poll};
 use std::time::{Instant, SystemTime};
 
+use jaus::counters::Count;
 use jaus::endpoint::{Remote, To, Transmit};
 use jaus::link;
 use jaus::link::custom::{Arrival, CustomLink};
@@ -24,7 +25,7 @@ use socket::Socket;
 use crate::beacon;
 use crate::credentials::Credentials;
 use crate::key::Key;
-use crate::transport::{Datagrams, Transport};
+use crate::transport::{Counter, Datagrams, Transport};
 use crate::trust::TrustFile;
 
 pub use beacons::Announce;
@@ -180,7 +181,7 @@ impl SecureLink {
         let Some(log) = &self.audit else { return };
         let records = std::iter::from_fn(|| self.transport.poll_record());
         records.for_each(|record| log.write(audit::entry(record)));
-        let lost = self.transport.counters().records_lost;
+        let lost = self.transport.counters().get(Counter::RecordsLost);
         if lost > self.records_lost {
             log.write(audit::loss(lost - self.records_lost));
             self.records_lost = lost;
@@ -236,6 +237,13 @@ impl SecureLink {
 impl CustomLink for SecureLink {
     fn name(&self) -> &str {
         "secure"
+    }
+
+    /// Those of its sessions, and those of beacons, which are zero without beacons.
+    fn counters(&self) -> Vec<Count> {
+        let none = beacon::Counters::default();
+        let beacons = self.beacons().unwrap_or(&none).counts();
+        self.transport.counters().counts().chain(beacons).collect()
     }
 
     fn transmit(&mut self, transmit: &Transmit) {

@@ -4,6 +4,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant};
 
+use jaus::counters::Count;
 use jaus::endpoint::Transmit;
 use jaus::link::custom::{Arrival, CustomLink};
 use zenoh::query::Query;
@@ -110,6 +111,10 @@ impl ZenohLink {
 impl CustomLink for ZenohLink {
     fn name(&self) -> &str {
         NAME
+    }
+
+    fn counters(&self) -> Vec<Count> {
+        self.shared.lock().exchange.counters().counts().collect()
     }
 
     fn transmit(&mut self, transmit: &Transmit) {

@@ -1,7 +1,17 @@
-//! The program without a network: what it says about its flags.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+//! The program without a network: what it says about its flags, and its metrics.
+#![allow(
+    clippy::disallowed_types,
+    clippy::unwrap_used,
+    reason = "a test with its own sockets, which fails by panicking"
+)]
 
-use std::process::Command;
+use std::collections::BTreeSet;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+
+use jaus_test_kit::group::own_group;
+use jaus_test_kit::tools::workspace;
 
 /// Runs the program, which has to end by itself; returns its exit status and output.
 fn run(arguments: &[&str]) -> (i32, String) {
@@ -45,4 +55,59 @@ fn the_help_begins_with_what_it_is_and_ends_with_examples() {
     assert_eq!(status, 0, "{text}");
     assert!(text.starts_with("Bridge between JAUS systems"), "{text}");
     assert!(text.contains("--accept \"60 control=127\""), "{text}");
+}
+
+/// A bridge without peers, which serves its metrics; ended when dropped.
+struct Bridge(Child);
+
+impl Bridge {
+    /// Starts it; returns the address of its metrics too.
+    fn start() -> (Self, String) {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_jaus-zenoh"));
+        let group = own_group().to_string();
+        program.args(["--loopback", "--group", &group, "--metrics", "0"]);
+        program.args(["--listen", "tcp/127.0.0.1:0"]);
+        program.env_remove("JAUS_LOG").stderr(Stdio::piped());
+        let mut bridge = Self(program.spawn().unwrap());
+        let lines = BufReader::new(bridge.0.stderr.take().unwrap()).lines();
+        let mut lines = lines.map(Result::unwrap);
+        let address = lines.find_map(|line| {
+            let (_, address) = line.split_once("metrics at http://")?;
+            Some(address.strip_suffix("/metrics")?.to_owned())
+        });
+        // Whatever else it logs must not block it.
+        std::thread::spawn(move || lines.for_each(drop));
+        (bridge, address.unwrap())
+    }
+}
+
+impl Drop for Bridge {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn its_counters_are_metrics_and_the_guide_describes_all() {
+    let (_bridge, address) = Bridge::start();
+    let mut stream = TcpStream::connect(address).unwrap();
+    let request = b"GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n";
+    stream.write_all(request).unwrap();
+    let mut metrics = String::new();
+    stream.read_to_string(&mut metrics).unwrap();
+    let refused = "jaus_zenoh_dropped_total{reason=\"id that is not accepted\"} 0";
+    assert!(metrics.lines().any(|line| line == refused), "{metrics}");
+
+    let name = |line: &str| {
+        let name = line.strip_prefix("# TYPE ")?.split(' ').next()?;
+        name.starts_with("jaus_zenoh_").then(|| name.to_owned())
+    };
+    let names: BTreeSet<_> = metrics.lines().filter_map(name).collect();
+    let guide = std::fs::read_to_string(workspace("docs/zenoh.md")).unwrap();
+    let rows = guide.lines().filter(|line| line.starts_with("| `jaus_"));
+    let words = rows.flat_map(|row| row.split('`'));
+    let described = words.filter(|word| word.starts_with("jaus_zenoh_"));
+    let described: BTreeSet<_> = described.map(str::to_owned).collect();
+    assert_eq!(names, described);
 }

@@ -7,6 +7,7 @@
 
 mod clocks;
 mod component;
+mod counts;
 mod exposition;
 mod node;
 mod server;

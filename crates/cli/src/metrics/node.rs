@@ -1,35 +1,20 @@
 //! The metrics of a node: its counters, links, peers and attached components.
 
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::time::Instant;
 
-use jaus::endpoint::{Counter, Peer};
+use jaus::endpoint::Peer;
+#[cfg(unix)]
+use jaus::node::JuniorReport;
 use jaus::node::{LinkReport, Node, TcpReport};
 
+use super::counts;
 use super::exposition::{Exposition, Unit, Value};
 
 /// Maximum number of peers, links or components with samples of their own. Peers are those known
 /// longest, so that new ids, which any sender can invent, replace none.
 const MOST: usize = 64;
-
-/// The counters that are one family each: their common beginning, the family, and its description.
-const REASONS: [(&str, &str, &str); 3] = [
-    (
-        "dropped: ",
-        "jaus_dropped",
-        "Received messages and datagrams that were dropped, by reason.",
-    ),
-    (
-        "not sent: ",
-        "jaus_not_sent",
-        "Messages and datagrams that were not sent, by reason.",
-    ),
-    (
-        "not forwarded: ",
-        "jaus_not_forwarded",
-        "Messages for other nodes that were not forwarded, by reason.",
-    ),
-];
 
 /// Adds all metrics of a node.
 pub(super) fn add(exposition: &mut Exposition, node: &Node, now: Instant) {
@@ -38,49 +23,15 @@ pub(super) fn add(exposition: &mut Exposition, node: &Node, now: Instant) {
     exposition
         .gauge("jaus_node_info", Unit::None, "The id of the node.")
         .add(&[("node", &id)], 1_u64);
-    add_counters(exposition, node);
+    counts::add(exposition, "jaus", node.counters().counts());
     add_links(exposition, node);
-    add_streams(exposition, node);
+    add_tcp(exposition, node);
+    add_serial_lines(exposition, node);
+    #[cfg(unix)]
+    add_junior(exposition, node.junior().as_ref());
+    add_custom_links(exposition, node);
     add_peers(exposition, node, now);
     add_components(exposition, node);
-}
-
-/// The reason in a counter's name, if it is one of a family with this beginning.
-fn reason(counter: Counter, beginning: &str) -> Option<&'static str> {
-    counter.name().strip_prefix(beginning)
-}
-
-fn add_counters(exposition: &mut Exposition, node: &Node) {
-    let counters = node.counters();
-    for (beginning, name, help) in REASONS {
-        let mut family = exposition.counter(name, Unit::None, help);
-        for (counter, count) in counters.iter() {
-            if let Some(reason) = reason(counter, beginning) {
-                family.add(&[("reason", &reason)], count);
-            }
-        }
-    }
-    for (counter, count) in counters.iter() {
-        if REASONS.iter().any(|(it, ..)| reason(counter, it).is_some()) {
-            continue;
-        }
-        let help = format!("Count of {}.", counter.name());
-        exposition
-            .counter(&name(counter), Unit::None, &help)
-            .add(&[], count);
-    }
-}
-
-/// The metric of a counter: `jaus_datagrams_received` for `DatagramsReceived`.
-fn name(counter: Counter) -> String {
-    let mut name = "jaus".to_owned();
-    for c in format!("{counter:?}").chars() {
-        if c.is_ascii_uppercase() {
-            name.push('_');
-        }
-        name.push(c.to_ascii_lowercase());
-    }
-    name
 }
 
 /// A metric of each item of a list: name, unit, description, value.
@@ -151,15 +102,24 @@ fn add_links(exposition: &mut Exposition, node: &Node) {
     }
 }
 
-/// TCP connections and serial lines.
-fn add_streams(exposition: &mut Exposition, node: &Node) {
-    let tcp: Vec<_> = node.tcp().into_iter().collect();
+/// One counter for each column, with a sample if the only link of its kind is there.
+fn add_columns<T>(exposition: &mut Exposition, link: Option<&T>, columns: &[Column<T, u64>]) {
+    for (name, unit, help, value) in columns {
+        let mut family = exposition.counter(name, *unit, help);
+        if let Some(link) = link {
+            family.add(&[], value(link));
+        }
+    }
+}
+
+fn add_tcp(exposition: &mut Exposition, node: &Node) {
+    let tcp = node.tcp();
     let mut connections = exposition.gauge(
         "jaus_tcp_connections",
         Unit::None,
         "Established TCP connections.",
     );
-    for tcp in &tcp {
+    if let Some(tcp) = &tcp {
         connections.add(&[], tcp.connections.len());
     }
     let columns: [Column<TcpReport, u64>; 4] = [
@@ -188,12 +148,10 @@ fn add_streams(exposition: &mut Exposition, node: &Node) {
             |it| it.counters.refused + it.counters.denied,
         ),
     ];
-    for (name, unit, help, value) in columns {
-        let mut family = exposition.counter(name, unit, help);
-        for tcp in &tcp {
-            family.add(&[], value(tcp));
-        }
-    }
+    add_columns(exposition, tcp.as_ref(), &columns);
+}
+
+fn add_serial_lines(exposition: &mut Exposition, node: &Node) {
     let lines = node.serial_lines();
     let help = "Whether the port of a serial line is open (1) or not (0).";
     let mut open = exposition.gauge("jaus_serial_open", Unit::None, help);
@@ -226,6 +184,67 @@ fn add_streams(exposition: &mut Exposition, node: &Node) {
             ),
         ],
     );
+}
+
+/// The link through Junior's node manager.
+#[cfg(unix)]
+fn add_junior(exposition: &mut Exposition, junior: Option<&JuniorReport>) {
+    let help = "Whether Junior's node manager has accepted all components (1) or not (0).";
+    let mut registered = exposition.gauge("jaus_junior_registered", Unit::None, help);
+    if let Some(junior) = junior {
+        registered.add(&[], junior.is_registered);
+    }
+    let columns: [Column<JuniorReport, u64>; 4] = [
+        (
+            "jaus_junior_received_datagrams",
+            Unit::None,
+            "Datagrams received through Junior's node manager.",
+            |it| it.counters.received,
+        ),
+        (
+            "jaus_junior_sent_datagrams",
+            Unit::None,
+            "Datagrams passed to Junior's node manager.",
+            |it| it.counters.sent,
+        ),
+        (
+            "jaus_junior_registrations",
+            Unit::None,
+            "How often Junior's node manager has accepted a component.",
+            |it| it.counters.registrations,
+        ),
+        (
+            "jaus_junior_failures",
+            Unit::None,
+            "How often Junior's node manager went away.",
+            |it| it.counters.failures,
+        ),
+    ];
+    add_columns(exposition, junior, &columns);
+    let help = "Datagrams that the link through Junior's node manager lost, by cause.";
+    let mut errors = exposition.counter("jaus_junior_errors", Unit::None, help);
+    for counters in junior.iter().map(|it| it.counters) {
+        for (cause, count) in [
+            ("receive", counters.receive_errors),
+            ("send", counters.send_errors),
+            ("send queue full", counters.send_overflows),
+            ("node manager away", counters.manager_away),
+        ] {
+            errors.add(&[("cause", &cause)], count);
+        }
+    }
+}
+
+/// The links of other crates. Those of the same name are added together.
+fn add_custom_links(exposition: &mut Exposition, node: &Node) {
+    let mut links = BTreeMap::<_, Vec<_>>::new();
+    for link in node.custom_links() {
+        let counts = links.entry(counts::snake_case(&link.name)).or_default();
+        counts.extend(link.counters);
+    }
+    for (name, counts) in links.into_iter().take(MOST) {
+        counts::add(exposition, &format!("jaus_{name}"), counts);
+    }
 }
 
 fn add_peers(exposition: &mut Exposition, node: &Node, now: Instant) {
@@ -345,6 +364,8 @@ fn add_components(exposition: &mut Exposition, node: &Node) {
 
 #[cfg(test)]
 mod tests {
+    use jaus::endpoint::Counter;
+
     use super::*;
     use crate::metrics::exposition::Format;
 
@@ -352,7 +373,7 @@ mod tests {
     async fn every_counter_of_the_endpoint_is_exported_once() {
         let node = Node::start(jaus::node::Config::loopback(101, 1)).unwrap();
         let mut exposition = Exposition::new(Format::Prometheus);
-        add_counters(&mut exposition, &node);
+        counts::add(&mut exposition, "jaus", node.counters().counts());
         let text = exposition.finish();
         let samples: Vec<_> = text.lines().filter(|it| !it.starts_with('#')).collect();
         assert_eq!(samples.len(), Counter::ALL.len(), "{text}");
@@ -364,5 +385,32 @@ mod tests {
             assert!(samples.contains(&expected), "{expected}: {text}");
         }
         node.shutdown().await;
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn losses_of_the_link_through_junior_have_their_causes() {
+        let counters = jaus::link::junior::Counters {
+            manager_away: 3,
+            failures: 1,
+            ..Default::default()
+        };
+        let junior = JuniorReport {
+            link: jaus::endpoint::LinkId(0),
+            folder: "/tmp".into(),
+            is_registered: false,
+            counters,
+        };
+        let mut exposition = Exposition::new(Format::Prometheus);
+        add_junior(&mut exposition, Some(&junior));
+        let text = exposition.finish();
+        for expected in [
+            "jaus_junior_registered 0",
+            "jaus_junior_failures_total 1",
+            "jaus_junior_errors_total{cause=\"node manager away\"} 3",
+            "jaus_junior_errors_total{cause=\"send\"} 0",
+        ] {
+            assert!(text.lines().any(|it| it == expected), "{expected}: {text}");
+        }
     }
 }

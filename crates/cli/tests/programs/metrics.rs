@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 use std::io::{Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use jaus_test_kit::group::own_group;
@@ -11,6 +12,7 @@ use jaus_test_kit::waiting::LIMIT;
 use serde_json::Value as Json;
 
 use crate::program::Program;
+use crate::support::run;
 
 const PLANNER: &str = env!("CARGO_BIN_EXE_jaus-planner");
 
@@ -23,6 +25,34 @@ fn start(program: &str, flags: &[&str]) -> (Program, String) {
     let (_, address) = said.split_once("metrics at http://").unwrap();
     let (address, _) = address.split_once("/metrics").unwrap();
     (program, address.to_owned())
+}
+
+/// The flags with the files of a new key, in a folder; and the public key.
+fn new_key(folder: &Path, name: &str) -> ([String; 2], String) {
+    let file = |kind: &str| folder.join(format!("{name}.{kind}")).display().to_string();
+    let flags = [
+        format!("--key={}", file("key")),
+        format!("--trusted-keys={}", file("trusted")),
+    ];
+    let made = run(&["keys", "new", &flags[0], &flags[1]], b"");
+    assert_eq!(made.status, 0, "{made:?}");
+    (flags, made.stdout.trim().to_owned())
+}
+
+/// A planner with a secure link that trusts nobody who runs, the address of the link, its public
+/// key, and the address of its metrics.
+fn start_secure(folder: &Path) -> (Program, SocketAddr, String, String) {
+    let ([key_file, trusted_keys], key) = new_key(folder, "planner");
+    let (_, absent) = new_key(folder, "absent");
+    let trust = format!("absent {absent} 60.255.255");
+    let listen = UdpSocket::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap();
+    let flag = format!("--secure-listen={listen}");
+    let flags = [&*key_file, &trusted_keys, "--trust", &trust, &flag];
+    let (program, address) = start(PLANNER, &flags);
+    (program, listen, key, address)
 }
 
 /// The answer to a request.
@@ -41,20 +71,27 @@ fn scrape(address: &str) -> String {
 /// Scrapes until a line is there.
 #[track_caller]
 fn scrape_until(address: &str, line: &str) -> String {
+    scrape_until_any(address, |it| it == line)
+}
+
+/// Scrapes until one line is as wanted.
+#[track_caller]
+fn scrape_until_any(address: &str, is_wanted: impl Fn(&str) -> bool) -> String {
     let start = Instant::now();
     loop {
         let metrics = scrape(address);
-        if metrics.lines().any(|it| it == line) {
+        if metrics.lines().any(&is_wanted) {
             return metrics;
         }
-        assert!(start.elapsed() < LIMIT, "no `{line}`: {metrics}");
+        assert!(start.elapsed() < LIMIT, "{metrics}");
         std::thread::sleep(Duration::from_millis(100));
     }
 }
 
-/// The names of all metrics of a program with a node and a component.
+/// The names of all metrics of a program with a node, a component and a secure link.
 fn names() -> BTreeSet<String> {
-    let (_planner, address) = start(PLANNER, &[]);
+    let folder = tempfile::tempdir().unwrap();
+    let (_planner, _, _, address) = start_secure(folder.path());
     let metrics = scrape_until(&address, "jaus_mission_under_way 0");
     let name = |line: &str| {
         let name = line.strip_prefix("# TYPE ")?.split(' ').next()?;
@@ -132,6 +169,31 @@ fn state_services_and_counters_of_a_program_are_served() {
     let service = "jaus_service_info{component=\"131.1.33\",service=\"urn:jaus:jss:mobility:\
         PrimitiveDriver\",version=\"";
     assert!(metrics.contains(service), "{metrics}");
+}
+
+#[test]
+fn a_secure_link_counts_refused_handshakes_by_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_planner, listen, key, address) = start_secure(folder.path());
+    let refused = "jaus_secure_handshakes_refused_total{reason=\"untrusted key\"} ";
+    let metrics = scrape_until(&address, &format!("{refused}0"));
+    let unsent = "jaus_secure_not_sent_total{reason=\"session has ended\"} 0";
+    assert!(metrics.lines().any(|it| it == unsent), "{metrics}");
+
+    let ([key_file, trusted_keys], _) = new_key(folder.path(), "stranger");
+    let (peer, trust) = (listen.to_string(), format!("planner {key} 101.255.255"));
+    let flags = [
+        &*key_file,
+        &trusted_keys,
+        "--trust",
+        &trust,
+        "--secure-peer",
+        &peer,
+    ];
+    let driver = env!("CARGO_BIN_EXE_jaus-primitive-driver");
+    let (_stranger, _) = start(driver, &flags);
+    let count = |line: &str| line.strip_prefix(refused)?.parse().ok();
+    scrape_until_any(&address, |line| count(line).is_some_and(|it: u64| it > 0));
 }
 
 #[test]

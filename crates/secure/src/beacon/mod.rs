@@ -34,7 +34,7 @@ use jaus::address::JausId;
 
 pub use announcer::Announcer;
 pub(crate) use neighbors::LIFETIME;
-pub use neighbors::{Counters, Neighbors, Sighting};
+pub use neighbors::{Counter, Counters, Neighbors, Sighting};
 
 use crate::key::{Fingerprint, Key, PublicKey};
 

@@ -19,28 +19,24 @@ const CHECKS: Rate = Rate::new(4, 16);
 /// of a processor even if their senders invent addresses.
 const ADDRESSES: usize = 64;
 
-/// Counts of beacons.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Counters {
-    /// Beacons that were accepted.
-    pub accepted: u64,
+jaus::counters! {
+    /// Counts of received beacons.
+    pub struct Counters;
+
+    BeaconsAccepted = "beacons accepted",
     /// Beacons with the key of this node.
-    pub own: u64,
-    /// Datagrams that were no beacons.
-    pub malformed: u64,
-    /// Beacons of keys that are not trusted.
-    pub unknown: u64,
+    Own = "beacons ignored: own",
+    Malformed = "beacons ignored: malformed",
+    Unknown = "beacons ignored: untrusted key",
     /// Beacons that came from another address than they name, or name no port.
-    pub misplaced: u64,
+    Misplaced = "beacons ignored: from another address",
     /// Beacons that were not newer than an earlier one of their key.
-    pub replayed: u64,
+    Replayed = "beacons ignored: not newer than the last one",
     /// Beacons whose signature was not checked, because too many came from their address.
-    pub limited: u64,
-    /// Beacons with a wrong signature.
-    pub forged: u64,
+    Limited = "beacons ignored: too many from one address",
+    Forged = "beacons ignored: wrong signature",
     /// Beacons of ids for which their key may not speak.
-    pub foreign_ids: u64,
+    ForeignIds = "beacons ignored: id that their key may not use",
 }
 
 /// A node that was found by its beacon.
@@ -93,53 +89,45 @@ impl Neighbors {
 
     /// Checks a datagram from this address; returns the node that it shows.
     pub fn handle(&mut self, now: Instant, from: SocketAddr, datagram: &[u8]) -> Option<Sighting> {
-        let result = self.check(now, from, datagram);
-        let counters = &mut self.counters;
-        let (counter, reason) = match result {
+        match self.check(now, from, datagram) {
             Ok(sighting) => {
-                counters.accepted += 1;
-                return Some(sighting);
+                self.counters.add(Counter::BeaconsAccepted);
+                Some(sighting)
             }
-            Err(Refusal::Own) => (&mut counters.own, "its own"),
-            Err(Refusal::Malformed) => (&mut counters.malformed, "malformed"),
-            Err(Refusal::Unknown) => (&mut counters.unknown, "the key is not trusted"),
-            Err(Refusal::Misplaced) => (&mut counters.misplaced, "from another address"),
-            Err(Refusal::Replayed) => (&mut counters.replayed, "not newer than the last one"),
-            Err(Refusal::Limited) => (&mut counters.limited, "too many from this address"),
-            Err(Refusal::Forged) => (&mut counters.forged, "wrong signature"),
-            Err(Refusal::ForeignId) => (&mut counters.foreign_ids, "foreign id"),
-        };
-        *counter += 1;
-        tracing::trace!(%from, reason, "beacon ignored");
-        None
+            Err(reason) => {
+                self.counters.add(reason);
+                tracing::trace!(%from, "{reason}");
+                None
+            }
+        }
     }
 
-    /// The checks, the cheap ones first.
+    /// The checks, the cheap ones first. The error is the counter of the reason.
     fn check(
         &mut self,
         now: Instant,
         from: SocketAddr,
         datagram: &[u8],
-    ) -> Result<Sighting, Refusal> {
+    ) -> Result<Sighting, Counter> {
         self.follow_trust();
-        let received = Received::decode(datagram).ok_or(Refusal::Malformed)?;
+        let received = Received::decode(datagram).ok_or(Counter::Malformed)?;
         let claim = received.claim();
         if claim.fingerprint == self.own {
-            return Err(Refusal::Own);
+            return Err(Counter::Own);
         }
         let key = self.keys.get(&claim.fingerprint).copied();
-        let key = key.ok_or(Refusal::Unknown)?;
-        let address = link_address(claim, from).ok_or(Refusal::Misplaced)?;
+        let key = key.ok_or(Counter::Unknown)?;
+        let address = link_address(claim, from).ok_or(Counter::Misplaced)?;
         if self.is_replayed(now, key, claim.stamp) {
-            return Err(Refusal::Replayed);
+            return Err(Counter::Replayed);
         }
         if !self.checks.take(now, from.ip()) {
-            return Err(Refusal::Limited);
+            return Err(Counter::Limited);
         }
-        let beacon = received.verify(key).ok_or(Refusal::Forged)?;
-        let peer = self.trust.find(key).ok_or(Refusal::Unknown)?;
+        let beacon = received.verify(key).ok_or(Counter::Forged)?;
+        let peer = self.trust.find(key).ok_or(Counter::Unknown)?;
         if !beacon.may_come_from(&peer.ids) {
-            return Err(Refusal::ForeignId);
+            return Err(Counter::ForeignIds);
         }
         self.last.insert(key, (beacon.stamp, now));
         Ok(Sighting { key, address })
@@ -165,19 +153,6 @@ impl Neighbors {
             .map(|key| (key.fingerprint(), key))
             .collect();
     }
-}
-
-/// Why a beacon was ignored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Refusal {
-    Own,
-    Malformed,
-    Unknown,
-    Misplaced,
-    Replayed,
-    Limited,
-    Forged,
-    ForeignId,
 }
 
 /// The address of the sender's link, if the beacon came from the address that it names: otherwise

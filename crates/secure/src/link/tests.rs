@@ -165,3 +165,33 @@ async fn a_node_that_is_shut_down_tells_its_peers() {
     });
     assert!(reason.unwrap().contains("the node stops"));
 }
+
+#[tokio::test]
+async fn the_counters_of_a_link_are_in_the_reports_of_its_node() {
+    let folder = tempfile::tempdir().unwrap();
+    let (rover_key, client_key) = (key(&folder, "rover"), key(&folder, "client"));
+    let stranger_key = key(&folder, "stranger");
+    let any = "127.0.0.1:0".parse().unwrap();
+    let trust = trusting("client", &client_key, "60.255.255");
+    let at_rover = SecureLink::open(&rover_key, trust, Settings::new(any)).unwrap();
+    let peers = [at_rover.local().unwrap()];
+    let trust = trusting("rover", &rover_key, "101.255.255");
+    let settings = Settings::new(any).connect(peers[0]);
+    let mut at_stranger = SecureLink::open(&stranger_key, trust, settings).unwrap();
+    let rover = node(101, at_rover);
+    assert!(at_stranger.probe(&peers, LIMIT).await[0].is_err());
+    let counted = async {
+        loop {
+            let reports = rover.custom_links();
+            assert_eq!(reports[0].name, "secure");
+            let refused = |count: &&Count| count.name == "RefusedKeys" && count.value > 0;
+            if let Some(count) = reports[0].counters.iter().find(refused) {
+                break count.description;
+            }
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    };
+    let description = tokio::time::timeout(LIMIT, counted).await.unwrap();
+    assert_eq!(description, "handshakes refused: untrusted key");
+    rover.shutdown().await;
+}

@@ -42,7 +42,7 @@ use quinn_proto::{
 pub use egress::Datagrams;
 pub use inlet::{Inlet, framed};
 pub use record::{Act, Fault, Record};
-pub use report::{Counters, SessionReport};
+pub use report::{Counter, Counters, SessionReport};
 
 use crate::authority::Rejection;
 use crate::credentials::Credentials;
@@ -177,7 +177,7 @@ impl Transport {
             && !self.is_dialling(from)
             && !self.first_packets.take(now, quota_address(from.ip()))
         {
-            self.counters.handshakes_dropped += 1;
+            self.counters.add(Counter::HandshakesDropped);
             return;
         }
         self.buffer.clear();
@@ -256,7 +256,7 @@ impl Transport {
         let from = incoming.remote_address().ip();
         let (all, near) = self.handshakes(from);
         if all >= MOST_HANDSHAKES || near >= MOST_HANDSHAKES_PER_ADDRESS {
-            self.counters.handshakes_dropped += 1;
+            self.counters.add(Counter::HandshakesDropped);
             self.endpoint.ignore(incoming);
             return;
         }
@@ -273,7 +273,7 @@ impl Transport {
                 self.advance(now, id);
             }
             Err(error) => {
-                self.counters.handshakes_failed += 1;
+                self.counters.add(Counter::HandshakesFailed);
                 if let Some(response) = error.response {
                     self.respond(&response);
                 }
@@ -371,7 +371,7 @@ impl Transport {
         tracing::info!(peer = peer.name, %address, "secure session established");
         session.peer = Some(peer);
         session.valid_until = identified.valid_until;
-        self.counters.established += 1;
+        self.counters.add(Counter::SessionsEstablished);
         match session.dial {
             // There are no dials any more after `close`.
             Some(dial) => {
@@ -427,9 +427,11 @@ impl Transport {
             let reason = reason.to_string();
             self.record(id, Act::Disconnected { reason });
         } else if session.peer.is_none() {
-            self.counters.handshakes_failed += 1;
+            self.counters.add(Counter::HandshakesFailed);
             let rejection = self.refusals.take();
-            self.counters.count(rejection.as_ref());
+            if let Some(rejection) = &rejection {
+                self.counters.count(rejection);
+            }
             let key = rejection.as_ref().and_then(Rejection::key);
             let fault = Fault::of(reason, rejection);
             if self.warned.is_none_or(|at| now >= at + WARNING_PAUSE) {

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Transport, code, parameters};
+use super::{Counter, Transport, code, parameters};
 
 /// The interval of warnings about the node's own certificate.
 pub(super) const REMINDER_PAUSE: Duration = Duration::from_secs(24 * 60 * 60);
@@ -70,7 +70,7 @@ impl Transport {
         }
         if let Some(warning) = self.credentials.warning() {
             self.reminded = Some(now);
-            self.counters.reminders += 1;
+            self.counters.add(Counter::ExpiryReminders);
             tracing::warn!("the certificate of this node: {warning}");
         }
     }

@@ -8,65 +8,48 @@ use jaus::endpoint::SessionId;
 use crate::authority::Rejection;
 use crate::trust::Peer;
 
-/// Counts of a transport since it was created.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Counters {
-    /// Sessions established.
-    pub established: u64,
+jaus::counters! {
+    /// Counts of a transport since it was created.
+    pub struct Counters;
+
+    SessionsEstablished = "sessions established",
     /// Handshakes that failed, most often because a side does not trust the key of the other.
-    pub handshakes_failed: u64,
-    /// Handshakes refused by this side because it does not trust the key.
-    pub refused_keys: u64,
-    /// Handshakes refused by this side because the certificate has expired or is not valid yet.
-    pub refused_times: u64,
-    /// Handshakes refused by this side because the certificate is revoked.
-    pub refused_revoked: u64,
+    HandshakesFailed = "handshakes failed",
+    RefusedKeys = "handshakes refused: untrusted key",
+    RefusedTimes = "handshakes refused: certificate expired or not valid yet",
+    RefusedRevoked = "handshakes refused: certificate revoked",
     /// Handshakes refused by this side for another defect of the certificate, its authority, or
     /// the proof of its key.
-    pub refused_certificates: u64,
-    /// Warnings that the node's own certificate has expired or expires soon.
-    pub reminders: u64,
+    RefusedCertificates = "handshakes refused: certificate or proof of its key not valid",
     /// First packets ignored because too many came from one address, or too many handshakes were
     /// unfinished.
-    pub handshakes_dropped: u64,
+    HandshakesDropped = "handshakes refused: too many from one address or unfinished",
+    ExpiryReminders = "warnings that the own certificate expires",
     /// Messages refused because they came from an id for which the key of their sender may not
     /// speak.
-    pub foreign_ids: u64,
+    ForeignIds = "dropped: id that the key of its sender may not use",
     /// Messages refused by the [rules](crate::rules::Rules) of the key of their sender.
-    pub refused: u64,
+    RuleForbids = "dropped: forbidden by the rules of its sender",
+    Malformed = "dropped: not JUDP",
     /// Messages not sent to a peer because the rules separate it from their source.
-    pub separated: u64,
-    /// Records for an audit log that were not kept, because too many waited.
-    pub records_lost: u64,
-    /// Notices of peers that they refused a message of this node.
-    pub notices: u64,
-    /// Datagrams that were no JUDP.
-    pub malformed: u64,
+    Separated = "not sent: rules separate source and peer",
     /// Datagrams dropped because the peer or the network was too slow.
-    pub send_overflows: u64,
-    /// Datagrams dropped because their session had ended.
-    pub no_session: u64,
+    SendOverflows = "not sent: peer or network too slow",
+    NoSession = "not sent: session has ended",
+    /// Records for an audit log that were not kept, because too many waited.
+    RecordsLost = "audit records lost",
+    NoticesReceived = "notices of peers that refused a message",
 }
 
 impl Counters {
     /// Counts a refused handshake.
-    pub(super) const fn count(&mut self, rejection: Option<&Rejection>) {
-        match rejection {
-            None => {}
-            Some(Rejection::UntrustedKey(_) | Rejection::NotEd25519) => {
-                self.refused_keys += 1;
-            }
-            Some(Rejection::Expired { .. } | Rejection::NotYetValid { .. }) => {
-                self.refused_times += 1;
-            }
-            Some(Rejection::Revoked { .. }) => {
-                self.refused_revoked += 1;
-            }
-            Some(_) => {
-                self.refused_certificates += 1;
-            }
-        }
+    pub(super) fn count(&mut self, rejection: &Rejection) {
+        self.add(match rejection {
+            Rejection::UntrustedKey(_) | Rejection::NotEd25519 => Counter::RefusedKeys,
+            Rejection::Expired { .. } | Rejection::NotYetValid { .. } => Counter::RefusedTimes,
+            Rejection::Revoked { .. } => Counter::RefusedRevoked,
+            _ => Counter::RefusedCertificates,
+        });
     }
 }
 

@@ -10,10 +10,10 @@ use jaus::messages::core::{RequestControl, confirm_control::ResponseCode};
 use jaus::wire::{Frame, Priority, judp};
 use quinn_proto::StreamId;
 
-use super::Transport;
 use super::record::{Act, Record};
 use super::screen::{self, Stop};
 use super::session::Session;
+use super::{Counter, Transport};
 use crate::rules::{denial_of_control, is_recorded};
 use crate::trust::Peer;
 
@@ -32,7 +32,7 @@ impl Transport {
     pub fn send(&mut self, session: SessionId, priority: Priority, datagram: &Bytes) {
         let is_established = |it: &Session| it.established().is_some();
         if !self.sessions.get(&session).is_some_and(is_established) {
-            self.counters.no_session += 1;
+            self.counters.add(Counter::NoSession);
             return;
         }
         let Some(datagram) = self.permitted(session, datagram) else {
@@ -40,7 +40,8 @@ impl Transport {
         };
         self.record_answers(session, &datagram);
         if let Some(session) = self.sessions.get_mut(&session) {
-            self.counters.send_overflows += session.queue(priority, datagram);
+            let dropped = session.queue(priority, datagram);
+            self.counters.add_many(Counter::SendOverflows, dropped);
         }
     }
 
@@ -72,7 +73,7 @@ impl Transport {
             passes.then_some(()).ok_or(Stop::ForeignId)
         })?;
         let stopped = screened.frames.iter().filter(|(_, it)| it.is_err()).count();
-        self.counters.separated += stopped as u64;
+        self.counters.add_many(Counter::Separated, stopped as u64);
         screened.passed
     }
 
@@ -141,11 +142,11 @@ impl Transport {
                 tracing::warn!(peer = peer.name, notice = ?text, "the peer refused a message");
                 session.heard = Some(now);
             }
-            self.counters.notices += 1;
+            self.counters.add(Counter::NoticesReceived);
             return;
         }
         let Some(screened) = screen::incoming(peer, octets) else {
-            self.counters.malformed += 1;
+            self.counters.add(Counter::Malformed);
             return;
         };
         session.received += 1;
@@ -185,7 +186,7 @@ impl Transport {
             }
             Ok(()) => {}
             Err(Stop::ForeignId) => {
-                self.counters.foreign_ids += 1;
+                self.counters.add(Counter::ForeignIds);
                 self.record(
                     id,
                     Act::ForeignId {
@@ -195,7 +196,7 @@ impl Transport {
                 );
             }
             Err(Stop::Rule(refusal)) => {
-                self.counters.refused += 1;
+                self.counters.add(Counter::RuleForbids);
                 self.record(id, message(Some(refusal)));
                 self.answer_refusal(now, id, frame, &screen::sentence(frame, refusal));
             }
@@ -224,7 +225,7 @@ impl Transport {
             notice.put_slice(&sentence.as_bytes()[..sentence.len().min(LONGEST_NOTICE)]);
             dropped += session.queue(Priority::Standard, notice.freeze());
         }
-        self.counters.send_overflows += dropped;
+        self.counters.add_many(Counter::SendOverflows, dropped);
     }
 
     /// Adds a record about an established session.
@@ -245,12 +246,12 @@ impl Transport {
     /// not displace what was done.
     pub(super) fn push_record(&mut self, record: Record) {
         if self.records.len() >= MOST_RECORDS && record.act.is_refusal() {
-            self.counters.records_lost += 1;
+            self.counters.add(Counter::RecordsLost);
             return;
         }
         if self.records.len() >= 2 * MOST_RECORDS {
             self.records.pop_front();
-            self.counters.records_lost += 1;
+            self.counters.add(Counter::RecordsLost);
         }
         self.records.push_back(record);
     }

@@ -51,10 +51,25 @@ fn nodes_without_addresses_of_each_other_meet_by_beacons() {
     let [vehicle, operator] = [VEHICLE, OPERATOR].map(|it| strangers.network.session(it).unwrap());
     assert!(operator.dialed, "the one with the smaller key");
     assert!(!vehicle.dialed);
-    assert_eq!(strangers.network.counters(VEHICLE).established, 1);
+    assert_eq!(
+        strangers
+            .network
+            .count(VEHICLE, Counter::SessionsEstablished),
+        1
+    );
     strangers.network.run(4 * PATIENCE);
-    assert_eq!(strangers.network.counters(VEHICLE).established, 1);
-    assert_eq!(strangers.network.counters(OPERATOR).established, 1);
+    assert_eq!(
+        strangers
+            .network
+            .count(VEHICLE, Counter::SessionsEstablished),
+        1
+    );
+    assert_eq!(
+        strangers
+            .network
+            .count(OPERATOR, Counter::SessionsEstablished),
+        1
+    );
 }
 
 #[test]

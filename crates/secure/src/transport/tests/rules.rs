@@ -45,8 +45,12 @@ fn a_key_that_may_observe_commands_nothing_and_is_told_so() {
     }
     network.run(SECOND);
     assert_eq!(network.hosts[0].received, [stop]);
-    assert_eq!(network.counters(0).refused, 2);
-    assert_eq!(network.counters(1).notices, 1, "one a second");
+    assert_eq!(network.count(0, Counter::RuleForbids), 2);
+    assert_eq!(
+        network.count(1, Counter::NoticesReceived),
+        1,
+        "one a second"
+    );
     let refused = |act: &Act| matches!(act, Act::Message { name, refusal: Some(_), .. } if name == "SetWrenchEffort");
     assert_eq!(
         records(&mut network, 0)
@@ -205,7 +209,7 @@ fn a_relay_separates_vehicles_and_operators_by_its_rules() {
     assert_eq!(received(3), [heartbeat]);
     assert!(received(4).is_empty(), "Bert may reach the truck alone");
     assert_eq!(
-        network.counters(0).refused,
+        network.count(0, Counter::RuleForbids),
         1,
         "Anna's message to the truck"
     );
@@ -252,7 +256,7 @@ fn refused_messages_do_not_displace_the_record_of_what_was_done() {
         network.send(1, Priority::Standard, &wrench);
     }
     network.run(5 * SECOND);
-    assert!(network.counters(0).records_lost > 0);
+    assert!(network.count(0, Counter::RecordsLost) > 0);
     let is_stop = |act: &Act| matches!(act, Act::Message { name, refusal: None, .. } if name == "SetEmergency");
     assert!(records(&mut network, 0).iter().any(is_stop));
 }
