@@ -14,7 +14,7 @@ pub(crate) use fit::{defaults, fit, zero_of};
 pub use parse::{Definition, ParseError};
 pub use set::{InterfaceError, Interfaces};
 
-use crate::value::Value;
+use crate::Value;
 
 /// The most octets of a name of a package, a type, a field or a constant.
 pub(crate) const LONGEST_NAME: usize = 255;

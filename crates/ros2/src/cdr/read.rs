@@ -4,9 +4,9 @@
 use std::sync::Arc;
 
 use super::{BIG_ENDIAN, HEADER, LITTLE_ENDIAN, LONGEST, width};
+use crate::Value;
 use crate::interface::{Field, Interface, Kind, Primitive, Size, TypeName};
 use crate::message::Message;
-use crate::value::Value;
 
 /// The most octets of padding after a message.
 const MOST_PADDING: usize = 7;
