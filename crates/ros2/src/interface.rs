@@ -85,9 +85,13 @@ impl FromStr for TypeName {
     }
 }
 
-/// A text for an error message, of bounded length.
+/// A text for an error message or the log: of bounded length, without control characters.
 pub(crate) fn shown(text: &str) -> String {
-    text.chars().take(100).collect()
+    let printable = |c: char| match c.is_control() {
+        true => char::REPLACEMENT_CHARACTER,
+        false => c,
+    };
+    text.chars().take(100).map(printable).collect()
 }
 
 /// Whether a name of a package or a field follows ROS's rules.
