@@ -14,7 +14,7 @@ pub(crate) use fit::{defaults, fit, zero_of};
 pub use parse::{Definition, ParseError};
 pub use set::{InterfaceError, Interfaces};
 
-use crate::value::Value;
+use crate::Value;
 
 /// The most octets of a name of a package, a type, a field or a constant.
 pub(crate) const LONGEST_NAME: usize = 255;
@@ -85,9 +85,13 @@ impl FromStr for TypeName {
     }
 }
 
-/// A text for an error message, of bounded length.
+/// A text for an error message or the log: of bounded length, without control characters.
 pub(crate) fn shown(text: &str) -> String {
-    text.chars().take(100).collect()
+    let printable = |c: char| match c.is_control() {
+        true => char::REPLACEMENT_CHARACTER,
+        false => c,
+    };
+    text.chars().take(100).map(printable).collect()
 }
 
 /// Whether a name of a package or a field follows ROS's rules.

@@ -5,7 +5,7 @@
 //!
 //! * [`interface`]: message types, read from the text of `.msg` files; those that a vehicle needs are
 //!   part of the crate.
-//! * [`message`] and [`value`]: messages, whose values are set and read by path.
+//! * [`message`]: messages, whose [values](Value) are set and read by path.
 //! * [`cdr`]: the encoding of messages.
 //! * [`graph`]: keys of topics, liveliness tokens, quality of service, attachments.
 //!
@@ -39,10 +39,10 @@ mod hash;
 pub mod interface;
 pub mod message;
 pub mod session;
-pub mod value;
+
+pub use jsidl::ros::Value;
 
 pub use graph::{Attachment, Gid, Qos, TopicName};
 pub use interface::{Interface, InterfaceError, Interfaces, TypeName};
 pub use message::{Message, ValueError};
 pub use session::{Ros, SessionError};
-pub use value::Value;

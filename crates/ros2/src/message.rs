@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use crate::Value;
 use crate::interface::{Field, Interface, Kind, Size, TypeName, defaults, fit, shown, zero_of};
-use crate::value::Value;
 
 /// A message of a known type. Its values fit the type at all times, so that it can be encoded.
 ///

@@ -9,6 +9,7 @@ use jaus_ros2::graph::{
 };
 use jaus_ros2::{Attachment, Gid, Interfaces, Qos, TopicName};
 use proptest::prelude::*;
+use zenoh::key_expr::KeyExpr;
 
 const CHATTER: &str = "std_msgs::msg::dds_::String_/\
     RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18";
@@ -211,6 +212,9 @@ fn quality_of_service_has_the_text_of_rmw_zenoh() {
     // What rmw_zenoh leaves out may be written.
     let explicit: Qos = "1:2:1,10:9223372036,854775807:,:1,,".parse().unwrap();
     assert_eq!(explicit, Qos::default());
+    // The nanoseconds of no limit may have a second of its seconds.
+    let carried: Qos = "1:2:1,10:9223372035,1854775807:,:1,,".parse().unwrap();
+    assert_eq!(carried, Qos::default());
     assert_eq!(explicit.reliability, Reliability::Reliable);
 }
 
@@ -274,14 +278,23 @@ fn names_follow_the_rules_of_ros() {
 
 proptest! {
     #[test]
-    fn no_key_panics(key in "(@ros2_lv/0/a/1/2/)?(NN|MP)?[ -~é]{0,60}") {
-        let _ = key.parse::<Token>();
-    }
-
-    #[test]
-    fn no_quality_of_service_panics(text in "[0-9:,]{0,60}") {
-        if let Ok(qos) = text.parse::<Qos>() {
-            prop_assert_eq!(qos.to_string().parse(), Ok(qos));
+    fn every_name_that_is_accepted_makes_keys_that_zenoh_accepts(
+        name in "(/[a-z_][a-z_0-9]{0,8}){1,3}|/.{0,20}",
+        namespace in "/|(/[a-z_][a-z_0-9]{0,8}){1,3}|/.{0,20}",
+        node in "[a-z_][a-z_0-9]{0,8}|.{0,20}",
+    ) {
+        let interfaces = Interfaces::bundled().unwrap();
+        let bool = interfaces.get("std_msgs/Bool").unwrap();
+        let (Ok(name), Ok(node)) = (name.parse(), NodeName::new(&namespace, &node)) else {
+            return Ok(());
+        };
+        let token = Token::of_node(7, "a1b2", 3, &node);
+        let endpoint = Endpoint::new(&name, &bool, Qos::sensor());
+        let publisher = token.with_endpoint(4, EntityKind::Publisher, endpoint);
+        for token in [token, publisher] {
+            KeyExpr::try_from(token.to_string()).unwrap();
+            prop_assert_eq!(token.to_string().parse(), Ok(token));
         }
+        KeyExpr::try_from(topic_key(7, &name, &bool)).unwrap();
     }
 }

@@ -3,18 +3,13 @@
 
 use std::process::Command;
 
-/// Runs the program, which has to end by itself; returns its exit status and output.
-fn run(arguments: &[&str]) -> (i32, String) {
-    run_in_domain("", arguments)
-}
+use jaus_test_kit::program::{assert_help, assert_refused};
+use jaus_test_kit::tools::workspace;
 
-fn run_in_domain(domain: &str, arguments: &[&str]) -> (i32, String) {
+fn program(arguments: &[&str]) -> Command {
     let mut program = Command::new(env!("CARGO_BIN_EXE_jaus-ros2"));
-    program.env("ROS_DOMAIN_ID", domain);
-    let output = program.args(arguments).output().unwrap();
-    let text = [output.stdout, output.stderr].concat();
-    let text = String::from_utf8(text).unwrap();
-    (output.status.code().unwrap(), text)
+    program.env("ROS_DOMAIN_ID", "").args(arguments);
+    program
 }
 
 #[test]
@@ -35,32 +30,29 @@ fn a_mistake_in_a_flag_is_refused_with_its_remedy() {
             "--all-reports",
         ),
     ] {
-        let (status, text) = run(&[&vehicle, flags].concat());
-        assert_eq!(status, 2, "{flags:?}: {text}");
-        assert!(text.contains(remedy), "{flags:?}: {text}");
+        assert_refused(&mut program(&[&vehicle, flags].concat()), remedy);
     }
-    let (status, text) = run(&["--loopback"]);
-    assert_eq!(status, 2, "{text}");
-    assert!(text.contains("--vehicle"), "{text}");
+    assert_refused(&mut program(&["--loopback"]), "--vehicle");
 }
 
 #[test]
 fn the_help_begins_with_what_it_is_and_ends_with_examples() {
-    let (status, text) = run(&["--help"]);
-    assert_eq!(status, 0, "{text}");
-    assert!(text.starts_with("Bridge between a JAUS vehicle"), "{text}");
-    assert!(
-        text.contains("jaus-ros2 --vehicle 101 --control 127"),
-        "{text}"
-    );
+    let example = "jaus-ros2 --vehicle 101 --control 127";
+    assert_help(&mut program(&[]), "Bridge between a JAUS vehicle", example);
 }
 
 #[test]
 fn the_domain_of_the_environment_may_be_empty_but_not_malformed() {
     let flags = ["--loopback", "--vehicle", "101", "--connect", "nowhere"];
-    let (_, text) = run_in_domain("", &flags);
-    assert!(text.contains("not a zenoh endpoint"), "{text}");
-    let (status, text) = run_in_domain("seven", &flags);
-    assert_eq!(status, 2, "{text}");
-    assert!(text.contains("0 to 232"), "{text}");
+    assert_refused(&mut program(&flags), "not a zenoh endpoint");
+    assert_refused(program(&flags).env("ROS_DOMAIN_ID", "seven"), "0 to 232");
+}
+
+#[test]
+fn the_settings_of_its_package_are_understood() {
+    let file = workspace("packaging/bridges/etc/ros2.toml");
+    jaus_cli::settings::read(&file).unwrap();
+    let mut program = program(&[]);
+    program.args(jaus_cli::settings::flags(&file).unwrap());
+    assert_help(&mut program, "Bridge between a JAUS vehicle", "jaus-ros2");
 }

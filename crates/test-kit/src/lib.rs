@@ -17,6 +17,7 @@ pub mod group;
 #[cfg(target_os = "linux")]
 pub mod hosts;
 pub mod map_file;
+pub mod program;
 pub mod random;
 pub mod rover;
 pub mod snapshot;

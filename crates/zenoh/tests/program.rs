@@ -11,15 +11,13 @@ use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 
 use jaus_test_kit::group::own_group;
+use jaus_test_kit::program::{assert_help, assert_refused};
 use jaus_test_kit::tools::workspace;
 
-/// Runs the program, which has to end by itself; returns its exit status and output.
-fn run(arguments: &[&str]) -> (i32, String) {
+fn program(arguments: &[&str]) -> Command {
     let mut program = Command::new(env!("CARGO_BIN_EXE_jaus-zenoh"));
-    let output = program.args(arguments).output().unwrap();
-    let text = [output.stdout, output.stderr].concat();
-    let text = String::from_utf8(text).unwrap();
-    (output.status.code().unwrap(), text)
+    program.args(arguments);
+    program
 }
 
 #[test]
@@ -36,25 +34,29 @@ fn a_mistake_in_a_flag_is_refused_with_its_remedy() {
     ] {
         let is_about_network = flags.is_empty() || flags[0].ends_with("connect");
         let network = if is_about_network { &[][..] } else { &network };
-        let (status, text) = run(&[network, flags].concat());
-        assert_eq!(status, 2, "{flags:?}: {text}");
-        assert!(text.contains(remedy), "{flags:?}: {text}");
+        assert_refused(&mut program(&[network, flags].concat()), remedy);
     }
 }
 
 #[test]
 fn it_does_not_attach_to_the_node_of_another_process() {
-    let (status, text) = run(&["--attach", "--listen", "tcp/127.0.0.1:0"]);
-    assert_eq!(status, 2, "{text}");
-    assert!(text.contains("omit --attach"), "{text}");
+    let flags = ["--attach", "--listen", "tcp/127.0.0.1:0"];
+    assert_refused(&mut program(&flags), "omit --attach");
 }
 
 #[test]
 fn the_help_begins_with_what_it_is_and_ends_with_examples() {
-    let (status, text) = run(&["--help"]);
-    assert_eq!(status, 0, "{text}");
-    assert!(text.starts_with("Bridge between JAUS systems"), "{text}");
-    assert!(text.contains("--accept \"60 control=127\""), "{text}");
+    let example = "--accept \"60 control=127\"";
+    assert_help(&mut program(&[]), "Bridge between JAUS systems", example);
+}
+
+#[test]
+fn the_settings_of_its_package_are_understood() {
+    let file = workspace("packaging/bridges/etc/zenoh.toml");
+    jaus_cli::settings::read(&file).unwrap();
+    let mut program = program(&[]);
+    program.args(jaus_cli::settings::flags(&file).unwrap());
+    assert_help(&mut program, "Bridge between JAUS systems", "jaus-zenoh");
 }
 
 /// A bridge without peers, which serves its metrics; ended when dropped.

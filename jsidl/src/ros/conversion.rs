@@ -1,29 +1,9 @@
 //! Converts values of the dynamic codec to the fields of ROS 2 messages.
 
 use super::definitions::{Arity, Definition, Definitions, Element, Field, Source};
+use super::value::Value;
 use crate::dynamic::{self, EncodeProblem, Fault, Raw, Step, Steps, mismatch, slots, unfit};
 use crate::model::Number;
-
-/// A value of a ROS 2 message, or of a part of it.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Value {
-    /// `bool`
-    Bool(bool),
-    /// `uint8` to `uint64`
-    Unsigned(u64),
-    /// `int8` to `int64`
-    Signed(i64),
-    /// `float32`, which fits `f64` exactly, or `float64`.
-    Float(f64),
-    /// `string`, without zeros.
-    String(String),
-    /// `uint8[]`, from raw octets.
-    Octets(Vec<u8>),
-    /// The elements of any other array or sequence, bounded or not.
-    Sequence(Vec<Self>),
-    /// The fields of a message, in the order of its `.msg` file; none if the message is empty.
-    Message(Vec<Self>),
-}
 
 type Converted<T = Value> = Result<T, Fault<EncodeProblem>>;
 
@@ -66,10 +46,9 @@ impl<'p> Conversion<'p> {
                 let chosen = chosen.ok_or(problem)?;
                 self.choice(fields, (*index).into(), chosen, &value)?
             }
-            (Source::Formatted, dynamic::Value::Formatted { format, octets }) => vec![
-                Value::Unsigned((*format).into()),
-                Value::Octets(octets.clone()),
-            ],
+            (Source::Formatted, dynamic::Value::Formatted { format, octets }) => {
+                vec![Value::Unsigned((*format).into()), sequence(octets)]
+            }
             (Source::Bits(places), dynamic::Value::Bits(raw)) => {
                 let places = places.iter().map(|place| place.of(*raw));
                 let parts = fields.iter().zip(places);
@@ -177,7 +156,7 @@ impl<'p> Conversion<'p> {
                 shown.map(Value::Float).ok_or_else(|| unfit(*raw, *kind))
             }
             (Element::Text, dynamic::Value::Text(octets)) => Ok(Value::String(text(octets))),
-            (Element::Octets, dynamic::Value::Blob(octets)) => Ok(Value::Octets(octets.clone())),
+            (Element::Octets, dynamic::Value::Blob(octets)) => Ok(sequence(octets)),
             (element, value) => Err(mismatch(element.kind(), value)),
         }
     }
@@ -191,6 +170,11 @@ fn number(kind: Number, raw: Raw) -> Converted {
         (Number::F64, Raw::F64(raw)) => Ok(Value::Float(raw)),
         (kind, raw) => Err(unfit(raw, kind)),
     }
+}
+
+/// `uint8[]`
+fn sequence(octets: &[u8]) -> Value {
+    Value::Sequence(octets.iter().map(|&octet| octet.into()).collect())
 }
 
 /// Strings of ROS 2 are UTF-8, and their readers stop at a zero.

@@ -36,7 +36,8 @@ mod nested;
 mod package;
 mod package_name;
 mod text;
+mod value;
 
-pub use conversion::Value;
 pub use package::{Interface, Package};
 pub use package_name::{PackageName, PackageNameError};
+pub use value::Value;

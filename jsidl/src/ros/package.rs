@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use heck::{ToShoutySnakeCase, ToSnakeCase};
 
-use super::conversion::{Conversion, Value};
+use super::conversion::Conversion;
 use super::definitions::Definitions;
 use super::package_name::PackageName;
+use super::value::Value;
 use super::{nested, text};
 use crate::dynamic::{self, EncodeError};
 use crate::library::Library;

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
+use jaus_test_kit::program::assert_refused;
 use jaus_test_kit::waiting::block_until;
 use serde_json::Value;
 
@@ -112,10 +113,7 @@ fn settings_that_cannot_be_are_refused_with_a_reason() {
     ] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_jaus"));
         command.arg("load").args(arguments.split(' '));
-        let output = command.current_dir(&directory).output().unwrap();
-        let error = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{error}");
-        assert!(error.contains(reason), "{error}");
+        assert_refused(command.current_dir(&directory), reason);
     }
 }
 

@@ -12,6 +12,7 @@ use jaus::link::Group;
 use jaus::messages::mobility::primitive_driver;
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
+use jaus_test_kit::program::assert_refused;
 use jaus_test_kit::waiting::LIMIT;
 
 use crate::program::Program;
@@ -133,16 +134,8 @@ fn the_operators_token_is_never_logged_and_printed_only_if_it_was_generated() {
 fn flags_of_motors_and_receivers_out_of_their_range_are_told_with_the_range() {
     let tool = std::path::Path::new(env!("CARGO_BIN_EXE_jaus"));
     let refused = |program: &str, flags: &str, told: &str| {
-        let program = tool.with_file_name(program);
-        let run = Command::new(program)
-            .args(flags.split(' '))
-            .output()
-            .unwrap();
-        let said = String::from_utf8_lossy(&run.stderr).into_owned();
-        assert!(
-            run.status.code() == Some(2) && said.contains(told),
-            "{flags}: {said}"
-        );
+        let mut program = Command::new(tool.with_file_name(program));
+        assert_refused(program.args(flags.split(' ')), told);
     };
     for (flags, told) in [
         ("--wheelbase 0", "write a number from 0.05 to 20"),

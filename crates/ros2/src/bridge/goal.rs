@@ -5,6 +5,9 @@ use std::fmt;
 use std::time::{Duration, Instant};
 
 use super::drive::Access;
+use super::frames::between_local_and_map;
+use super::ports::GoalPose;
+use crate::interface::shown;
 
 /// A place in the local frame of JAUS.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,6 +18,30 @@ pub struct Goal {
     pub y: f64,
     /// The heading at the goal, in radians clockwise from north.
     pub heading: f64,
+}
+
+impl Goal {
+    /// The goal of a pose, which has to be in the frame `map`.
+    ///
+    /// # Errors
+    /// The reason why it cannot be one: another frame, a position that is not finite, or no rotation.
+    pub fn of(pose: &GoalPose, map: &str) -> Result<Self, String> {
+        if pose.frame != map {
+            let frame = shown(&pose.frame);
+            return Err(format!("its frame_id is `{frame}` and has to be `{map}`"));
+        }
+        if !pose.position.iter().all(|it| it.is_finite()) {
+            return Err("its position is not finite".to_owned());
+        }
+        let attitude = pose.orientation.attitude();
+        let attitude = attitude.ok_or("its orientation is no quaternion of length 1")?;
+        let [x, y, _] = between_local_and_map(pose.position);
+        Ok(Self {
+            x,
+            y,
+            heading: attitude.yaw,
+        })
+    }
 }
 
 /// A command about the goal.
@@ -302,6 +329,13 @@ impl fmt::Display for Progress {
     reason = "virtual time starts at any instant"
 )]
 mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    use proptest::array::{uniform3, uniform4};
+    use proptest::num;
+    use proptest::prelude::*;
+
+    use super::super::frames::Quaternion;
     use super::*;
 
     const GOAL: Goal = Goal {
@@ -485,5 +519,52 @@ mod tests {
         assert_eq!(navigation.poll_order(now), Some(Order::Stop));
         let why = Progress::Failed("no answer".to_owned());
         assert_eq!(*navigation.progress(), why);
+    }
+
+    const EAST: Quaternion = Quaternion {
+        x: 0.0,
+        y: 0.0,
+        z: 0.0,
+        w: 1.0,
+    };
+
+    #[test]
+    fn the_goal_of_a_pose_is_north_and_east_and_its_frame_is_compared() {
+        let mut pose = GoalPose {
+            frame: "map".to_owned(),
+            position: [2.0, 1.0, 0.5],
+            orientation: EAST,
+        };
+        let goal = Goal::of(&pose, "map").unwrap();
+        assert_eq!((goal.x, goal.y, goal.heading), (1.0, 2.0, FRAC_PI_2));
+        pose.frame = "odom".to_owned();
+        let why = Goal::of(&pose, "map").unwrap_err();
+        assert_eq!(why, "its frame_id is `odom` and has to be `map`");
+    }
+
+    proptest! {
+        #[test]
+        fn any_pose_is_a_goal_or_refused_for_a_reason_that_a_log_can_show(
+            frame in prop_oneof![Just("map".to_owned()), any::<String>()],
+            repeated in 0..200_usize,
+            position in uniform3(num::f64::ANY),
+            orientation in prop_oneof![
+                Just(EAST),
+                uniform4(num::f64::ANY).prop_map(|[x, y, z, w]| Quaternion { x, y, z, w }),
+            ],
+        ) {
+            let frame = if frame == "map" { frame } else { frame.repeat(repeated) };
+            let pose = GoalPose { frame, position, orientation };
+            match Goal::of(&pose, "map") {
+                Ok(goal) => {
+                    prop_assert!(goal.x.is_finite() && goal.y.is_finite(), "{goal:?}");
+                    prop_assert!((-PI..PI).contains(&goal.heading), "{goal:?}");
+                }
+                Err(why) => {
+                    prop_assert!(why.len() < 500, "{why}");
+                    prop_assert!(!why.contains(char::is_control), "{why:?}");
+                }
+            }
+        }
     }
 }

@@ -8,9 +8,9 @@ use super::frames::Quaternion;
 use super::ports::GoalPose;
 use super::samples::{FixSample, OdometrySample, PoseSample, TwistSample};
 use super::velocity::Twist;
+use crate::Value;
 use crate::interface::{Interface, InterfaceError, Interfaces};
 use crate::message::{Message, ValueError};
-use crate::value::Value;
 
 /// The types of the messages that the bridge converts itself.
 #[derive(Debug)]

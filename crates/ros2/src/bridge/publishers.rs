@@ -219,6 +219,8 @@ fn nanoseconds(from: Instant, to: Instant) -> i128 {
     reason = "virtual time starts at any instant"
 )]
 mod tests {
+    use proptest::prelude::*;
+
     use super::super::velocity::Twist;
     use super::*;
 
@@ -356,5 +358,39 @@ mod tests {
             assert_eq!(checked.is_ok(), number < 64, "{number}");
         }
         assert_eq!(network.receive(1, 2, 1), Ok(()), "a known one");
+    }
+
+    /// Publisher, sequence number, stamp, milliseconds since the command before, and whether it moves.
+    fn commands() -> impl Strategy<Value = Vec<(u8, i64, i64, u64, bool)>> {
+        let publisher = prop_oneof![0..3_u8, 0..80_u8];
+        let sequence = prop_oneof![0..9_i64, any::<i64>()];
+        let passed = prop_oneof![0..300_u64, 0..12_000_u64];
+        let command = (publisher, sequence, any::<i64>(), passed, any::<bool>());
+        prop::collection::vec(command, 1..100)
+    }
+
+    proptest! {
+        #[test]
+        fn commands_with_any_numbers_and_times_are_refused_or_in_order(commands in commands()) {
+            let mut publishers = Publishers::new(TIMEOUT);
+            let mut accepted = BTreeMap::new();
+            let mut now = Instant::now();
+            for (publisher, sequence, stamp, passed, moves) in commands {
+                now += Duration::from_millis(passed);
+                let publisher = Gid([publisher; 16]);
+                let command = Command {
+                    publisher,
+                    sequence,
+                    stamp,
+                    arrival: now,
+                    twist: Twist::default(),
+                };
+                let is_fresh = publishers.check(now, &command, moves).is_ok();
+                prop_assert!(publishers.known.len() <= Publishers::MOST);
+                if is_fresh && let Some((before, at)) = accepted.insert(publisher, (sequence, now)) {
+                    prop_assert!(sequence > before || now - at >= Publishers::SILENCE);
+                }
+            }
+        }
     }
 }

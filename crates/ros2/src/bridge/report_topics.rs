@@ -6,7 +6,7 @@ use std::collections::btree_map::Entry;
 use heck::ToSnakeCase;
 use jaus::address::JausId;
 use jsidl::dynamic;
-use jsidl::ros::{Package, PackageName, Value as Generated};
+use jsidl::ros::{Package, PackageName};
 
 use super::definition::Definition;
 use super::reports::Reports;
@@ -14,7 +14,6 @@ use crate::graph::Qos;
 use crate::interface::Interfaces;
 use crate::message::Message;
 use crate::session::{Node, Publisher};
-use crate::value::Value;
 
 /// Publishes further reports of a vehicle.
 pub(super) struct ReportTopics {
@@ -144,28 +143,14 @@ fn publish(
     let decoded = dynamic::decode(message, octets).map_err(|error| error.to_string())?;
     let generated = package.interface(service, message);
     let generated = generated.ok_or("its definition has no type")?;
-    let value = generated.value(&decoded);
-    let value = converted(value.map_err(|error| error.to_string())?);
+    let value = generated
+        .value(&decoded)
+        .map_err(|error| error.to_string())?;
     let message = Message::from_value(publisher.interface(), value);
     let message = message.map_err(|error| error.to_string())?;
     publisher
         .publish(&message)
         .map_err(|error| error.to_string())
-}
-
-/// The same value for the encoder.
-fn converted(value: Generated) -> Value {
-    let all = |values: Vec<Generated>| values.into_iter().map(converted).collect();
-    match value {
-        Generated::Bool(it) => Value::Bool(it),
-        Generated::Unsigned(it) => Value::Unsigned(it),
-        Generated::Signed(it) => Value::Signed(it),
-        Generated::Float(it) => Value::Float(it),
-        Generated::String(it) => Value::String(it),
-        Generated::Octets(it) => it.into(),
-        Generated::Sequence(it) => Value::Sequence(all(it)),
-        Generated::Message(it) => Value::Message(all(it)),
-    }
 }
 
 #[cfg(test)]
@@ -194,7 +179,7 @@ mod tests {
         let name = format!("jaus_msgs/msg/{}", generated.name());
         let interface = topics.interfaces.get(&name).unwrap();
         let status = dynamic::decode(message, &[0x02, 0x40, 5, 0, 0, 0, 0]).unwrap();
-        let value = converted(generated.value(&status).unwrap());
+        let value = generated.value(&status).unwrap();
         let message = Message::from_value(&interface, value).unwrap();
         assert_eq!(message.float("status").unwrap(), 5.0);
         assert_eq!(

@@ -205,27 +205,14 @@ impl Runner {
 
     /// The goal in the frame of the vehicle, or why it cannot be one.
     fn goal(&self, pose: &GoalPose) -> Result<Goal, String> {
-        let map = &self.settings.map_frame;
-        if pose.frame != *map {
-            return Err(format!(
-                "its frame_id is `{}` and has to be `{map}`",
-                pose.frame
-            ));
-        }
-        if !pose.position.iter().all(|it| it.is_finite()) {
-            return Err("its position is not finite".to_owned());
-        }
-        let attitude = pose.orientation.attitude();
-        let attitude = attitude.ok_or("its orientation is no quaternion of length 1")?;
+        let goal = Goal::of(pose, &self.settings.map_frame)?;
         if self.drive.is_moving() {
             return Err("the vehicle is driven by cmd_vel".to_owned());
         }
         if self.vehicle.goal().is_none() {
             return Err("the vehicle has no planner and no local waypoint driver".to_owned());
         }
-        let [x, y, _] = between_local_and_map(pose.position);
-        let heading = attitude.yaw;
-        Ok(Goal { x, y, heading })
+        Ok(goal)
     }
 
     fn handle_emergency(&mut self, now: Instant, on: bool) {

@@ -13,7 +13,7 @@ use super::ports::{Command, Input, Output};
 use super::report_topics::ReportTopics;
 use super::samples::PoseSample;
 use crate::graph::{Endpoint, Entity, EntityKind, Gid, Qos};
-use crate::interface::Interface;
+use crate::interface::{Interface, shown};
 use crate::message::{Message, ValueError};
 use crate::session::{
     Node, Publisher, Received, Ros, SessionError, Subscription, SubscriptionCounters,
@@ -331,7 +331,7 @@ impl Watch {
 fn mismatch_of(publisher: &Endpoint, ours: &Interface) -> Option<String> {
     let name = ours.name();
     if publisher.type_name != name.dds() {
-        let theirs = &publisher.type_name;
+        let theirs = shown(&publisher.type_name);
         let remedy = match name.name() {
             "Twist" => "use --stamped for TwistStamped",
             _ => "do not use --stamped for Twist",
@@ -342,7 +342,7 @@ fn mismatch_of(publisher: &Endpoint, ours: &Interface) -> Option<String> {
     }
     let is_same = publisher.type_hash == ours.hash();
     (!is_same).then(|| {
-        let theirs = &publisher.type_hash;
+        let theirs = shown(&publisher.type_hash);
         format!("its {name} has the hash {theirs}: use the definition of ROS 2 Jazzy or newer")
     })
 }
@@ -352,7 +352,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_publisher_of_another_type_is_reported_with_the_remedy() {
+    fn a_publisher_of_another_type_is_reported_with_the_remedy_in_printable_characters() {
         let types = Types::bundled().unwrap();
         let topic = "/v101/cmd_vel".parse().unwrap();
         let publisher = |interface| Endpoint::new(&topic, interface, Qos::default());
@@ -367,6 +367,15 @@ mod tests {
         plain.type_hash = "TypeHashNotSupported".to_owned();
         let why = mismatch_of(&plain, &types.twist).unwrap();
         assert!(why.contains("hash TypeHashNotSupported"), "{why}");
+        let hostile = "\u{1b}[2J\n".repeat(1000);
+        plain.type_hash.clone_from(&hostile);
+        let of_hash = mismatch_of(&plain, &types.twist).unwrap();
+        plain.type_name = hostile;
+        let of_name = mismatch_of(&plain, &types.twist).unwrap();
+        for why in [of_hash, of_name] {
+            assert!(why.len() < 500, "{why}");
+            assert!(!why.contains(char::is_control), "{why:?}");
+        }
     }
 
     #[test]

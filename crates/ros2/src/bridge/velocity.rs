@@ -127,6 +127,10 @@ impl Limits {
 
 #[cfg(test)]
 mod tests {
+    use proptest::array::uniform3;
+    use proptest::num;
+    use proptest::prelude::*;
+
     use super::*;
 
     const LIMITS: Limits = Limits {
@@ -211,5 +215,26 @@ mod tests {
         let rounded = LIMITS.velocity(&twist(2.000_000_1, -1.500_000_1)).unwrap();
         assert_eq!(rounded, LIMITS.velocity(&twist(2.0, -1.5)).unwrap());
         assert!(rounded.effort(LIMITS).is_ok());
+    }
+
+    proptest! {
+        #[test]
+        fn any_twist_is_refused_or_can_be_commanded_within_the_limits(
+            linear in uniform3(num::f64::ANY),
+            angular in uniform3(num::f64::ANY),
+            is_small: bool,
+        ) {
+            let scaled = |it: f64| if is_small { it % 3.0 } else { it };
+            let twist = Twist {
+                linear: linear.map(scaled),
+                angular: angular.map(scaled),
+            };
+            if let Ok(velocity) = LIMITS.velocity(&twist) {
+                prop_assert!(velocity.forward.abs() <= LIMITS.speed, "{velocity:?}");
+                prop_assert!(velocity.yaw_rate.abs() <= LIMITS.yaw_rate, "{velocity:?}");
+                prop_assert!(velocity.effort(LIMITS).is_ok(), "{velocity:?}");
+                prop_assert!(velocity.command().is_ok(), "{velocity:?}");
+            }
+        }
     }
 }

@@ -4,9 +4,9 @@
 use std::sync::Arc;
 
 use super::{BIG_ENDIAN, HEADER, LITTLE_ENDIAN, LONGEST, width};
+use crate::Value;
 use crate::interface::{Field, Interface, Kind, Primitive, Size, TypeName};
 use crate::message::Message;
-use crate::value::Value;
 
 /// The most octets of padding after a message.
 const MOST_PADDING: usize = 7;
@@ -40,7 +40,7 @@ fn shown_path(path: &str) -> String {
 pub fn decode(interface: &Arc<Interface>, octets: &[u8]) -> Result<Message, CdrError> {
     let mut reader = Reader {
         octets,
-        at: HEADER,
+        at: 0,
         is_little: true,
     };
     let values = reader
@@ -76,6 +76,7 @@ impl Fault {
 
 struct Reader<'a> {
     octets: &'a [u8],
+    /// The next octet; the first one until the header is read.
     at: usize,
     is_little: bool,
 }
@@ -103,6 +104,7 @@ impl Reader<'_> {
             }
             _ => return Err(self.fault("there is no header")),
         };
+        self.at = HEADER;
         Ok(())
     }
 
@@ -119,7 +121,8 @@ impl Reader<'_> {
             // The member that ROS adds to a message without fields.
             self.take(1)?;
         }
-        let mut values = Vec::with_capacity(interface.fields().len());
+        let left = self.octets.len() - self.at;
+        let mut values = Vec::with_capacity(interface.fields().len().min(left));
         for field in interface.fields() {
             let value = self.field(field);
             values.push(value.map_err(|fault| fault.within(&field.name))?);

@@ -1,9 +1,9 @@
 //! Writes messages, in little endian.
 
 use super::{HEADER, LITTLE_ENDIAN, width};
+use crate::Value;
 use crate::interface::{Field, Interface, Kind, Primitive, Size};
 use crate::message::Message;
-use crate::value::Value;
 
 /// Encodes a message, with its header.
 #[must_use]

@@ -106,8 +106,8 @@ pub struct QosError(String);
 
 /// The depth that rmw_zenoh leaves out.
 const DEFAULT_DEPTH: u64 = 42;
-/// No limit of time, as ROS writes it. s and ns
-const INFINITE: (u64, u64) = (9_223_372_036, 854_775_807);
+/// No limit of time, as ROS writes it.
+const INFINITE: Duration = Duration::new(9_223_372_036, 854_775_807);
 
 impl fmt::Display for Qos {
     /// Writes reliability, durability, history and depth, deadline, lifespan, liveliness and lease. What
@@ -154,12 +154,10 @@ struct Time(Option<Duration>);
 
 impl fmt::Display for Time {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (seconds, nanoseconds) = match self.0 {
-            Some(time) => (time.as_secs(), time.subsec_nanos().into()),
-            None => INFINITE,
-        };
-        let seconds = Omitting(seconds, INFINITE.0);
-        write!(f, "{seconds},{}", Omitting(nanoseconds, INFINITE.1))
+        let time = self.0.unwrap_or(INFINITE);
+        let seconds = Omitting(time.as_secs(), INFINITE.as_secs());
+        let below = |time: Duration| u64::from(time.subsec_nanos());
+        write!(f, "{seconds},{}", Omitting(below(time), below(INFINITE)))
     }
 }
 
@@ -223,11 +221,9 @@ fn number(text: &str, default: u64) -> Option<u64> {
 /// Reads seconds and nanoseconds; the outer `None` is a malformed text, the inner one no limit.
 fn time(text: &str) -> Option<Option<Duration>> {
     let (seconds, nanoseconds) = text.split_once(',')?;
-    let seconds = number(seconds, INFINITE.0)?;
-    let nanoseconds = number(nanoseconds, INFINITE.1)?;
-    if (seconds, nanoseconds) == INFINITE {
-        return Some(None);
-    }
+    let seconds = number(seconds, INFINITE.as_secs())?;
+    let nanoseconds = number(nanoseconds, INFINITE.subsec_nanos().into())?;
     let below = Duration::from_nanos(nanoseconds);
-    Duration::from_secs(seconds).checked_add(below).map(Some)
+    let time = Duration::from_secs(seconds).checked_add(below)?;
+    Some((time != INFINITE).then_some(time))
 }

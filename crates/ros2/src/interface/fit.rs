@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Field, Interface, Kind, Primitive, Size};
-use crate::value::Value;
+use crate::Value;
 
 /// The range of an integer type.
 fn range(primitive: Primitive) -> Option<(i128, i128)> {
@@ -32,8 +32,8 @@ pub(crate) fn fit<N>(value: Value, kind: &Kind<N>) -> Result<Value, String> {
         (Kind::Primitive(primitive), value) => fit_primitive(value, *primitive),
         (Kind::String { most }, Value::String(text)) => fit_text(text, *most),
         (Kind::Message(_), Value::Message(fields)) => Ok(Value::Message(fields)),
-        (Kind::String { .. }, value) => Err(format!("{} is not a text", value.what())),
-        (Kind::Message(_), value) => Err(format!("{} is not a message", value.what())),
+        (Kind::String { .. }, value) => Err(format!("{} is not a text", value.kind())),
+        (Kind::Message(_), value) => Err(format!("{} is not a message", value.kind())),
     }
 }
 
@@ -54,20 +54,20 @@ fn fit_primitive(value: Value, primitive: Primitive) -> Result<Value, String> {
     let Some((least, greatest)) = range(primitive) else {
         return match (primitive, &value) {
             (Primitive::Bool, Value::Bool(_)) => Ok(value),
-            (Primitive::Bool, _) => Err(format!("{} is not a truth value", value.what())),
+            (Primitive::Bool, _) => Err(format!("{} is not a truth value", value.kind())),
             _ => match value.as_float() {
                 Some(number) if primitive == Primitive::Float32 => {
                     Ok(Value::Float(rounded(number)))
                 }
                 Some(number) => Ok(Value::Float(number)),
-                None => Err(format!("{} is not a number", value.what())),
+                None => Err(format!("{} is not a number", value.kind())),
             },
         };
     };
     let number = match value {
         Value::Unsigned(number) => i128::from(number),
         Value::Signed(number) => i128::from(number),
-        other => return Err(format!("{} is not an integer", other.what())),
+        other => return Err(format!("{} is not an integer", other.kind())),
     };
     if !(least..=greatest).contains(&number) {
         return Err(format!("{number} is not from {least} to {greatest}"));

@@ -2,7 +2,7 @@
 
 use super::fit;
 use super::{Kind, Primitive, Size};
-use crate::value::Value;
+use crate::Value;
 
 /// Reads a value of a field, which may be a list such as `[1, 2, 3]`.
 pub(super) fn of_field<N>(text: &str, kind: &Kind<N>, size: Size) -> Result<Value, String> {

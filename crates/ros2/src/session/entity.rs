@@ -272,37 +272,79 @@ mod tests {
     use std::pin::pin;
     use std::task::{Context, Waker};
 
+    use proptest::prelude::*;
+
+    use super::super::run::receive_message;
     use super::*;
+    use crate::cdr::LONGEST;
     use crate::graph::Gid;
     use crate::interface::Interfaces;
 
-    #[test]
-    fn a_flood_of_malformed_messages_leaves_time_for_other_tasks() {
-        let node = Node::new(
-            Arc::new(Shared::new(0)),
-            NodeName::new("/", "rover").unwrap(),
-        );
+    const ATTACHMENT: Attachment = Attachment {
+        sequence: 1,
+        stamp: 0,
+        gid: Gid([7; 16]),
+    };
+
+    /// A subscription of a `Twist`.
+    fn subscription() -> Subscription {
+        let name = NodeName::new("/", "rover").unwrap();
+        let node = Node::new(Arc::new(Shared::new(0)), name);
         let interfaces = Interfaces::bundled().unwrap();
         let twist = interfaces.get("geometry_msgs/msg/Twist").unwrap();
-        let mut subscription = node.subscription("/a", &twist, Qos::default()).unwrap();
+        node.subscription("/a", &twist, Qos::default()).unwrap()
+    }
+
+    #[test]
+    fn a_flood_of_malformed_messages_leaves_time_for_other_tasks() {
+        let mut subscription = subscription();
         let inbox = subscription.inbox.clone();
-        for sequence in 1..=3 {
-            let gid = Gid([0; 16]);
-            inbox.push(Incoming {
-                attachment: Attachment {
-                    sequence,
-                    stamp: 0,
-                    gid,
-                },
-                arrival: jaus::node::now(),
-                octets: vec![0; 3],
-            });
+        for _ in 1..=3 {
+            let attachment = ATTACHMENT.encode().into();
+            receive_message(&inbox, Some(&attachment), &vec![0; 3].into());
         }
         let mut receive = pin!(subscription.receive());
         let mut context = Context::from_waker(Waker::noop());
         for malformed in 1..=3 {
             assert!(receive.as_mut().poll(&mut context).is_pending());
             assert_eq!(inbox.malformed(), malformed);
+        }
+    }
+
+    #[test]
+    fn a_message_that_is_too_long_is_counted_and_does_not_wait() {
+        let subscription = subscription();
+        let attachment = ATTACHMENT.encode().into();
+        let longer = vec![0; LONGEST + 1].into();
+        receive_message(&subscription.inbox, Some(&attachment), &longer);
+        assert_eq!(subscription.counters().malformed, 1);
+        assert!(subscription.inbox.lock().is_empty());
+    }
+
+    proptest! {
+        #[test]
+        fn any_message_is_received_or_counted(
+            // Both are too short, unless they are replaced.
+            attachment in prop::option::of(prop::collection::vec(any::<u8>(), 0..33)),
+            is_attached in prop::bool::weighted(0.7),
+            mut payload in prop::collection::vec(any::<u8>(), 0..52),
+            is_whole in prop::bool::weighted(0.7),
+        ) {
+            if is_whole {
+                payload.resize(52, 0);
+                payload[..4].copy_from_slice(&[0, 1, 0, 0]);
+            }
+            let mut subscription = subscription();
+            let attachment = match is_attached {
+                true => Some(ATTACHMENT.encode().into()),
+                false => attachment.map(Into::into),
+            };
+            receive_message(&subscription.inbox, attachment.as_ref(), &payload.into());
+            let received = subscription.try_receive();
+            let counters = subscription.counters();
+            prop_assert_eq!(u64::from(received.is_some()) + counters.malformed, 1);
+            prop_assert_eq!(received.is_some(), is_attached && is_whole);
+            prop_assert_eq!(counters.dropped, 0);
         }
     }
 }

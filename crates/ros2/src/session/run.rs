@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+use zenoh::bytes::ZBytes;
 use zenoh::config::Config;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::{Publisher, Subscriber};
@@ -188,7 +189,9 @@ impl Running {
             }
             Declaration::Subscription { key, inbox } => {
                 let builder = self.session.declare_subscriber(key);
-                let declared = builder.callback(move |sample| receive_message(&inbox, &sample));
+                let declared = builder.callback(move |sample| {
+                    receive_message(&inbox, sample.attachment(), sample.payload());
+                });
                 subscriber = Some(declared.wait()?);
             }
         }
@@ -290,15 +293,16 @@ fn receive_token(shared: &Shared, sample: &Sample) {
     }
 }
 
-fn receive_message(inbox: &Inbox, sample: &Sample) {
-    let attachment = sample.attachment().map(|it| it.to_bytes());
+/// Queues a message for its subscription, or counts it if it cannot be one.
+pub(super) fn receive_message(inbox: &Inbox, attachment: Option<&ZBytes>, payload: &ZBytes) {
+    let attachment = attachment.map(ZBytes::to_bytes);
     let attachment = Attachment::decode(attachment.as_deref().unwrap_or_default());
     match attachment {
-        Ok(attachment) if sample.payload().len() <= LONGEST => {
+        Ok(attachment) if payload.len() <= LONGEST => {
             inbox.push(Incoming {
                 attachment,
                 arrival: jaus::node::now(),
-                octets: sample.payload().to_bytes().into_owned(),
+                octets: payload.to_bytes().into_owned(),
             });
         }
         Ok(_) => inbox.refuse("it is too long"),

@@ -1,4 +1,4 @@
-"""Reads the .msg files of packages with rosbags (pip install rosbags), which knows the rules of ROS 2.
+"""Reads the .msg files of packages with the package rosbags, which knows the rules of ROS 2; `.ci/ros2` runs it.
 
 Usage: rosbags_reads.py DIRECTORY, the output of `jaus jsidl msg -o DIRECTORY`
 """

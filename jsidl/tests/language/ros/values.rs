@@ -35,7 +35,6 @@ fn fits(interfaces: &Interfaces, field: &Field, value: &Value) -> bool {
         Count::Exactly(number) => length == number,
     };
     match value {
-        Value::Octets(octets) => field.ty == "uint8" && has_length(octets.len()),
         Value::Sequence(values) => {
             let fits = |value| fits_one(interfaces, &field.ty, value);
             has_length(values.len()) && values.iter().all(fits)

@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use jaus_test_kit::program::assert_refused;
+
 use crate::support::{Running, jaus, own_group, run};
 
 #[test]
@@ -281,14 +283,9 @@ fn a_settings_file_does_what_the_flags_do_and_flags_come_on_top() {
 
 #[test]
 fn a_log_filter_that_makes_no_sense_is_refused() {
-    let output = jaus()
-        .arg("encode")
-        .env("JAUS_LOG", "jaus=loud")
-        .output()
-        .unwrap();
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert!(message.contains("JAUS_LOG=jaus=loud"), "{message}");
-    assert_eq!(output.status.code(), Some(2));
+    let mut encode = jaus();
+    encode.arg("encode").env("JAUS_LOG", "jaus=loud");
+    assert_refused(&mut encode, "JAUS_LOG=jaus=loud");
 }
 
 #[test]

@@ -1,21 +1,22 @@
-//! Values of messages, as trees.
+//! Values of ROS 2 messages, as trees.
 
-/// A value of a field.
+/// A value of a ROS 2 message, or of a part of it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// A truth value.
+    /// `bool`
     Bool(bool),
-    /// An integer that is not negative: of `uint8` to `uint64`, and `byte`.
+    /// An integer that is not negative: `uint8` to `uint64`, and `byte`.
     Unsigned(u64),
-    /// An integer: of `int8` to `int64`.
+    /// An integer: `int8` to `int64`.
     Signed(i64),
-    /// A number: of `float32` and `float64`.
+    /// A number: `float32`, which fits `f64` exactly, or `float64`.
     Float(f64),
-    /// A text, without NUL.
+    /// `string`, without NUL.
     String(String),
-    /// The elements of an array or a sequence.
+    /// The elements of an array or a sequence, bounded or not. Those of `uint8[]` are
+    /// [unsigned](Self::Unsigned).
     Sequence(Vec<Self>),
-    /// A message: the values of its fields, in their order.
+    /// A message: the values of its fields, in the order of its `.msg` file; none if it is empty.
     Message(Vec<Self>),
 }
 
@@ -79,8 +80,9 @@ impl Value {
         }
     }
 
-    /// What the value is, for errors.
-    pub(crate) const fn what(&self) -> &'static str {
+    /// The kind of value, for errors: `an integer`, for example.
+    #[must_use]
+    pub const fn kind(&self) -> &'static str {
         match self {
             Self::Bool(_) => "a truth value",
             Self::Unsigned(_) | Self::Signed(_) => "an integer",
