@@ -259,9 +259,14 @@ impl Writer<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Barrier;
+
+    use jaus_view::Dictionary;
+    use serde_json::Value as Json;
+
     use super::*;
     use crate::server::latest::tests::full;
-    use crate::{Server, ServerSettings};
+    use crate::{Channels, Sample, Server, ServerSettings};
 
     fn shared() -> Arc<Shared> {
         Server::new(ServerSettings::default()).0.shared
@@ -317,6 +322,48 @@ mod tests {
         let expected = protocol::message_data(7, 5, b"{}");
         assert_eq!(waiting.try_recv().ok(), Some(expected));
         assert!(waiting.try_recv().is_err(), "channel 4 has no sample");
+    }
+
+    #[test]
+    fn no_sample_is_missed_or_sent_twice_if_it_is_published_while_a_client_subscribes() {
+        const SUBSCRIPTIONS: u32 = 30;
+        const LAST: u64 = 100;
+        let dictionary = Dictionary::new();
+        let channels = Channels::new(&dictionary);
+        for _ in 0..50 {
+            let (server, sharing) = Server::new(ServerSettings::default());
+            let (client, mut waiting) = Client::new();
+            server.shared.clients().push(client.clone());
+            let start = Barrier::new(2);
+            std::thread::scope(|threads| {
+                threads.spawn(|| {
+                    start.wait();
+                    for time in 1..=LAST {
+                        let (channel, value) = (3, Json::Null);
+                        let sample = Sample {
+                            channel,
+                            time,
+                            value,
+                        };
+                        sharing.publish(&channels, &[sample]);
+                    }
+                });
+                start.wait();
+                for id in 0..SUBSCRIPTIONS {
+                    client.handle(subscribe(3, id, 1), &server.shared);
+                }
+            });
+            let mut received = BTreeMap::<u32, Vec<u64>>::new();
+            while let Ok(data) = waiting.try_recv() {
+                let id = u32::from_le_bytes(data[1..5].try_into().unwrap());
+                let time = u64::from_le_bytes(data[5..13].try_into().unwrap());
+                received.entry(id).or_default().push(time);
+            }
+            for times in received.values() {
+                assert_eq!(*times, Vec::from_iter(times[0]..=LAST));
+            }
+            assert_eq!(received.len(), SUBSCRIPTIONS as usize);
+        }
     }
 
     #[test]
