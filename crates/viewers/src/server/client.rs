@@ -330,7 +330,7 @@ mod tests {
         const LAST: u64 = 100;
         let dictionary = Dictionary::new();
         let channels = Channels::new(&dictionary);
-        for _ in 0..50 {
+        for _ in 0..200 {
             let (server, sharing) = Server::new(ServerSettings::default());
             let (client, mut waiting) = Client::new();
             server.shared.clients().push(client.clone());
