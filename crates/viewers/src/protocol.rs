@@ -14,6 +14,8 @@ use crate::channels::Channel;
 pub(crate) const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 /// First octet of a sample.
 const MESSAGE_DATA: u8 = 1;
+/// Octets of a sample before its data.
+pub(crate) const MESSAGE_DATA_HEADER: usize = 13;
 
 /// A request of a client.
 #[derive(Debug, PartialEq, Eq, Deserialize)]
@@ -84,7 +86,7 @@ pub(crate) fn warning(message: &str) -> String {
 
 /// A sample for a subscription.
 pub(crate) fn message_data(subscription: u32, time: u64, data: &[u8]) -> Bytes {
-    let mut octets = Vec::with_capacity(13 + data.len());
+    let mut octets = Vec::with_capacity(MESSAGE_DATA_HEADER + data.len());
     octets.push(MESSAGE_DATA);
     octets.extend_from_slice(&subscription.to_le_bytes());
     octets.extend_from_slice(&time.to_le_bytes());

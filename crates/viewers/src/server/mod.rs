@@ -1,17 +1,19 @@
 //! A server for live viewers: Foxglove's WebSocket protocol, read-only.
 //!
 //! It accepts [`MOST_CLIENTS`] connections, half as many from one address, and refuses more. A
-//! client that reads too slowly loses samples and gets a warning with their number. Publishing never
-//! waits.
+//! subscription starts with the latest sample of its channel, at its original time. A client that
+//! reads too slowly loses samples and gets a warning with their number. Publishing never waits for a
+//! client.
 
 mod client;
 mod handshake;
+mod latest;
 
 use std::convert::Infallible;
 use std::io;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
 use jaus_view::places::{Place, Places, Source};
@@ -20,8 +22,8 @@ use tokio::sync::watch;
 use tokio::task::JoinSet;
 
 use crate::channels::{Channel, Channels, Sample};
-use crate::protocol;
 use client::Client;
+use latest::Latest;
 
 /// Limit of connections, including those whose handshake is not complete.
 pub const MOST_CLIENTS: usize = 32;
@@ -87,6 +89,9 @@ struct Shared {
     channels: RwLock<Vec<Arc<Channel>>>,
     /// The number of channels, for the clients to announce new ones.
     count: watch::Sender<usize>,
+    /// Locked while samples or a subscription are handled, before the locks of the clients: so a
+    /// subscription gets each sample once, either as the latest or when it is published.
+    latest: Mutex<Latest>,
     /// At most as many as there are places.
     clients: Mutex<Vec<Arc<Client>>>,
     lost: AtomicU64,
@@ -100,6 +105,7 @@ impl Server {
             settings,
             channels: RwLock::new(Vec::new()),
             count: watch::Sender::new(0),
+            latest: Mutex::default(),
             clients: Mutex::new(Vec::new()),
             lost: AtomicU64::new(0),
         });
@@ -159,25 +165,24 @@ async fn pause_after(error: &io::Error) {
 
 impl Sharing {
     /// Publishes samples of `channels` to the clients that have subscribed to them, and announces new
-    /// channels. Never waits: a client whose queue is full loses samples.
+    /// channels. Never waits for a client: one whose queue is full loses samples.
+    ///
+    /// The latest sample of each channel is kept for clients that subscribe later, if it has at most
+    /// 1 KiB, or at most 1 MiB and those of more than 1 KiB have at most 8 MiB together.
     pub fn publish(&self, channels: &Channels<'_>, samples: &[Sample]) {
         self.announce(channels.all());
-        let clients = self.0.clients();
+        let shared = &self.0;
+        let mut latest = shared.latest();
+        let clients = shared.clients();
         for sample in samples {
-            let mut data = None;
+            // Serialising to memory fails only for non-text map keys, which do not occur.
+            let data = serde_json::to_vec(&sample.value).unwrap_or_default();
             for client in clients.iter() {
                 for subscription in client.subscriptions_to(sample.channel) {
-                    // Serialised once, and only for subscribers. Serialising to memory fails only for
-                    // non-text map keys, which do not occur.
-                    let data = data.get_or_insert_with(|| {
-                        serde_json::to_vec(&sample.value).unwrap_or_default()
-                    });
-                    let message = protocol::message_data(subscription, sample.time, data);
-                    if !client.offer(message) {
-                        self.0.lost.fetch_add(1, Ordering::Relaxed);
-                    }
+                    shared.offer(client, subscription, sample.time, &data);
                 }
             }
+            latest.keep(sample.channel, sample.time, data);
         }
     }
 
@@ -206,8 +211,19 @@ impl Sharing {
 }
 
 impl Shared {
-    fn clients(&self) -> std::sync::MutexGuard<'_, Vec<Arc<Client>>> {
+    fn clients(&self) -> MutexGuard<'_, Vec<Arc<Client>>> {
         self.clients.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn latest(&self) -> MutexGuard<'_, Latest> {
+        self.latest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Queues a sample for a client, or counts it as lost.
+    fn offer(&self, client: &Client, subscription: u32, time: u64, data: &[u8]) {
+        if !client.offer(subscription, time, data) {
+            self.lost.fetch_add(1, Ordering::Relaxed);
+        }
     }
 
     /// The channels from this number on.

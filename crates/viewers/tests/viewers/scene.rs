@@ -22,6 +22,9 @@ pub fn dictionary() -> Dictionary {
 /// 42.1.1 queries the heartbeat of 101.1.1.
 const QUERY: &[u8] = b"\x02\x00\x10\x00\x01\x01\x01\x65\x00\x01\x01\x2A\x00\x02\x22\x07\x00";
 
+/// The time of a status whose reserved field is 0, in nanoseconds since 1970.
+pub const TIME: u64 = 1_790_000_000_000_000_000;
+
 /// An MCAP recording of this many frames.
 pub fn recording(count: u32) -> Vec<u8> {
     let mut packet = Vec::new();
@@ -75,7 +78,7 @@ impl Scene {
         Channels::new(&self.dictionary)
     }
 
-    /// Publishes a status of a component.
+    /// Publishes a status of a component, whose time is [`TIME`] plus `reserved`.
     pub fn publish(&self, channels: &mut Channels<'_>, source: &str, reserved: u32) {
         let status = json!({
             "source": source, "code": "4002", "message": "ReportStatus",
@@ -85,7 +88,7 @@ impl Scene {
         let Json::Object(object) = status else {
             return;
         };
-        let samples = channels.handle_entry(&Entry::of_object(object), 5);
+        let samples = channels.handle_entry(&Entry::of_object(object), TIME + u64::from(reserved));
         assert_eq!(samples.len(), 1);
         self.sharing.publish(channels, &samples);
     }
@@ -118,8 +121,16 @@ impl Viewer {
         Self { socket }
     }
 
-    /// A viewer that has subscribed to the only channel, with the number 7.
+    /// A viewer that has subscribed to the only channel, with the number 7, and has received its
+    /// latest sample.
     pub async fn subscribed(scene: &Scene) -> Self {
+        let mut viewer = Self::subscribing(scene).await;
+        viewer.sample().await;
+        viewer
+    }
+
+    /// A viewer that subscribes to the only channel, with the number 7.
+    pub async fn subscribing(scene: &Scene) -> Self {
         let mut viewer = Self::connect(scene).await;
         assert_eq!(viewer.text().await["op"], "serverInfo");
         let advertised = viewer.text().await;
@@ -127,7 +138,6 @@ impl Viewer {
         let subscription = json!({ "id": 7, "channelId": advertised["channels"][0]["id"] });
         let subscriptions = json!({ "op": "subscribe", "subscriptions": [subscription] });
         viewer.say(&subscriptions).await;
-        viewer.settle().await;
         viewer
     }
 

@@ -4,10 +4,11 @@ use std::fs;
 use std::path::Path;
 
 use crate::support::{Message, RAW, Running, ip_packet, own_group, pcap, run};
-use futures_util::StreamExt;
+use futures_util::{SinkExt, StreamExt};
 use jaus_test_kit::waiting::within_limit;
-use serde_json::Value as Json;
+use serde_json::{Value as Json, json};
 use tokio_tungstenite::connect_async;
+use tokio_tungstenite::tungstenite::Message as WebSocketMessage;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 use tokio_tungstenite::tungstenite::http::HeaderValue;
 use tokio_tungstenite::tungstenite::http::header::SEC_WEBSOCKET_PROTOCOL;
@@ -139,45 +140,49 @@ fn flags_of_the_black_box_need_it_and_unknown_triggers_are_refused() {
     assert_eq!(wrong.status, 2);
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_viewer_gets_the_channels_of_what_passes_on_an_interface() {
+#[tokio::test]
+async fn a_viewer_that_connects_after_the_traffic_gets_its_channels_and_latest_messages() {
     let network = own_group();
-    let group = &network[4];
-    let flags = [
-        "--interface",
-        "lo",
-        "--group",
-        group,
-        "--listen",
-        "127.0.0.1:0",
-    ];
-    let mut running = Running::command("view", &flags);
+    let network: Vec<&str> = network.iter().map(String::as_str).collect();
+    let view = ["--interface", "lo", "--group", network[4]];
+    // Packets of other tests pass on the interface, too.
+    let only = ["--filter", "from=111.1.7", "--listen", "127.0.0.1:0"];
+    let mut running = Running::command("view", &[&view[..], &only].concat());
     let said = running.read_until("ws://");
-    let address = said.split("ws://").nth(1).unwrap();
-    let address = address.split_whitespace().next().unwrap();
-    let mut request = format!("ws://{address}").into_client_request().unwrap();
+    let mut words = said.split_whitespace();
+    let url = words.find(|it| it.starts_with("ws://")).unwrap();
+    let discover = ["discover", "--for", "300ms", "--id", "111.1.7"];
+    run(&[&discover[..], &network].concat(), b"");
+    let mut request = url.into_client_request().unwrap();
     let subprotocol = HeaderValue::from_static("foxglove.sdk.v1");
     request
         .headers_mut()
         .insert(SEC_WEBSOCKET_PROTOCOL, subprotocol);
     let (mut socket, _) = connect_async(request).await.unwrap();
-    let network = network.clone();
-    let traffic = std::thread::spawn(move || {
-        let network: Vec<&str> = network.iter().map(String::as_str).collect();
-        for _ in 0..5 {
-            run(&[&["discover", "--for", "200ms"], &*network].concat(), b"");
-        }
-    });
     loop {
         let message = within_limit(socket.next()).await.unwrap().unwrap();
-        if message
-            .to_text()
-            .is_ok_and(|it| it.contains("QueryIdentification"))
-        {
-            break;
+        match message {
+            WebSocketMessage::Text(text) => {
+                let text: Json = serde_json::from_str(&text).unwrap();
+                let channels = text["channels"].as_array().into_iter().flatten();
+                for channel in channels.filter(|it| is_query(it)) {
+                    let subscription = json!({ "id": 7, "channelId": channel["id"] });
+                    let subscribe = json!({ "op": "subscribe", "subscriptions": [subscription] });
+                    let subscribe = WebSocketMessage::text(subscribe.to_string());
+                    socket.send(subscribe).await.unwrap();
+                }
+            }
+            WebSocketMessage::Binary(sample) => {
+                assert_eq!(&sample[..5], b"\x01\x07\0\0\0");
+                break;
+            }
+            _ => {}
         }
     }
-    traffic.join().unwrap();
+}
+
+fn is_query(channel: &Json) -> bool {
+    channel["topic"] == "/jaus/111/1/7/QueryIdentification"
 }
 
 #[test]
