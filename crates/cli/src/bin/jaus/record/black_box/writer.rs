@@ -12,6 +12,7 @@ use jaus_viewers::{BlackBoxFiles, BlackBoxNames, Recorder, RecordingFormat, Snap
 use tokio::sync::mpsc;
 
 use super::Settings;
+use super::report::{Content, Report, Written};
 
 /// Limit of files that wait to be written: the first and the complete version of one.
 const WAITING: usize = 2;
@@ -21,20 +22,25 @@ const REPORTS: usize = 16;
 const SAMPLES: u64 = 8;
 
 /// Why a file is not written if the thread has not caught up.
-pub(super) const BUSY: &str = "the disk is still busy with the file before it";
+const BUSY: &str = "the disk is still busy with the file before it";
 
 /// A file to write.
 pub(super) struct Job {
     pub(super) file: PathBuf,
     pub(super) snapshot: Snapshot,
+    pub(super) content: Content,
 }
 
-/// What has become of a job.
-pub(super) struct Report {
-    pub(super) file: PathBuf,
-    pub(super) packets: usize,
-    /// Its size, or why it is not written.
-    pub(super) octets: Result<u64, String>,
+impl Job {
+    /// The report that it is not written, because the thread is busy.
+    pub(super) fn refused(self) -> Report {
+        Report {
+            file: self.file,
+            content: self.content,
+            deleted: 0,
+            result: Err(BUSY.to_owned()),
+        }
+    }
 }
 
 /// Hands jobs to the thread, which ends with the last job when this is dropped.
@@ -103,11 +109,7 @@ impl Writer {
             self.waiting.fetch_sub(1, Ordering::Relaxed);
             let (std::sync::mpsc::TrySendError::Full(job)
             | std::sync::mpsc::TrySendError::Disconnected(job)) = error;
-            Report {
-                file: job.file,
-                packets: job.snapshot.frames().len(),
-                octets: Err(BUSY.to_owned()),
-            }
+            job.refused()
         })
     }
 }
@@ -123,13 +125,15 @@ struct Thread {
 
 impl Thread {
     fn run(mut self, jobs: &Receiver<Job>, reports: &mpsc::Sender<Report>) {
-        for Job { file, snapshot } in jobs {
-            let octets = self.write(&file, &snapshot);
+        for job in jobs {
+            let deleted = self.files.deleted_on_full_disk();
+            let written = self.write(&job.file, &job.snapshot);
             self.waiting.fetch_sub(1, Ordering::Relaxed);
             let report = Report {
-                file,
-                packets: snapshot.frames().len(),
-                octets: octets.map_err(|error| error.to_string()),
+                file: job.file,
+                content: job.content,
+                deleted: self.files.deleted_on_full_disk() - deleted,
+                result: written.map_err(|error| error.to_string()),
             };
             if reports.blocking_send(report).is_err() {
                 return;
@@ -137,10 +141,13 @@ impl Thread {
         }
     }
 
-    fn write(&mut self, file: &Path, snapshot: &Snapshot) -> std::io::Result<u64> {
+    fn write(&mut self, file: &Path, snapshot: &Snapshot) -> std::io::Result<Written> {
         let (format, dictionary) = (self.format, &self.dictionary);
         let sample_limit = self.sample_limit;
-        let mut octets = 0;
+        let mut written = Written {
+            octets: 0,
+            left_out: 0,
+        };
         self.files.write(file, |out| {
             let mut out = BufWriter::new(out);
             let network = Network::of_any_port();
@@ -149,9 +156,11 @@ impl Thread {
             for kept in snapshot.frames() {
                 recorder.write_frame(&kept.frame())?;
             }
-            octets = recorder.finish()?;
+            let left_out = recorder.left_out();
+            let octets = recorder.finish()?;
+            written = Written { octets, left_out };
             out.flush()
         })?;
-        Ok(octets)
+        Ok(written)
     }
 }
