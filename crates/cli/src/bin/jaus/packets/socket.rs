@@ -118,7 +118,8 @@ impl PacketSocket {
 
     /// Waits for packets of the chosen interfaces.
     pub(super) async fn next(&mut self) -> Result<Vec<Packet>, Failure> {
-        self.socket.readable().await.map_err(failed)?;
+        let ready = self.socket.readable().await;
+        ready.map_err(|error| failed(&error))?;
         let mut packets = Vec::new();
         for _ in 0..BATCH {
             let (socket, buffer) = (&self.socket, &mut self.buffer);
@@ -170,7 +171,7 @@ impl PacketSocket {
             Err(error) if error.kind() == io::ErrorKind::Interrupted => 0,
             // An interface that goes down reports it once.
             Err(error) if error.raw_os_error() == Some(Errno::ENETDOWN as i32) => 0,
-            Err(error) => return Err(failed(error)),
+            Err(error) => return Err(failed(&error)),
         };
         Ok(Some(length + AROUND))
     }
@@ -187,7 +188,7 @@ fn receive(socket: &UdpSocket, buffer: &mut [u8]) -> io::Result<(usize, Option<L
     Ok(recvfrom(socket.as_raw_fd(), buffer)?)
 }
 
-fn failed(error: io::Error) -> Failure {
+fn failed(error: &io::Error) -> Failure {
     Failure::new(format!("cannot read the packet socket: {error}"))
 }
 
@@ -201,7 +202,6 @@ fn set_buffer(socket: &impl AsFd, octets: usize) {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a test with sockets of its own")]
 mod tests {
     use jaus_test_kit::evidence::{not_tested, this_test};
     use jaus_test_kit::waiting::within_limit;
