@@ -166,11 +166,14 @@ mod tests {
         }
     }
 
-    fn jaus_packet() -> Packet {
+    /// A component of 42 queries the heartbeat of 101.1.1.
+    fn query([node, component]: [u8; 2]) -> Packet {
+        let mut datagram = *b"\x02\x00\x10\x00\x01\x01\x01\x65\x00\x01\x01\x2A\x00\x02\x22\x07\x00";
+        datagram[9..11].copy_from_slice(&[component, node]);
         let mut octets = Vec::new();
         etherparse::PacketBuilder::ipv4([10, 0, 0, 1], [10, 0, 0, 2], 16)
             .udp(40_000, 3794)
-            .write(&mut octets, b"content")
+            .write(&mut octets, &datagram)
             .unwrap();
         packet(octets)
     }
@@ -178,17 +181,17 @@ mod tests {
     #[test]
     fn lost_packets_are_in_the_tally_and_with_the_next_frame_of_the_file() {
         let folder = tempfile::tempdir().unwrap();
-        let dictionary = Dictionary::default();
+        let dictionary = Dictionary::new();
         for format in [RecordingFormat::Pcapng, RecordingFormat::Mcap] {
             let path = folder.path().join(format.extension());
             let created = Recording::create(&path, false, format, &[3794], &dictionary);
             let mut recording = created.unwrap();
-            recording.take(&jaus_packet()).unwrap();
+            recording.take(&query([1, 1])).unwrap();
             recording.add_lost(5);
             recording.take(&packet(b"filtered out".to_vec())).unwrap();
             recording.add_lost(2);
-            recording.take(&jaus_packet()).unwrap();
-            recording.take(&jaus_packet()).unwrap();
+            recording.take(&query([1, 1])).unwrap();
+            recording.take(&query([1, 1])).unwrap();
             recording.add_lost(1);
             let tally = recording.finish().unwrap();
             assert_eq!((tally.packets, tally.missing.lost), (3, 8));
@@ -205,6 +208,26 @@ mod tests {
             }
             assert_eq!(lost, [0, 7, 0], "{format}");
         }
+    }
+
+    #[test]
+    fn messages_beyond_the_limit_of_channels_are_in_the_tally() {
+        let folder = tempfile::tempdir().unwrap();
+        let dictionary = Dictionary::new().with_catalogue();
+        let path = folder.path().join("a.mcap");
+        let format = RecordingFormat::Mcap;
+        let created = Recording::create(&path, false, format, &[3794], &dictionary);
+        let mut recording = created.unwrap();
+        for node in 1..=20 {
+            for component in 1..=250 {
+                recording.take(&query([node, component])).unwrap();
+            }
+        }
+        let missing = recording.finish().unwrap().missing;
+        let expected = 5000 - jaus_viewers::MOST_CHANNELS as u64;
+        assert!(missing.left_out >= expected, "{missing:?}");
+        let remark = missing.remarks().next().unwrap();
+        assert!(remark.contains("in the frames alone"), "{remark}");
     }
 
     #[test]

@@ -164,3 +164,73 @@ impl Thread {
         Ok(written)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use jaus_view::LinkType;
+    use jaus_viewers::{BlackBox, BlackBoxLimits, Kept};
+
+    use super::*;
+
+    /// 42.1.1 queries the heartbeat of 101.1.1.
+    fn query() -> Kept {
+        let mut octets = Vec::new();
+        let datagram = b"\x02\x00\x10\x00\x01\x01\x01\x65\x00\x01\x01\x2A\x00\x02\x22\x07\x00";
+        etherparse::PacketBuilder::ipv4([10, 0, 0, 1], [10, 0, 0, 2], 16)
+            .udp(3794, 3794)
+            .write(&mut octets, datagram)
+            .unwrap();
+        Kept {
+            interface: "eth0".into(),
+            link: LinkType::RAW,
+            time: Timestamp::new(1_790_000_000, 0, 9),
+            octets: octets.into(),
+            lost: 0,
+        }
+    }
+
+    fn settings(directory: &Path) -> Settings {
+        Settings {
+            directory: directory.to_owned(),
+            format: RecordingFormat::Mcap,
+            // No room for samples.
+            limits: BlackBoxLimits {
+                time: Duration::MAX,
+                octets: 0,
+            },
+            on: Vec::new(),
+            on_message: Vec::new(),
+            after: Duration::ZERO,
+            files: 20,
+        }
+    }
+
+    #[test]
+    #[expect(clippy::disallowed_methods, reason = "the test begins at some time")]
+    fn a_report_has_the_number_of_messages_that_are_in_the_frames_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = settings(folder.path());
+        let started = Writer::start(&settings, Arc::new(Dictionary::new().with_catalogue()));
+        let (mut writer, mut reports) = started.unwrap_or_else(|failure| panic!("{failure}"));
+        let mut kept = BlackBox::new(BlackBoxLimits {
+            octets: 1 << 20,
+            ..settings.limits
+        });
+        kept.push(Instant::now(), query());
+        let content = Content {
+            packets: 1,
+            lost: 0,
+            triggers: 1,
+        };
+        let job = Job {
+            file: writer.reserve("operator"),
+            snapshot: kept.snapshot(),
+            content,
+        };
+        assert!(writer.enqueue(job).is_ok());
+        let written = reports.blocking_recv().unwrap().result.unwrap();
+        assert_eq!(written.left_out, 1);
+    }
+}
