@@ -148,6 +148,7 @@ fn black_boxes(packets: &[Bytes], figures: &mut Figures) {
                 link: LinkType::RAW,
                 time: Timestamp::since_1970(Duration::ZERO, 9),
                 octets: Bytes::copy_from_slice(packet),
+                lost: 0,
             };
             kept.push(start, frame);
             count += 1;

@@ -36,6 +36,8 @@ pub struct Kept {
     pub time: Timestamp,
     /// The frame as captured, whole.
     pub octets: Bytes,
+    /// Number of frames lost before it.
+    pub lost: u64,
 }
 
 /// The latest frames, within limits of time and memory.
@@ -58,7 +60,7 @@ impl Kept {
             time: Some(self.time),
             link: self.link,
             octets: &self.octets,
-            lost: 0,
+            lost: self.lost,
             // No link has frames of 4 GiB.
             length: u32::try_from(self.octets.len()).unwrap_or(u32::MAX),
             interface: &self.interface,
@@ -116,6 +118,12 @@ impl Snapshot {
         &self.0
     }
 
+    /// Number of frames lost between them, and before the oldest.
+    #[must_use]
+    pub fn lost(&self) -> u64 {
+        self.0.iter().map(|frame| frame.lost).sum()
+    }
+
     /// The frames of both.
     #[must_use]
     pub fn followed_by(&self, later: Self) -> Self {
@@ -136,6 +144,7 @@ mod tests {
             link: LinkType::RAW,
             time: Timestamp::new(number.into(), 0, 9),
             octets: vec![number; length].into(),
+            lost: 0,
         }
     }
 
@@ -193,5 +202,23 @@ mod tests {
         let all = before.followed_by(kept.snapshot());
         let numbers: Vec<_> = all.frames().iter().map(|it| it.octets[0]).collect();
         assert_eq!(numbers, [1, 2]);
+    }
+    #[test]
+    fn what_was_lost_is_counted_as_long_as_the_frame_after_it_is_kept() {
+        let limits = BlackBoxLimits {
+            time: Duration::from_secs(10),
+            octets: 2 * (100 + AROUND),
+        };
+        let mut kept = BlackBox::new(limits);
+        let now = Instant::now();
+        for (number, lost) in [(1, 5), (2, 0), (3, 7)] {
+            let frame = Kept {
+                lost,
+                ..frame(number, 100)
+            };
+            assert_eq!(frame.frame().lost, lost);
+            kept.push(now, frame);
+        }
+        assert_eq!(kept.snapshot().lost(), 7);
     }
 }

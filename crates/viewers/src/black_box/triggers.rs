@@ -9,6 +9,9 @@ use jaus_view::{Entry, Filter};
 
 /// The same trigger counts again after this time without it.
 const QUIET: Duration = Duration::from_secs(60);
+/// The same trigger counts at most once in this time, so that a component that alternates between
+/// states does not replace the files of other incidents with its own.
+const PAUSE: Duration = Duration::from_secs(60);
 /// A loss of control within this time of the client's own release is no loss.
 const RELEASE: Duration = Duration::from_secs(5);
 /// Limit of each table. The least recent entry makes room.
@@ -96,15 +99,48 @@ impl Trigger {
 /// Recognises triggers in messages.
 ///
 /// A state that is reported again and again triggers once; it triggers again after another state, or
-/// after a minute without it.
+/// after a minute without it. No trigger counts twice within a minute: a state that begins again
+/// earlier counts when the minute is over, if it lasts.
 #[derive(Debug, Default)]
 pub struct Triggers {
     kinds: Vec<TriggerKind>,
     filters: Vec<Filter>,
-    /// When each was last recognised.
-    active: BTreeMap<Trigger, Instant>,
+    occurrences: BTreeMap<Trigger, Occurrence>,
     /// When a client released a component.
     released: BTreeMap<(String, String), Instant>,
+}
+
+/// How a trigger was recognised so far.
+#[derive(Debug, Clone, Copy)]
+struct Occurrence {
+    /// When it last counted.
+    counted: Instant,
+    /// When it was last recognised.
+    recognised: Instant,
+    /// Whether the component has reported another state since it last counted.
+    is_over: bool,
+}
+
+impl Occurrence {
+    const fn new(now: Instant) -> Self {
+        Self {
+            counted: now,
+            recognised: now,
+            is_over: false,
+        }
+    }
+
+    /// Recognises it again. Whether it counts.
+    fn recur(&mut self, now: Instant) -> bool {
+        let since = |at| now.saturating_duration_since(at);
+        let begins = self.is_over || since(self.recognised) > QUIET;
+        self.recognised = now;
+        let counts = begins && since(self.counted) >= PAUSE;
+        if counts {
+            *self = Self::new(now);
+        }
+        counts
+    }
 }
 
 impl Triggers {
@@ -123,10 +159,17 @@ impl Triggers {
         let kind = self.recognise(entry, now)?;
         let source = entry.text("source").unwrap_or_default().to_owned();
         let trigger = Trigger { kind, source };
-        let before = self.active.get(&trigger).copied();
-        insert(&mut self.active, trigger.clone(), now);
-        let is_new = before.is_none_or(|at| now.saturating_duration_since(at) > QUIET);
-        is_new.then_some(trigger)
+        let counts = match self.occurrences.get_mut(&trigger) {
+            Some(occurrence) => occurrence.recur(now),
+            None => {
+                let new = Occurrence::new(now);
+                insert(&mut self.occurrences, trigger.clone(), new, |it| {
+                    it.recognised
+                });
+                true
+            }
+        };
+        counts.then_some(trigger)
     }
 
     fn recognise(&mut self, entry: &Entry, now: Instant) -> Option<TriggerKind> {
@@ -141,7 +184,7 @@ impl Triggers {
                     Some("FAILURE") => Some(TriggerKind::Fault),
                     _ => None,
                 };
-                self.forget_states(entry, kind);
+                self.end_states(entry, kind);
                 kind
             }
             Some(RELEASE_CONTROL) => {
@@ -149,6 +192,7 @@ impl Triggers {
                     &mut self.released,
                     ends(entry, "source", "destination"),
                     now,
+                    |at| *at,
                 );
                 None
             }
@@ -166,12 +210,14 @@ impl Triggers {
     }
 
     /// A component that reports another state may report this one again.
-    fn forget_states(&mut self, entry: &Entry, reported: Option<TriggerKind>) {
+    fn end_states(&mut self, entry: &Entry, reported: Option<TriggerKind>) {
         let source = entry.text("source").unwrap_or_default();
         for kind in [TriggerKind::Emergency, TriggerKind::Fault] {
             if reported != Some(kind) {
                 let source = source.to_owned();
-                self.active.remove(&Trigger { kind, source });
+                if let Some(occurrence) = self.occurrences.get_mut(&Trigger { kind, source }) {
+                    occurrence.is_over = true;
+                }
             }
         }
     }
@@ -182,15 +228,20 @@ fn ends(entry: &Entry, client: &str, component: &str) -> (String, String) {
     (text(client), text(component))
 }
 
-/// Inserts into a bounded table.
-fn insert<K: Ord + Clone>(table: &mut BTreeMap<K, Instant>, key: K, now: Instant) {
+/// Inserts a new key into a bounded table, in place of the least recent one.
+fn insert<K: Ord + Clone, V>(
+    table: &mut BTreeMap<K, V>,
+    key: K,
+    value: V,
+    time: impl Fn(&V) -> Instant,
+) {
     if table.len() >= MOST && !table.contains_key(&key) {
-        let oldest = table.iter().min_by_key(|(_, at)| **at);
+        let oldest = table.iter().min_by_key(|(_, value)| time(value));
         if let Some(oldest) = oldest.map(|(key, _)| key.clone()) {
             table.remove(&oldest);
         }
     }
-    table.insert(key, now);
+    table.insert(key, value);
 }
 
 #[cfg(test)]
@@ -218,17 +269,54 @@ mod tests {
     #[test]
     fn a_state_triggers_when_it_begins_and_not_while_it_lasts() {
         let mut triggers = all();
-        let now = Instant::now();
-        let mut kind_of = |entry: &Entry| triggers.handle_entry(entry, now).map(|it| it.kind);
-        assert_eq!(kind_of(&status("1.1.1", "READY")), None);
+        let start = Instant::now();
+        let mut kind_of = |minute, entry: &Entry| {
+            let now = start + minute * Duration::from_secs(60);
+            triggers.handle_entry(entry, now).map(|it| it.kind)
+        };
+        assert_eq!(kind_of(0, &status("1.1.1", "READY")), None);
         let emergency = status("1.1.1", "EMERGENCY");
-        assert_eq!(kind_of(&emergency), Some(TriggerKind::Emergency));
-        assert_eq!(kind_of(&emergency), None);
+        assert_eq!(kind_of(0, &emergency), Some(TriggerKind::Emergency));
+        for minute in 0..3 {
+            assert_eq!(kind_of(minute, &emergency), None);
+        }
         let failure = status("1.1.1", "FAILURE");
-        assert_eq!(kind_of(&failure), Some(TriggerKind::Fault));
-        assert_eq!(kind_of(&emergency), Some(TriggerKind::Emergency));
+        assert_eq!(kind_of(2, &failure), Some(TriggerKind::Fault));
+        assert_eq!(kind_of(2, &emergency), Some(TriggerKind::Emergency));
         let other = status("1.1.2", "EMERGENCY");
-        assert_eq!(kind_of(&other), Some(TriggerKind::Emergency));
+        assert_eq!(kind_of(2, &other), Some(TriggerKind::Emergency));
+    }
+
+    #[test]
+    fn a_component_that_alternates_between_states_triggers_once_a_minute() {
+        let mut triggers = all();
+        let start = Instant::now();
+        let mut counted = Vec::new();
+        for tenth in 0..1500 {
+            let now = start + tenth * Duration::from_millis(100);
+            let state = if tenth % 2 == 0 { "EMERGENCY" } else { "READY" };
+            let trigger = triggers.handle_entry(&status("66.1.1", state), now);
+            counted.extend(trigger.map(|_| tenth / 10));
+        }
+        assert_eq!(counted, [0, 60, 120]);
+    }
+
+    #[test]
+    fn a_state_that_begins_again_within_the_minute_and_lasts_triggers_after_it() {
+        let mut triggers = all();
+        let start = Instant::now();
+        let mut counts = |second, state| {
+            let now = start + Duration::from_secs(second);
+            triggers
+                .handle_entry(&status("1.1.1", state), now)
+                .is_some()
+        };
+        assert!(counts(0, "FAILURE"));
+        assert!(!counts(10, "READY"));
+        assert!(!counts(20, "FAILURE"));
+        assert!(!counts(59, "FAILURE"));
+        assert!(counts(60, "FAILURE"));
+        assert!(!counts(120, "FAILURE"));
     }
 
     #[test]
@@ -295,7 +383,7 @@ mod tests {
         for number in 0..3 * MOST {
             triggers.handle_entry(&status(&format!("{number}.1.1"), "FAILURE"), now);
         }
-        assert_eq!(triggers.active.len(), MOST);
+        assert_eq!(triggers.occurrences.len(), MOST);
     }
 
     #[test]

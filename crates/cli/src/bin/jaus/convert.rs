@@ -10,7 +10,7 @@ use jaus_viewers::{Recorder, RecordingFormat};
 
 use crate::decode::network;
 use crate::definitions::Definitions;
-use crate::recordings;
+use crate::recordings::{self, Missing};
 
 /// Convert a recording to MCAP, for Foxglove and PlotJuggler, or back to pcapng, for Wireshark
 ///
@@ -74,13 +74,11 @@ impl Convert {
                 }
             }
         }
-        let left_out = recorder.left_out();
-        if left_out > 0 {
-            say(format_args!(
-                "{left_out} messages are in the frames alone: there are more sources than an MCAP \
-                 file gets channels"
-            ));
-        }
+        let missing = Missing {
+            left_out: recorder.left_out(),
+            ..Missing::default()
+        };
+        missing.remarks().for_each(say);
         let octets = recorder.finish().map_err(failed)?;
         Output::new().line(format_args!(
             "{} in {}, {}",

@@ -1,11 +1,12 @@
-//! Files of recordings: opened for reading, and created for writing.
+//! Files of recordings: opened for reading, and created for writing; and what they lack.
 
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::Path;
 
 use jaus_cli::failure::Failure;
-use jaus_viewers::Recording;
+use jaus_cli::output::counted;
+use jaus_viewers::{Recording, recording_file_options};
 
 /// Opens a recording: pcap, pcapng or MCAP.
 pub(crate) fn open(path: &Path) -> Result<Recording<BufReader<File>>, Failure> {
@@ -16,8 +17,8 @@ pub(crate) fn open(path: &Path) -> Result<Recording<BufReader<File>>, Failure> {
 
 /// Creates a file, which must not exist without `overwrite`.
 pub(crate) fn create(path: &Path, overwrite: bool) -> Result<File, Failure> {
-    let mut options = OpenOptions::new();
-    options.write(true).truncate(true);
+    let mut options = recording_file_options();
+    options.truncate(true);
     let options = if overwrite {
         options.create(true)
     } else {
@@ -30,4 +31,34 @@ pub(crate) fn create(path: &Path, overwrite: bool) -> Result<File, Failure> {
         )),
         _ => Failure::file(path, &error),
     })
+}
+
+/// What a recording lacks.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Missing {
+    /// Packets of this host, JAUS or not, that were lost because they came too fast.
+    pub(crate) lost: u64,
+    /// Messages of an MCAP file that are in its frames alone.
+    pub(crate) left_out: u64,
+}
+
+impl Missing {
+    /// A remark for people on each kind of loss.
+    pub(crate) fn remarks(self) -> impl Iterator<Item = String> {
+        let remark = |count: u64, what, why| {
+            let count = usize::try_from(count).unwrap_or(usize::MAX);
+            (count > 0).then(|| format!("{}: {why}", counted(count, what)))
+        };
+        let lost = remark(
+            self.lost,
+            "lost packet",
+            "they came faster than they were recorded, and need not be JAUS",
+        );
+        let left_out = remark(
+            self.left_out,
+            "message",
+            "in the frames alone, because an MCAP file has limits of channels and of samples",
+        );
+        lost.into_iter().chain(left_out)
+    }
 }

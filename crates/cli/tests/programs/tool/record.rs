@@ -61,6 +61,12 @@ fn what_goes_to_the_group_is_recorded_and_can_be_decoded() {
         recorded.stderr.contains(" packets recorded, "),
         "{recorded:?}"
     );
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = fs::metadata(file.path()).unwrap().permissions().mode();
+        assert_eq!(mode & 0o137, 0, "other users cannot read it: {mode:o}");
+    }
     let decoded = run(&["decode", file.path(), "--port", port], b"");
     assert!(
         decoded.stdout.contains("QueryIdentification"),

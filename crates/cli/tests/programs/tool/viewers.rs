@@ -1,12 +1,14 @@
 //! Recordings as MCAP, live viewers and the black box, with the real program.
 
 use std::fs;
+use std::net::{Ipv4Addr, UdpSocket};
 use std::path::Path;
 
 use crate::support::{Message, RAW, Running, ip_packet, own_group, pcap, run};
 use futures_util::{SinkExt, StreamExt};
 use jaus_test_kit::waiting::within_limit;
 use serde_json::{Value as Json, json};
+use socket2::SockRef;
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message as WebSocketMessage;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
@@ -113,8 +115,10 @@ fn a_file_of_the_black_box_is_whole_even_if_the_program_is_killed_at_once() {
         let folder = tempfile::tempdir().unwrap();
         let file = file_of_a_killed_black_box(folder.path(), format);
         assert!(file.ends_with(&format!("-operator.{format}")), "{file}");
-        let names = fs::read_dir(folder.path()).unwrap().count();
-        assert_eq!(names, 1, "nothing half-written remains");
+        let names = fs::read_dir(folder.path()).unwrap();
+        let names = names.map(|it| it.unwrap().file_name());
+        let names = names.filter(|name| name != ".black-box.lock");
+        assert_eq!(names.count(), 1, "nothing half-written remains");
         let decoded = run(&["decode", &file], b"");
         assert!(
             decoded.stdout.contains("QueryIdentification"),
@@ -125,6 +129,71 @@ fn a_file_of_the_black_box_is_whole_even_if_the_program_is_killed_at_once() {
         let converted = run(&["convert", &file, &copy], b"");
         assert_eq!((converted.status, &*converted.stderr), (0, ""));
     }
+}
+
+/// Sends a query of each of these components of 66.1 to a group on loopback.
+fn send_from(components: &[u32], group: &str) {
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let loopback = Ipv4Addr::LOCALHOST;
+    SockRef::from(&socket)
+        .set_multicast_if_v4(&loopback)
+        .unwrap();
+    for component in components {
+        let message = Message {
+            source: 66 << 16 | 0x0100 | component,
+            ..Message::new(b"\x02\x22")
+        };
+        socket.send_to(&message.datagram(), group).unwrap();
+    }
+}
+
+#[test]
+fn triggers_while_a_file_is_pending_are_counted_and_not_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let network = own_group();
+    let recorded = recorded(&network);
+    let place = folder.path().to_str().unwrap();
+    let black_box = [place, "--last", "1min", "--after", "1h", "--json"];
+    let trigger = ["--on-message", "from=66"];
+    let recorded = recorded.iter().map(String::as_str);
+    let flags: Vec<&str> = black_box
+        .into_iter()
+        .chain(trigger)
+        .chain(recorded)
+        .collect();
+    let mut running = Running::command("record", &flags);
+    running.read_until("keeping");
+    send_from(&[1, 2, 3, 2, 1], &network[4]);
+    let mut printed = running.read_until("\"written\"");
+    running.signal("-INT");
+    printed += &running.read_until("\"triggers\":3");
+    let count = |event: &str| printed.matches(&format!("\"event\":\"{event}\"")).count();
+    assert_eq!((count("trigger"), count("written")), (1, 2), "{printed}");
+    let written: Json = serde_json::from_str(printed.lines().last().unwrap()).unwrap();
+    for number in ["lost", "left_out", "deleted"] {
+        assert!(written[number].is_u64(), "{written}");
+    }
+}
+
+#[test]
+fn a_second_black_box_in_a_directory_is_refused_with_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let network = own_group();
+    let recorded = recorded(&network);
+    let place = folder.path().to_str().unwrap();
+    let recorded = recorded.iter().map(String::as_str);
+    let flags: Vec<&str> = [place, "--last", "1min"]
+        .into_iter()
+        .chain(recorded)
+        .collect();
+    let mut first = Running::command("record", &flags);
+    first.read_until("stay in memory");
+    let second = run(&[&["record", "--for", "1s"], &*flags].concat(), b"");
+    assert!(
+        second.stderr.contains("name another directory"),
+        "{second:?}"
+    );
+    assert_eq!(second.status, 2);
 }
 
 #[test]

@@ -37,7 +37,7 @@ impl Packet {
         }
     }
 
-    /// The packet as a frame of a capture: a frame without a link header.
+    /// The packet as a frame of a capture: a frame without a link header, and without a loss before it.
     pub(super) fn frame(&self) -> Frame<'_> {
         Frame {
             time: Some(self.time),
@@ -85,6 +85,25 @@ impl Source {
             #[cfg(target_os = "linux")]
             Self::Socket(socket) => socket.next().await,
             Self::Group(listeners) => Ok(listeners.next().await),
+        }
+    }
+
+    /// The packets that wait, without waiting for more.
+    pub(super) fn rest(&mut self) -> Result<Vec<Packet>, Failure> {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Socket(socket) => socket.rest(),
+            Self::Group(_) => Ok(Vec::new()),
+        }
+    }
+
+    /// Number of packets, JAUS or not, that were lost since the last call because they were not read
+    /// in time. Only packet sockets count them.
+    pub(super) fn take_lost(&self) -> u64 {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Socket(socket) => socket.take_lost(),
+            Self::Group(_) => 0,
         }
     }
 }

@@ -4,6 +4,7 @@
 //! version is complete and on the disk before it gets the name. A thread of its own writes, so that a
 //! slow disk never keeps packets waiting.
 
+mod report;
 mod writer;
 
 use std::future::Future;
@@ -26,7 +27,8 @@ use tokio::time::sleep_until;
 use super::filter::Filter;
 use crate::events::EventPrinter;
 use crate::packets::{Packet, Source};
-use writer::{BUSY, Job, Report, Writer};
+use report::{Content, Report};
+use writer::{Job, Writer};
 
 /// The flags of the black box.
 #[derive(Args)]
@@ -143,7 +145,7 @@ pub(super) async fn run(
     // Without the keeper the thread ends after its last file, and so do the reports.
     drop(keeper);
     while let Some(report) = reports.recv().await {
-        tell(&report, printer)?;
+        report.print(printer)?;
     }
     result.and(completed).map(|()| Outcome::Done)
 }
@@ -168,19 +170,31 @@ impl Watching<'_> {
         loop {
             let due = until(keeper.deadline());
             tokio::select! {
-                () = &mut end => return Ok(()),
+                () = &mut end => {
+                    let packets = self.source.rest()?;
+                    return self.handle_all(&packets, keeper, printer);
+                }
                 () = due => keeper.complete(printer)?,
                 () = self.requests.next() => {
                     keeper.handle_trigger(&Trigger::of_operator(), now(), printer)?;
                 }
-                Some(report) = reports.recv() => tell(&report, printer)?,
-                packets = self.source.next() => {
-                    for packet in packets? {
-                        self.handle(&packet, keeper, printer)?;
-                    }
-                }
+                Some(report) = reports.recv() => report.print(printer)?,
+                packets = self.source.next() => self.handle_all(&packets?, keeper, printer)?,
             }
         }
+    }
+
+    fn handle_all(
+        &mut self,
+        packets: &[Packet],
+        keeper: &mut Keeper<'_>,
+        printer: &mut EventPrinter,
+    ) -> Result<(), Failure> {
+        for packet in packets {
+            self.handle(packet, keeper, printer)?;
+        }
+        keeper.add_lost(self.source.take_lost());
+        Ok(())
     }
 
     fn handle(
@@ -213,26 +227,6 @@ async fn until(time: Option<Instant>) {
 #[expect(clippy::disallowed_methods, reason = "a command runs in real time")]
 fn now() -> Instant {
     Instant::now()
-}
-
-fn tell(report: &Report, printer: &mut EventPrinter) -> Result<(), Failure> {
-    let file = report.file.display();
-    match &report.octets {
-        Ok(octets) => {
-            let packets = report.packets;
-            let details = json!({ "file": file.to_string(), "packets": packets, "octets": octets });
-            let words = format_args!("{packets} packets in {file}, {}", size(*octets));
-            printer.timed("written", details, words)
-        }
-        Err(error) => {
-            let details = json!({ "file": file.to_string(), "error": error });
-            printer.timed(
-                "failed",
-                details,
-                format_args!("{file} is not written: {error}"),
-            )
-        }
-    }
 }
 
 /// Decodes packets, and recognises triggers.
@@ -269,6 +263,8 @@ struct Keeper<'s> {
     settings: &'s Settings,
     kept: BlackBox,
     pending: Option<Pending>,
+    /// Number of lost packets that no packet in memory mentions yet.
+    lost_before_next: u64,
     writer: Writer,
 }
 
@@ -276,6 +272,8 @@ struct Keeper<'s> {
 struct Pending {
     until: Instant,
     file: PathBuf,
+    /// Number of triggers so far.
+    triggers: u64,
     before: Snapshot,
     since: BlackBox,
 }
@@ -286,6 +284,7 @@ impl<'s> Keeper<'s> {
             settings,
             kept: BlackBox::new(settings.limits),
             pending: None,
+            lost_before_next: 0,
             writer,
         }
     }
@@ -317,6 +316,7 @@ impl<'s> Keeper<'s> {
             link: frame.link,
             time: packet.time,
             octets: packet.octets.clone(),
+            lost: std::mem::take(&mut self.lost_before_next),
         };
         if let Some(pending) = &mut self.pending {
             pending.since.push(now, kept.clone());
@@ -324,42 +324,46 @@ impl<'s> Keeper<'s> {
         self.kept.push(now, kept);
     }
 
+    /// Counts lost packets. The next packet in memory mentions them.
+    const fn add_lost(&mut self, packets: u64) {
+        self.lost_before_next += packets;
+    }
+
     /// When the pending file is to be completed.
     fn deadline(&self) -> Option<Instant> {
         self.pending.as_ref().map(|pending| pending.until)
     }
 
-    /// Writes what is in memory. A trigger while a file is pending belongs to that file.
+    /// Writes what is in memory. A trigger while a file is pending belongs to that file, and is
+    /// counted.
     fn handle_trigger(
         &mut self,
         trigger: &Trigger,
         now: Instant,
         printer: &mut EventPrinter,
     ) -> Result<(), Failure> {
+        if let Some(pending) = &mut self.pending {
+            pending.triggers += 1;
+            return Ok(());
+        }
         let details = json!({ "kind": trigger.kind.name(), "source": trigger.source });
         let of = match &*trigger.source {
             "" => String::new(),
             source => format!(" of {source}"),
         };
         printer.timed("trigger", details, format_args!("{}{of}", trigger.kind))?;
-        if self.pending.is_some() {
-            return Ok(());
-        }
         let before = self.kept.snapshot();
         let file = self.writer.reserve(trigger.kind.name());
+        let job = self.job(&file, before.clone(), 1);
         if self.writer.is_busy() {
             // One more file in memory would exceed the limit.
-            let refused = Report {
-                file,
-                packets: before.frames().len(),
-                octets: Err(BUSY.to_owned()),
-            };
-            return tell(&refused, printer);
+            return job.refused().print(printer);
         }
-        self.write(&file, before.clone(), printer)?;
+        self.enqueue(job, printer)?;
         self.pending = Some(Pending {
             until: now + self.settings.after,
             file,
+            triggers: 1,
             before,
             since: BlackBox::new(BlackBoxLimits {
                 time: Duration::MAX,
@@ -374,25 +378,30 @@ impl<'s> Keeper<'s> {
         match self.pending.take() {
             Some(pending) => {
                 let all = pending.before.followed_by(pending.since.snapshot());
-                self.write(&pending.file, all, printer)
+                let job = self.job(&pending.file, all, pending.triggers);
+                self.enqueue(job, printer)
             }
             None => Ok(()),
         }
     }
 
-    fn write(
-        &self,
-        file: &Path,
-        snapshot: Snapshot,
-        printer: &mut EventPrinter,
-    ) -> Result<(), Failure> {
-        let job = Job {
+    fn job(&self, file: &Path, snapshot: Snapshot, triggers: u64) -> Job {
+        let content = Content {
+            packets: snapshot.frames().len(),
+            lost: snapshot.lost() + self.lost_before_next,
+            triggers,
+        };
+        Job {
             file: file.to_owned(),
             snapshot,
-        };
+            content,
+        }
+    }
+
+    fn enqueue(&self, job: Job, printer: &mut EventPrinter) -> Result<(), Failure> {
         match self.writer.enqueue(job) {
             Ok(()) => Ok(()),
-            Err(error) => tell(&error, printer),
+            Err(refused) => refused.print(printer),
         }
     }
 }

@@ -20,7 +20,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use crate::definitions::Definitions;
 use crate::events::{EventFormat, EventPrinter};
-use crate::packets::Source;
+use crate::packets::{Packet, Source};
 use black_box::Flags as BlackBoxFlags;
 use file::{Recording, STANDARD_OUTPUT, Tally};
 use filter::Filter;
@@ -48,10 +48,12 @@ use filter::Filter;
     jaus record drive.mcap                 for Foxglove and PlotJuggler\n  \
     jaus record /var/log/jaus --last 5min --on emergency,fault,control-lost\n  \
     jaus record boxes --last 1min --on-message 'message=ReportStatus status=shutdown' --format mcap\n\n\
-    Events of --json, on standard output: \"progress\" each second and \"end\", with \"packets\" and \
-    \"octets\". Of a black box: \"keeping\", then for each file \"trigger\" with its \"kind\" and \
-    \"source\", and \"written\" with the \"file\", its \"packets\" and \"octets\"; the second time \
-    with --after. \"failed\" has an \"error\" instead.")]
+    Events of --json, on standard output: \"progress\" each second and \"end\", with \"packets\", \
+    \"octets\", the number of packets \"lost\" because they came too fast, and of messages \
+    \"left_out\" of the channels of an MCAP file. Of a black box: \"keeping\", then for each file \
+    \"trigger\" with its \"kind\" and \"source\", and \"written\" with the \"file\", the same numbers, \
+    the number of its \"triggers\", and of older files \"deleted\" because the disk was full; the \
+    second time with --after. \"failed\" has an \"error\" instead of a size.")]
 pub(crate) struct Record {
     /// The file to write, which must not exist without --overwrite; - is standard output. With
     /// --last, a directory
@@ -169,7 +171,10 @@ impl Record {
         let mut told = 0;
         loop {
             tokio::select! {
-                () = &mut end => return Ok(()),
+                () = &mut end => {
+                    let rest = source.rest()?;
+                    return take(recording, &rest, source);
+                }
                 _ = second.tick() => {
                     recording.flush()?;
                     let tally = recording.tally();
@@ -178,9 +183,7 @@ impl Record {
                         progress.tell(&tally)?;
                     }
                 }
-                packets = source.next() => {
-                    packets?.iter().try_for_each(|packet| recording.take(packet))?;
-                }
+                packets = source.next() => take(recording, &packets?, source)?,
             }
             let limit = self.size.map(|size| size as u64);
             if limit.is_some_and(|limit| recording.tally().octets >= limit) {
@@ -188,6 +191,15 @@ impl Record {
             }
         }
     }
+}
+
+/// Records packets of a source, and what it has lost.
+fn take(recording: &mut Recording<'_>, packets: &[Packet], source: &Source) -> Result<(), Failure> {
+    packets
+        .iter()
+        .try_for_each(|packet| recording.take(packet))?;
+    recording.add_lost(source.take_lost());
+    Ok(())
 }
 
 /// Where the progress is printed.
@@ -214,8 +226,10 @@ impl Progress {
             Self::Quiet => {}
             Self::Words if file == Path::new(STANDARD_OUTPUT) => say(tally),
             Self::Words => say(format_args!("{tally} in {}", file.display())),
-            Self::Events(printer) => printer.plain("end", tally.to_json(), "")?,
+            Self::Events(printer) => return printer.plain("end", tally.to_json(), ""),
         }
+        // What is lost is no progress.
+        tally.missing.remarks().for_each(say);
         Ok(())
     }
 }

@@ -12,6 +12,7 @@ use jaus_viewers::{BlackBoxFiles, BlackBoxNames, Recorder, RecordingFormat, Snap
 use tokio::sync::mpsc;
 
 use super::Settings;
+use super::report::{Content, Report, Written};
 
 /// Limit of files that wait to be written: the first and the complete version of one.
 const WAITING: usize = 2;
@@ -21,20 +22,25 @@ const REPORTS: usize = 16;
 const SAMPLES: u64 = 8;
 
 /// Why a file is not written if the thread has not caught up.
-pub(super) const BUSY: &str = "the disk is still busy with the file before it";
+const BUSY: &str = "the disk is still busy with the file before it";
 
 /// A file to write.
 pub(super) struct Job {
     pub(super) file: PathBuf,
     pub(super) snapshot: Snapshot,
+    pub(super) content: Content,
 }
 
-/// What has become of a job.
-pub(super) struct Report {
-    pub(super) file: PathBuf,
-    pub(super) packets: usize,
-    /// Its size, or why it is not written.
-    pub(super) octets: Result<u64, String>,
+impl Job {
+    /// The report that it is not written, because the thread is busy.
+    pub(super) fn refused(self) -> Report {
+        Report {
+            file: self.file,
+            content: self.content,
+            deleted: 0,
+            result: Err(BUSY.to_owned()),
+        }
+    }
 }
 
 /// Hands jobs to the thread, which ends with the last job when this is dropped.
@@ -103,11 +109,7 @@ impl Writer {
             self.waiting.fetch_sub(1, Ordering::Relaxed);
             let (std::sync::mpsc::TrySendError::Full(job)
             | std::sync::mpsc::TrySendError::Disconnected(job)) = error;
-            Report {
-                file: job.file,
-                packets: job.snapshot.frames().len(),
-                octets: Err(BUSY.to_owned()),
-            }
+            job.refused()
         })
     }
 }
@@ -123,13 +125,15 @@ struct Thread {
 
 impl Thread {
     fn run(mut self, jobs: &Receiver<Job>, reports: &mpsc::Sender<Report>) {
-        for Job { file, snapshot } in jobs {
-            let octets = self.write(&file, &snapshot);
+        for job in jobs {
+            let deleted = self.files.deleted_on_full_disk();
+            let written = self.write(&job.file, &job.snapshot);
             self.waiting.fetch_sub(1, Ordering::Relaxed);
             let report = Report {
-                file,
-                packets: snapshot.frames().len(),
-                octets: octets.map_err(|error| error.to_string()),
+                file: job.file,
+                content: job.content,
+                deleted: self.files.deleted_on_full_disk() - deleted,
+                result: written.map_err(|error| error.to_string()),
             };
             if reports.blocking_send(report).is_err() {
                 return;
@@ -137,10 +141,13 @@ impl Thread {
         }
     }
 
-    fn write(&mut self, file: &Path, snapshot: &Snapshot) -> std::io::Result<u64> {
+    fn write(&mut self, file: &Path, snapshot: &Snapshot) -> std::io::Result<Written> {
         let (format, dictionary) = (self.format, &self.dictionary);
         let sample_limit = self.sample_limit;
-        let mut octets = 0;
+        let mut written = Written {
+            octets: 0,
+            left_out: 0,
+        };
         self.files.write(file, |out| {
             let mut out = BufWriter::new(out);
             let network = Network::of_any_port();
@@ -149,9 +156,81 @@ impl Thread {
             for kept in snapshot.frames() {
                 recorder.write_frame(&kept.frame())?;
             }
-            octets = recorder.finish()?;
+            let left_out = recorder.left_out();
+            let octets = recorder.finish()?;
+            written = Written { octets, left_out };
             out.flush()
         })?;
-        Ok(octets)
+        Ok(written)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use jaus_view::LinkType;
+    use jaus_viewers::{BlackBox, BlackBoxLimits, Kept};
+
+    use super::*;
+
+    /// 42.1.1 queries the heartbeat of 101.1.1.
+    fn query() -> Kept {
+        let mut octets = Vec::new();
+        let datagram = b"\x02\x00\x10\x00\x01\x01\x01\x65\x00\x01\x01\x2A\x00\x02\x22\x07\x00";
+        etherparse::PacketBuilder::ipv4([10, 0, 0, 1], [10, 0, 0, 2], 16)
+            .udp(3794, 3794)
+            .write(&mut octets, datagram)
+            .unwrap();
+        Kept {
+            interface: "eth0".into(),
+            link: LinkType::RAW,
+            time: Timestamp::new(1_790_000_000, 0, 9),
+            octets: octets.into(),
+            lost: 0,
+        }
+    }
+
+    fn settings(directory: &Path) -> Settings {
+        Settings {
+            directory: directory.to_owned(),
+            format: RecordingFormat::Mcap,
+            // No room for samples.
+            limits: BlackBoxLimits {
+                time: Duration::MAX,
+                octets: 0,
+            },
+            on: Vec::new(),
+            on_message: Vec::new(),
+            after: Duration::ZERO,
+            files: 20,
+        }
+    }
+
+    #[test]
+    #[expect(clippy::disallowed_methods, reason = "the test begins at some time")]
+    fn a_report_has_the_number_of_messages_that_are_in_the_frames_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = settings(folder.path());
+        let started = Writer::start(&settings, Arc::new(Dictionary::new().with_catalogue()));
+        let (mut writer, mut reports) = started.unwrap_or_else(|failure| panic!("{failure}"));
+        let mut kept = BlackBox::new(BlackBoxLimits {
+            octets: 1 << 20,
+            ..settings.limits
+        });
+        kept.push(Instant::now(), query());
+        let content = Content {
+            packets: 1,
+            lost: 0,
+            triggers: 1,
+        };
+        let job = Job {
+            file: writer.reserve("operator"),
+            snapshot: kept.snapshot(),
+            content,
+        };
+        assert!(writer.enqueue(job).is_ok());
+        let written = reports.blocking_recv().unwrap().result.unwrap();
+        assert_eq!(written.left_out, 1);
     }
 }
