@@ -30,6 +30,8 @@ const PING: Duration = Duration::from_secs(10);
 const SILENCE: Duration = Duration::from_secs(60);
 /// Limit of a client's messages in a second. Further ones wait for the next second.
 const REQUESTS: u32 = 50;
+/// Least interval of warnings to a client that never catches up.
+const WARNING: Duration = Duration::from_secs(1);
 /// Channels that are announced in one message.
 const TOGETHER: usize = 64;
 
@@ -38,8 +40,8 @@ type Socket = WebSocketStream<TcpStream>;
 /// What a client has subscribed to, and what waits for it.
 #[derive(Debug)]
 pub(super) struct Client {
-    /// The channels of the subscriptions, by the client's numbers.
-    subscriptions: Mutex<BTreeMap<u32, usize>>,
+    /// The client's numbers of its subscriptions, by channel.
+    subscriptions: Mutex<BTreeMap<usize, u32>>,
     queue: mpsc::Sender<Bytes>,
     waiting_octets: AtomicUsize,
     lost: AtomicU64,
@@ -57,18 +59,16 @@ impl Client {
         (Arc::new(client), waiting)
     }
 
-    /// The numbers of the subscriptions to a channel.
-    pub(super) fn subscriptions_to(&self, channel: usize) -> Vec<u32> {
-        let subscriptions = self.subscriptions();
-        let of_channel = subscriptions.iter().filter(|(_, it)| **it == channel);
-        of_channel.map(|(&id, _)| id).collect()
+    /// The number of the subscription to a channel.
+    pub(super) fn subscription_to(&self, channel: usize) -> Option<u32> {
+        self.subscriptions().get(&channel).copied()
     }
 
     /// Queues a sample; counts it as lost and returns false if the queue is full.
     pub(super) fn offer(&self, subscription: u32, time: u64, data: &[u8]) -> bool {
         let length = MESSAGE_DATA_HEADER + data.len();
         let waiting = self.waiting_octets.fetch_add(length, Ordering::Relaxed);
-        // Copied only if there is room: a client may subscribe to a large sample many times.
+        // Copied only if there is room.
         let is_queued = waiting + length <= WAITING_OCTETS
             && self.queue.try_reserve().is_ok_and(|place| {
                 place.send(protocol::message_data(subscription, time, data));
@@ -79,6 +79,24 @@ impl Client {
             self.lost.fetch_add(1, Ordering::Relaxed);
         }
         is_queued
+    }
+
+    /// The number of lost samples, if it is time for a warning of them: when the client has caught
+    /// up, and once a second at most while it does not. `warned` is the time of the last one.
+    fn lost_to_tell(
+        &self,
+        warned: &mut Option<Instant>,
+        now: Instant,
+        has_caught_up: bool,
+    ) -> Option<u64> {
+        let is_due = warned.is_none_or(|at| now.saturating_duration_since(at) >= WARNING);
+        if !has_caught_up && !is_due {
+            return None;
+        }
+        let lost = self.lost.swap(0, Ordering::Relaxed);
+        let lost = (lost > 0).then_some(lost)?;
+        *warned = Some(now);
+        Some(lost)
     }
 
     /// Notes that octets wait no more.
@@ -96,7 +114,7 @@ impl Client {
             Request::Unsubscribe { subscription_ids } => {
                 let mut subscriptions = self.subscriptions();
                 for id in subscription_ids {
-                    subscriptions.remove(&id);
+                    subscriptions.retain(|_, it| *it != id);
                 }
                 None
             }
@@ -112,14 +130,20 @@ impl Client {
         if subscriptions.len() >= MOST_CHANNELS {
             return Err("the limit of subscriptions is reached");
         }
-        subscriptions.insert(new.id, channel);
+        if subscriptions.contains_key(&channel) {
+            return Err("there is a subscription to this channel already");
+        }
+        if subscriptions.values().any(|&it| it == new.id) {
+            return Err("another subscription has this id");
+        }
+        subscriptions.insert(channel, new.id);
         if let Some(sample) = latest.of(channel) {
             shared.offer(self, new.id, sample.time, &sample.data);
         }
         Ok(())
     }
 
-    fn subscriptions(&self) -> MutexGuard<'_, BTreeMap<u32, usize>> {
+    fn subscriptions(&self) -> MutexGuard<'_, BTreeMap<usize, u32>> {
         let subscriptions = self.subscriptions.lock();
         subscriptions.unwrap_or_else(PoisonError::into_inner)
     }
@@ -136,6 +160,7 @@ pub(super) async fn serve(shared: &Shared, socket: Socket) {
         client: &client,
         sink,
         announced: 0,
+        warned: None,
     };
     tokio::select! {
         ended = writer.run(waiting, refused) => {
@@ -187,6 +212,8 @@ struct Writer<'s> {
     sink: SplitSink<Socket, Message>,
     /// Number of channels that were announced.
     announced: usize,
+    /// When it was warned last of lost samples.
+    warned: Option<Instant>,
 }
 
 impl Writer<'_> {
@@ -236,18 +263,18 @@ impl Writer<'_> {
         Ok(())
     }
 
-    /// Warns the client of lost samples, with their number, once it has caught up.
+    /// Warns the client of lost samples, with their number, if it is time.
     async fn tell_lost(&mut self, has_caught_up: bool) -> Result<(), Error> {
-        if !has_caught_up {
+        #[expect(clippy::disallowed_methods, reason = "clients run in real time")]
+        let now = Instant::now();
+        let lost = self
+            .client
+            .lost_to_tell(&mut self.warned, now, has_caught_up);
+        let Some(lost) = lost else {
             return Ok(());
-        }
-        match self.client.lost.swap(0, Ordering::Relaxed) {
-            0 => Ok(()),
-            lost => {
-                let words = format!("{lost} messages lost: this viewer reads too slowly");
-                self.send(Message::text(protocol::warning(&words))).await
-            }
-        }
+        };
+        let words = format!("{lost} messages lost: this viewer reads too slowly");
+        self.send(Message::text(protocol::warning(&words))).await
     }
 
     async fn send(&mut self, message: Message) -> Result<(), Error> {
@@ -272,12 +299,9 @@ mod tests {
         Server::new(ServerSettings::default()).0.shared
     }
 
-    /// Subscribes to a channel with `count` numbers from `first` on.
-    fn subscribe(channel_id: u64, first: u32, count: usize) -> Request {
-        let numbers = (first..).take(count);
-        Request::Subscribe {
-            subscriptions: numbers.map(|id| Subscription { id, channel_id }).collect(),
-        }
+    fn subscribe(id: u32, channel_id: u64) -> Request {
+        let subscriptions = vec![Subscription { id, channel_id }];
+        Request::Subscribe { subscriptions }
     }
 
     #[test]
@@ -298,42 +322,79 @@ mod tests {
     }
 
     #[test]
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "the test starts at an arbitrary instant"
+    )]
+    fn a_client_that_never_catches_up_is_warned_once_a_second() {
+        let (client, _waiting) = Client::new();
+        let (start, mut warned) = (Instant::now(), None);
+        let mut lose = |number, after, has_caught_up| {
+            client.lost.fetch_add(number, Ordering::Relaxed);
+            client.lost_to_tell(&mut warned, start + after, has_caught_up)
+        };
+        assert_eq!(lose(3, Duration::ZERO, false), Some(3));
+        assert_eq!(lose(4, WARNING / 2, false), None);
+        assert_eq!(lose(5, WARNING, false), Some(9));
+        assert_eq!(lose(6, WARNING, true), Some(6), "it has caught up");
+        assert_eq!(lose(0, 3 * WARNING, true), None);
+    }
+
+    #[test]
     fn subscriptions_are_bounded_and_end_when_the_client_says_so() {
         let (shared, (client, _waiting)) = (shared(), Client::new());
-        assert_eq!(client.handle(subscribe(3, 7, 2), &shared), None);
-        assert_eq!(client.subscriptions_to(3), [7, 8]);
-        assert!(client.subscriptions_to(4).is_empty());
+        assert_eq!(client.handle(subscribe(7, 3), &shared), None);
+        assert_eq!(client.handle(subscribe(8, 4), &shared), None);
+        assert_eq!(client.subscription_to(3), Some(7));
+        assert_eq!(client.subscription_to(5), None);
         let unsubscribe = Request::Unsubscribe {
             subscription_ids: vec![7, 99],
         };
         assert_eq!(client.handle(unsubscribe, &shared), None);
-        assert_eq!(client.subscriptions_to(3), [8]);
-        let most = subscribe(3, 100, MOST_CHANNELS);
-        assert!(client.handle(most, &shared).is_some());
+        assert_eq!(client.subscription_to(3), None);
+        assert_eq!(client.subscription_to(4), Some(8));
+        let many = (100..).take(MOST_CHANNELS);
+        let many = many.map(|it: u32| client.handle(subscribe(it, it.into()), &shared));
+        assert_eq!(many.flatten().count(), 1, "one too many is refused");
         assert_eq!(client.subscriptions().len(), MOST_CHANNELS);
+    }
+
+    #[test]
+    fn a_channel_and_a_number_have_one_subscription() {
+        // With thousands of them to one channel, a client would delay the samples of all others.
+        let (shared, (client, mut waiting)) = (shared(), Client::new());
+        shared.latest().keep(3, 5, b"{}".to_vec());
+        assert_eq!(client.handle(subscribe(7, 3), &shared), None);
+        assert!(client.handle(subscribe(8, 3), &shared).is_some());
+        assert!(client.handle(subscribe(7, 4), &shared).is_some());
+        assert_eq!(client.subscription_to(3), Some(7));
+        assert_eq!(client.subscription_to(4), None);
+        assert!(waiting.try_recv().is_ok());
+        assert!(waiting.try_recv().is_err());
     }
 
     #[test]
     fn each_subscription_gets_the_latest_sample_of_its_channel_with_its_time() {
         let (shared, (client, mut waiting)) = (shared(), Client::new());
         shared.latest().keep(3, 5, b"{}".to_vec());
-        client.handle(subscribe(3, 7, 1), &shared);
-        client.handle(subscribe(4, 8, 1), &shared);
+        client.handle(subscribe(7, 3), &shared);
+        client.handle(subscribe(8, 4), &shared);
         let expected = protocol::message_data(7, 5, b"{}");
         assert_eq!(waiting.try_recv().ok(), Some(expected));
         assert!(waiting.try_recv().is_err(), "channel 4 has no sample");
     }
 
     #[test]
-    fn no_sample_is_missed_or_sent_twice_if_it_is_published_while_a_client_subscribes() {
-        const SUBSCRIPTIONS: u32 = 30;
+    fn no_sample_is_missed_or_sent_twice_if_it_is_published_while_clients_subscribe() {
+        const CLIENTS: usize = 30;
         const LAST: u64 = 100;
         let dictionary = Dictionary::new();
         let channels = Channels::new(&dictionary);
         for _ in 0..200 {
             let (server, sharing) = Server::new(ServerSettings::default());
-            let (client, mut waiting) = Client::new();
-            server.shared.clients().push(client.clone());
+            let clients: Vec<_> = (0..CLIENTS).map(|_| Client::new()).collect();
+            let all = clients.iter().map(|(client, _)| client.clone());
+            server.shared.clients().extend(all);
             let start = Barrier::new(2);
             std::thread::scope(|threads| {
                 threads.spawn(|| {
@@ -349,20 +410,16 @@ mod tests {
                     }
                 });
                 start.wait();
-                for id in 0..SUBSCRIPTIONS {
-                    client.handle(subscribe(3, id, 1), &server.shared);
+                for (client, _) in &clients {
+                    client.handle(subscribe(7, 3), &server.shared);
                 }
             });
-            let mut received = BTreeMap::<u32, Vec<u64>>::new();
-            while let Ok(data) = waiting.try_recv() {
-                let id = u32::from_le_bytes(data[1..5].try_into().unwrap());
-                let time = u64::from_le_bytes(data[5..13].try_into().unwrap());
-                received.entry(id).or_default().push(time);
+            for (_, mut waiting) in clients {
+                let received = std::iter::from_fn(|| waiting.try_recv().ok());
+                let time = |data: Bytes| u64::from_le_bytes(data[5..13].try_into().unwrap());
+                let times: Vec<_> = received.map(time).collect();
+                assert_eq!(times, Vec::from_iter(times[0]..=LAST));
             }
-            for times in received.values() {
-                assert_eq!(*times, Vec::from_iter(times[0]..=LAST));
-            }
-            assert_eq!(received.len(), SUBSCRIPTIONS as usize);
         }
     }
 
@@ -371,24 +428,12 @@ mod tests {
         let (shared, (client, mut waiting)) = (shared(), Client::new());
         *shared.latest() = full();
         for channel in 0..MOST_CHANNELS {
-            client.handle(subscribe(channel as u64, channel as u32, 1), &shared);
+            client.handle(subscribe(channel as u32, channel as u64), &shared);
         }
         assert_eq!(shared.lost.load(Ordering::Relaxed), 0);
         assert_eq!(
             std::iter::from_fn(|| waiting.try_recv().ok()).count(),
             MOST_CHANNELS
         );
-    }
-
-    #[test]
-    fn a_large_sample_that_is_subscribed_to_many_times_is_lost_and_counted() {
-        let (shared, (client, _waiting)) = (shared(), Client::new());
-        *shared.latest() = full();
-        client.handle(subscribe(0, 0, MOST_CHANNELS), &shared);
-        let waiting = client.waiting_octets.load(Ordering::Relaxed);
-        assert!(waiting <= WAITING_OCTETS, "{waiting}");
-        let lost = shared.lost.load(Ordering::Relaxed);
-        assert_eq!(lost, client.lost.load(Ordering::Relaxed));
-        assert!(lost > 4000, "{lost}");
     }
 }

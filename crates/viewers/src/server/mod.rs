@@ -178,7 +178,7 @@ impl Sharing {
             // Serialising to memory fails only for non-text map keys, which do not occur.
             let data = serde_json::to_vec(&sample.value).unwrap_or_default();
             for client in clients.iter() {
-                for subscription in client.subscriptions_to(sample.channel) {
+                if let Some(subscription) = client.subscription_to(sample.channel) {
                     shared.offer(client, subscription, sample.time, &data);
                 }
             }
