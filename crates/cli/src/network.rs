@@ -136,11 +136,11 @@ impl Network {
     }
 
     /// For the examination of a node before its start: its id, if one is chosen, and its settings,
-    /// but with a temporary id.
-    pub fn for_examination(&self) -> Result<(Option<JausId>, Config), Failure> {
+    /// but with a temporary id, such as [`passing_id`].
+    pub fn for_examination(&self, passing: JausId) -> Result<(Option<JausId>, Config), Failure> {
         let (identity, node) = self.settings()?;
         let id = self.chosen_id(&identity, &node);
-        Ok((id, self.with_flags(node, passing_id())?))
+        Ok((id, self.with_flags(node, passing)?))
     }
 
     /// Whether a settings file is chosen.
@@ -502,9 +502,10 @@ async fn attach_somewhere(host: &Host) -> Result<Port, HostError> {
     host.attach(passing_id().component()).await
 }
 
-/// A temporary id: from subsystem 60000 on, where no vehicles are numbered. It differs from run to
-/// run, so that simultaneous commands do not collide.
-fn passing_id() -> JausId {
+/// A temporary id: from subsystem 60000 on, where no vehicles are numbered. It differs from call to
+/// call, so that simultaneous commands do not collide.
+#[must_use]
+pub fn passing_id() -> JausId {
     let random = RandomState::new().build_hasher().finish();
     let [subsystem, node, component, ..] = random.to_le_bytes();
     JausId::new(

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use jaus::endpoint::Peer;
 #[cfg(unix)]
@@ -15,6 +15,8 @@ use super::exposition::{Exposition, Unit, Value};
 /// Maximum number of peers, links or components with samples of their own. Peers are those known
 /// longest, so that new ids, which any sender can invent, replace none.
 const MOST: usize = 64;
+/// A peer that is silent for this time leaves its place to others.
+const SILENCE: Duration = Duration::from_secs(60);
 
 /// Adds all metrics of a node.
 pub(super) fn add(exposition: &mut Exposition, node: &Node, now: Instant) {
@@ -253,6 +255,7 @@ fn add_peers(exposition: &mut Exposition, node: &Node, now: Instant) {
     exposition
         .gauge("jaus_peers", Unit::None, help)
         .add(&[], peers.len());
+    peers.retain(|peer| now.saturating_duration_since(peer.last_heard) < SILENCE);
     peers.sort_by_key(|peer| (peer.first_heard, peer.id));
     peers.truncate(MOST);
     add_table(
@@ -364,14 +367,18 @@ fn add_components(exposition: &mut Exposition, node: &Node) {
 
 #[cfg(test)]
 mod tests {
+    use jaus::component::{Component, Kind};
     use jaus::endpoint::Counter;
+    use jaus::node::{Config, now};
+    use jaus_test_kit::group::own_group;
+    use jaus_test_kit::waiting::until;
 
     use super::*;
     use crate::metrics::exposition::Format;
 
     #[tokio::test]
     async fn every_counter_of_the_endpoint_is_exported_once() {
-        let node = Node::start(jaus::node::Config::loopback(101, 1)).unwrap();
+        let node = Node::start(Config::loopback(101, 1)).unwrap();
         let mut exposition = Exposition::new(Format::Prometheus);
         counts::add(&mut exposition, "jaus", node.counters().counts());
         let text = exposition.finish();
@@ -385,6 +392,23 @@ mod tests {
             assert!(samples.contains(&expected), "{expected}: {text}");
         }
         node.shutdown().await;
+    }
+
+    #[tokio::test]
+    async fn a_silent_peer_leaves_its_place_to_others() {
+        let group = own_group();
+        let start = |subsystem| Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
+        let (node, other) = (start(101), start(102));
+        let rover = || Component::builder(Kind::Vehicle, "Rover");
+        let _rovers = [&node, &other].map(|it| rover().attach(it, 1).unwrap());
+        until(|| !node.peers().is_empty()).await;
+        let has_samples = |after: Duration| {
+            let mut exposition = Exposition::new(Format::Prometheus);
+            add_peers(&mut exposition, &node, now() + after);
+            exposition.finish().contains("{peer=\"102.1.1\"}")
+        };
+        assert!(has_samples(Duration::ZERO));
+        assert!(!has_samples(2 * SILENCE));
     }
 
     #[cfg(unix)]

@@ -41,6 +41,8 @@ pub(super) struct Finding {
     check: &'static str,
     /// Observed state.
     what: String,
+    /// A figure that differs from round to round.
+    figure: Option<String>,
     /// Remedy.
     advice: Option<String>,
 }
@@ -70,6 +72,7 @@ impl Finding {
             mark,
             check,
             what: what.to_string(),
+            figure: None,
             advice: None,
         }
     }
@@ -77,6 +80,27 @@ impl Finding {
     #[cfg(feature = "secure")]
     pub(super) fn is_problem(&self) -> bool {
         self.mark == Mark::Problem
+    }
+
+    /// Adds a figure that belongs to the observed state, but is another one in every round.
+    #[cfg(feature = "secure")]
+    pub(super) fn figure(mut self, figure: impl Display) -> Self {
+        self.figure = Some(figure.to_string());
+        self
+    }
+
+    /// Whether it says the same as another finding, whatever their figures are.
+    pub(super) fn is_same_as(&self, other: &Self) -> bool {
+        let said = |it: &Self| (it.mark, it.check, it.what.clone(), it.advice.clone());
+        said(self) == said(other)
+    }
+
+    /// What was observed, with the figure.
+    fn observed(&self) -> String {
+        match &self.figure {
+            Some(figure) => format!("{}; {figure}", self.what),
+            None => self.what.clone(),
+        }
     }
 
     /// Adds a remedy.
@@ -92,7 +116,11 @@ impl Finding {
             true => format!("{}{name:8}\x1b[0m", self.mark.colour()),
             false => format!("{name:8}"),
         };
-        let mut text = format!("{mark} {:12}{}", self.check, wrapped(&self.what, INDENT));
+        let mut text = format!(
+            "{mark} {:12}{}",
+            self.check,
+            wrapped(&self.observed(), INDENT)
+        );
         if let Some(advice) = &self.advice {
             text.push_str(&format!(
                 "\n{:INDENT$}{}",
@@ -107,7 +135,7 @@ impl Finding {
         json!({
             "verdict": self.mark.name(),
             "check": self.check,
-            "what": self.what,
+            "what": self.observed(),
             "advice": self.advice,
         })
     }

@@ -25,9 +25,10 @@ use serde_json::json;
 
 use self::finding::{Finding, Mark};
 use self::watch::Rounds;
+use jaus::address::JausId;
 use jaus::node::Config;
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::network::Network;
+use jaus_cli::network::{Network, passing_id};
 use jaus_cli::output::{Output, colours_wanted, counted, say};
 use jaus_cli::runtime::{self, Clock};
 
@@ -85,7 +86,7 @@ impl Doctor {
             return runtime::run(self.watch(pause));
         }
         let mut report = Report::new(self.json, true);
-        runtime::run(self.examine(&mut report))?;
+        runtime::run(self.examine(passing_id(), &mut report))?;
         report.close()
     }
 
@@ -95,13 +96,15 @@ impl Doctor {
         let mut output = Output::new();
         let mut rounds = Rounds::default();
         let mut outcome = Outcome::Incomplete;
+        // With one id for all rounds it stays one entry in the tables of its peers.
+        let own = passing_id();
         let end = runtime::end(None);
         tokio::pin!(end);
         loop {
             let mut report = Report::new(self.json, false);
             tokio::select! {
                 () = &mut end => return Ok(outcome),
-                examined = self.examine(&mut report) => examined?,
+                examined = self.examine(own, &mut report) => examined?,
             }
             outcome = report.outcome();
             let colours = report.colours;
@@ -119,15 +122,15 @@ impl Doctor {
         }
     }
 
-    async fn examine(&self, report: &mut Report) -> Result<(), Failure> {
-        let (id, config) = self.network.for_examination()?;
+    async fn examine(&self, own: JausId, report: &mut Report) -> Result<(), Failure> {
+        let (id, config) = self.network.for_examination(own)?;
         if self.network.has_file() {
             report.add(Finding::ok("settings", "the settings file can be read"))?;
         }
         #[cfg(feature = "secure")]
         let config = match self.network.secure()? {
             Some(link) => {
-                let node = jaus::address::JausId::new(config.subsystem, config.node, 0);
+                let node = JausId::new(config.subsystem, config.node, 0);
                 report.add_all(secure::check(&link, node, self.duration).await)?;
                 match secure::plain(config) {
                     Ok(Some(config)) => config,

@@ -93,10 +93,8 @@ fn of_peer(peer: SocketAddr, reached: Reached) -> Finding {
         Ok(session) => {
             let time = session.round_trip.as_secs_f64() * 1000.0;
             let name = &session.peer.name;
-            Finding::ok(
-                CHECK,
-                format_args!("{peer} is `{name}`; round trip {time:.1} ms"),
-            )
+            Finding::ok(CHECK, format_args!("{peer} is `{name}`"))
+                .figure(format_args!("round trip {time:.1} ms"))
         }
         Err(fault) => {
             let finding = Finding::problem(CHECK, format_args!("{peer}: {fault}"));

@@ -48,8 +48,10 @@ impl Rounds {
     /// Takes the findings of a round. Returns what is over, and then what is new.
     pub(super) fn handle_round(&mut self, findings: Vec<Finding>) -> Vec<Difference> {
         let before = std::mem::replace(&mut self.latest, findings);
-        let over = before.iter().filter(|it| !self.latest.contains(it));
-        let new = self.latest.iter().filter(|it| !before.contains(it));
+        let lacks =
+            |findings: &[Finding], it: &Finding| !findings.iter().any(|other| other.is_same_as(it));
+        let over = before.iter().filter(|it| lacks(&self.latest, it));
+        let new = self.latest.iter().filter(|it| lacks(&before, it));
         let over = over.cloned().map(Difference::Over);
         over.chain(new.cloned().map(Difference::New)).collect()
     }
@@ -58,6 +60,15 @@ impl Rounds {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(feature = "secure")]
+    #[test]
+    fn another_figure_is_no_difference() {
+        let reached = |time: &str| vec![Finding::ok("secure", "the peer is `rover`").figure(time)];
+        let mut rounds = Rounds::default();
+        assert_eq!(rounds.handle_round(reached("round trip 4.6 ms")).len(), 1);
+        assert_eq!(rounds.handle_round(reached("round trip 7.6 ms")), []);
+    }
 
     #[test]
     fn only_differences_between_rounds_are_shown() {

@@ -34,7 +34,7 @@ use jaus::address::JausId;
 use jaus::link::{Interface, Interfaces, interface};
 use jaus::node::Config;
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::network::Network;
+use jaus_cli::network::{Network, passing_id};
 use jaus_cli::output::{Output, colours_wanted, say};
 use jaus_cli::runtime;
 use tokio::time::{Instant, sleep_until};
@@ -80,7 +80,7 @@ pub(crate) struct Examine {
 impl Examine {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         self.network.require_plain()?;
-        let (wanted, config) = self.network.for_examination()?;
+        let (wanted, config) = self.network.for_examination(passing_id())?;
         runtime::run(self.examine(wanted, config))
     }
 
