@@ -10,7 +10,7 @@ use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::{Output, say};
 use jaus_cli::runtime::{self, RunFor};
 use jaus_view::Filter;
-use jaus_viewers::{Channels, Server, ServerSettings};
+use jaus_viewers::{Channels, MOST_CHANNELS, Server, ServerSettings};
 use tokio::net::TcpListener;
 
 use crate::definitions::Definitions;
@@ -64,6 +64,16 @@ pub(crate) struct View {
     run_for: RunFor,
 }
 
+/// Says that samples were left out for want of channels, unless it `is_full` already.
+fn say_once_when_full(left_out: u64, is_full: &mut bool) {
+    if left_out > 0 && !std::mem::replace(is_full, true) {
+        say(format_args!(
+            "all {MOST_CHANNELS} channels are taken: viewers get no messages of further components or kinds; choose \
+             some with --filter, and start again"
+        ));
+    }
+}
+
 impl View {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         let dictionary = self.definitions.load()?;
@@ -72,6 +82,7 @@ impl View {
             let mut source = self.source(&dictionary).await?;
             let (server, sharing) = Server::new(self.settings());
             let mut channels = Channels::new(&dictionary);
+            let mut is_full = false;
             self.announce(&listener)?;
             let serving = server.serve(listener);
             let end = self.run_for.end();
@@ -85,6 +96,7 @@ impl View {
                             if self.filter.iter().all(|filter| filter.passes(&entry)) {
                                 let samples = channels.handle_entry(&entry, time);
                                 sharing.publish(&channels, &samples);
+                                say_once_when_full(channels.left_out(), &mut is_full);
                             }
                         }
                     }
