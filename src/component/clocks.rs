@@ -64,8 +64,9 @@ impl PeerClocks {
 
     /// The age of a report with this time stamp of a peer. `None` before the peer's first answer.
     ///
-    /// Only the peer's own Time service counts. Set Time sets the time of one component, and anybody
-    /// may be another component of the same node, so the time of a neighbour says nothing.
+    /// Only the peer's own Time service counts. Another component of its node may report any time:
+    /// Set Time changes the time of one component, and on a plain network any sender can claim a
+    /// component id.
     #[must_use]
     pub fn age(&self, peer: JausId, stamp: TimeStamp) -> Option<Age> {
         self.lock().peers.get(&peer)?.age(stamp, time_of_day())

@@ -13,7 +13,7 @@
 //! For each message, zenoh (1.10) compares the key chunk by chunk with all declared keys that have
 //! begun alike, one after the other. So messages share their first chunk neither with the tokens nor
 //! with the views, of which a fleet has thousands, and the first two digits of `TO` are a chunk of
-//! their own: a thousand subscriptions are told apart by some hundred comparisons.
+//! their own: a thousand subscriptions are told apart by a few hundred comparisons.
 
 use std::collections::hash_map::RandomState;
 use std::fmt;

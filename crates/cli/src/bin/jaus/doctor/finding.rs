@@ -91,8 +91,11 @@ impl Finding {
 
     /// Whether it says the same as another finding, whatever their figures are.
     pub(super) fn is_same_as(&self, other: &Self) -> bool {
-        let said = |it: &Self| (it.mark, it.check, it.what.clone(), it.advice.clone());
-        said(self) == said(other)
+        self.said() == other.said()
+    }
+
+    fn said(&self) -> (Mark, &str, &str, Option<&str>) {
+        (self.mark, self.check, &self.what, self.advice.as_deref())
     }
 
     /// What was observed, with the figure.
