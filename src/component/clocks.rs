@@ -38,20 +38,34 @@ pub struct PeerClocks(Arc<Mutex<Table>>);
 
 #[derive(Debug, Default)]
 struct Table {
-    peers: BTreeMap<JausId, ClockEstimator>,
-    /// The last peer that was asked.
-    latest: Option<JausId>,
+    peers: BTreeMap<JausId, PeerClock>,
+    /// The peers whose ages the application has queried lately, and when.
+    wanted: BTreeMap<JausId, Instant>,
+}
+
+#[derive(Debug, Default)]
+struct PeerClock {
+    estimator: ClockEstimator,
+    /// When to ask next; at once if it was never asked.
+    due: Option<Instant>,
 }
 
 impl PeerClocks {
-    /// Maximum number of peers.
+    /// Maximum number of peers. Those whose ages are queried come first.
     pub const MOST: usize = 64;
     /// Maximum number of peers asked in one round.
     const PER_ROUND: usize = 16;
-    /// Pause between two rounds. Longer than an answer waits anywhere, so that none is taken for
-    /// that of a later query.
+    /// Pause between two queries to one peer. Longer than an answer waits anywhere, so that none is
+    /// taken for that of a later query.
     const PAUSE: Duration = Duration::from_secs(4);
-    /// Pause while there are no peers.
+    /// The same for a peer whose ages are queried: a slewed clock may be wrong by 83 ms after it.
+    const WANTED_PAUSE: Duration = Duration::from_secs(1);
+    /// An answer after this time may be the one to a repeated query, and another one may follow. The
+    /// peer is then asked again after the long pause only.
+    const PROMPT: Duration = Duration::from_millis(400);
+    /// A peer whose age was not queried for this time is not wanted any more.
+    const INTEREST: Duration = Duration::from_secs(10);
+    /// Pause between two rounds.
     const LOOK: Duration = Duration::from_millis(200);
     /// Time to wait for an answer.
     const PATIENCE: Duration = Duration::from_secs(1);
@@ -59,43 +73,44 @@ impl PeerClocks {
     /// The estimate for a peer.
     #[must_use]
     pub fn offset(&self, peer: JausId) -> Option<ClockOffset> {
-        self.lock().peers.get(&peer)?.offset()
+        self.lock().peers.get(&peer)?.estimator.offset()
     }
 
     /// The age of a report with this time stamp of a peer. `None` before the peer's first answer.
+    /// The clocks of peers whose ages are queried are measured every second, and before others.
     ///
     /// Only the peer's own Time service counts. Another component of its node may report any time:
     /// Set Time changes the time of one component, and on a plain network any sender can claim a
     /// component id.
     #[must_use]
     pub fn age(&self, peer: JausId, stamp: TimeStamp) -> Option<Age> {
-        self.lock().peers.get(&peer)?.age(stamp, time_of_day())
+        let now = Instant::now();
+        let mut table = self.lock();
+        table.want(now, peer);
+        let clock = table.peers.get(&peer)?;
+        clock.estimator.age(stamp, now.into_std())
     }
 
     /// The estimates of all peers that have answered, in order of their ids.
     #[must_use]
     pub fn offsets(&self) -> Vec<(JausId, ClockOffset)> {
         let table = self.lock();
-        let offset = |(&peer, it): (&JausId, &ClockEstimator)| Some((peer, it.offset()?));
+        let offset = |(&peer, it): (&JausId, &PeerClock)| Some((peer, it.estimator.offset()?));
         table.peers.iter().filter_map(offset).collect()
     }
 
     /// Measures for as long as it is polled.
     pub async fn measure(&self, component: &Component) -> Infallible {
         loop {
-            let pause = match self.round(component).await {
-                0 => Self::LOOK,
-                _ => Self::PAUSE,
-            };
-            sleep(pause).await;
+            self.round(component).await;
+            sleep(Self::LOOK).await;
         }
     }
 
-    /// Asks the next peers, and returns their number.
-    async fn round(&self, component: &Component) -> usize {
+    /// Asks the peers whose turn it is.
+    async fn round(&self, component: &Component) {
         let providers = providers(component);
-        let asked = self.lock().next_peers(&providers);
-        let number = asked.len();
+        let asked = self.lock().due_peers(Instant::now(), &providers);
         let exchanges = asked.into_iter();
         let exchanges = exchanges.map(|peer| exchange(component.clone(), peer));
         let answers = exchanges.collect::<JoinSet<_>>().join_all().await;
@@ -107,7 +122,6 @@ impl PeerClocks {
                 );
             }
         }
-        number
     }
 
     fn lock(&self) -> MutexGuard<'_, Table> {
@@ -116,30 +130,75 @@ impl PeerClocks {
 }
 
 impl Table {
-    /// Forgets peers that are gone, adds new ones, and returns those whose turn it is.
-    fn next_peers(&mut self, providers: &BTreeSet<JausId>) -> Vec<JausId> {
+    /// Notes that the age of a report of a peer was queried. Their number is bounded.
+    fn want(&mut self, now: Instant, peer: JausId) {
+        if self.wanted.len() < PeerClocks::MOST || self.wanted.contains_key(&peer) {
+            self.wanted.insert(peer, now);
+        }
+    }
+
+    /// Forgets peers that are gone, adds new ones, and returns those whose turn it is. They are asked
+    /// again after the long pause, unless they answer promptly.
+    fn due_peers(&mut self, now: Instant, providers: &BTreeSet<JausId>) -> Vec<JausId> {
+        self.wanted
+            .retain(|_, at| now.saturating_duration_since(*at) < PeerClocks::INTEREST);
         self.peers.retain(|id, _| providers.contains(id));
-        for &id in providers {
+        let (wanted, others): (Vec<JausId>, Vec<JausId>) = providers
+            .iter()
+            .partition(|id| self.wanted.contains_key(id));
+        for &id in &wanted {
+            self.add_wanted(id);
+        }
+        for &id in &others {
             if self.peers.len() < PeerClocks::MOST {
                 self.peers.entry(id).or_default();
             }
         }
-        let ids: Vec<JausId> = self.peers.keys().copied().collect();
-        let begin = ids.partition_point(|&id| Some(id) <= self.latest);
-        let in_turn = ids.iter().copied().cycle().skip(begin);
-        let next: Vec<JausId> = in_turn.take(PeerClocks::PER_ROUND.min(ids.len())).collect();
-        self.latest = next.last().copied().or(self.latest);
-        next
+        let mut due: Vec<(bool, Option<Instant>, JausId)> = self
+            .peers
+            .iter()
+            .filter(|(_, clock)| clock.due.is_none_or(|due| due <= now))
+            .map(|(&id, clock)| (!self.wanted.contains_key(&id), clock.due, id))
+            .collect();
+        // Wanted ones first, then those that have waited longest.
+        due.sort_unstable();
+        due.truncate(PeerClocks::PER_ROUND);
+        // With many peers, each is asked less often, so that the load stays the same.
+        let turns = u32::try_from(self.peers.len().div_ceil(PeerClocks::PER_ROUND)).unwrap_or(1);
+        for (is_other, _, id) in &due {
+            if let Some(clock) = self.peers.get_mut(id) {
+                let turns = if *is_other { turns } else { 1 };
+                clock.due = Some(now + PeerClocks::PAUSE * turns);
+            }
+        }
+        due.into_iter().map(|(_, _, id)| id).collect()
+    }
+
+    /// Adds a peer, in the place of one that is not wanted if there are too many.
+    fn add_wanted(&mut self, id: JausId) {
+        if self.peers.len() >= PeerClocks::MOST && !self.peers.contains_key(&id) {
+            let unwanted = self.peers.keys().find(|it| !self.wanted.contains_key(it));
+            let Some(unwanted) = unwanted.copied() else {
+                return;
+            };
+            self.peers.remove(&unwanted);
+        }
+        self.peers.entry(id).or_default();
     }
 
     fn handle_answer(&mut self, answer: &Answer) -> Option<Exchange> {
-        let estimator = self.peers.get_mut(&answer.peer)?;
+        let is_wanted = self.wanted.contains_key(&answer.peer);
+        let clock = self.peers.get_mut(&answer.peer)?;
         let Answer {
             sent,
             received,
             time_of_day,
             ..
         } = *answer;
+        if is_wanted && received.saturating_duration_since(sent) < PeerClocks::PROMPT {
+            clock.due = Some(Instant::from_std(received) + PeerClocks::WANTED_PAUSE);
+        }
+        let estimator = &mut clock.estimator;
         Some(estimator.handle_report(sent, received, time_of_day, &answer.report))
     }
 }
@@ -183,8 +242,9 @@ mod tests {
     fn the_time_of_another_component_of_its_node_says_nothing_about_a_peer() {
         let (sensor, neighbour) = (JausId::new(101, 1, 41), JausId::new(101, 1, 35));
         let clocks = PeerClocks::default();
-        clocks.lock().next_peers(&BTreeSet::from([neighbour]));
-        let now = Instant::now().into_std();
+        let now = Instant::now();
+        clocks.lock().due_peers(now, &BTreeSet::from([neighbour]));
+        let now = now.into_std();
         let answer = Answer {
             peer: neighbour,
             sent: now,
@@ -205,14 +265,41 @@ mod tests {
         let many: BTreeSet<JausId> = (1..=200).map(|it| JausId::new(it, 1, 1)).collect();
         let mut table = Table::default();
         let mut asked = BTreeSet::new();
+        let mut now = Instant::now();
         for _ in 0..4 {
-            let next = table.next_peers(&many);
-            assert_eq!(next.len(), PeerClocks::PER_ROUND);
-            asked.extend(next);
+            let due = table.due_peers(now, &many);
+            assert_eq!(due.len(), PeerClocks::PER_ROUND);
+            asked.extend(due);
+            now += PeerClocks::LOOK;
         }
         assert_eq!(asked.len(), PeerClocks::MOST);
+        assert_eq!(table.due_peers(now, &many), [], "all wait for an answer");
         let few: BTreeSet<JausId> = many.into_iter().take(3).collect();
-        assert_eq!(table.next_peers(&few).len(), 3);
+        now += PeerClocks::PAUSE * 4;
+        assert_eq!(table.due_peers(now, &few).len(), 3);
         assert_eq!(table.peers.len(), 3);
+    }
+
+    #[test]
+    fn a_peer_whose_age_is_wanted_is_asked_first_and_every_second() {
+        let many: BTreeSet<JausId> = (1..=200).map(|it| JausId::new(it, 1, 1)).collect();
+        let sensor = JausId::new(200, 1, 1);
+        let mut table = Table::default();
+        let mut now = Instant::now();
+        table.due_peers(now, &many);
+        table.want(now, sensor);
+        now += PeerClocks::LOOK;
+        assert_eq!(table.due_peers(now, &many).first(), Some(&sensor));
+        let received = now.into_std();
+        table.handle_answer(&Answer {
+            peer: sensor,
+            sent: received,
+            received,
+            time_of_day: time_of_day(),
+            report: ReportTime::default(),
+        });
+        now += PeerClocks::WANTED_PAUSE;
+        assert_eq!(table.due_peers(now, &many).first(), Some(&sensor));
+        assert!(table.peers.len() <= PeerClocks::MOST);
     }
 }

@@ -7,8 +7,8 @@
 //! clock have in common, and its uncertainty is half of that width. Assuming equal delays, as NTP
 //! does, gives the same middle for a single exchange.
 //!
-//! Bounds that have nothing in common with the earlier ones prove that a clock was stepped; the
-//! estimate then starts again.
+//! Bounds that have nothing in common with the earlier ones prove that a clock was slewed or stepped;
+//! the estimate then starts again.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -16,6 +16,10 @@ use std::time::{Duration, Instant};
 use super::time::{DAY, milliseconds_of_day, nearest_day, reported_day};
 use crate::messages::core::ReportTime;
 use crate::messages::core::report_time::TimeStamp;
+
+/// The largest slew of a clock, in seconds per second: the default limit of chrony (`maxslewrate`,
+/// 83 333 parts per million). ntpd and the kernel's `adjtime` stay at 500 parts per million.
+pub const MOST_SLEW: f64 = 0.083_334;
 
 /// Nanoseconds in a millisecond, the resolution of JAUS time stamps.
 const MILLISECOND: i128 = 1_000_000;
@@ -25,6 +29,9 @@ const MILLISECOND: i128 = 1_000_000;
 pub enum Exchange {
     /// It fits the earlier ones.
     Accepted,
+    /// It contradicts the earlier ones, and the difference since the last one is no more than
+    /// [`MOST_SLEW`] explains.
+    Slewed,
     /// It contradicts the earlier ones: the peer's clock or the own one was stepped.
     Stepped,
     /// The report has no valid time.
@@ -87,13 +94,15 @@ struct Bounds {
 pub struct ClockEstimator {
     /// What all exchanges since the last step have in common.
     common: Option<Bounds>,
+    /// Own time of day at the latest exchange, in nanoseconds since the beginning of 1970.
+    own: i128,
     /// Bounds of single exchanges, oldest first, for the drift.
     history: VecDeque<Bounds>,
     steps: u64,
 }
 
 impl ClockEstimator {
-    /// Largest drift between two clocks: two crystals, or one that NTP slews.
+    /// Largest drift between two clocks for long: two crystals, or one that NTP adjusts.
     const LARGEST_DRIFT: f64 = 5e-4;
     /// The drift counts as known at this uncertainty.
     const KNOWN_DRIFT: f64 = 1e-4;
@@ -124,6 +133,7 @@ impl ClockEstimator {
             least: seconds(peer - own),
             most: seconds(peer + MILLISECOND - own + round_trip),
         };
+        self.own = own;
         self.handle_bounds(bounds)
     }
 
@@ -137,14 +147,27 @@ impl ClockEstimator {
         let least = bounds.least.max(common.least - drifted);
         let most = bounds.most.min(common.most + drifted);
         if least > most {
-            self.steps += 1;
-            self.begin(bounds);
-            return Exchange::Stepped;
+            return self.handle_contradiction(bounds);
         }
         let at = bounds.at;
         self.common = Some(Bounds { at, least, most });
         self.keep(bounds);
         Exchange::Accepted
+    }
+
+    /// Starts again after a change that no drift explains.
+    fn handle_contradiction(&mut self, bounds: Bounds) -> Exchange {
+        let is_slew = self.history.back().is_some_and(|last| {
+            let elapsed = bounds.at.saturating_duration_since(last.at);
+            let slewed = MOST_SLEW * elapsed.as_secs_f64();
+            bounds.least <= last.most + slewed && bounds.most >= last.least - slewed
+        });
+        self.begin(bounds);
+        if is_slew {
+            return Exchange::Slewed;
+        }
+        self.steps += 1;
+        Exchange::Stepped
     }
 
     fn begin(&mut self, bounds: Bounds) {
@@ -202,13 +225,14 @@ impl ClockEstimator {
             })
     }
 
-    /// The age of a report with this time stamp of the peer, at the own time `time_of_day`. `None`
-    /// before the first exchange, or if the stamp is no valid time.
+    /// The age at `now` of a report with this time stamp of the peer. `None` before the first
+    /// exchange, or if the stamp is no valid time.
     #[must_use]
-    pub fn age(&self, stamp: TimeStamp, time_of_day: Duration) -> Option<Age> {
+    pub fn age(&self, stamp: TimeStamp, now: Instant) -> Option<Age> {
         let offset = self.offset()?;
-        let own = nanoseconds(time_of_day);
-        let peer_now = own + (offset.seconds * 1e9).round() as i128;
+        // The own time of day may have been set since the exchange; the time that has passed has not.
+        let elapsed = nanoseconds(now.saturating_duration_since(offset.measured_at));
+        let peer_now = self.own + elapsed + (offset.seconds * 1e9).round() as i128;
         let near = i64::try_from(peer_now / MILLISECOND).ok()?;
         let of_day = milliseconds_of_day(stamp)?;
         let day = nearest_day(near, of_day, stamp.day());

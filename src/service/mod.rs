@@ -45,6 +45,7 @@ mod publication;
 #[cfg(any(test, feature = "arbitrary"))]
 pub mod rig;
 mod safety;
+mod sample_age;
 mod share;
 mod stack;
 #[cfg(test)]
@@ -68,7 +69,7 @@ pub use client::{
     Retake, SessionId, SessionLoss, SessionOrder, SessionSettings, SessionState, SubscriptionEnd,
     SubscriptionId, SubscriptionNews, TargetState, Topic, When,
 };
-pub use clock_offset::{Age, ClockEstimator, ClockOffset, Drift, Exchange};
+pub use clock_offset::{Age, ClockEstimator, ClockOffset, Drift, Exchange, MOST_SLEW};
 pub use context::Context;
 pub use control::{AccessControl, Condition, Management};
 pub use directory::{
@@ -86,6 +87,7 @@ pub use liveness::Liveness;
 pub use outbox::Outbox;
 pub use publication::{NotPublished, Publication};
 pub use safety::UnsafeService;
+pub use sample_age::{SampleAge, SampleStamp};
 pub use stack::{Event, Stack};
 pub use standing::{Controller, Standing, State};
 pub use time::{Time, TimeOfDay};

@@ -76,6 +76,10 @@ impl World {
         self.estimator.handle_report(sent, received, own, &report)
     }
 
+    fn age(&self, stamp: TimeStamp) -> Age {
+        self.estimator.age(stamp, self.start + self.now).unwrap()
+    }
+
     #[track_caller]
     fn assert_sound(&self) -> ClockOffset {
         let offset = self.estimator.offset().unwrap();
@@ -163,6 +167,32 @@ fn a_step_of_either_clock_is_noticed_with_the_next_exchange() {
 }
 
 #[test]
+fn a_slew_is_no_step_and_the_offset_follows_it() {
+    for slew in [MOST_SLEW, -MOST_SLEW] {
+        let mut world = World::new(0.25);
+        world.exchange(0.002, 0.002);
+        for _ in 0..60 {
+            world.pass(1.0);
+            world.offset += slew;
+            assert_ne!(world.exchange(0.002, 0.002), Exchange::Stepped);
+            world.assert_sound();
+        }
+        assert_eq!(world.assert_sound().steps, 0);
+    }
+}
+
+#[test]
+fn a_step_of_the_own_clock_makes_no_report_older() {
+    let mut world = World::new(-40.0);
+    world.exchange(0.002, 0.002);
+    let stamp = world.report().time_stamp.unwrap();
+    world.pass(0.5);
+    world.own += Duration::from_secs(3600);
+    let age = world.age(stamp);
+    assert!((age.seconds - 0.5).abs() <= age.uncertainty, "{age:?}");
+}
+
+#[test]
 fn midnight_changes_the_day_of_reports_with_and_without_a_date() {
     for has_date in [true, false] {
         for offset in [0.9, -0.9] {
@@ -224,10 +254,10 @@ fn the_age_of_a_report_needs_no_synchronised_clocks() {
         world.exchange(0.002, 0.002);
         let stamp = world.report().time_stamp.unwrap();
         world.pass(0.5);
-        let age = world.estimator.age(stamp, world.own + world.now).unwrap();
+        let age = world.age(stamp);
         assert!((age.seconds - 0.5).abs() <= age.uncertainty, "{age:?}");
         assert!(age.uncertainty < 0.005, "{age:?}");
     }
     let unknown = ClockEstimator::default();
-    assert_eq!(unknown.age(TimeStamp(0), Duration::ZERO), None);
+    assert_eq!(unknown.age(TimeStamp(0), Instant::now()), None);
 }
