@@ -99,17 +99,26 @@ impl PeerClocks {
         table.peers.iter().filter_map(offset).collect()
     }
 
-    /// Measures for as long as it is polled.
+    /// Measures the clocks of all peers for as long as it is polled.
     pub async fn measure(&self, component: &Component) -> Infallible {
         loop {
-            self.round(component).await;
+            self.round(component, providers(component)).await;
             sleep(Self::LOOK).await;
         }
     }
 
-    /// Asks the peers whose turn it is.
-    async fn round(&self, component: &Component) {
-        let providers = providers(component);
+    /// Measures the clocks of the peers whose ages are queried, for as long as it is polled.
+    pub async fn measure_wanted(&self, component: &Component) -> Infallible {
+        loop {
+            let mut providers = providers(component);
+            providers.retain(|id| self.lock().wanted.contains_key(id));
+            self.round(component, providers).await;
+            sleep(Self::LOOK).await;
+        }
+    }
+
+    /// Asks those of these peers whose turn it is.
+    async fn round(&self, component: &Component, providers: BTreeSet<JausId>) {
         let asked = self.lock().due_peers(Instant::now(), &providers);
         let exchanges = asked.into_iter();
         let exchanges = exchanges.map(|peer| exchange(component.clone(), peer));

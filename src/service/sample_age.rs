@@ -16,6 +16,8 @@
 use std::time::{Duration, Instant};
 
 use super::clock_offset::{Age, MOST_SLEW};
+use super::time::{DAY, milliseconds_of_day};
+use crate::messages::core::report_time::TimeStamp;
 
 /// What is known of the time of a sample when its report arrives.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +33,16 @@ impl SampleStamp {
     #[must_use]
     pub const fn new(time: Duration, measured: Option<Age>) -> Self {
         Self { time, measured }
+    }
+
+    /// The time stamp of a report, with the age that the measured offset of the sender's clock gives
+    /// it. `None` if it is no valid time, and for stamp 0, which sensors without a clock send.
+    #[must_use]
+    pub fn of_report(stamp: TimeStamp, measured: Option<Age>) -> Option<Self> {
+        let of_day = milliseconds_of_day(stamp)?;
+        let in_month = i64::from(stamp.day()) * DAY + of_day;
+        let milliseconds = u64::try_from(in_month).ok().filter(|it| *it != 0)?;
+        Some(Self::new(Duration::from_millis(milliseconds), measured))
     }
 }
 
@@ -154,7 +166,10 @@ impl SampleAge {
         // The clock may be slewed in any direction since then.
         let elapsed = now.saturating_duration_since(age.measured_at);
         let margin = age.uncertainty + MOST_SLEW * elapsed.as_secs_f64();
-        Some(((age.seconds - margin).max(0.0), (age.seconds + margin).max(0.0)))
+        Some((
+            (age.seconds - margin).max(0.0),
+            (age.seconds + margin).max(0.0),
+        ))
     }
 
     /// Corrects a lag by the bounds of the age.

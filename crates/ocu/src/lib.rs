@@ -15,7 +15,6 @@ mod picture;
 mod report;
 pub mod request;
 mod role;
-mod sample_clock;
 #[expect(
     clippy::disallowed_methods,
     reason = "the server's clock, tasks and delays"

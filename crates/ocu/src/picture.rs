@@ -12,10 +12,9 @@ use super::georeference::Georeference;
 use super::missing::{Absence, GonePart, GoneParts};
 use super::report::{Mission, MissionStage, Report};
 use super::role::Role;
-use super::sample_clock::SampleClock;
 use super::state::{self, age};
 use jaus::address::JausId;
-use jaus::service::{ComponentEntry, Directory, State};
+use jaus::service::{ComponentEntry, Directory, SampleAge, State};
 use jaus_vehicle::messages::handoff::enhanced_access_control;
 
 /// The known state of a vehicle.
@@ -199,7 +198,8 @@ impl Picture {
             Report::Control(what) => part.controller = Some(Sample { what, by, at: now }),
             Report::Stage(stage) => part.stage = Some(stage),
             Report::Pose(what, sampled) => {
-                let at = SampleClock::sampled_at(&mut part.pose_clock, now, sampled);
+                part.pose_age.handle(now, sampled.stamp());
+                let at = sample_time(now, by, &part.pose_age, self.pose.as_ref());
                 self.pose = Some(Sample { what, by, at });
             }
             Report::GlobalPose(fix) => {
@@ -208,7 +208,8 @@ impl Picture {
                 self.georeference.handle_fix(now, fix, local);
             }
             Report::Velocity(what, sampled) => {
-                let at = SampleClock::sampled_at(&mut part.velocity_clock, now, sampled);
+                part.velocity_age.handle(now, sampled.stamp());
+                let at = sample_time(now, by, &part.velocity_age, self.velocity.as_ref());
                 // An inertial measurement unit reports turn rates without a speed.
                 let source = self.velocity.map(|known| known.by);
                 if what.x.is_some() || source.is_none_or(|source| source == by) {
@@ -489,6 +490,13 @@ pub(super) const PRESENT: &str = "present";
 
 fn state_name(code: u8) -> &'static str {
     State::from_code(code).map_or("unknown", State::name)
+}
+
+/// The time of a sensor's last sample. Its first sample counts as taken on arrival, until the next one
+/// shows whether its time stamps advance.
+fn sample_time<T>(now: Instant, by: JausId, age: &SampleAge, known: Option<&Sample<T>>) -> Instant {
+    let first = || known.filter(|it| it.by == by).map(|it| it.at);
+    age.sampled_at().or_else(first).unwrap_or(now)
 }
 
 #[cfg(test)]

@@ -1,11 +1,12 @@
 //! Reports of vehicle parts, decoded from messages into SI units.
 
 use super::georeference::Fix;
-use super::sample_clock::Sampled;
 use super::state;
 use jaus::address::JausId;
+use jaus::messages::core::report_time::TimeStamp;
 use jaus::messages::core::{ReportControl, ReportStatus};
 use jaus::messages::mobility::{ReportGlobalPose, ReportLocalPose, ReportVelocityState};
+use jaus::service::{Age, SampleStamp};
 use jaus_vehicle::ground::StageState;
 use jaus_vehicle::messages::ground::{
     ReportMission, ReportPlannedPath, ReportRasterMaps, ReportStage,
@@ -39,6 +40,33 @@ impl Report {
             Self::Pose(_, sampled) | Self::Velocity(_, sampled) => Some(sampled),
             _ => None,
         }
+    }
+}
+
+/// What is known of the time of a sample when its report arrives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sampled {
+    stamp: Option<TimeStamp>,
+    /// By the measured offset of the sender's clock.
+    measured: Option<Age>,
+}
+
+impl Sampled {
+    fn new(stamp: Option<u32>) -> Self {
+        Self {
+            stamp: stamp.map(TimeStamp),
+            measured: None,
+        }
+    }
+
+    /// Enters the age that `measured` gives for the stamp.
+    pub(super) fn measure(&mut self, measured: impl FnOnce(TimeStamp) -> Option<Age>) {
+        self.measured = self.stamp.and_then(measured);
+    }
+
+    /// `None` without a valid stamp.
+    pub(super) fn stamp(&self) -> Option<SampleStamp> {
+        SampleStamp::of_report(self.stamp?, self.measured)
     }
 }
 
@@ -144,7 +172,7 @@ impl From<ReportLocalPose> for Report {
             yaw: report.yaw_rad(),
             age_ms: 0,
         };
-        Self::Pose(pose, Sampled::new(report.time_stamp))
+        Self::Pose(pose, Sampled::new(report.time_stamp.map(|it| it.0)))
     }
 }
 
@@ -161,7 +189,7 @@ impl From<ReportVelocityState> for Report {
             yaw_rate: report.yaw_rate_rad_per_s(),
             age_ms: 0,
         };
-        Self::Velocity(velocity, Sampled::new(report.time_stamp))
+        Self::Velocity(velocity, Sampled::new(report.time_stamp.map(|it| it.0)))
     }
 }
 

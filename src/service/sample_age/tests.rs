@@ -86,6 +86,18 @@ impl Sensor {
 }
 
 #[test]
+fn a_stamp_that_is_no_time_and_the_stamp_0_are_none() {
+    assert_eq!(SampleStamp::of_report(TimeStamp::default(), None), None);
+    let wrong = TimeStamp::default().with_hour(31).unwrap();
+    assert_eq!(SampleStamp::of_report(wrong, None), None);
+    let stamp = TimeStamp::default().with_day(2).unwrap();
+    let stamp = stamp.with_milliseconds(7).unwrap();
+    let time = Duration::from_millis(2 * 86_400_000 + 7);
+    let expected = Some(SampleStamp::from(time));
+    assert_eq!(SampleStamp::of_report(stamp, None), expected);
+}
+
+#[test]
 fn a_stamp_that_stands_still_goes_stale() {
     let mut sensor = Sensor::new();
     sensor.measure();
@@ -102,7 +114,10 @@ fn a_sensor_that_was_frozen_from_the_beginning_is_never_fresh() {
     let mut age = SampleAge::default();
     let start = Instant::now();
     for count in 0..10 {
-        age.handle(start + PERIOD * count, Some(Duration::from_secs(3600).into()));
+        age.handle(
+            start + PERIOD * count,
+            Some(Duration::from_secs(3600).into()),
+        );
     }
     assert_eq!(age.age(start + PERIOD * 10), None);
 }

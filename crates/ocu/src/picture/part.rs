@@ -4,10 +4,9 @@ use std::time::{Duration, Instant};
 
 use super::Sample;
 use crate::role::{self, Role};
-use crate::sample_clock::SampleClock;
 use crate::state;
 use jaus::address::JausId;
-use jaus::service::{ComponentEntry, State};
+use jaus::service::{ComponentEntry, SampleAge, State};
 
 /// Which reports of the vehicle's parts are expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,8 +50,8 @@ pub(crate) struct Part {
     pub(super) reports_pose: bool,
     pub(super) reports_global_pose: bool,
     pub(super) reports_velocity: bool,
-    pub(super) pose_clock: Option<SampleClock>,
-    pub(super) velocity_clock: Option<SampleClock>,
+    pub(super) pose_age: SampleAge,
+    pub(super) velocity_age: SampleAge,
     /// Time of its last report.
     pub(super) heard: Option<Instant>,
     /// Whether the last subscription event was a loss of reports.
@@ -74,8 +73,8 @@ impl Part {
             reports_pose: false,
             reports_global_pose: false,
             reports_velocity: false,
-            pose_clock: None,
-            velocity_clock: None,
+            pose_age: SampleAge::default(),
+            velocity_age: SampleAge::default(),
             heard: None,
             is_down: false,
         }
@@ -99,7 +98,8 @@ impl Part {
     /// Forgets its reports.
     pub(super) fn forget(&mut self) {
         (self.status, self.controller, self.stage) = (None, None, None);
-        (self.pose_clock, self.velocity_clock) = (None, None);
+        self.pose_age.forget();
+        self.velocity_age.forget();
         (self.heard, self.is_down) = (None, false);
     }
 

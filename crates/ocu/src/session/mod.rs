@@ -32,7 +32,6 @@ use super::state::{Control, Drive, State, Tree};
 use super::stick::PageId;
 use super::stick::{Push, Stick};
 use jaus::component::{Component, Handlers, PeerClocks};
-use jaus::messages::core::report_time::TimeStamp;
 use jaus::node::time_of_day;
 use jaus_vehicle::parts::PartError;
 use jaus_view::Timestamp;
@@ -220,7 +219,7 @@ impl Session {
                 never = &mut measuring => match never {},
                 Some((by, mut report)) = self.sightings.recv() => {
                     if let Some(sampled) = report.sampled() {
-                        sampled.measure(|stamp| self.clocks.age(by, TimeStamp(stamp.0)));
+                        sampled.measure(|stamp| self.clocks.age(by, stamp));
                     }
                     if let Some(vehicle) = self.fleet.get_mut(by.subsystem()) {
                         vehicle.handle_report(Instant::now(), by, report);

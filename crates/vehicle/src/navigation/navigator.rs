@@ -5,7 +5,8 @@ use std::fmt;
 use std::time::{Duration, Instant};
 
 use super::{Estimate, Estimator, Navigation, Receiver};
-use crate::motion::{DeadReckoning, Freshness, WheelCount};
+use crate::motion::{DeadReckoning, WheelCount};
+use jaus::service::SampleAge;
 
 /// Limits of what a [`Navigator`] reports.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,7 +73,7 @@ pub struct Navigator {
     config: NavigatorConfig,
     receiver: Receiver,
     /// Age of the positions, by the receiver's clock.
-    fixes: Freshness,
+    fixes: SampleAge,
     /// Time of a fresh position whose course has not been used.
     course_due: Option<Instant>,
     wheels: Wheels,
@@ -83,7 +84,7 @@ pub struct Navigator {
 #[derive(Debug, Default)]
 struct Wheels {
     reckoning: DeadReckoning,
-    freshness: Freshness,
+    age: SampleAge,
     read_at: Option<Instant>,
 }
 
@@ -103,7 +104,7 @@ impl Navigator {
             match news {
                 Navigation::Fix(fix) => {
                     // A report that waited in a buffer is as old as its fix.
-                    if let Some(at) = self.fixes.handle(now, Some(fix.time)) {
+                    if let Some(at) = self.fixes.handle(now, Some(fix.time.into())) {
                         self.estimator.handle_fix(at, &fix);
                         self.course_due = Some(at);
                     }
@@ -134,7 +135,7 @@ impl Navigator {
     pub fn handle_count(&mut self, now: Instant, count: WheelCount) {
         let wheels = &mut self.wheels;
         let read_at = Duration::from_millis(count.time_ms.into());
-        let at = wheels.freshness.handle(now, Some(read_at));
+        let at = wheels.age.handle(now, Some(read_at.into()));
         let gone = wheels.reckoning.handle_count(count);
         // Travel counts, even if it is not known when the count was read.
         wheels.read_at = at.or(wheels.read_at);
@@ -145,7 +146,7 @@ impl Navigator {
 
     /// The wheels' source was lost. The next count may have another clock.
     pub fn forget_wheels(&mut self) {
-        self.wheels.freshness.forget();
+        self.wheels.age.forget();
     }
 
     /// Sets the heading in radians from north, as a person knows it.

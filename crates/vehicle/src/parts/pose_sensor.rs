@@ -16,10 +16,11 @@ use super::pose_file::{self, Kept};
 use super::{Part, PartError, Slot, Telemetry};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::Vehicle;
-use crate::motion::{DeadReckoning, Frame, Freshness, Motion, Observed, Pilot, Pose, WheelCount};
+use crate::motion::{DeadReckoning, Frame, Motion, Observed, Pilot, Pose, WheelCount};
 use jaus::component::Component;
 use jaus::messages::mobility::{QueryLocalPose, QueryLocalPoseExt};
 use jaus::node::now;
+use jaus::service::SampleAge;
 
 /// Estimates the pose by dead reckoning from a start pose and the wheel travel since.
 ///
@@ -125,13 +126,13 @@ impl Running {
         mut counts: Sense<ReportWheelOdometry>,
         silence: Duration,
     ) -> Result<Infallible, PartError> {
-        let mut freshness = Freshness::default();
+        let mut age = SampleAge::default();
         let mut sampled_at = None;
         loop {
             let heard = timeout(silence, counts.next()).await;
             let now = now();
             if counts.take_loss() {
-                freshness.forget();
+                age.forget();
             }
             self.take_set_pose();
             let pose = match heard {
@@ -139,7 +140,7 @@ impl Running {
                     let count = WheelCount::from(&report?);
                     let read_at = Duration::from_millis(count.time_ms.into());
                     self.reckoning.handle_count(count);
-                    if let Some(at) = freshness.handle(now, Some(read_at)) {
+                    if let Some(at) = age.handle(now, Some(read_at.into())) {
                         sampled_at = Some(at);
                         self.telemetry.set_sampled("pose", at);
                     }

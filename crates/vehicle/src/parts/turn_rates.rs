@@ -4,11 +4,11 @@
 use jaus::component::Component;
 use jaus::messages::mobility::ReportVelocityState;
 use jaus::node::now;
+use jaus::service::SampleAge;
 
-use super::drivers::{Sense, time_in_month};
+use super::drivers::Sense;
 use super::iio_device::{Reading, Readings, next_reading};
 use super::{IioDevice, PartError};
-use crate::motion::Freshness;
 
 /// The gyroscope of a global pose sensor.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub(super) enum TurnRates {
     Device(Readings<f64>),
     Component {
         reports: Box<Sense<ReportVelocityState>>,
-        freshness: Freshness,
+        age: SampleAge,
     },
 }
 
@@ -35,7 +35,7 @@ impl TurnRates {
     pub(super) fn of_component(component: &Component, hz: f64) -> Result<Self, PartError> {
         Ok(Self::Component {
             reports: Box::new(Sense::yaw_rate(component, hz)?),
-            freshness: Freshness::default(),
+            age: SampleAge::default(),
         })
     }
 
@@ -47,12 +47,13 @@ impl TurnRates {
             Self::Device(readings) => next_reading(readings)
                 .await
                 .ok_or_else(|| PartError::Broken("the gyroscope's input has ended".to_owned())),
-            Self::Component { reports, freshness } => loop {
+            Self::Component { reports, age } => loop {
                 let report = reports.next().await?;
                 if reports.take_loss() {
-                    freshness.forget();
+                    age.forget();
                 }
-                let at = freshness.handle(now(), report.time_stamp.and_then(time_in_month));
+                let stamp = reports.stamp(report.time_stamp.map(|it| it.0));
+                let at = age.handle(now(), stamp);
                 // The sensor of the wheels also reports a yaw rate.
                 let rate = report.yaw_rate_rad_per_s();
                 let rate = rate.filter(|_| report.velocity_x.is_none());

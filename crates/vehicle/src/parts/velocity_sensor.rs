@@ -13,13 +13,14 @@ use super::drivers::Sense;
 use super::{Part, PartError, Slot};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::both_versions;
-use crate::motion::{Freshness, Speedometer, Velocity, WheelCount};
+use crate::motion::{Speedometer, Velocity, WheelCount};
 use jaus::component::Handlers;
 use jaus::messages::mobility::{
     QueryVelocityState, QueryVelocityStateExt, ReportVelocityState, ReportVelocityStateExt,
     velocity_state_sensor,
 };
 use jaus::node::now;
+use jaus::service::SampleAge;
 
 /// Computes the velocity of the vehicle from the travel of its wheels.
 ///
@@ -63,19 +64,19 @@ impl Part for VelocitySensor {
             "wheel travel",
         )?;
         let mut speedometer = Speedometer::default();
-        let mut freshness = Freshness::default();
+        let mut age = SampleAge::default();
         let mut sampled_at = slot.time.system_time();
         loop {
             let heard = timeout(self.silence, counts.next()).await;
             let now = now();
             if counts.take_loss() {
-                freshness.forget();
+                age.forget();
             }
             let velocity = match heard {
                 Ok(report) => {
                     let count = WheelCount::from(&report?);
                     let read_at = Duration::from_millis(count.time_ms.into());
-                    if let Some(at) = freshness.handle(now, Some(read_at)) {
+                    if let Some(at) = age.handle(now, Some(read_at.into())) {
                         slot.telemetry.set_sampled("velocity", at);
                         sampled_at = slot.time.system_time() - now.saturating_duration_since(at);
                     }

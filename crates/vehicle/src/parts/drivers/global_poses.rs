@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use super::senses::time_in_month;
 use super::{FaultMonitor, RemotePlatform};
 use crate::mobility::Vehicle;
 use crate::motion::{Frame, GlobalPose, Limits};
 use jaus::messages::mobility::ReportGlobalPose;
+use jaus::service::SampleStamp;
 
 /// Passes reports to a remote platform.
 ///
@@ -50,7 +50,12 @@ impl GlobalPoses {
     }
 
     /// Handles a report. The frame is moved to the vehicle when it is far away and at rest.
-    pub(in crate::parts) fn handle_report(&mut self, now: Instant, report: &ReportGlobalPose) {
+    pub(in crate::parts) fn handle_report(
+        &mut self,
+        now: Instant,
+        stamp: Option<SampleStamp>,
+        report: &ReportGlobalPose,
+    ) {
         let is_certain = report
             .position_rms_m()
             .is_none_or(|rms| rms <= self.max_rms);
@@ -64,7 +69,6 @@ impl GlobalPoses {
         });
         let pose = pose.filter(|pose| self.is_plausible(now, pose));
         let pose = pose.map(|pose| self.to_local(&pose));
-        let stamp = report.time_stamp.and_then(time_in_month);
         self.remote_platform.handle_pose(now, stamp, pose);
     }
 
@@ -173,7 +177,7 @@ mod tests {
                 self.remote_platform
                     .handle_velocity(self.now, None, velocity);
                 if let Some(report) = fault(self.report()) {
-                    self.poses.handle_report(self.now, &report);
+                    self.poses.handle_report(self.now, None, &report);
                 }
                 self.vehicle.handle_time(self.now);
             }

@@ -14,5 +14,5 @@ pub(super) use fault_monitor::FaultMonitor;
 pub(super) use global_poses::GlobalPoses;
 pub(super) use next::{Language, Next};
 pub(super) use remote_platform::{Order, RemotePlatform, RemotePlatformSettings};
-pub(super) use senses::{Sense, reported_pose, time_in_month};
+pub(super) use senses::{Sense, reported_pose};
 pub(super) use standing::{Watchman, guard, shut_down};

@@ -170,7 +170,7 @@ impl Bench {
     fn report_motion(&self, now: Instant) {
         let motion = self.vehicle.motion();
         let (pose, velocity) = (motion.pose, motion.velocity);
-        let stamp = Some(self.time);
+        let stamp = Some(self.time.into());
         let platform = &self.remote_platform;
         platform.handle_pose(now, stamp, Some((pose.x, pose.y, pose.yaw)));
         // Only the vector driver reads a velocity sensor.
@@ -209,7 +209,9 @@ impl Bench {
         self.scans.extend(goes_on.then_some((self.time, scan)));
         let (stamp, scan) = reported.unzip();
         self.reported = stamp.unwrap_or(self.reported);
-        let seen = self.remote_platform.handle_scan(now, stamp, scan.as_ref());
+        let seen = self
+            .remote_platform
+            .handle_scan(now, stamp.map(Into::into), scan.as_ref());
         if let Some(obstacles) = seen {
             self.fence.set_obstacles(obstacles);
         }

@@ -4,11 +4,10 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::motion::{
-    CommandDeadline, Drive, Freshness, Limits, Motion, Platform, Pose, Velocity, wrap,
-};
+use crate::motion::{CommandDeadline, Drive, Limits, Motion, Platform, Pose, Velocity, wrap};
 use crate::sensing::Scan;
 use crate::zones::Point;
+use jaus::service::{SampleAge, SampleStamp};
 
 /// Motion and orders of a driver. Cheap to clone; all clones share one state.
 #[derive(Debug, Clone)]
@@ -19,10 +18,10 @@ struct State {
     settings: RemotePlatformSettings,
     limits: Limits,
     motion: Motion,
-    pose: Freshness,
-    velocity: Freshness,
+    pose: SampleAge,
+    velocity: SampleAge,
     /// The scans of the range sensor.
-    scan: Freshness,
+    scan: SampleAge,
     /// The last scan, and the pose when it was first reported.
     last_scan: Option<(Scan, Pose)>,
     /// Whether the vehicle must not move without scans.
@@ -76,9 +75,9 @@ impl RemotePlatform {
             settings,
             limits: settings.limits,
             motion: Motion::default(),
-            pose: Freshness::default(),
-            velocity: Freshness::default(),
-            scan: Freshness::default(),
+            pose: SampleAge::default(),
+            velocity: SampleAge::default(),
+            scan: SampleAge::default(),
             last_scan: None,
             needs_scan: settings.needs_scan,
             order: None,
@@ -91,7 +90,7 @@ impl RemotePlatform {
     pub(in crate::parts) fn handle_pose(
         &self,
         now: Instant,
-        stamp: Option<Duration>,
+        stamp: Option<SampleStamp>,
         pose: Option<(f64, f64, f64)>,
     ) {
         let mut state = self.lock();
@@ -111,7 +110,7 @@ impl RemotePlatform {
     pub(in crate::parts) fn handle_velocity(
         &self,
         now: Instant,
-        stamp: Option<Duration>,
+        stamp: Option<SampleStamp>,
         velocity: Option<(f64, f64)>,
     ) {
         let mut state = self.lock();
@@ -130,7 +129,7 @@ impl RemotePlatform {
     pub(in crate::parts) fn handle_scan(
         &self,
         now: Instant,
-        stamp: Option<Duration>,
+        stamp: Option<SampleStamp>,
         scan: Option<&Scan>,
     ) -> Option<Vec<Point>> {
         let mut state = self.lock();
@@ -346,7 +345,7 @@ mod tests {
             remote_platform.handle_time(now);
             remote_platform.head(0.0, 1.0);
             let stamp = Duration::from_secs(3600) + period * stamp;
-            remote_platform.handle_pose(now, Some(stamp), Some((1.0, 2.0, 0.5)));
+            remote_platform.handle_pose(now, Some(stamp.into()), Some((1.0, 2.0, 0.5)));
             remote_platform.plan(now)
         };
         for count in 0..10 {
@@ -371,7 +370,7 @@ mod tests {
             remote_platform.head(0.0, 1.0);
             let scan = Scan::default();
             let at = stamp.map(|stamp| Duration::from_secs(3600) + period * stamp);
-            let places = remote_platform.handle_scan(now, at, at.map(|_| &scan));
+            let places = remote_platform.handle_scan(now, at.map(Into::into), at.map(|_| &scan));
             assert!(places.is_none_or(|it| it.is_empty()));
             remote_platform.plan(now)
         };
@@ -423,7 +422,8 @@ mod tests {
             let now = start + Duration::from_millis(100) * count;
             let stamp = Duration::from_secs(3600) + Duration::from_millis(100) * stamp;
             remote_platform.handle_pose(now, None, Some((x, 0.0, 0.0)));
-            let seen = remote_platform.handle_scan(now, Some(stamp), Some(&Scan::new(ahead)));
+            let seen =
+                remote_platform.handle_scan(now, Some(stamp.into()), Some(&Scan::new(ahead)));
             seen.map(|places| places[0].0)
         };
         places(0, 0, 0.0);

@@ -1,7 +1,6 @@
 //! Sensor input: subscriptions to a service of the own subsystem, with rediscovery after loss.
 
 use std::convert::Infallible;
-use std::time::Duration;
 
 use super::{GlobalPoses, RemotePlatform};
 use crate::ground::{reported_scan, reported_zones};
@@ -11,20 +10,22 @@ use crate::messages::environment_sensing::query_range_sensor_data::{
 use crate::messages::environment_sensing::{
     QueryRangeSensorData, ReportRangeSensorData, range_sensor,
 };
-use crate::motion::{Fence, Freshness, Pose};
+use crate::motion::{Fence, Pose};
 use crate::parts::PartError;
 use crate::sensing::Scan;
 use crate::zones::Zones;
 use jaus::address::JausId;
 use jaus::codec::{Message, Query};
-use jaus::component::{Audience, Component, GroupSubscription, GroupUpdate, When};
-use jaus::messages::mobility::report_local_pose::TimeStamp;
+use jaus::component::{Audience, Component, GroupSubscription, GroupUpdate, PeerClocks, When};
+use jaus::messages::core::report_time::TimeStamp;
 use jaus::messages::mobility::{
     QueryGlobalPose, QueryLocalOperatingZone, QueryLocalPose, QueryVelocityState, ReportGlobalPose,
     ReportLocalOperatingZone, ReportLocalPose, ReportVelocityState, global_pose_sensor,
     local_operating_zone, local_pose_sensor, velocity_state_sensor,
 };
 use jaus::node::now;
+use jaus::service::{SampleAge, SampleStamp};
+use tokio::task::JoinSet;
 
 /// The reports of one sensor of the own subsystem, whichever provides them at the time.
 ///
@@ -34,6 +35,10 @@ pub(in crate::parts) struct Sense<R> {
     /// Whether a report has what is wanted of a source.
     is_suitable: fn(&R) -> bool,
     source: Option<JausId>,
+    /// The clock of the source.
+    clocks: PeerClocks,
+    /// Measures that clock until it is dropped.
+    _measuring: JoinSet<Infallible>,
     /// Whether the source was lost since the last report.
     was_lost: bool,
     what: &'static str,
@@ -50,10 +55,16 @@ impl<R: Message> Sense<R> {
     ) -> Result<Self, PartError> {
         let providers = Audience::providers(urn).in_subsystem(component.id().subsystem());
         let reports = component.subscribe_all(providers, query, When::hz(hz));
+        let clocks = PeerClocks::default();
+        let mut measuring = JoinSet::new();
+        let (own, measured) = (component.clone(), clocks.clone());
+        measuring.spawn(async move { measured.measure_wanted(&own).await });
         Ok(Self {
             reports: reports.map_err(|error| PartError::Broken(error.to_string()))?,
             is_suitable: |_| true,
             source: None,
+            clocks,
+            _measuring: measuring,
             was_lost: false,
             what,
         })
@@ -96,6 +107,14 @@ impl<R: Message> Sense<R> {
     pub(in crate::parts) const fn take_loss(&mut self) -> bool {
         std::mem::replace(&mut self.was_lost, false)
     }
+
+    /// What the time stamp of the last report says about the age of its sample; `None` for stamp 0,
+    /// which sensors without a clock send.
+    pub(in crate::parts) fn stamp(&self, stamp: Option<u32>) -> Option<SampleStamp> {
+        let stamp = TimeStamp(stamp?);
+        let measured = self.source.and_then(|peer| self.clocks.age(peer, stamp));
+        SampleStamp::of_report(stamp, measured)
+    }
 }
 
 /// The pose in a report; `None` if the sensor does not know it.
@@ -130,7 +149,7 @@ impl Sense<ReportLocalPose> {
                 remote_platform.handle_pose(now, None, None);
             }
             let pose = reported_pose(&report).map(|it| (it.x, it.y, it.yaw));
-            let stamp = report.time_stamp.and_then(time_in_month);
+            let stamp = self.stamp(report.time_stamp.map(|it| it.0));
             remote_platform.handle_pose(now, stamp, pose);
         }
     }
@@ -139,16 +158,16 @@ impl Sense<ReportLocalPose> {
 impl Sense<ReportLocalPose> {
     /// Passes all reports to a fence whose platform does not know its pose in the zones' frame.
     pub(in crate::parts) async fn locate(mut self, fence: &Fence) -> Result<Infallible, PartError> {
-        let mut freshness = Freshness::default();
+        let mut age = SampleAge::default();
         loop {
             let report = self.next().await?;
             let pose = reported_pose(&report);
-            let stamp = report.time_stamp.and_then(time_in_month);
+            let stamp = self.stamp(report.time_stamp.map(|it| it.0));
             if self.take_loss() || pose.is_none() {
-                freshness.forget();
+                age.forget();
                 fence.handle_pose(None);
             }
-            let sampled_at = freshness.handle(now(), stamp);
+            let sampled_at = age.handle(now(), stamp);
             if let Some(located) = pose.zip(sampled_at) {
                 fence.handle_pose(Some(located));
             }
@@ -172,10 +191,10 @@ impl Sense<ReportRangeSensorData> {
     /// measure.
     pub(in crate::parts) async fn next_scan(
         &mut self,
-    ) -> Result<Option<(Option<Duration>, Scan)>, PartError> {
+    ) -> Result<Option<(Option<SampleStamp>, Scan)>, PartError> {
         let report = self.next().await?;
         let scan = reported_scan(&report);
-        Ok(scan.map(|(stamp, scan)| (time_in_month(TimeStamp(stamp.0)), scan)))
+        Ok(scan.map(|(stamp, scan)| (self.stamp(Some(stamp.0)), scan)))
     }
 
     /// Passes all scans to a remote platform, and the obstacles to a fence.
@@ -261,7 +280,7 @@ impl Sense<ReportGlobalPose> {
             if self.take_loss() {
                 poses.handle_loss(now);
             }
-            poses.handle_report(now, &report);
+            poses.handle_report(now, self.stamp(report.time_stamp.map(|it| it.0)), &report);
         }
     }
 }
@@ -305,31 +324,8 @@ impl Sense<ReportVelocityState> {
                 remote_platform.handle_velocity(now, None, None);
             }
             let velocity = report.velocity_x_m_per_s().zip(report.yaw_rate_rad_per_s());
-            let stamp = report.time_stamp.and_then(time_in_month);
+            let stamp = self.stamp(report.time_stamp.map(|it| it.0));
             remote_platform.handle_velocity(now, stamp, velocity);
         }
-    }
-}
-
-/// Converts a stamp of version 1.0 reports to the time since the start of its month; `None` for
-/// stamp 0, which sensors without a clock send.
-pub(in crate::parts) fn time_in_month(stamp: TimeStamp) -> Option<Duration> {
-    let hours = u64::from(stamp.day()) * 24 + u64::from(stamp.hour());
-    let seconds = (hours * 60 + u64::from(stamp.minutes())) * 60 + u64::from(stamp.seconds());
-    let time = Duration::from_millis(seconds * 1000 + u64::from(stamp.milliseconds()));
-    Some(time).filter(|time| !time.is_zero())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_stamp_0_is_none() {
-        assert_eq!(time_in_month(TimeStamp::default()), None);
-        let stamp = TimeStamp::default().with_day(2).unwrap();
-        let stamp = stamp.with_milliseconds(7).unwrap();
-        let time = Duration::from_millis(2 * 86_400_000 + 7);
-        assert_eq!(time_in_month(stamp), Some(time));
     }
 }

@@ -12,7 +12,7 @@ use crate::messages::environment_sensing::ReportRangeSensorData;
 use crate::messages::ground::report_stage::State;
 use crate::messages::ground::{QueryStage, ReportStage, stage};
 use crate::mission::{Link, LinkState};
-use crate::motion::{Freshness, Pose};
+use crate::motion::Pose;
 use crate::parts::PartError;
 use crate::parts::drivers::{Sense, reported_pose};
 use crate::sensing::Scan;
@@ -25,6 +25,7 @@ use jaus::messages::mobility::{
     ReportLocalPose, local_path_segment_driver, local_vector_driver, primitive_driver,
 };
 use jaus::node::now;
+use jaus::service::SampleAge;
 
 /// An event of a driver of the chain.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,12 +103,12 @@ pub(super) async fn look_around(
     mut scans: Sense<ReportRangeSensorData>,
     tell: &mpsc::Sender<News>,
 ) -> Result<(), PartError> {
-    let mut freshness = Freshness::default();
+    let mut age = SampleAge::default();
     loop {
         let Some((stamp, scan)) = scans.next_scan().await? else {
             continue;
         };
-        if freshness.handle(now(), stamp).is_some() && tell.send(News::Scan(scan)).await.is_err() {
+        if age.handle(now(), stamp).is_some() && tell.send(News::Scan(scan)).await.is_err() {
             return Ok(());
         }
     }
