@@ -33,6 +33,10 @@ pub(super) struct Picture {
     georeference: Georeference,
     velocity: Option<Sample<state::Velocity>>,
     mission: Option<Sample<Mission>>,
+    /// Whether the planner of the mission has restarted since it reported it, and whether it was
+    /// lost before it came back.
+    has_planner_restarted: bool,
+    was_planner_lost: bool,
     path: Vec<[f64; 2]>,
     maps: Vec<state::Map>,
     store: Option<JausId>,
@@ -69,6 +73,8 @@ impl Picture {
             georeference: Georeference::default(),
             velocity: None,
             mission: None,
+            has_planner_restarted: false,
+            was_planner_lost: false,
             path: Vec::new(),
             maps: Vec::new(),
             store: None,
@@ -182,6 +188,7 @@ impl Picture {
 
     pub(super) fn handle_time(&mut self, now: Instant) {
         self.gone.handle_time(now);
+        self.was_planner_lost |= self.lost_planner(now).is_some();
     }
 
     /// Handles a report of a part of the vehicle.
@@ -215,13 +222,40 @@ impl Picture {
                     self.velocity = Some(Sample { what, by, at });
                 }
             }
-            Report::Mission(what) => self.mission = Some(Sample { what, by, at: now }),
+            Report::Mission(what) => self.handle_mission(now, by, what),
             Report::Path(path) => self.path = path,
             Report::Maps(maps) => {
                 self.maps = maps;
                 self.store = Some(by);
             }
             Report::Subscription { .. } => {}
+        }
+    }
+
+    /// Handles the report of a mission. A planner that drove and has none any more has restarted:
+    /// its mission ended without a report, and is kept for that.
+    fn handle_mission(&mut self, now: Instant, by: JausId, what: Mission) {
+        if what.stage.is_idle() {
+            self.handle_planner_restart(by);
+            if self.has_planner_restarted {
+                return;
+            }
+        }
+        (self.has_planner_restarted, self.was_planner_lost) = (false, false);
+        self.mission = Some(Sample { what, by, at: now });
+    }
+
+    /// Handles the restart of a planner, unless it was known to be lost before.
+    pub(super) fn handle_planner_restart(&mut self, planner: JausId) {
+        let drove = |it: &Sample<Mission>| it.by == planner && it.what.stage.is_driven();
+        let is_new = !self.was_planner_lost && self.mission.as_ref().is_some_and(drove);
+        self.has_planner_restarted |= is_new;
+    }
+
+    /// The operator drives on: that the planner has restarted is known.
+    pub(super) fn forget_planner_restart(&mut self) {
+        if std::mem::take(&mut self.has_planner_restarted) {
+            self.mission = None;
         }
     }
 
@@ -276,7 +310,14 @@ impl Picture {
             is_expected && part.is_silent(now, self.depth.silent())
         });
         let silent = silent.map(|(id, part)| (*id, &*part.name, Absence::Silent));
-        gone.chain(silent)
+        gone.chain(silent).chain(self.restarted_planner(now))
+    }
+
+    /// A planner that has restarted while it drove is missing as the one that it was.
+    fn restarted_planner(&self, now: Instant) -> Option<(JausId, &str, Absence)> {
+        let lost = self.lost_planner(now);
+        let (id, how) = lost.filter(|(_, how)| *how == Absence::Restarted)?;
+        Some((id, &self.parts.get(&id)?.name, how))
     }
 
     /// The condition of any component of the vehicle that discovery knows, for the tree.
@@ -304,13 +345,16 @@ impl Picture {
         self.missing(now).map(describe).collect()
     }
 
-    /// The planner, if it was lost while it drove. When all parts are silent, the network is to
+    /// The planner, if it was lost or has restarted while it drove. When all parts are silent, the network is to
     /// blame, and the planner does not count as lost.
     pub(super) fn lost_planner(&self, now: Instant) -> Option<(JausId, Absence)> {
         let known = self.mission.as_ref();
         let planner = known.filter(|it| it.what.stage.is_driven())?.by;
         if self.gone.get(planner).is_some() {
             return Some((planner, Absence::Gone));
+        }
+        if self.has_planner_restarted {
+            return Some((planner, Absence::Restarted));
         }
         let part = self.parts.get(&planner)?;
         let mut others = self.parts.iter().filter(|(id, _)| **id != planner);

@@ -79,6 +79,11 @@ impl MissionStage {
         name.copied().unwrap_or("unknown")
     }
 
+    /// Whether no mission was given since the planner started.
+    pub(super) const fn is_idle(self) -> bool {
+        self.0 == 0
+    }
+
     pub(super) const fn awaits_approval(self) -> bool {
         self.0 == 3
     }

@@ -326,7 +326,7 @@ pub struct Mission {
 pub struct LostPlanner {
     /// JAUS id.
     pub id: String,
-    /// `gone` or `silent`, as for [`Missing`].
+    /// `gone`, `silent` or `restarted`, as for [`Missing`].
     pub how: &'static str,
     /// Whether this station has stopped the drivers, which requires that it controlled the planner.
     pub told_to_stop: bool,

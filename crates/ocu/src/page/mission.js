@@ -21,7 +21,7 @@ const OLD = 2_000;
 
 /** What became of a mission whose planner is lost, and what is left to the operator. */
 function lostPlanner({ id, how, told_to_stop: stopped }) {
-  const loss = `The planner ${plain(id, 16)} is ${plain(how, 10)}`;
+  const loss = `The planner ${plain(id, 16)} ${how === "restarted" ? "restarted while it drove" : `is ${plain(how, 10)}`}`;
   return stopped
     ? `${loss}. The vehicle was stopped: press Emergency stop if it still moves.`
     : `${loss}. This station does not control the drivers: press Emergency stop if the vehicle still moves.`;

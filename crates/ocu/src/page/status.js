@@ -34,7 +34,8 @@ export function showLink(link, state) {
 }
 
 /** How a part is missing, in words. */
-const absence = ({ name, id, how }) => `${plain(name, 40)} ${plain(id, 16)} is ${how === "gone" ? "gone" : "silent"}`;
+const absence = ({ name, id, how }) => `${plain(name, 40)} ${plain(id, 16)} ${ABSENCE[how] ?? "is silent"}`;
+const ABSENCE = { gone: "is gone", restarted: "restarted while it drove: the vehicle was stopped" };
 
 /** The ids of the parts that were missing when that was last shown. */
 let missed = new Set();
@@ -48,7 +49,7 @@ export function showMissing(state, live) {
     if (missed.has(id) && !now.has(id)) toast("good", `${words(role)} ${plain(id, 16)} is back`);
   }
   missed = now;
-  const silent = missing.filter(({ how }) => how !== "gone");
+  const silent = missing.filter(({ how }) => how === "silent");
   // All parts at once: the network is the reason, or the whole vehicle.
   const all = parts.length > 1 && silent.length === parts.length;
   const texts = all

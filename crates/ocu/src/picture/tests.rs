@@ -282,3 +282,78 @@ fn a_planner_that_is_silent_while_others_report_is_lost_after_2_s() {
     picture.handle_report(now, PLANNER, mission(7).into());
     assert_eq!(picture.lost_planner(now), None);
 }
+
+#[test]
+fn a_planner_that_drove_and_reports_no_mission_has_restarted() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), planner()]);
+    picture.handle_report(start, PLANNER, mission(7).into());
+    picture.handle_report(start + ms(250), PLANNER, mission(0).into());
+    let lost = Some((PLANNER, Absence::Restarted));
+    // The mission does not vanish without a word, however long the new planner reports none.
+    for time in [250, 500, 60_000] {
+        let now = start + ms(time);
+        picture.handle_report(now, PLANNER, mission(0).into());
+        assert_eq!(picture.lost_planner(now), lost, "{time} ms");
+        let shown = picture.mission_state(now, true).unwrap();
+        assert_eq!(shown.lost.map(|it| it.how), Some("restarted"));
+        assert!(
+            picture
+                .missing(now)
+                .any(|(id, _, how)| (id, Some(how)) == (PLANNER, lost.map(|it| it.1)))
+        );
+    }
+    let now = start + ms(60_250);
+    picture.handle_report(now, PLANNER, mission(2).into());
+    assert_eq!(picture.lost_planner(now), None, "a new mission");
+}
+
+#[test]
+fn a_planner_that_ends_its_mission_has_not_restarted() {
+    let start = Instant::now();
+    for stage in [8, 9, 10] {
+        let mut picture = picture(start, &[driver(), planner()]);
+        for stage in [7, stage, 0] {
+            picture.handle_report(start, PLANNER, mission(stage).into());
+        }
+        assert_eq!(picture.lost_planner(start), None, "{stage}");
+    }
+}
+
+#[test]
+fn a_planner_whose_restart_its_session_has_noticed_is_lost_before_it_reports() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), planner()]);
+    picture.handle_report(start, PLANNER, mission(3).into());
+    picture.handle_planner_restart(PLANNER);
+    assert_eq!(picture.lost_planner(start), None, "it did not drive");
+    picture.handle_report(start, PLANNER, mission(7).into());
+    picture.handle_planner_restart(PLANNER);
+    assert_eq!(
+        picture.lost_planner(start),
+        Some((PLANNER, Absence::Restarted))
+    );
+}
+
+#[test]
+fn a_planner_that_was_lost_before_it_is_back_is_not_lost_again() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), planner()]);
+    picture.handle_report(start, PLANNER, mission(7).into());
+    picture.set_parts(start, [driver()].iter());
+    picture.handle_time(start);
+    picture.set_parts(start, [driver(), planner()].iter());
+    picture.handle_report(start, PLANNER, mission(0).into());
+    assert_eq!(picture.lost_planner(start), None);
+}
+
+#[test]
+fn the_restart_of_a_planner_is_forgotten_once_the_operator_drives_on() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), planner()]);
+    picture.handle_report(start, PLANNER, mission(7).into());
+    picture.handle_report(start, PLANNER, mission(0).into());
+    picture.forget_planner_restart();
+    picture.handle_report(start, PLANNER, mission(0).into());
+    assert_eq!(picture.lost_planner(start), None);
+}

@@ -101,6 +101,12 @@ impl Lease {
         session.state().held().map(|_| Arc::clone(session))
     }
 
+    /// Whether a part under control has restarted and is not yet under control again.
+    pub(super) fn has_restarted(&self, part: JausId) -> bool {
+        let state = self.holds.get(&part).map(Hold::state);
+        matches!(state, Some(SessionState::Lost { why, .. }) if why.is_restart())
+    }
+
     /// The sessions with all held parts.
     pub(super) fn all_held(&self) -> Vec<Arc<Session>> {
         let parts = self.holds.keys();

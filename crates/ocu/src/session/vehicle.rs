@@ -134,7 +134,7 @@ impl Vehicle {
         for (id, name, how) in self.picture.missing(now) {
             missing.insert(id, how);
             if self.missing.get(&id) != Some(&how) {
-                tracing::warn!("{name} {id} is {}", how.name());
+                tracing::warn!("{name} {id} {}", how.words());
             }
         }
         for id in self.missing.keys().filter(|id| !missing.contains_key(id)) {
@@ -148,15 +148,22 @@ impl Vehicle {
     /// Stops the vehicle after the planner was lost while driving for this operator. Its drivers
     /// have no supervising client left, so the station takes control and sends them to standby.
     fn stop_after_lost_planner(&mut self, now: Instant) {
+        if let Some(planner) = self.picture.find(Role::Planner)
+            && self.lease.has_restarted(planner)
+        {
+            self.picture.handle_planner_restart(planner);
+        }
         let Some((planner, how)) = self.picture.lost_planner(now) else {
             return;
         };
         if self.lease.wanted() == Wanted::Planner {
             tracing::warn!(
-                "the planner {planner} is {} while it drives: stopping the vehicle",
-                how.name()
+                "the planner {planner} {} while it drives: stopping the vehicle",
+                how.words()
             );
             self.lease.want_stopped(&self.picture);
+        } else if self.lease.is_ready() {
+            self.picture.forget_planner_restart();
         }
     }
 

@@ -9,7 +9,7 @@ use jaus_test_kit::waiting::within_limit;
 use jaus_vehicle::messages::ground::{QueryMission, ReportMission, mission_planner};
 use serde_json::{Value, json};
 
-use crate::scene::{Scene, driver_of};
+use crate::scene::{Page, Scene, driver_of};
 
 fn missing(state: &Value) -> Vec<&Value> {
     let missing = state["vehicle"]["missing"].as_array();
@@ -156,11 +156,8 @@ pub(crate) fn planner(scene: &Scene, stage: Arc<AtomicU8>) -> Component {
     )
 }
 
-#[tokio::test]
-async fn a_planner_that_ends_while_it_drives_is_named_and_the_station_stops_the_vehicle() {
-    let scene = Scene::new().await;
-    let stage = Arc::new(AtomicU8::new(3));
-    let planner = planner(&scene, Arc::clone(&stage));
+/// A page whose operator has approved mission 7 of a planner, which drives.
+async fn on_mission(scene: &Scene, stage: &AtomicU8) -> Page {
     let mut page = scene.page().await;
     page.until(|state| state["mission"]["stage"] == "awaiting_approval")
         .await;
@@ -176,6 +173,15 @@ async fn a_planner_that_ends_while_it_drives_is_named_and_the_station_stops_the_
     stage.store(7, Ordering::Relaxed);
     page.until(|state| state["mission"]["stage"] == "driving" && driver_of(state)["ours"] == false)
         .await;
+    page
+}
+
+#[tokio::test]
+async fn a_planner_that_ends_while_it_drives_is_named_and_the_station_stops_the_vehicle() {
+    let scene = Scene::new().await;
+    let stage = Arc::new(AtomicU8::new(3));
+    let planner = planner(&scene, Arc::clone(&stage));
+    let mut page = on_mission(&scene, &stage).await;
 
     drop(planner);
     let stopped = |state: &Value| {
@@ -188,4 +194,27 @@ async fn a_planner_that_ends_while_it_drives_is_named_and_the_station_stops_the_
     let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
     let refused = page.ask(push).await.unwrap_err();
     assert!(refused.contains("resume first"), "{refused}");
+}
+
+#[tokio::test]
+async fn a_planner_that_restarts_while_it_drives_is_named_and_the_station_stops_the_vehicle() {
+    let scene = Scene::new().await;
+    let stage = Arc::new(AtomicU8::new(3));
+    let first = planner(&scene, Arc::clone(&stage));
+    let mut page = on_mission(&scene, &stage).await;
+
+    drop(first);
+    scene.until(|scene| scene.is_free(36)).await;
+    stage.store(0, Ordering::Relaxed);
+    let _second = planner(&scene, Arc::clone(&stage));
+    let stopped = |state: &Value| {
+        state["mission"]["lost"]["told_to_stop"] == true && driver_of(state)["state"] == "standby"
+    };
+    let state = page.until(stopped).await;
+    assert_eq!(state["mission"]["lost"]["how"], "restarted", "{state}");
+    assert_eq!(missing(&state)[0]["how"], "restarted");
+    // The operator drives on.
+    page.ask(json!({"type": "resume"})).await.unwrap();
+    page.until(|state| state["mission"]["lost"].is_null() && missing(state).is_empty())
+        .await;
 }

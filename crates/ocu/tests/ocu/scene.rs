@@ -172,14 +172,15 @@ impl Scene {
     }
 
     pub(crate) async fn start_rover(&mut self) {
-        // The component number is free once the old one has detached.
-        let is_gone = || {
-            let components = self.nodes[0].components();
-            components.iter().all(|it| it.id.component() != 1)
-        };
-        until(is_gone).await;
+        until(|| self.is_free(1)).await;
         let frozen = self.frozen.as_ref();
         self.rover = Some(rover(&self.vehicle, &self.nodes[0], self.timeout, frozen));
+    }
+
+    /// Whether a component number of the vehicle is free: the old component has detached.
+    pub(crate) fn is_free(&self, component: u8) -> bool {
+        let components = self.nodes[0].components();
+        components.iter().all(|it| it.id.component() != component)
     }
 
     /// Ends this station without notice to its pages.
