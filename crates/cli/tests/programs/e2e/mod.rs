@@ -50,6 +50,11 @@ fn a_mission_through_the_page_ends_by_the_death_of_the_planner_and_by_a_key() {
         plan(page, FAR, Some(SLOW));
         approve(page);
 
+        says_that_the_planner_has_restarted(system, page);
+        take_control(page);
+        plan(page, FAR, Some(SLOW));
+        approve(page);
+
         take_over_by_keyboard(page);
         emergency(page);
 
@@ -206,6 +211,27 @@ fn says_that_the_planner_is_gone(system: &System, page: &mut Browser) {
     page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
     system.start("jaus-planner");
     comes_alive(page);
+}
+
+/// A planner that is killed while it drives and is back at once is another one: the vehicle stops,
+/// and the page says why.
+fn says_that_the_planner_has_restarted(system: &System, page: &mut Browser) {
+    page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) > 0.1");
+    system.kill("jaus-planner");
+    system.start("jaus-planner");
+    let rests = "Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05";
+    assert!(
+        page.holds_within(Duration::from_secs(2), rests),
+        "it drives on"
+    );
+    let line = "document.querySelector('#mission-line').textContent";
+    page.wait(&format!(
+        "/planner [0-9.]+ restarted while it drove. The vehicle was stopped/.test({line})"
+    ));
+    page.wait(
+        "document.querySelector('#missing').textContent.includes('restarted while it drove')",
+    );
+    look_from_all_screens(page, "3-planner-restarted");
 }
 
 /// Holding a key drives the vehicle and ends a mission; releasing the key stops it.
