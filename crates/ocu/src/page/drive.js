@@ -107,7 +107,7 @@ export class Drive {
     if (this.#timer) {
       clearInterval(this.#timer);
       this.#timer = 0;
-      this.#link.send({ type: "drive_end" });
+      this.#link.release();
     }
     this.#render([0, 0], null);
   }
@@ -115,7 +115,7 @@ export class Drive {
   #tick() {
     const [direction, source] = this.#direction();
     const [forward, turn] = direction.map((value) => Math.round(value * this.#limit * 1000) / 1000);
-    if (!this.#link.send({ type: "drive", forward, turn })) {
+    if (!this.#link.setpoint({ forward, turn })) {
       this.release();
       return;
     }

@@ -3,12 +3,13 @@
 // reconnections as well. Clearing it takes two.
 
 import { get, mark, say, show, toast } from "./dom.js";
+import { StopLink } from "./stop_link.js";
 
-const REPEAT = 500;
 const touch = matchMedia("(hover: none)");
 
 export class Emergency {
   #link;
+  #stops;
   /** Whether the operator has stopped the vehicle and it has not confirmed that yet. */
   #wanted = false;
   #confirmed = false;
@@ -23,6 +24,10 @@ export class Emergency {
   /** Calls `unbar` when the operator stops a vehicle and the station takes no requests. */
   constructor(link, unbar) {
     this.#link = link;
+    this.#stops = new StopLink(link);
+    this.#stops.addEventListener("refused", ({ detail }) => this.#refuse(detail));
+    link.addEventListener("hello", () => this.#stops.start());
+    link.addEventListener("barred", () => this.#stops.close());
     this.#unbar = unbar;
     get("estop").addEventListener("click", () => this.stop());
     get("estop-all").addEventListener("click", () => this.stopAll());
@@ -30,10 +35,6 @@ export class Emergency {
     get("clear-no").addEventListener("click", () => this.#closeSheet());
     get("clear-yes").addEventListener("click", () => this.#clear("emergency"));
     get("clear-all").addEventListener("click", () => this.#clear("emergency_all"));
-    setInterval(() => {
-      if (this.#wantedAll) this.#send("emergency_all");
-      else if (this.#wanted) this.#send("emergency");
-    }, REPEAT);
     this.#render();
   }
 
@@ -78,6 +79,7 @@ export class Emergency {
     this.#confirmed = state?.vehicle?.emergency === true;
     if (this.#confirmed) this.#wanted = false;
     if (this.#moving() === 0) this.#wantedAll = false;
+    if (!this.#wanted && !this.#wantedAll) this.#stops.cancel();
     this.#render();
   }
 
@@ -86,10 +88,12 @@ export class Emergency {
     return this.#vehicles.filter(({ presence, state }) => presence === "present" && state !== "emergency").length;
   }
 
-  async #send(type) {
-    if (!this.#link.open || !this.#link.settled) return;
-    const reason = await this.#link.ask({ type, on: true });
-    if (reason === null || !(this.#wanted || this.#wantedAll)) return;
+  #send(type) {
+    if (type === "emergency_all") this.#stops.stopAll();
+    else if (this.#link.vehicle !== null) this.#stops.stop(this.#link.vehicle);
+  }
+
+  #refuse(reason) {
     if (this.#refusal !== reason) toast("bad", `Emergency stop: ${reason}`);
     this.#refusal = reason;
   }
