@@ -26,8 +26,9 @@ export class Fleet {
     this.#vehicles = list(vehicles, MOST).filter((one) => number(one?.subsystem) !== null);
   }
 
-  /** Shows the list and the selected vehicle; `usable` says whether another one can be selected. */
-  update(state, usable) {
+  /** Shows the list and the selected vehicle; `usable` says whether another one can be selected, and
+   * `page` is the number of this page at the station. */
+  update(state, usable, page) {
     const chosen = number(state?.vehicle?.subsystem);
     const name = plain(state?.vehicle?.name, 40) || "Vehicle";
     const count = this.#vehicles.length;
@@ -38,7 +39,7 @@ export class Fleet {
     const left = new Set(this.#rows.keys());
     for (const vehicle of this.#vehicles) {
       left.delete(vehicle.subsystem);
-      this.#showRow(vehicle, vehicle.subsystem === chosen, usable);
+      this.#showRow(vehicle, vehicle.subsystem === chosen, usable, page);
     }
     for (const gone of left) {
       this.#rows.get(gone).remove();
@@ -52,7 +53,7 @@ export class Fleet {
     (rows.find((row) => row.firstChild.ariaCurrent === "true") ?? rows[0])?.firstChild.focus();
   }
 
-  #showRow(vehicle, chosen, usable) {
+  #showRow(vehicle, chosen, usable, page) {
     const row = this.#rows.get(vehicle.subsystem) ?? this.#create(vehicle.subsystem);
     const button = row.firstChild;
     const [, name, mode, detail] = button.children;
@@ -62,7 +63,7 @@ export class Fleet {
     button.disabled = !usable;
     say(name, `${plain(vehicle.name, 40) || "Vehicle"} · ${vehicle.subsystem}`);
     say(mode, condition(vehicle));
-    say(detail, `${controller(vehicle)} · ${news(vehicle)}`);
+    say(detail, `${controller(vehicle, page)} · ${news(vehicle)}`);
   }
 
   #create(number) {
@@ -101,9 +102,11 @@ function condition({ presence, state, mission }) {
   return words(state ?? "unknown");
 }
 
-function controller({ held, requested, controller: id, authority }) {
+function controller({ held, driver, requested, controller: id, authority }, page) {
   if (requested) return "another operator requests control";
-  if (held) return "you control it";
+  if (driver?.endsWith(`(page ${page})`)) return "you control it";
+  if (driver) return `${plain(driver, 48)} controls it`;
+  if (held) return "this station controls it";
   if (!id) return "nobody controls it";
   return `${plain(id, 16)} controls it${number(authority) === null ? "" : ` (${authority})`}`;
 }

@@ -74,7 +74,7 @@ function render() {
   const barred = account.missing || (link.open && link.settled && !trusted);
   const hint = account.users ? account.hindrance : "enter the token to use it";
   emergency.update(state, fleet.vehicles, barred ? hint : "");
-  fleet.update(state, live && trusted);
+  fleet.update(state, live, link.page);
   const hindrance = hindered(live);
   drive.update(state, hindrance || uncontrolled());
   const mode = part(state, "primitive_driver")?.state;
@@ -85,7 +85,7 @@ function render() {
 }
 
 function renderState(live, operable, hindrance) {
-  showControl(state, authority, operable, account);
+  showControl(state, authority, operable, account, link.page);
   engage.update(state, operable, hindrance);
   handover.update(state, operable);
   showStatus(state, Number.isFinite(link.age) ? link.age : 0);
@@ -109,8 +109,7 @@ function uncontrolled() {
   if (!state.control?.wanted) return "Press Drive by hand first";
   const driver = part(state, "primitive_driver");
   if (state.control.held && driver?.ours && driver.state === "standby") return "In standby: press Drive by hand first";
-  // While control is asked for, as when the operator takes over from the planner, what is held is
-  // sent already and acts as soon as the vehicle agrees.
+  if (state.control.planner_drives) return "A mission drives: take over first";
   return state.control.held ? "" : sentence(state.control.reason);
 }
 

@@ -64,10 +64,10 @@ export function showMissing(state, live) {
 let holderHere = "you";
 
 /** Shows who controls, and offers to take, request or release control. */
-export function showControl(state, authority, operable, account) {
-  const { held, wanted, asking, reason, user } = state.control ?? {};
-  const isOther = account.users && Boolean(user) && user !== account.user;
-  holderHere = isOther ? plain(user, 32) : "you";
+export function showControl(state, authority, operable, account, ownPage) {
+  const { held, wanted, asking, reason, user, page } = state.control ?? {};
+  const isOther = number(page) !== null && page !== ownPage;
+  holderHere = !isOther ? "you" : account.users && user !== account.user ? plain(user, 32) : "another page";
   const driver = part(state, "primitive_driver");
   const [word, detail] = held
     ? [isOther ? `${holderHere} has control` : "You have control", number(authority) === null ? "" : `authority ${authority}`]
@@ -84,7 +84,7 @@ export function showControl(state, authority, operable, account) {
   const offer = outranks ? "Request control" : "Take control";
   say(button, asking ? "Withdraw" : held || wanted ? "Release" : offer);
   button.classList.toggle("primary", !held && !wanted && !asking);
-  button.disabled = !operable;
+  button.disabled = !operable || isOther;
 }
 
 function holder(driver) {
