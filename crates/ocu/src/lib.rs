@@ -9,8 +9,13 @@
 mod answer;
 mod base_map;
 mod georeference;
+mod handover;
 mod missing;
+mod orders;
+pub mod ownership;
 pub(crate) mod page;
+pub mod page_link;
+mod pages;
 mod picture;
 mod report;
 pub mod request;
@@ -33,6 +38,7 @@ mod tls;
 mod token;
 mod tree;
 pub mod users;
+mod vehicle_link;
 
 pub use base_map::{BaseMap, BaseMapError};
 pub use station::{Listen, OpenStation, Station};

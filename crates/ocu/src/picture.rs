@@ -377,12 +377,12 @@ impl Picture {
         })
     }
 
-    /// The vehicle in the list of vehicles. The flags state whether the station has selected it,
-    /// controls it, and is requested to hand it over.
+    /// The vehicle in the list of vehicles, with the operator of this station who has it. The flags
+    /// state whether the station controls it, and is requested to hand it over.
     pub(super) fn fleet_state(
         &self,
         now: Instant,
-        selected: bool,
+        driver: String,
         (held, requested): (bool, bool),
     ) -> state::FleetVehicle {
         let principal = self.principal().and_then(|id| self.parts.get(&id));
@@ -401,7 +401,7 @@ impl Picture {
         state::FleetVehicle {
             subsystem: self.vehicle,
             name: self.name.clone(),
-            selected,
+            driver,
             presence,
             state: status.map(|known| state_name(known.what)),
             controller: holder.map(|(id, _)| id.to_string()),

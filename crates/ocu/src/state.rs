@@ -1,11 +1,11 @@
-//! Snapshots for pages: the selected vehicle, the list of vehicles, and the tree of components. Each
+//! Snapshots for pages: the vehicle of the page, the list of vehicles, and the tree of components. Each
 //! one is complete, so that a reconnecting page needs nothing else. Unknown values are `null`.
 
 use std::time::Instant;
 
 use serde::Serialize;
 
-/// Snapshot of the selected vehicle.
+/// Snapshot of the vehicle that a page has selected.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct State {
     /// Snapshot counter.
@@ -31,6 +31,8 @@ pub struct State {
 pub struct Fleet {
     /// The vehicles, by subsystem number.
     pub vehicles: Vec<FleetVehicle>,
+    /// Whether all vehicles are to be in emergency, also those that appear later.
+    pub all_stopped: bool,
 }
 
 /// A vehicle in the list.
@@ -40,8 +42,8 @@ pub struct FleetVehicle {
     pub subsystem: u16,
     /// Name.
     pub name: String,
-    /// Whether it is the selected vehicle.
-    pub selected: bool,
+    /// The operator of this station who controls it, with the page; empty if none does.
+    pub driver: String,
     /// `present`, `silent` if its reports have ceased, `gone` if discovery has lost it, or
     /// `unknown` if it was never discovered.
     pub presence: &'static str,
@@ -255,9 +257,13 @@ pub struct Control {
     pub held: bool,
     /// Whether control is wanted.
     pub wanted: bool,
-    /// Name of the user who drives: who last took control, drove or approved a mission. `null`
-    /// unless this station has or wants control.
+    /// Name of the user who has the vehicle, or had it last. `null` unless this station has or wants
+    /// control.
     pub user: Option<String>,
+    /// Number of the page that has the vehicle. No other page can drive or release it.
+    pub page: Option<u64>,
+    /// Whether the planner drives for this station. The operator has to take over before driving.
+    pub planner_drives: bool,
     /// Why control is not complete.
     pub reason: String,
     /// JAUS id of the operator whose control this station has requested.
@@ -290,7 +296,8 @@ pub struct Drive {
     pub forward: f64,
     /// Right, -1 to 1.
     pub turn: f64,
-    /// Why the station ended manual drive although the stick was not released; empty otherwise.
+    /// Why the station refused or ended manual drive although the stick was not released; empty
+    /// otherwise.
     pub reason: String,
 }
 

@@ -247,6 +247,8 @@ export class Link extends EventTarget {
 
   /** Confirms a state once it is drawn. */
   #show(seq) {
+    // A hidden page draws nothing, but still gets states: an alarm sounds there too.
+    if (document.hidden) return this.#flow.received(seq);
     const socket = this.#socket;
     const drawn = (isShown) => {
       clearTimeout(timer);
@@ -254,8 +256,7 @@ export class Link extends EventTarget {
       if (socket !== this.#socket) return;
       isShown ? this.#flow.shown(seq) : this.#flow.received(seq);
     };
-    // A hidden page draws nothing, but still gets states: an alarm sounds there too.
-    const timer = setTimeout(() => drawn(false), document.hidden ? 0 : DRAWN);
+    const timer = setTimeout(() => drawn(false), DRAWN);
     const frame = requestAnimationFrame(() => drawn(true));
   }
 
