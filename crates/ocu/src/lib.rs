@@ -8,8 +8,10 @@
 
 mod answer;
 mod base_map;
+mod events;
 mod georeference;
 mod handover;
+mod map_overlay;
 mod missing;
 mod orders;
 pub mod ownership;
@@ -34,6 +36,7 @@ mod session;
 pub mod state;
 mod station;
 pub mod stick;
+mod stop_monitor;
 mod tls;
 mod token;
 mod tree;

@@ -6,12 +6,13 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use serde::Serialize;
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{mpsc, oneshot, watch};
 
 use super::answer::Said;
 use super::ownership::{Owner, PageId};
 use super::page_link::TooOld;
 use super::request::OperatorRequest;
+use super::state::{Events, Overlay};
 use super::vehicle_link::VehicleLinkQuality;
 
 /// Callback for the result of a request: success, or the reason for failure.
@@ -38,6 +39,17 @@ pub(super) enum Order {
         vehicle: u16,
         map: u16,
         reply: CellsReply,
+    },
+    /// Request for what lies over the map of a vehicle, by a page that has the zones of a revision.
+    Overlay {
+        vehicle: u16,
+        zones: u32,
+        reply: oneshot::Sender<Option<Overlay>>,
+    },
+    /// Request for the events after the one with a number.
+    Events {
+        after: u64,
+        reply: oneshot::Sender<Events>,
     },
     /// A page is gone, and with it its operator.
     Gone(PageId),
@@ -70,6 +82,8 @@ pub(super) struct DriveOrder {
 /// A stop, which overtakes all orders.
 pub(super) struct StopOrder {
     pub(super) target: StopTarget,
+    /// The user who stops, for the log of events.
+    pub(super) user: Arc<str>,
     pub(super) reply: StopReply,
 }
 

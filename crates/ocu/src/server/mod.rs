@@ -3,12 +3,13 @@
 
 mod attempts;
 mod base_map;
-mod bounds;
+pub(super) mod bounds;
 mod connections;
 mod gate;
 mod guard;
 mod login;
 mod logins;
+mod looks;
 mod socket;
 mod stop_socket;
 mod trail;
@@ -157,6 +158,8 @@ impl Server {
             .route("/ws", get(serve_page))
             .route("/stop", get(serve_stops))
             .route("/map/{vehicle}/{map}", get(serve_map))
+            .route("/overlay/{vehicle}", get(looks::serve_overlay))
+            .route("/events", get(looks::serve_events))
             .route("/base-map", get(base_map::describe))
             .route("/base-map/{zoom}/{x}/{y}", get(base_map::serve))
             .route("/session", get(login::session))
@@ -358,7 +361,7 @@ impl Shared {
         match shown.map(|it| self.admits(it, address)) {
             Some(Ok(())) => Ok(()),
             _ => {
-                let words = "the map requires the token: send Authorization: Bearer TOKEN\n";
+                let words = "this requires the token: send Authorization: Bearer TOKEN\n";
                 Err((StatusCode::UNAUTHORIZED, words))
             }
         }

@@ -333,7 +333,13 @@ impl Reader<'_> {
                 (_, None) => StopTarget::OfPage(self.page),
             };
             let reply = StopReply::Confirmed(reply);
-            let _ = access.stops.send(StopOrder { target, reply }).await;
+            let user = Arc::clone(&self.visitor.user);
+            let order = StopOrder {
+                target,
+                user,
+                reply,
+            };
+            let _ = access.stops.send(order).await;
         } else {
             let order = Order::OperatorRequest {
                 page: self.page,

@@ -140,6 +140,7 @@ impl<'s> Stops<'s> {
         }
         let order = StopOrder {
             target: vehicle.map_or(StopTarget::All, StopTarget::Vehicle),
+            user: Arc::clone(&self.visitor.user),
             reply: self.reply(vehicle),
         };
         // On error the session has ended, and the connection with it.

@@ -59,6 +59,18 @@ impl Session {
                 }
                 None => reply(Err("unknown vehicle".to_owned())),
             },
+            // Sending fails only if the page does not wait any more.
+            Order::Overlay {
+                vehicle,
+                zones,
+                reply,
+            } => {
+                let vehicle = self.fleet.get(vehicle);
+                let _ = reply.send(vehicle.map(|it| it.picture.overlay_state(zones)));
+            }
+            Order::Events { after, reply } => {
+                let _ = reply.send(self.events.state(now, after));
+            }
             Order::Gone(page) => self.close(now, page),
         }
     }
@@ -99,9 +111,11 @@ impl Session {
         let shown = self.pages.vehicle(page);
         match request {
             OperatorRequest::Emergency { on: false } => {
+                self.note_emergency(now, meant.or(shown), self.user(page), false);
                 return self.clear_emergency(now, meant.or(shown), reply);
             }
             OperatorRequest::EmergencyAll { on: false } => {
+                self.note_emergency_of_all(now, self.user(page), false);
                 return self.clear_all_emergencies(now, reply);
             }
             OperatorRequest::Handover {

@@ -14,12 +14,20 @@ use crate::orders::{Reply, StopOrder, StopReply, StopTarget};
 impl Session {
     /// Sends an emergency at once.
     pub(super) fn handle_stop(&mut self, now: Instant, order: StopOrder) {
-        let StopOrder { target, reply } = order;
+        let StopOrder {
+            target,
+            user,
+            reply,
+        } = order;
         let number = match target {
             StopTarget::OfPage(page) => self.pages.vehicle(page),
             StopTarget::Vehicle(number) => Some(number),
-            StopTarget::All => return self.stop_all(now, reply),
+            StopTarget::All => {
+                self.stop_all(now, reply);
+                return self.note_emergency_of_all(now, user, true);
+            }
         };
+        self.note_emergency(now, number, user, true);
         let vehicle = number.and_then(|number| self.fleet.get_mut(number));
         let vehicle = vehicle.filter(|it| it.has_managed());
         match (vehicle, reply) {

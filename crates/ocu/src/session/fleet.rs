@@ -66,6 +66,11 @@ impl Fleet {
         self.chosen.is_empty() || self.chosen.contains(&number)
     }
 
+    /// The numbers of all vehicles.
+    pub(super) fn numbers(&self) -> impl Iterator<Item = u16> {
+        self.vehicles.keys().copied()
+    }
+
     pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Vehicle> {
         self.vehicles.values_mut()
     }

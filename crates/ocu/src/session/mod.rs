@@ -13,6 +13,7 @@ mod hold;
 mod lease;
 mod maps;
 mod mission;
+mod observations;
 mod vehicle;
 
 use std::time::{Duration, Instant};
@@ -24,6 +25,7 @@ use self::client::{Client, Finished};
 use self::fleet::Fleet;
 use self::following::Sighting;
 use super::answer::Said;
+use super::events::EventLog;
 use super::handover::{self, Notice};
 use super::orders::{Access, Order, Publisher, Snapshot, StopOrder, json};
 use super::pages::Pages;
@@ -45,6 +47,7 @@ pub(super) struct Session {
     all_stopped: bool,
     /// Stops come before everything else.
     stops: mpsc::Receiver<StopOrder>,
+    events: EventLog,
     orders: mpsc::Receiver<Order>,
     sightings: mpsc::Receiver<Sighting>,
     notices: mpsc::Receiver<Notice>,
@@ -61,6 +64,8 @@ impl Session {
     const BEAT: Duration = Duration::from_millis(50);
     /// Number of periods between two snapshots of the pages' vehicles.
     const SNAPSHOT: u64 = 2;
+    /// Number of periods between two observations for the log of events.
+    const OBSERVATION: u64 = 4;
     /// Number of periods between two snapshots of the list of vehicles, and of the tree, and between
     /// two measurements of round trips.
     const FLEET_SNAPSHOT: u64 = 20;
@@ -84,6 +89,7 @@ impl Session {
             clocks: PeerClocks::default(),
             all_stopped: false,
             stops,
+            events: EventLog::default(),
             orders: inbox,
             sightings,
             notices,
@@ -202,6 +208,9 @@ impl Session {
         }
         self.show();
         self.seq += 1;
+        if self.seq.is_multiple_of(Self::OBSERVATION) {
+            self.observe(now);
+        }
         if self.seq.is_multiple_of(Self::SNAPSHOT) {
             self.pages.publish(|vehicle| self.snapshot(now, vehicle));
         }
@@ -262,6 +271,7 @@ impl Session {
             drive: vehicle.map(|it| it.manual.state()).unwrap_or_default(),
             mission: vehicle.and_then(|it| it.mission_state(now)),
             map: vehicle.and_then(|it| it.picture.map_state()),
+            events: self.events.latest(),
         }
     }
 }

@@ -19,4 +19,5 @@ mod hostile;
 mod looking;
 mod missing;
 mod stop;
+mod truth;
 mod users;
