@@ -1,13 +1,14 @@
 // The list of vehicles: which there are, how they are, who controls them, and which one is selected.
 // Rows are kept and changed in place, so that focus stays where it is.
 
-import { duration, get, list, make, mark, number, plain, say, show, words } from "./dom.js";
+import { duration, figure, get, list, make, mark, number, plain, say, show, words } from "./dom.js";
 
 const MOST = 256;
 
 export class Fleet {
   #select;
   #vehicles = [];
+  #allStopped = false;
   #rows = new Map();
 
   /** Calls `select` with the number of a vehicle that the operator chooses. */
@@ -21,8 +22,14 @@ export class Fleet {
     return this.#vehicles;
   }
 
+  /** Whether *Stop all* is latched: the station stops vehicles that join. */
+  get allStopped() {
+    return this.#allStopped;
+  }
+
   /** Takes a list of vehicles. */
-  handle({ vehicles }) {
+  handle({ vehicles, all_stopped: allStopped }) {
+    this.#allStopped = allStopped === true;
     this.#vehicles = list(vehicles, MOST).filter((one) => number(one?.subsystem) !== null);
   }
 
@@ -95,14 +102,19 @@ export class Fleet {
 }
 
 /** The vehicle's state in words; while it is on a mission, the mission's. */
-function condition({ presence, state, mission }) {
+export function condition({ presence, state, mission, at_rest: rest, speed, runaway }) {
   if (presence === "unknown") return "Not found yet";
   if (presence !== "present") return words(presence);
-  if (state === "ready" && mission) return words(mission);
-  return words(state ?? "unknown");
+  if (runaway === true) return "RUNAWAY";
+  if (state === "emergency" && rest === false) return `Emergency, ${pace(speed) || "moving"}`;
+  const mode = state === "ready" && mission ? words(mission) : words(state ?? "unknown");
+  return rest === false && pace(speed) ? `${mode}, ${pace(speed)}` : mode;
 }
 
-function controller({ held, driver, requested, controller: id, authority }, page) {
+const pace = (speed) => (number(speed) !== null && Math.abs(speed) >= 0.05 ? `${figure(Math.abs(speed), 1)} m/s` : "");
+
+/** Who drives or controls the vehicle, in words. */
+export function controller({ held, driver, requested, controller: id, authority }, page) {
   if (requested) return "another operator requests control";
   if (driver?.endsWith(`(page ${page})`)) return "you control it";
   if (driver) return `${plain(driver, 48)} controls it`;
