@@ -9,6 +9,8 @@
 mod answer;
 mod base_map;
 mod events;
+#[expect(clippy::disallowed_methods, reason = "the subscriptions' delays")]
+mod following;
 mod georeference;
 mod handover;
 mod map_overlay;

@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use tokio::sync::mpsc;
 
-use super::following::Sighting;
 use super::vehicle::Vehicle;
+use crate::following::Sighting;
 use crate::picture::{Depth, PRESENT};
 use crate::role;
 use crate::state;

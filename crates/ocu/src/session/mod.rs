@@ -8,7 +8,6 @@ mod control;
 mod driving;
 mod emergency;
 mod fleet;
-mod following;
 mod hold;
 mod lease;
 mod maps;
@@ -23,9 +22,9 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use self::client::{Client, Finished};
 use self::fleet::Fleet;
-use self::following::Sighting;
 use super::answer::Said;
 use super::events::EventLog;
+use super::following::Sighting;
 use super::handover::{self, Notice};
 use super::orders::{Access, Order, Publisher, Snapshot, StopOrder, json};
 use super::pages::Pages;

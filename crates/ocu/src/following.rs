@@ -1,4 +1,4 @@
-//! The session's subscriptions to the reports of a vehicle's parts, renewed for as long as the part
+//! The station's subscriptions to the reports of a vehicle's parts, renewed for as long as the part
 //! exists: all of the selected vehicle, and the few of the others that the list of vehicles shows.
 
 use std::collections::BTreeMap;
