@@ -9,14 +9,17 @@ use std::time::{Duration, Instant};
 
 pub(super) use self::part::{Depth, Part};
 use super::georeference::Georeference;
+use super::map_overlay::MapOverlay;
 use super::missing::{Absence, GonePart, GoneParts};
 use super::report::{Mission, MissionStage, Report};
 use super::role::Role;
 use super::sample_clock::SampleClock;
 use super::state::{self, age};
+use super::stop_monitor::StopMonitor;
 use jaus::address::JausId;
 use jaus::service::{ComponentEntry, Directory, State};
 use jaus_vehicle::messages::handoff::enhanced_access_control;
+use jaus_vehicle::motion;
 
 /// The known state of a vehicle.
 #[derive(Debug)]
@@ -40,6 +43,8 @@ pub(super) struct Picture {
     path: Vec<[f64; 2]>,
     maps: Vec<state::Map>,
     store: Option<JausId>,
+    stop_monitor: StopMonitor,
+    overlay: MapOverlay,
 }
 
 /// A reported value with its reporter and sample time. The time comes from the report's time stamp,
@@ -78,6 +83,8 @@ impl Picture {
             path: Vec::new(),
             maps: Vec::new(),
             store: None,
+            stop_monitor: StopMonitor::default(),
+            overlay: MapOverlay::default(),
         }
     }
 
@@ -104,6 +111,8 @@ impl Picture {
         (self.pose, self.velocity, self.mission) = (None, None, None);
         (self.path, self.maps, self.store) = (Vec::new(), Vec::new(), None);
         self.georeference = Georeference::default();
+        self.stop_monitor = StopMonitor::default();
+        self.overlay.forget();
     }
 
     pub(super) const fn parts(&self) -> &BTreeMap<JausId, Part> {
@@ -210,8 +219,11 @@ impl Picture {
                 self.pose = Some(Sample { what, by, at });
             }
             Report::GlobalPose(fix) => {
-                let fresh = |it: &&Sample<_>| now.saturating_duration_since(it.at) < Self::PAIR;
-                let local = self.pose.as_ref().filter(fresh).map(|it| &it.what);
+                let local = self
+                    .pose
+                    .as_ref()
+                    .filter(|it| is_within(now, it, Self::PAIR));
+                let local = local.map(|it| &it.what);
                 self.georeference.handle_fix(now, fix, local);
             }
             Report::Velocity(what, sampled) => {
@@ -220,6 +232,8 @@ impl Picture {
                 let source = self.velocity.map(|known| known.by);
                 if what.x.is_some() || source.is_none_or(|source| source == by) {
                     self.velocity = Some(Sample { what, by, at });
+                    let emergency = self.in_emergency().next().is_some();
+                    self.stop_monitor.handle_velocity(now, &what, emergency);
                 }
             }
             Report::Mission(what) => self.handle_mission(now, by, what),
@@ -227,6 +241,12 @@ impl Picture {
             Report::Maps(maps) => {
                 self.maps = maps;
                 self.store = Some(by);
+            }
+            Report::Zones(zones) => self.overlay.handle_zones(zones),
+            Report::Scan(scan) => {
+                let pose = self.pose.filter(|it| is_within(now, it, Self::PAIR));
+                let pose = pose.and_then(|it| located(&it.what));
+                self.overlay.handle_scan(now, pose, scan.as_ref());
             }
             Report::Subscription { .. } => {}
         }
@@ -385,6 +405,63 @@ impl Picture {
         stopped.map(|(id, _)| *id)
     }
 
+    /// The velocity, if its sample is fresh enough to tell whether the vehicle is at rest.
+    fn fresh_velocity(&self, now: Instant) -> Option<state::Velocity> {
+        let limit = self.depth.velocity_counts();
+        let fresh = self.velocity.filter(|it| is_within(now, it, limit));
+        fresh.map(|it| it.what)
+    }
+
+    /// Whether the vehicle is at rest by its measured velocity; `None` if that is unknown.
+    pub(super) fn at_rest(&self, now: Instant) -> Option<bool> {
+        StopMonitor::at_rest(&self.fresh_velocity(now)?)
+    }
+
+    /// Whether the vehicle moves in an emergency and does not slow down.
+    pub(super) fn is_runaway(&self, now: Instant) -> bool {
+        self.stop_monitor.is_runaway() && self.fresh_velocity(now).is_some()
+    }
+
+    /// Why a driver holds the vehicle. Of several drivers the one nearest to the motors counts: the
+    /// others wait for it.
+    pub(super) fn hold_reason(&self, now: Instant) -> Option<state::HoldReason> {
+        if self.in_emergency().next().is_some() {
+            return None;
+        }
+        let holding = self
+            .parts
+            .iter()
+            .filter_map(|(id, part)| Some((part.role, id, part.hold_reason(now)?)));
+        let (role, id, reason) = holding.min_by_key(|(role, ..)| *role)?;
+        Some(state::HoldReason {
+            role: role.name(),
+            id: id.to_string(),
+            reason: reason.to_owned(),
+        })
+    }
+
+    /// The components in Failure, each with a description.
+    pub(super) fn faults(&self) -> impl Iterator<Item = (JausId, String)> {
+        let failed = self
+            .parts
+            .iter()
+            .filter(|(_, part)| part.is(State::Failure));
+        failed.map(|(id, part)| {
+            let reason = part.stage.as_ref().map_or("", |it| &*it.reason);
+            let reason = if reason.is_empty() {
+                String::new()
+            } else {
+                format!(": {reason}")
+            };
+            (*id, format!("{} {id} reports a failure{reason}", part.name))
+        })
+    }
+
+    /// The overlay of the map for a page that has the zones of a revision.
+    pub(super) fn overlay_state(&self, known_zones: u32) -> state::Overlay {
+        self.overlay.state(known_zones)
+    }
+
     /// Snapshot of the vehicle. `obstacle` returns why a part is not under control.
     pub(super) fn vehicle_state(
         &self,
@@ -418,15 +495,19 @@ impl Picture {
             missing: self.missing_state(now),
             stale: self.stale(now),
             emergency: if emergency_wanted { all } else { any },
+            at_rest: self.at_rest(now),
+            runaway: self.is_runaway(now),
+            held: self.hold_reason(now),
+            overlay: self.overlay.revision(now),
         })
     }
 
-    /// The vehicle in the list of vehicles. The flags state whether the station has selected it,
-    /// controls it, and is requested to hand it over.
+    /// The vehicle in the list of vehicles, with the operator of this station who has it. The flags
+    /// state whether the station controls it, and is requested to hand it over.
     pub(super) fn fleet_state(
         &self,
         now: Instant,
-        selected: bool,
+        driver: String,
         (held, requested): (bool, bool),
     ) -> state::FleetVehicle {
         let principal = self.principal().and_then(|id| self.parts.get(&id));
@@ -445,9 +526,12 @@ impl Picture {
         state::FleetVehicle {
             subsystem: self.vehicle,
             name: self.name.clone(),
-            selected,
+            driver,
             presence,
             state: status.map(|known| state_name(known.what)),
+            speed: self.fresh_velocity(now).and_then(|it| it.x),
+            at_rest: self.at_rest(now),
+            runaway: self.is_runaway(now),
             controller: holder.map(|(id, _)| id.to_string()),
             authority: holder.map(|(_, authority)| authority),
             held,
@@ -530,6 +614,19 @@ impl Picture {
 
 /// Condition of a component without a known state.
 pub(super) const PRESENT: &str = "present";
+
+fn is_within<T>(now: Instant, sample: &Sample<T>, limit: Duration) -> bool {
+    now.saturating_duration_since(sample.at) < limit
+}
+
+/// The pose for calculations; `None` if a coordinate is unknown.
+fn located(pose: &state::Pose) -> Option<motion::Pose> {
+    let (x, y) = pose.x.zip(pose.y)?;
+    Some(motion::Pose {
+        yaw: pose.yaw?,
+        ..motion::Pose::at(x, y)
+    })
+}
 
 fn state_name(code: u8) -> &'static str {
     State::from_code(code).map_or("unknown", State::name)

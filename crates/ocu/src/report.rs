@@ -5,11 +5,16 @@ use super::sample_clock::Sampled;
 use super::state;
 use jaus::address::JausId;
 use jaus::messages::core::{ReportControl, ReportStatus};
-use jaus::messages::mobility::{ReportGlobalPose, ReportLocalPose, ReportVelocityState};
-use jaus_vehicle::ground::StageState;
+use jaus::messages::mobility::{
+    ReportGlobalPose, ReportLocalOperatingZone, ReportLocalPose, ReportVelocityState,
+};
+use jaus_vehicle::ground::{StageState, reported_scan, reported_zones};
+use jaus_vehicle::messages::environment_sensing::ReportRangeSensorData;
 use jaus_vehicle::messages::ground::{
     ReportMission, ReportPlannedPath, ReportRasterMaps, ReportStage,
 };
+use jaus_vehicle::sensing::Scan;
+use jaus_vehicle::zones::Zones;
 
 /// A report of a part.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +31,10 @@ pub(super) enum Report {
     Mission(Mission),
     Path(Vec<[f64; 2]>),
     Maps(Vec<state::Map>),
+    /// The operating zones, or why they are unusable.
+    Zones(Result<Zones, String>),
+    /// What the range sensor sees; `None` if it does not measure.
+    Scan(Option<Scan>),
     /// A subscription has lost or regained its reports.
     Subscription {
         is_up: bool,
@@ -100,6 +109,11 @@ impl MissionStage {
 }
 
 impl Mission {
+    /// Why it is blocked or has ended; empty otherwise.
+    pub(super) fn reason(&self) -> &str {
+        &self.reason
+    }
+
     /// Snapshot for pages, without the path.
     pub(super) fn state(&self) -> state::Mission {
         state::Mission {
@@ -182,6 +196,18 @@ impl From<ReportMission> for Report {
             remaining: f64::from(report.remaining),
             reason: report.reason.to_string(),
         })
+    }
+}
+
+impl From<ReportLocalOperatingZone> for Report {
+    fn from(report: ReportLocalOperatingZone) -> Self {
+        Self::Zones(reported_zones(&report))
+    }
+}
+
+impl From<ReportRangeSensorData> for Report {
+    fn from(report: ReportRangeSensorData) -> Self {
+        Self::Scan(reported_scan(&report).map(|(_, scan)| scan))
     }
 }
 

@@ -4,6 +4,7 @@
 // again before everything has been let go.
 
 import { get, mark, plain, say, toast } from "./dom.js";
+import { DriveEnd } from "./drive_end.js";
 import { Gamepads } from "./gamepad.js";
 
 const PERIOD = 100;
@@ -31,6 +32,9 @@ export class Drive {
   #confirmed = null;
   /** Why the station ended driving although nothing was let go. */
   #halt = "";
+  #end = new DriveEnd();
+  /** Why a driver of the vehicle holds it; empty if none does. */
+  #holdReason = "";
 
   constructor(link, emergency) {
     this.#link = link;
@@ -50,9 +54,10 @@ export class Drive {
   update(state, obstacle) {
     this.#obstacle = obstacle;
     this.#confirmed = state?.drive ?? null;
-    const halt = plain(state?.drive?.reason, 200);
-    if (halt && halt !== this.#halt) toast("bad", `Driving ended: ${halt}`);
-    this.#halt = halt;
+    const ended = this.#end.update(state);
+    if (ended) toast("bad", `Driving ended: ${ended}`);
+    this.#halt = plain(state?.drive?.reason, 200);
+    this.#holdReason = plain(state?.vehicle?.held?.reason, 200);
     mark(get("stick"), "aria-disabled", String(Boolean(obstacle)));
     if (obstacle && this.#timer) this.release();
     if (!this.#timer) this.#render([0, 0], null);
@@ -107,7 +112,7 @@ export class Drive {
     if (this.#timer) {
       clearInterval(this.#timer);
       this.#timer = 0;
-      this.#link.send({ type: "drive_end" });
+      this.#link.release();
     }
     this.#render([0, 0], null);
   }
@@ -115,7 +120,7 @@ export class Drive {
   #tick() {
     const [direction, source] = this.#direction();
     const [forward, turn] = direction.map((value) => Math.round(value * this.#limit * 1000) / 1000);
-    if (!this.#link.send({ type: "drive", forward, turn })) {
+    if (!this.#link.setpoint({ forward, turn })) {
       this.release();
       return;
     }
@@ -188,9 +193,11 @@ export class Drive {
     mark(tag, "data-on", source ? "yes" : null);
     mark(get("stick"), "data-on", source ? "yes" : null);
     say(get("drive-line"), this.#line(source));
+    mark(get("drive-line"), "data-held", source && this.#holdReason ? "yes" : null);
   }
 
   #line(source) {
+    if (source && this.#holdReason) return `Held: ${this.#holdReason}`;
     if (source) return this.#confirmed?.active ? "Driving: commands are being sent" : "Sending";
     if (this.#obstacle) return this.#obstacle;
     return this.#halt ? `Stopped: ${this.#halt}` : "Ready: nothing is sent until you hold something";

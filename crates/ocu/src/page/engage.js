@@ -1,5 +1,5 @@
-// From arrival to driving by hand with one button: takes control, makes the vehicle ready, and then
-// leaves it to the stick and the keys.
+// From arrival to driving by hand with one button: takes control, also from a mission, makes the
+// vehicle ready, and then leaves it to the stick and the keys.
 
 import { get, mark, plain, say, show, toast } from "./dom.js";
 import { part } from "./status.js";
@@ -13,6 +13,7 @@ export class Engage {
   /** When control or Resume was asked for last; null while the button is not at work. */
   #asked = null;
   #resumed = false;
+  #tookOver = false;
 
   /** Sends requests by `ask`, and calls `ready` when the vehicle can be driven. */
   constructor(ask, ready) {
@@ -23,19 +24,19 @@ export class Engage {
 
   /** Takes a state; `obstacle` says what prevents driving even after control and Resume, or is empty. */
   update(state, operable, obstacle) {
-    const { held, wanted, asking } = state?.control ?? {};
+    const { held, wanted, asking, planner_drives: planned } = state?.control ?? {};
     const mode = part(state, "primitive_driver")?.state;
-    if (this.#asked !== null) this.#go(Boolean(held || wanted || asking), held, mode, operable, obstacle);
-    const done = held && mode === "ready";
+    if (this.#asked !== null) this.#go(Boolean(held || wanted || asking), held, planned ? "planned" : mode, operable, obstacle);
+    const done = held && mode === "ready" && !planned;
     const button = get("by-hand");
-    show(button, operable && Boolean(mode) && !obstacle && !done && document.body.dataset.mission !== "under-way");
+    show(button, operable && Boolean(mode) && !obstacle && !done && (planned || document.body.dataset.mission !== "under-way"));
     button.disabled = this.#asked !== null;
-    say(button, this.#asked === null ? "Drive by hand" : asking ? "Requesting control" : "Taking control");
+    say(button, this.#asked === null ? (planned ? "Take over" : "Drive by hand") : asking ? "Requesting control" : "Taking control");
     mark(button, "aria-busy", this.#asked === null ? null : "true");
   }
 
   #begin() {
-    [this.#asked, this.#resumed] = [performance.now(), false];
+    [this.#asked, this.#resumed, this.#tookOver] = [performance.now(), false, false];
     this.#request({ type: "control", on: true });
   }
 
@@ -44,7 +45,11 @@ export class Engage {
     if (!operable || obstacle) return this.#end(obstacle);
     if (!isOurs) return performance.now() - this.#asked > GRACE ? this.#end("Control was not granted") : undefined;
     if (!held) return;
-    if (mode === "ready") {
+    if (mode === "planned") {
+      if (this.#tookOver) return;
+      this.#tookOver = true;
+      this.#request({ type: "take_over" });
+    } else if (mode === "ready") {
       this.#end("");
       this.#ready();
     } else if (mode === "standby" && !this.#resumed) {

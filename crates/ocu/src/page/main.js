@@ -6,6 +6,7 @@ import { get, mark, plain, say, show, toast, typing } from "./dom.js";
 import { Drive } from "./drive.js";
 import { Emergency } from "./emergency.js";
 import { Engage } from "./engage.js";
+import { Events } from "./events.js";
 import { Fleet } from "./fleet.js";
 import { keepFocus } from "./focus.js";
 import { Handover } from "./handover.js";
@@ -13,7 +14,8 @@ import { Link } from "./link.js";
 import { MapView } from "./map.js";
 import { Messages } from "./messages.js";
 import { Mission } from "./mission.js";
-import { part, showControl, showLink, showMissing, showStatus } from "./status.js";
+import { Sound } from "./sound.js";
+import { part, showControl, showHeld, showLink, showMissing, showStatus } from "./status.js";
 import { followTheme } from "./theme.js";
 import { showSystem, showTree } from "./tree.js";
 
@@ -26,6 +28,8 @@ const drive = new Drive(link, () => emergency.stop());
 const fleet = new Fleet((subsystem) => selectVehicle(subsystem));
 const engage = new Engage(ask, () => readyToDrive());
 const handover = new Handover(ask);
+const events = new Events();
+const sound = new Sound();
 new Messages(link);
 followTheme(() => map.recolour());
 
@@ -41,6 +45,8 @@ let authority = null;
 link.addEventListener("hello", async ({ detail }) => {
   trusted = account.users ? account.operates : !detail.token_needed;
   map.offerBaseMap(detail.base_map);
+  map.reconnect();
+  events.reset();
   authority = detail.authority;
   if (detail.token_needed && !trusted && link.token) await offer(link.token);
   else show(get("token-sheet"), detail.token_needed && !trusted && !watching());
@@ -73,8 +79,9 @@ function render() {
   const operable = live && trusted && Boolean(state?.vehicle);
   const barred = account.missing || (link.open && link.settled && !trusted);
   const hint = account.users ? account.hindrance : "enter the token to use it";
-  emergency.update(state, fleet.vehicles, barred ? hint : "");
-  fleet.update(state, live && trusted);
+  emergency.update(state, live, fleet, barred ? hint : "");
+  sound.update(state, live, fleet.vehicles);
+  fleet.update(state, live, link.page);
   const hindrance = hindered(live);
   drive.update(state, hindrance || uncontrolled());
   const mode = part(state, "primitive_driver")?.state;
@@ -85,14 +92,16 @@ function render() {
 }
 
 function renderState(live, operable, hindrance) {
-  showControl(state, authority, operable, account);
+  showControl(state, authority, operable, account, link.page);
   engage.update(state, operable, hindrance);
   handover.update(state, operable);
   showStatus(state, Number.isFinite(link.age) ? link.age : 0);
   showMissing(state, live);
+  showHeld(state, live);
   map.update(state, live, link.token);
   mission.update(state, operable);
   showSystem(state);
+  events.update(state, live, fleet.vehicles, link.token);
 }
 
 /** Why this page cannot drive now, even with control of a ready vehicle; empty if one can. */
@@ -109,8 +118,7 @@ function uncontrolled() {
   if (!state.control?.wanted) return "Press Drive by hand first";
   const driver = part(state, "primitive_driver");
   if (state.control.held && driver?.ours && driver.state === "standby") return "In standby: press Drive by hand first";
-  // While control is asked for, as when the operator takes over from the planner, what is held is
-  // sent already and acts as soon as the vehicle agrees.
+  if (state.control.planner_drives) return "A mission drives: take over first";
   return state.control.held ? "" : sentence(state.control.reason);
 }
 
@@ -205,7 +213,7 @@ get("control-text").addEventListener("click", () => {
 function select(view) {
   const { body } = document;
   body.dataset.view = view;
-  if (["vehicles", "system", "messages"].includes(view)) body.dataset.inspect = view;
+  if (["vehicles", "system", "events", "messages"].includes(view)) body.dataset.inspect = view;
   for (const button of document.querySelectorAll("[data-show]")) {
     mark(button, "aria-pressed", String(button.dataset.show === view));
     button.classList.toggle("inspected", button.dataset.show === body.dataset.inspect);

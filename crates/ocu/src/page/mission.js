@@ -19,6 +19,20 @@ const OVER = ["idle", "arrived", "failed", "stopped", "lost"];
 /** A planner reports its mission 4 times a second; an older report, in milliseconds, is marked as old. */
 const OLD = 2_000;
 
+/** Stages in which the vehicle drives or is about to. */
+const DRIVEN = ["path", "vector", "primitive", "driving"];
+
+/**
+ * Why the mission does not go on. The planner keeps the reason of an earlier attempt while the next one
+ * drives well; then only what holds the vehicle now counts.
+ */
+export function currentReason(stage, mission, vehicle) {
+  const reason = plain(mission.reason, 255);
+  if (!DRIVEN.includes(stage) || reason.startsWith("returns:")) return reason;
+  const held = plain(vehicle?.held?.reason, 255);
+  return held ? `held: ${held}` : "";
+}
+
 /** What became of a mission whose planner is lost, and what is left to the operator. */
 function lostPlanner({ id, how, told_to_stop: stopped }) {
   const loss = `The planner ${plain(id, 16)} ${how === "restarted" ? "restarted while it drove" : `is ${plain(how, 10)}`}`;
@@ -152,7 +166,7 @@ export class Mission {
     }[stage] ?? words(stage);
     const left = number(mission.remaining_m);
     const far = left !== null && !OVER.includes(stage) ? `, ${figure(left, 1)} m to go` : "";
-    const reason = this.#isCleared(stage, vehicle, mission.reason) ? "the emergency is cleared; plan again" : plain(mission.reason, 255);
+    const reason = this.#isCleared(stage, vehicle, mission.reason) ? "the emergency is cleared; plan again" : currentReason(stage, mission, vehicle);
     const age = number(mission.age_ms) ?? 0;
     const old = age > OLD ? ` (${duration(age)} old)` : "";
     say(line, `${what}${far}${reason ? `: ${reason}` : ""}${old}`);

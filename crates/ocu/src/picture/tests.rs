@@ -4,11 +4,11 @@ use super::*;
 use jaus::messages::core::{ReportStatus, management};
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::messages::mobility::{
-    ReportLocalPose, ReportVelocityState, local_pose_sensor, primitive_driver,
+    ReportLocalPose, ReportVelocityState, local_pose_sensor, local_vector_driver, primitive_driver,
     velocity_state_sensor,
 };
 use jaus::service::Offer;
-use jaus_vehicle::messages::ground::{ReportMission, mission_planner};
+use jaus_vehicle::messages::ground::{ReportMission, ReportStage, mission_planner, stage};
 
 const DRIVER: JausId = JausId::new(101, 2, 33);
 const SENSORS: JausId = JausId::new(101, 2, 40);
@@ -356,4 +356,98 @@ fn the_restart_of_a_planner_is_forgotten_once_the_operator_drives_on() {
     picture.forget_planner_restart();
     picture.handle_report(start, PLANNER, mission(0).into());
     assert_eq!(picture.lost_planner(start), None);
+}
+
+fn moving(speed: f64) -> ReportVelocityState {
+    let mut report = ReportVelocityState::default();
+    report.set_velocity_x_m_per_s(speed).unwrap();
+    report.set_yaw_rate_rad_per_s(0.0).unwrap();
+    report
+}
+
+fn shown(picture: &Picture, now: Instant) -> state::VehicleState {
+    // The directory, which decides whether there is a vehicle at all, is empty here.
+    picture.vehicle_state(now, false, |_| None).unwrap()
+}
+
+#[test]
+fn an_emergency_does_not_count_as_a_stop_before_the_speed_is_measured() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), sensors()]);
+    let emergency = ReportStatus {
+        status: (State::Emergency as u8).into(),
+        ..ReportStatus::default()
+    };
+    picture.handle_report(start, DRIVER, emergency.into());
+    let rest = |picture: &Picture, now| {
+        let shown = shown(picture, now);
+        assert!(shown.emergency);
+        shown.at_rest
+    };
+    assert_eq!(rest(&picture, start), None, "no velocity was reported");
+    picture.handle_report(start, SENSORS, moving(1.7).into());
+    assert_eq!(rest(&picture, start), Some(false));
+    picture.handle_report(start + ms(100), SENSORS, moving(0.0).into());
+    assert_eq!(rest(&picture, start + ms(1099)), Some(true));
+    assert_eq!(rest(&picture, start + ms(1100)), None, "the sample is old");
+    let unknown = ReportVelocityState::default();
+    picture.handle_report(start + ms(1100), SENSORS, unknown.into());
+    assert_eq!(rest(&picture, start + ms(1100)), None);
+}
+
+#[test]
+fn a_vehicle_that_keeps_moving_in_emergency_is_a_runaway_while_its_speed_is_known() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), sensors()]);
+    for tenth in 0..=12 {
+        let now = start + ms(100 * tenth);
+        let emergency = ReportStatus {
+            status: (State::Emergency as u8).into(),
+            ..ReportStatus::default()
+        };
+        assert!(!shown(&picture, now).runaway, "{tenth}");
+        if tenth < 11 {
+            picture.handle_report(now, DRIVER, emergency.into());
+            picture.handle_report(now, SENSORS, moving(0.6).into());
+        }
+        if tenth == 10 {
+            break;
+        }
+    }
+    assert!(shown(&picture, start + ms(1000)).runaway);
+    assert!(
+        picture
+            .fleet_state(start + ms(1000), true, (false, false))
+            .runaway
+    );
+    assert!(!shown(&picture, start + ms(2000)).runaway);
+}
+
+#[test]
+fn the_reason_of_the_driver_nearest_to_the_motors_says_why_the_vehicle_is_held() {
+    let start = Instant::now();
+    let vector = component(
+        JausId::new(101, 2, 35),
+        &[management::URN, local_vector_driver::URN, stage::URN],
+    );
+    let vector_id = vector.id;
+    let mut picture = picture(start, &[driver(), vector, sensors()]);
+    let report = |state: u8, reason: &str| ReportStage {
+        state: state.into(),
+        reason: reason.into(),
+        ..ReportStage::default()
+    };
+    assert_eq!(shown(&picture, start).held, None);
+    let obstacle = "an obstacle is 0.4 m away: turn or drive back";
+    picture.handle_report(start, vector_id, report(3, obstacle).into());
+    let held = shown(&picture, start).held.unwrap();
+    assert_eq!((held.role, &*held.reason), ("vector_driver", obstacle));
+    let edge = "the edge of the operating zone is 0.2 m away: turn or drive back";
+    picture.handle_report(start, DRIVER, report(2, edge).into());
+    let held = shown(&picture, start).held.unwrap();
+    assert_eq!((held.role, &*held.reason), ("primitive_driver", edge));
+    assert_eq!(shown(&picture, start + ms(1500)).held, None, "it is old");
+    picture.handle_report(start, DRIVER, report(2, "").into());
+    picture.handle_report(start, vector_id, report(0, "stopped: released").into());
+    assert_eq!(shown(&picture, start).held, None, "nothing holds it");
 }

@@ -18,4 +18,6 @@ mod handover;
 mod hostile;
 mod looking;
 mod missing;
+mod stop;
+mod truth;
 mod users;

@@ -30,8 +30,7 @@ async fn a_driver_that_ends_is_named_and_nobody_drives_until_it_is_back() {
     assert_eq!(part["id"], "101.1.1");
     let why = &state["vehicle"]["stale"];
     assert_eq!(why, "the primitive driver 101.1.1 is gone");
-    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
-    page.ask(push).await.unwrap_err();
+    page.drive(0.5).await.unwrap_err();
 
     scene.start_rover().await;
     page.until(|state| missing(state).is_empty() && state["vehicle"]["stale"].is_null())
@@ -80,13 +79,11 @@ async fn a_pose_that_freezes_ends_manual_drive_although_it_is_still_reported() {
     let mut page = scene.driver().await;
     page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
     frozen.store(true, Ordering::Relaxed);
-    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
     let refused = within_limit(async {
         loop {
-            if let Err(refused) = page.ask(push.clone()).await {
+            if let Err(refused) = page.drive(0.5).await {
                 return refused;
             }
-            tokio::time::sleep(Duration::from_millis(100)).await;
         }
     })
     .await;
@@ -114,8 +111,7 @@ async fn a_pose_that_always_arrives_late_by_the_clock_of_its_sensor_is_too_old_t
     let state = page.until(|state| age(state) >= Some(2900)).await;
     assert!(age(&state) < Some(10_000), "{state}");
     scene.until(|scene| scene.speed() == 0.0).await;
-    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
-    let refused = page.ask(push).await.unwrap_err();
+    let refused = page.drive(0.5).await.unwrap_err();
     assert!(refused.contains("stale"), "{refused}");
 }
 
@@ -191,8 +187,7 @@ async fn a_planner_that_ends_while_it_drives_is_named_and_the_station_stops_the_
     };
     let state = page.until(stopped).await;
     assert_eq!(state["mission"]["lost"]["id"], "101.1.36");
-    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
-    let refused = page.ask(push).await.unwrap_err();
+    let refused = page.drive(0.5).await.unwrap_err();
     assert!(refused.contains("resume first"), "{refused}");
 }
 

@@ -14,6 +14,7 @@ mod keyboard;
 mod pictures;
 mod steps;
 mod system;
+mod truth;
 #[cfg(feature = "https")]
 mod users;
 mod watching;
@@ -126,6 +127,11 @@ fn without_a_global_pose_the_page_says_why_there_is_no_geographic_map() {
 #[test]
 fn a_mission_is_planned_driven_and_stopped_by_keyboard_alone() {
     on_system(keyboard::run);
+}
+
+#[test]
+fn the_page_says_why_a_vehicle_is_held_and_that_it_has_stopped_only_when_it_has() {
+    on_system(truth::run);
 }
 
 #[test]
