@@ -97,6 +97,16 @@ export class Link extends EventTarget {
     return this.#transmit({ vehicle: this.#vehicle, ...request });
   }
 
+  /** Sends a setpoint of manual drive, each part from -1 to 1; false if it could not be sent at once. */
+  setpoint({ forward, turn }) {
+    return this.send({ type: "drive", forward, turn });
+  }
+
+  /** Ends manual drive. */
+  release() {
+    return this.send({ type: "drive_end" });
+  }
+
   /** Uses a token from now on; resolves like `ask`. */
   async useToken(token) {
     const reason = await this.ask({ type: "token", token });

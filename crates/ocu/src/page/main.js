@@ -24,7 +24,7 @@ const mission = new Mission(ask, map);
 const emergency = new Emergency(link, () => unbar());
 const drive = new Drive(link, () => emergency.stop());
 const fleet = new Fleet((subsystem) => selectVehicle(subsystem));
-const engage = new Engage(ask, () => readyToDrive());
+const engage = new Engage(ask, mission, () => readyToDrive());
 const handover = new Handover(ask);
 new Messages(link);
 followTheme(() => map.recolour());
@@ -76,6 +76,7 @@ function render() {
   emergency.update(state, fleet.vehicles, barred ? hint : "");
   fleet.update(state, live && trusted);
   const hindrance = hindered(live);
+  if (state) mission.update(state, operable);
   drive.update(state, hindrance || uncontrolled());
   const mode = part(state, "primitive_driver")?.state;
   get("resume").disabled = !operable || !state.control?.held || mode !== "standby";
@@ -91,7 +92,6 @@ function renderState(live, operable, hindrance) {
   showStatus(state, Number.isFinite(link.age) ? link.age : 0);
   showMissing(state, live);
   map.update(state, live, link.token);
-  mission.update(state, operable);
   showSystem(state);
 }
 
@@ -106,12 +106,11 @@ function hindered(live) {
 
 /** What is still missing for driving; empty if nothing is. */
 function uncontrolled() {
-  if (!state.control?.wanted) return "Press Drive by hand first";
+  if (!state.control?.wanted) return mission.drives ? "A mission drives: take control first" : "Press Drive by hand first";
+  if (mission.drives) return "A mission drives: press Take over first";
   const driver = part(state, "primitive_driver");
   if (state.control.held && driver?.ours && driver.state === "standby") return "In standby: press Drive by hand first";
-  // While control is asked for, as when the operator takes over from the planner, what is held is
-  // sent already and acts as soon as the vehicle agrees.
-  return state.control.held ? "" : sentence(state.control.reason);
+  return state.control.held ? "" : sentence(state.control.reason) || "Taking control";
 }
 
 const sentence = (text) => plain(text, 140).replace(/^./, (letter) => letter.toUpperCase());
@@ -139,10 +138,11 @@ get("control-button").addEventListener("click", () => {
 get("resume").addEventListener("click", () => ask({ type: "resume" }));
 get("standby").addEventListener("click", () => ask({ type: "standby" }));
 get("vehicle-button").addEventListener("click", () => showFleet());
+for (const id of ["estop", "estop-all"]) get(id).addEventListener("click", () => drive.end("emergency stop"));
 
 /** Selects a vehicle: the one before stops, unless it is on a mission. */
 async function selectVehicle(subsystem) {
-  drive.release();
+  drive.end("another vehicle was selected");
   mission.forget();
   await ask({ type: "select", subsystem });
 }
@@ -200,11 +200,13 @@ get("control-text").addEventListener("click", () => {
   if (!trusted && link.open && !account.users) openTokenSheet();
 });
 
-// Views of small screens, and keys.
+// Views, and keys. On a large screen mission and manual drive are both shown: the one that is touched or
+// has the focus is the view.
 
 function select(view) {
   const { body } = document;
   body.dataset.view = view;
+  drive.show(view === "drive");
   if (["vehicles", "system", "messages"].includes(view)) body.dataset.inspect = view;
   for (const button of document.querySelectorAll("[data-show]")) {
     mark(button, "aria-pressed", String(button.dataset.show === view));
@@ -214,10 +216,16 @@ function select(view) {
 for (const button of document.querySelectorAll("[data-show]")) {
   button.addEventListener("click", () => select(button.dataset.show));
 }
+for (const panel of document.querySelectorAll(".panel.operate")) {
+  for (const type of ["pointerdown", "focusin"]) {
+    panel.addEventListener(type, () => document.body.dataset.view !== panel.dataset.panel && select(panel.dataset.panel), true);
+  }
+}
 select("mission");
 
 addEventListener("keydown", (event) => {
-  if (emergency.key(event) || typing()) return;
+  if (emergency.key(event)) return drive.end("emergency stop");
+  if (typing()) return;
   if (event.code === "KeyV" && !event.ctrlKey && !event.metaKey && !event.altKey) {
     event.preventDefault();
     return showFleet();

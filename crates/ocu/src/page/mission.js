@@ -14,6 +14,8 @@ const STAGES = [
   ["driving", "Driving"],
   ["arrived", "Arrived"],
 ];
+/** The stages in which the planner has the drivers. */
+const DRIVEN = ["path", "vector", "primitive", "driving"];
 const OVER = ["idle", "arrived", "failed", "stopped", "lost"];
 
 /** A planner reports its mission 4 times a second; an older report, in milliseconds, is marked as old. */
@@ -79,6 +81,11 @@ export class Mission {
   /** Whether there is an approval that waits for the operator. */
   get waits() {
     return this.#mission?.stage === "awaiting_approval";
+  }
+
+  /** Whether a mission drives the vehicle, or begins to. */
+  get drives() {
+    return !this.#mission?.lost && DRIVEN.includes(this.#mission?.stage);
   }
 
   update(state, operable) {

@@ -18,4 +18,5 @@ mod handover;
 mod hostile;
 mod looking;
 mod missing;
+mod page;
 mod users;
