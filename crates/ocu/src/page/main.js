@@ -138,7 +138,15 @@ get("control-button").addEventListener("click", () => {
 get("resume").addEventListener("click", () => ask({ type: "resume" }));
 get("standby").addEventListener("click", () => ask({ type: "standby" }));
 get("vehicle-button").addEventListener("click", () => showFleet());
-for (const id of ["estop", "estop-all"]) get(id).addEventListener("click", () => drive.end("emergency stop"));
+for (const [id, stop] of [["estop", () => emergency.stop()], ["estop-all", () => emergency.stopAll()]]) {
+  get(id).addEventListener("click", () => drive.end("emergency stop"));
+  // While one finger holds the stick, browsers make no click of a second one.
+  get(id).addEventListener("pointerdown", ({ button }) => {
+    if (button > 0) return;
+    drive.end("emergency stop");
+    stop();
+  });
+}
 
 /** Selects a vehicle: the one before stops, unless it is on a mission. */
 async function selectVehicle(subsystem) {
