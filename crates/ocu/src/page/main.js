@@ -26,7 +26,7 @@ const mission = new Mission(ask, map);
 const emergency = new Emergency(link, () => unbar());
 const drive = new Drive(link, () => emergency.stop());
 const fleet = new Fleet((subsystem) => selectVehicle(subsystem));
-const engage = new Engage(ask, () => readyToDrive());
+const engage = new Engage(ask, mission, () => readyToDrive());
 const handover = new Handover(ask);
 const events = new Events();
 const sound = new Sound();
@@ -83,6 +83,7 @@ function render() {
   sound.update(state, live, fleet.vehicles);
   fleet.update(state, live, link.page);
   const hindrance = hindered(live);
+  if (state) mission.update(state, operable);
   drive.update(state, hindrance || uncontrolled());
   const mode = part(state, "primitive_driver")?.state;
   get("resume").disabled = !operable || !state.control?.held || mode !== "standby";
@@ -99,7 +100,6 @@ function renderState(live, operable, hindrance) {
   showMissing(state, live);
   showHeld(state, live);
   map.update(state, live, link.token);
-  mission.update(state, operable);
   showSystem(state);
   events.update(state, live, fleet.vehicles, link.token);
 }
@@ -115,11 +115,11 @@ function hindered(live) {
 
 /** What is still missing for driving; empty if nothing is. */
 function uncontrolled() {
-  if (!state.control?.wanted) return "Press Drive by hand first";
+  if (!state.control?.wanted) return mission.drives ? "A mission drives: take control first" : "Press Drive by hand first";
+  if (mission.drives) return "A mission drives: press Take over first";
   const driver = part(state, "primitive_driver");
   if (state.control.held && driver?.ours && driver.state === "standby") return "In standby: press Drive by hand first";
-  if (state.control.planner_drives) return "A mission drives: take over first";
-  return state.control.held ? "" : sentence(state.control.reason);
+  return state.control.held ? "" : sentence(state.control.reason) || "Taking control";
 }
 
 const sentence = (text) => plain(text, 140).replace(/^./, (letter) => letter.toUpperCase());
@@ -147,10 +147,19 @@ get("control-button").addEventListener("click", () => {
 get("resume").addEventListener("click", () => ask({ type: "resume" }));
 get("standby").addEventListener("click", () => ask({ type: "standby" }));
 get("vehicle-button").addEventListener("click", () => showFleet());
+for (const [id, stop] of [["estop", () => emergency.stop()], ["estop-all", () => emergency.stopAll()]]) {
+  get(id).addEventListener("click", () => drive.end("emergency stop"));
+  // While one finger holds the stick, browsers make no click of a second one.
+  get(id).addEventListener("pointerdown", ({ button }) => {
+    if (button > 0) return;
+    drive.end("emergency stop");
+    stop();
+  });
+}
 
 /** Selects a vehicle: the one before stops, unless it is on a mission. */
 async function selectVehicle(subsystem) {
-  drive.release();
+  drive.end("another vehicle was selected");
   mission.forget();
   await ask({ type: "select", subsystem });
 }
@@ -208,11 +217,13 @@ get("control-text").addEventListener("click", () => {
   if (!trusted && link.open && !account.users) openTokenSheet();
 });
 
-// Views of small screens, and keys.
+// Views, and keys. On a large screen mission and manual drive are both shown: the one that is touched or
+// has the focus is the view.
 
 function select(view) {
   const { body } = document;
   body.dataset.view = view;
+  drive.show(view === "drive");
   if (["vehicles", "system", "events", "messages"].includes(view)) body.dataset.inspect = view;
   for (const button of document.querySelectorAll("[data-show]")) {
     mark(button, "aria-pressed", String(button.dataset.show === view));
@@ -222,10 +233,16 @@ function select(view) {
 for (const button of document.querySelectorAll("[data-show]")) {
   button.addEventListener("click", () => select(button.dataset.show));
 }
+for (const panel of document.querySelectorAll(".panel.operate")) {
+  for (const type of ["pointerdown", "focusin"]) {
+    panel.addEventListener(type, () => document.body.dataset.view !== panel.dataset.panel && select(panel.dataset.panel), true);
+  }
+}
 select("mission");
 
 addEventListener("keydown", (event) => {
-  if (emergency.key(event) || typing()) return;
+  if (emergency.key(event)) return drive.end("emergency stop");
+  if (typing()) return;
   if (event.code === "KeyV" && !event.ctrlKey && !event.metaKey && !event.altKey) {
     event.preventDefault();
     return showFleet();

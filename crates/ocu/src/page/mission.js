@@ -14,13 +14,12 @@ const STAGES = [
   ["driving", "Driving"],
   ["arrived", "Arrived"],
 ];
+/** The stages in which the planner has the drivers. */
+const DRIVEN = ["path", "vector", "primitive", "driving"];
 const OVER = ["idle", "arrived", "failed", "stopped", "lost"];
 
 /** A planner reports its mission 4 times a second; an older report, in milliseconds, is marked as old. */
 const OLD = 2_000;
-
-/** Stages in which the vehicle drives or is about to. */
-const DRIVEN = ["path", "vector", "primitive", "driving"];
 
 /**
  * Why the mission does not go on. The planner keeps the reason of an earlier attempt while the next one
@@ -46,6 +45,8 @@ export class Mission {
   #map;
   #stages = new Map();
   #mission = null;
+  /** Whether this station has let the planner drive, and its mission is not over. */
+  #isOurs = false;
   #furthest = { mission: null, index: -1 };
   #operable = false;
   /** Whether the vehicle has reported an emergency since a mission was under way, or may have before this page looked. */
@@ -95,9 +96,15 @@ export class Mission {
     return this.#mission?.stage === "awaiting_approval";
   }
 
+  /** Whether a mission drives the vehicle, or begins to: the operator has to take over first. */
+  get drives() {
+    return this.#isOurs || (!this.#mission?.lost && DRIVEN.includes(this.#mission?.stage));
+  }
+
   update(state, operable) {
     const mission = state.mission && typeof state.mission === "object" ? state.mission : null;
     this.#mission = mission;
+    this.#isOurs = state.control?.planner_drives === true;
     this.#operable = operable;
     const lost = mission?.lost ?? null;
     const stage = lost ? "lost" : plain(mission?.stage ?? "idle", 30);
