@@ -60,7 +60,7 @@ pub(super) struct Mission {
 pub(super) struct MissionStage(u8);
 
 impl MissionStage {
-    const NAMES: [&str; 11] = [
+    const NAMES: [&str; 12] = [
         "idle",
         "map",
         "planning",
@@ -72,6 +72,7 @@ impl MissionStage {
         "arrived",
         "failed",
         "stopped",
+        "waiting",
     ];
 
     pub(super) fn name(self) -> &'static str {

@@ -118,6 +118,11 @@ pub enum OperatorRequest {
         /// The mission to approve.
         mission: u32,
     },
+    /// Continue a mission that a fault has stopped.
+    Continue {
+        /// The mission to continue.
+        mission: u32,
+    },
     /// Stop the mission.
     Stop,
 }
@@ -141,6 +146,7 @@ impl OperatorRequest {
             Self::DriveEnd => "end drive",
             Self::Destination { .. } => "plan mission",
             Self::Approve { .. } => "approve mission",
+            Self::Continue { .. } => "continue mission",
             Self::Stop => "stop mission",
         }
     }
@@ -159,7 +165,9 @@ impl OperatorRequest {
     pub(crate) fn details(&self) -> Option<String> {
         match self {
             Self::Destination { x, y, .. } => Some(format!("to x {x} m, y {y} m")),
-            Self::Approve { mission } => Some(format!("mission {mission}")),
+            Self::Approve { mission } | Self::Continue { mission } => {
+                Some(format!("mission {mission}"))
+            }
             Self::Handover { operator, .. } => Some(format!("requested by {operator}")),
             _ => None,
         }
@@ -222,6 +230,10 @@ mod tests {
             (
                 r#"{"type":"approve","mission":3}"#,
                 OperatorRequest::Approve { mission: 3 },
+            ),
+            (
+                r#"{"type":"continue","mission":3}"#,
+                OperatorRequest::Continue { mission: 3 },
             ),
             (r#"{"type":"stop"}"#, OperatorRequest::Stop),
         ];

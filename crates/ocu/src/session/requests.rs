@@ -17,7 +17,9 @@ use jaus::address::JausId;
 use jaus::component::Session as PartSession;
 use jaus::service::State;
 use jaus_vehicle::messages::ground::set_destination::Approved;
-use jaus_vehicle::messages::ground::{ApproveMission, SetDestination, StopMission};
+use jaus_vehicle::messages::ground::{
+    ApproveMission, ContinueMission, SetDestination, StopMission,
+};
 
 /// Success, or the reason for failure.
 type Outcome = Result<(), String>;
@@ -56,7 +58,7 @@ impl Session {
         let takes_over = match request {
             OperatorRequest::Control { on } => *on && !is_wanted,
             OperatorRequest::Drive { .. } => self.stick.driver().is_none_or(|it| it == page),
-            OperatorRequest::Approve { .. } => true,
+            OperatorRequest::Approve { .. } | OperatorRequest::Continue { .. } => true,
             _ => false,
         };
         if takes_over {
@@ -340,6 +342,7 @@ impl Vehicle {
     fn handle_request(&mut self, request: &OperatorRequest, client: &mut Client, reply: Reply) {
         match *request {
             OperatorRequest::Destination { x, y, speed } => self.go_to(x, y, speed, client, reply),
+            OperatorRequest::Continue { mission } => self.continue_mission(mission, client, reply),
             _ => self.stop_mission(client, reply),
         }
     }
@@ -475,6 +478,20 @@ impl Vehicle {
             return Err("the vehicle's pose is unknown".to_owned());
         }
         Ok(planner)
+    }
+
+    /// Lets the planner drive on after a fault. The drivers are released first, so that the planner
+    /// can control them.
+    fn continue_mission(&mut self, mission: u32, client: &mut Client, reply: Reply) {
+        let planner = match self.ready_planner() {
+            Ok(planner) => planner,
+            Err(why) => return reply(Err(why)),
+        };
+        let drivers = self.lease.want(Wanted::Planner, &self.picture);
+        client.tell(reply, async move {
+            release_all(drivers).await;
+            deliver(&planner, &ContinueMission { mission }).await
+        });
     }
 
     fn stop_mission(&self, client: &mut Client, reply: Reply) {
