@@ -169,7 +169,12 @@ impl Pilot {
     pub fn pursue(&mut self, goal: Goal) -> Ticket {
         self.tickets += 1;
         let ticket = Ticket(self.tickets);
-        self.jumps.forget();
+        let course = self.course.as_ref().filter(|course| !course.has_arrived);
+        if !course.is_some_and(|course| course.goal.needs_pose()) {
+            // A vehicle that does not drive by its pose may be put anywhere. A repeated goal must not
+            // hide a jump.
+            self.jumps.forget();
+        }
         let course = Course::new(goal, ticket, &self.motion().pose, &self.limits);
         self.course = Some(course);
         ticket
