@@ -190,7 +190,7 @@ impl Trial {
             Fault::Hung => Some(Plant::DEADLINE + Duration::from_millis(1)),
             Fault::Stopped | Fault::Dropped => Some(Duration::ZERO),
             Fault::MotorFailed => Some(Duration::from_millis(200)),
-            Fault::NanPose => Some(Duration::from_millis(200)),
+            Fault::NanPose | Fault::PoseJumps => Some(Duration::from_millis(200)),
             Fault::FrozenPose | Fault::DiskStall => Some(Duration::from_secs(1)),
             Fault::ReceiverSilent
             | Fault::ReceiverFrozen
@@ -245,6 +245,7 @@ impl Trial {
                 self.outlast(|plant| plant.fault = None);
             }
             Fault::NanPose => self.spoil_pose(Sensor::Unknown),
+            Fault::PoseJumps => self.spoil_pose(Sensor::Displaced),
             Fault::FrozenPose | Fault::DiskStall => self.spoil_pose(Sensor::Stalled),
             Fault::VehicleClock | Fault::ControllerClock => self.step_clock(),
             Fault::ReceiverSilent

@@ -69,7 +69,7 @@ pub(super) struct Mission {
 pub(super) struct MissionStage(u8);
 
 impl MissionStage {
-    const NAMES: [&str; 11] = [
+    const NAMES: [&str; 12] = [
         "idle",
         "map",
         "planning",
@@ -81,6 +81,7 @@ impl MissionStage {
         "arrived",
         "failed",
         "stopped",
+        "waiting",
     ];
 
     pub(super) fn name(self) -> &'static str {

@@ -132,6 +132,11 @@ pub enum OperatorRequest {
         /// The mission to approve.
         mission: u32,
     },
+    /// Continue a mission that a fault has stopped.
+    Continue {
+        /// The mission to continue.
+        mission: u32,
+    },
     /// Stop the mission.
     Stop,
 }
@@ -202,6 +207,7 @@ impl OperatorRequest {
             Self::TakeOver => "take over from mission",
             Self::Destination { .. } => "plan mission",
             Self::Approve { .. } => "approve mission",
+            Self::Continue { .. } => "continue mission",
             Self::Stop => "stop mission",
         }
     }
@@ -220,7 +226,9 @@ impl OperatorRequest {
     pub(crate) fn details(&self) -> Option<String> {
         match self {
             Self::Destination { x, y, .. } => Some(format!("to x {x} m, y {y} m")),
-            Self::Approve { mission } => Some(format!("mission {mission}")),
+            Self::Approve { mission } | Self::Continue { mission } => {
+                Some(format!("mission {mission}"))
+            }
             Self::Handover { operator, .. } => Some(format!("requested by {operator}")),
             _ => None,
         }
@@ -306,6 +314,10 @@ mod tests {
             (
                 r#"{"type":"approve","mission":3}"#,
                 OperatorRequest::Approve { mission: 3 },
+            ),
+            (
+                r#"{"type":"continue","mission":3}"#,
+                OperatorRequest::Continue { mission: 3 },
             ),
             (r#"{"type":"stop"}"#, OperatorRequest::Stop),
         ];

@@ -62,6 +62,7 @@ export class Mission {
     }
     get("stages").append(...this.#stages.values());
     get("approve").addEventListener("click", () => this.#ask({ type: "approve", mission: this.#mission?.mission }, "Mission approved"));
+    get("continue").addEventListener("click", () => this.#ask({ type: "continue", mission: this.#mission?.mission }, "Mission continued"));
     get("stop").addEventListener("click", () => this.#ask({ type: "stop" }, "Mission stopped"));
     const form = get("destination");
     form.addEventListener("submit", (event) => {
@@ -119,6 +120,9 @@ export class Mission {
     show(get("attempt"), attempts > 0 && !OVER.includes(stage));
     say(get("attempt"), `Attempt ${number(mission?.attempt) ?? 0} of ${attempts}`);
     get("approve").disabled = !operable || !this.waits || Boolean(state.vehicle?.stale);
+    show(get("approve"), stage !== "waiting");
+    show(get("continue"), stage === "waiting");
+    get("continue").disabled = !operable || Boolean(state.vehicle?.stale);
     get("stop").disabled = !operable || !mission || OVER.includes(stage);
     get("plan").disabled = !operable;
     document.body.dataset.mission = OVER.includes(stage) ? "over" : "under-way";
@@ -130,7 +134,7 @@ export class Mission {
     // A mission that ended does not say where: it was where it was seen last.
     if (index >= 0) this.#furthest.index = index;
     const reached = index >= 0 ? index : stage === "idle" ? -1 : this.#furthest.index;
-    const ended = { failed: "failed", stopped: "stopped", lost: "failed" }[stage];
+    const ended = { failed: "failed", stopped: "stopped", lost: "failed", waiting: "waiting" }[stage];
     STAGES.forEach(([key, name], position) => {
       let how = position < reached ? "done" : position > reached ? "ahead" : "active";
       if (position === reached && ended) how = ended;
@@ -170,6 +174,7 @@ export class Mission {
       arrived: "Arrived",
       failed: "Failed",
       stopped: "Stopped",
+      waiting: "Stopped for a fault, and waits for Continue",
     }[stage] ?? words(stage);
     const left = number(mission.remaining_m);
     const far = left !== null && !OVER.includes(stage) ? `, ${figure(left, 1)} m to go` : "";

@@ -242,6 +242,9 @@ impl Vehicle {
                 self.go_to((x, y), speed, client, reply)
             }
             OperatorRequest::Approve { mission } => self.approve(now, mission, client, reply),
+            OperatorRequest::Continue { mission } => {
+                self.continue_mission(now, mission, client, reply);
+            }
             OperatorRequest::Stop => self.stop_mission(client, reply),
             // These have ways of their own.
             OperatorRequest::Select { .. }

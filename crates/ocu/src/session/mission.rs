@@ -9,10 +9,13 @@ use super::lease::Wanted;
 use super::vehicle::Vehicle;
 use crate::orders::Reply;
 use crate::role::Role;
+use jaus::codec::Message;
 use jaus::component::Session;
 use jaus::service::State;
 use jaus_vehicle::messages::ground::set_destination::Approved;
-use jaus_vehicle::messages::ground::{ApproveMission, SetDestination, StopMission};
+use jaus_vehicle::messages::ground::{
+    ApproveMission, ContinueMission, SetDestination, StopMission,
+};
 
 impl Vehicle {
     /// Whether a planner that this station has let drive has not ended its mission.
@@ -80,18 +83,48 @@ impl Vehicle {
         client.tell(reply, async move { deliver(&planner, &destination).await });
     }
 
-    /// Lets the planner drive. The drivers are released first, so that the planner can control
-    /// them.
+    /// Lets the planner drive the path of a mission.
     pub(super) fn approve(&mut self, now: Instant, number: u32, client: &mut Client, reply: Reply) {
-        let planner = match self.may_approve(now, number) {
-            Ok(planner) => planner,
-            Err(why) => return reply(Err(why)),
-        };
+        match self.may_approve(now, number) {
+            Ok(planner) => {
+                let approval = ApproveMission { mission: number };
+                self.let_planner_drive(now, planner, approval, client, reply);
+            }
+            Err(why) => reply(Err(why)),
+        }
+    }
+
+    /// Lets the planner drive on after a fault.
+    pub(super) fn continue_mission(
+        &mut self,
+        now: Instant,
+        number: u32,
+        client: &mut Client,
+        reply: Reply,
+    ) {
+        match self.ready_planner() {
+            Ok(planner) => {
+                let command = ContinueMission { mission: number };
+                self.let_planner_drive(now, planner, command, client, reply);
+            }
+            Err(why) => reply(Err(why)),
+        }
+    }
+
+    /// Releases the drivers, so that the planner can control them, and then gives it a command.
+    fn let_planner_drive<M: Message + Send + Sync + 'static>(
+        &mut self,
+        now: Instant,
+        planner: Arc<Session>,
+        command: M,
+        client: &mut Client,
+        reply: Reply,
+    ) {
         self.manual.stop(now);
         let drivers = self.lease.want(Wanted::Planner, &self.picture);
         client.tell(reply, async move {
             release_all(drivers).await;
-            deliver(&planner, &ApproveMission { mission: number }).await
+            deliver(&planner, &command).await
         });
     }
 

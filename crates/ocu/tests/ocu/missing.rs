@@ -6,7 +6,9 @@ use std::time::{Duration, UNIX_EPOCH};
 
 use jaus::component::{Component, Handlers, Kind, Management, Time, TimeOfDay};
 use jaus_test_kit::waiting::within_limit;
-use jaus_vehicle::messages::ground::{QueryMission, ReportMission, mission_planner};
+use jaus_vehicle::messages::ground::{
+    ContinueMission, QueryMission, ReportMission, mission_planner,
+};
 use serde_json::{Value, json};
 
 use crate::scene::{Page, Scene, driver_of};
@@ -134,8 +136,9 @@ async fn a_page_that_falls_silent_while_it_drives_is_told_why_the_vehicle_stoppe
     assert_eq!(state["drive"]["reason"], "", "it was let go");
 }
 
-/// A planner with mission 7 in the given stage.
+/// A planner with mission 7 in the given stage, which drives when it is told to continue.
 pub(crate) fn planner(scene: &Scene, stage: Arc<AtomicU8>) -> Component {
+    let continued = Arc::clone(&stage);
     let mission = Handlers::new(mission_planner::LATEST).answer(move |_: QueryMission| {
         let stage = stage.load(Ordering::Relaxed).into();
         ReportMission {
@@ -144,6 +147,13 @@ pub(crate) fn planner(scene: &Scene, stage: Arc<AtomicU8>) -> Component {
             ..ReportMission::default()
         }
     });
+    let mission = mission
+        .command(move |command: ContinueMission, _, _| {
+            if command.mission == 7 {
+                continued.store(7, Ordering::Relaxed);
+            }
+        })
+        .on_stop(|_| {});
     scene.attach(
         36,
         Component::builder(Kind::Vehicle, "Rover")
@@ -211,5 +221,24 @@ async fn a_planner_that_restarts_while_it_drives_is_named_and_the_station_stops_
     // The operator drives on.
     page.ask(json!({"type": "resume"})).await.unwrap();
     page.until(|state| state["mission"]["lost"].is_null() && missing(state).is_empty())
+        .await;
+}
+
+#[tokio::test]
+async fn a_mission_that_a_fault_has_stopped_goes_on_when_the_operator_continues_it() {
+    let scene = Scene::new().await;
+    let stage = Arc::new(AtomicU8::new(11));
+    let _planner = planner(&scene, Arc::clone(&stage));
+    let mut page = scene.page().await;
+    page.until(|state| state["mission"]["stage"] == "waiting")
+        .await;
+    let go_on = json!({"type": "continue", "mission": 7});
+    page.ask(go_on.clone()).await.unwrap_err();
+    page.ask(json!({"type": "control", "on": true}))
+        .await
+        .unwrap();
+    page.ask(json!({"type": "resume"})).await.unwrap();
+    page.ask(go_on).await.unwrap();
+    page.until(|state| state["mission"]["stage"] == "driving" && driver_of(state)["ours"] == false)
         .await;
 }
