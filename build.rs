@@ -31,7 +31,9 @@ fn main() {
         .runtime("crate::codec")
         // Peers of mobility 1.0 know no other messages than those that 1.1 calls deprecated.
         .warn_of_deprecated(false)
-        .module("core", "urn:jaus:jss:core:");
+        .module("core", "urn:jaus:jss:core:")
+        // Our own part of it, which every component offers.
+        .module("core", "urn:jaus-rs:core:");
     for (feature, modules) in SETS {
         if std::env::var_os(format!("CARGO_FEATURE_{feature}")).is_some() {
             for (module, urn) in *modules {

@@ -76,6 +76,8 @@ pub enum StopCause {
     Expired(JausId),
     /// The client has shown no life.
     ControllerSilent(JausId),
+    /// The client has restarted: whoever commanded the motion is gone.
+    Restarted(JausId),
     /// Control was released, lost, or taken over.
     ControlChanged,
     /// The component is in standby, or restarts.
@@ -121,6 +123,7 @@ impl fmt::Display for StopCause {
         match self {
             Self::Expired(client) => write!(f, "{client} did not repeat its command in time"),
             Self::ControllerSilent(client) => write!(f, "{client} is silent"),
+            Self::Restarted(client) => write!(f, "{client} has restarted"),
             Self::ControlChanged => f.write_str("control was released, lost or taken over"),
             Self::Standby => f.write_str("the component is in standby"),
             Self::Requested => f.write_str("the application stopped it"),
@@ -480,6 +483,7 @@ mod tests {
                 "42.1.1 did not repeat its command in time",
             ),
             (StopCause::ControllerSilent(OWNER), "42.1.1 is silent"),
+            (StopCause::Restarted(OWNER), "42.1.1 has restarted"),
             (StopCause::Fault("no current".to_owned()), "no current"),
             (StopCause::PoseStale(late), "the pose is 2.5 s old"),
             (StopCause::Hung(late), "the component was delayed for 2.5 s"),

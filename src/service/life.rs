@@ -6,9 +6,14 @@
 //!
 //! | silent for | what happens |
 //! |---|---|
-//! | [`Life::MOVING`] | while motion depends on the peer: Query Heartbeat Pulse, four times a second |
-//! | [`Life::SILENCE`] | Query Heartbeat Pulse, once a second, with acknowledgement |
+//! | [`Life::MOVING`] | while motion depends on the peer: a probe, four times a second |
+//! | [`Life::SILENCE`] | a probe, once a second, with acknowledgement |
 //! | [`Life::DEATH`] | dead, if it has ever answered or acknowledged a probe; otherwise the timeout of control applies |
+//!
+//! A probe is Query Heartbeat Pulse, or Query Incarnation for a peer that offers [`Incarnation`].
+//! The client in control of a ready component is asked for its incarnation every
+//! [`Life::CHECK`] even if it is not silent: another number than before is a restart, however fast
+//! it was.
 //!
 //! Any message is a sign of life. A transport acknowledgement counts only for peers that have never
 //! answered a probe with a message, because a node also acknowledges for a component that hangs.
@@ -16,11 +21,13 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
 
-use super::Outbox;
+use bytes::Bytes;
+
 use super::discovery::Budget;
+use super::{Incarnation, Outbox, code_of};
 use crate::address::JausId;
 use crate::codec::Message;
-use crate::messages::core::{QueryHeartbeatPulse, ReportHeartbeatPulse};
+use crate::messages::core::{QueryHeartbeatPulse, ReportHeartbeatPulse, ReportIncarnation};
 use crate::wire::Priority;
 
 /// Why a peer is watched. The client in control is always probed, the others within a budget.
@@ -32,6 +39,8 @@ pub enum Rank {
     EmergencySetter,
     /// It is in control.
     Controller,
+    /// It is in control of a component that is ready to move.
+    ReadyController,
     /// It is in control, and motion continues only while it is alive.
     MovingController,
 }
@@ -45,10 +54,19 @@ pub struct Life {
     subscriber_probes: Budget,
     setter_probes: Budget,
     dead: VecDeque<JausId>,
+    own: Incarnation,
+    restarted: VecDeque<JausId>,
+    /// The latest peer to tell its incarnation before it was watched: a client does so just before
+    /// it requests control.
+    announced: Option<(Instant, JausId, Incarnation)>,
 }
 
 #[derive(Debug)]
 struct Peer {
+    /// Its incarnation, if it has told it.
+    incarnation: Option<Incarnation>,
+    /// When it was last asked for its incarnation.
+    asked: Option<Instant>,
     /// Time of the last sign of life.
     alive: Instant,
     /// Whether it has ever answered a probe with a message, and whether it acknowledges probes.
@@ -64,34 +82,59 @@ struct Peer {
 
 impl Default for Life {
     fn default() -> Self {
+        Self::new(Incarnation::random())
+    }
+}
+
+impl Life {
+    /// A component of this incarnation, which watches no peer yet.
+    #[must_use]
+    pub fn new(own: Incarnation) -> Self {
         Self {
             peers: BTreeMap::new(),
             due: BTreeSet::new(),
             subscriber_probes: Budget::new(Self::BURST, Self::REFILL),
             setter_probes: Budget::new(Self::BURST, Self::REFILL),
             dead: VecDeque::new(),
+            own,
+            restarted: VecDeque::new(),
+            announced: None,
         }
     }
-}
 
-impl Life {
     /// A peer that has been silent for this time is probed, and again at this interval.
     pub const SILENCE: Duration = Duration::from_secs(1);
     /// The same while motion depends on the peer.
     pub const MOVING: Duration = Duration::from_millis(250);
+    /// Interval of queries for the incarnation of a client in control of a ready component. One
+    /// lost answer must not delay the detection of a restart beyond 0.5 s.
+    pub const CHECK: Duration = Duration::from_millis(200);
     /// A peer that answers probes and has been silent for this time is dead.
     pub const DEATH: Duration = Duration::from_secs(4);
     /// Budget for probes to subscribers, and another for those to setters of emergencies: a burst
     /// of `BURST`, then one per `REFILL`. Their ids may be forged.
     const BURST: u32 = 32;
     const REFILL: Duration = Duration::from_millis(50);
+    /// An announcement counts for a peer that is watched within this time.
+    const ANNOUNCEMENT: Duration = Duration::from_secs(1);
+
+    /// The component's own incarnation.
+    #[must_use]
+    pub const fn own(&self) -> Incarnation {
+        self.own
+    }
 
     /// Watches a peer that has just sent a message. A peer that is already watched is checked no
     /// later than its rank demands.
     pub fn watch(&mut self, now: Instant, id: JausId, rank: Rank) {
+        let announced = self.announced.filter(|&(at, by, _)| {
+            by == id && now.saturating_duration_since(at) < Self::ANNOUNCEMENT
+        });
         let peer = self.peers.entry(id).or_insert_with(|| {
             self.due.insert((now + rank.patience(), id));
             Peer {
+                incarnation: announced.map(|(_, _, incarnation)| incarnation),
+                asked: None,
                 alive: now,
                 answers: false,
                 acknowledges: false,
@@ -100,20 +143,51 @@ impl Life {
                 look: now + rank.patience(),
             }
         });
-        let soon = peer.alive + rank.patience();
-        if soon < peer.look && peer.probes == 0 {
+        let check = peer.next_check(now, rank);
+        let probe = Some(peer.alive + rank.patience()).filter(|_| peer.probes == 0);
+        let soon = probe.into_iter().chain(check).min();
+        if let Some(soon) = soon.filter(|soon| *soon < peer.look) {
             self.due.remove(&(peer.look, id));
             peer.look = soon;
             self.due.insert((soon, id));
         }
     }
 
-    /// Notes a message with this code from a peer.
-    pub fn hear(&mut self, now: Instant, id: JausId, code: Option<u16>) {
-        if let Some(peer) = self.peers.get_mut(&id) {
-            peer.alive = now;
-            peer.probes = 0;
-            peer.answers |= code == Some(ReportHeartbeatPulse::CODE);
+    /// Notes a message from a peer.
+    pub fn hear(&mut self, now: Instant, id: JausId, payload: &Bytes) {
+        let told = Incarnation::told_in(payload);
+        let Some(peer) = self.peers.get_mut(&id) else {
+            if let Some(incarnation) = told {
+                self.announced = Some((now, id, incarnation));
+            }
+            return;
+        };
+        peer.alive = now;
+        peer.probes = 0;
+        peer.answers |= matches!(
+            code_of(payload),
+            Some(ReportHeartbeatPulse::CODE | ReportIncarnation::CODE)
+        );
+        if let Some(incarnation) = told
+            && peer
+                .incarnation
+                .replace(incarnation)
+                .is_some_and(|it| it != incarnation)
+        {
+            self.restarted.push_back(id);
+        }
+    }
+
+    /// Asks a watched peer that offers [`Incarnation`] for its incarnation, unless it has told it
+    /// already: a client of this library does so before it requests control.
+    pub fn introduce(&mut self, now: Instant, id: JausId, out: &mut Outbox) {
+        let Some(peer) = self.peers.get_mut(&id) else {
+            return;
+        };
+        let is_due = peer.asked.is_none_or(|asked| now >= asked + Self::CHECK);
+        if peer.incarnation.is_none() && is_due {
+            peer.asked = Some(now);
+            out.send_with(id, Priority::High, &self.own.query());
         }
     }
 
@@ -144,7 +218,7 @@ impl Life {
         peer.is_some_and(|peer| !peer.answers && !peer.acknowledges) && !self.is_alive(now, id)
     }
 
-    /// Probes silent peers. `rank` returns why a peer is still watched; `None` ends the watch.
+    /// Probes silent peers, and asks controllers for their incarnation. `rank` returns why a peer is still watched; `None` ends the watch.
     pub fn handle_timeout(
         &mut self,
         now: Instant,
@@ -165,14 +239,22 @@ impl Life {
                     let has_budget = match rank {
                         Rank::Subscriber => self.subscriber_probes.take(now),
                         Rank::EmergencySetter => self.setter_probes.take(now),
-                        Rank::Controller | Rank::MovingController => true,
+                        Rank::Controller | Rank::ReadyController | Rank::MovingController => true,
                     };
-                    if is_due && has_budget {
+                    if !is_due && peer.is_to_be_checked(now, rank) {
+                        peer.asked = Some(now);
+                        out.send_with(id, Priority::High, &self.own.query());
+                    } else if is_due && has_budget {
                         peer.is_known = true;
                         peer.probes = peer
                             .probes
                             .saturating_add(u32::from(silence >= rank.patience()));
-                        out.send_acknowledged(id, Priority::High, &QueryHeartbeatPulse {});
+                        if peer.incarnation.is_some() {
+                            peer.asked = Some(now);
+                            out.send_acknowledged(id, Priority::High, &self.own.query());
+                        } else {
+                            out.send_acknowledged(id, Priority::High, &QueryHeartbeatPulse {});
+                        }
                     }
                     peer.look = peer.next_look(now, rank);
                     self.due.insert((peer.look, id));
@@ -191,6 +273,11 @@ impl Life {
     pub fn poll_dead(&mut self) -> Option<JausId> {
         self.dead.pop_front()
     }
+
+    /// The next peer that is not the one that was watched: it has restarted since.
+    pub fn poll_restarted(&mut self) -> Option<JausId> {
+        self.restarted.pop_front()
+    }
 }
 
 impl Rank {
@@ -198,8 +285,15 @@ impl Rank {
     const fn patience(self) -> Duration {
         match self {
             Self::MovingController => Life::MOVING,
-            Self::Controller | Self::EmergencySetter | Self::Subscriber => Life::SILENCE,
+            Self::ReadyController | Self::Controller | Self::EmergencySetter | Self::Subscriber => {
+                Life::SILENCE
+            }
         }
+    }
+
+    /// Whether a restart of the peer must be noticed at once.
+    const fn is_checked(self) -> bool {
+        matches!(self, Self::ReadyController | Self::MovingController)
     }
 }
 
@@ -210,13 +304,26 @@ impl Peer {
         (self.answers || self.acknowledges) && self.probes >= 2
     }
 
-    /// The next probe, or the time of death if that is earlier.
+    /// When it is to be asked for its incarnation, although it may not be silent.
+    fn next_check(&self, now: Instant, rank: Rank) -> Option<Instant> {
+        self.incarnation.filter(|_| rank.is_checked())?;
+        Some(self.asked.map_or(now, |asked| asked + Life::CHECK))
+    }
+
+    fn is_to_be_checked(&self, now: Instant, rank: Rank) -> bool {
+        self.next_check(now, rank).is_some_and(|check| check <= now)
+    }
+
+    /// The next probe or check, or the time of death if that is earlier.
     fn next_look(&self, now: Instant, rank: Rank) -> Instant {
         let probe = if self.probes == 0 {
             (self.alive + rank.patience()).max(now + rank.patience() / 5)
         } else {
             now + rank.patience()
         };
+        let probe = self
+            .next_check(now, rank)
+            .map_or(probe, |check| probe.min(check));
         match self.alive + Life::DEATH {
             death if death > now => probe.min(death),
             _ => probe,
@@ -237,6 +344,11 @@ mod tests {
     const CLIENT: JausId = JausId::new(102, 1, 2);
     const STEP: Duration = Duration::from_millis(50);
 
+    /// The octets of a message without fields.
+    fn head(code: u16) -> Bytes {
+        Bytes::copy_from_slice(&code.to_le_bytes())
+    }
+
     /// What the client does; its node acknowledges in any case.
     #[derive(Clone, Copy, PartialEq)]
     enum Client {
@@ -256,14 +368,14 @@ mod tests {
             *now += STEP;
             life.watch(*now, CLIENT, Rank::MovingController);
             if client != Client::Suspended {
-                life.hear(*now, CLIENT, Some(QueryStatus::CODE));
+                life.hear(*now, CLIENT, &head(QueryStatus::CODE));
             }
             life.handle_timeout(*now, |_| Some(Rank::MovingController), &mut out);
             while out.pop().is_some() {
                 probes += 1;
                 life.acknowledged(*now, CLIENT);
                 if client == Client::Lively {
-                    life.hear(*now, CLIENT, Some(ReportHeartbeatPulse::CODE));
+                    life.hear(*now, CLIENT, &head(ReportHeartbeatPulse::CODE));
                 }
             }
         }
@@ -345,7 +457,7 @@ mod tests {
         for (heard, next) in [(900, 1900), (100, 1200)] {
             let (mut life, start) = (Life::default(), Instant::now());
             life.watch(start, CLIENT, Rank::Controller);
-            life.hear(start + millis(heard), CLIENT, None);
+            life.hear(start + millis(heard), CLIENT, &Bytes::new());
             let due = start + Life::SILENCE;
             assert_eq!(
                 probes(&mut life, due, Rank::Controller),
@@ -361,12 +473,12 @@ mod tests {
         type Sign = fn(&mut Life, Instant);
         let signs: [(Sign, bool); 3] = [
             (
-                |life, now| life.hear(now, CLIENT, Some(ReportHeartbeatPulse::CODE)),
+                |life, now| life.hear(now, CLIENT, &head(ReportHeartbeatPulse::CODE)),
                 true,
             ),
             (|life, now| life.acknowledged(now, CLIENT), true),
             (
-                |life, now| life.hear(now, CLIENT, Some(QueryStatus::CODE)),
+                |life, now| life.hear(now, CLIENT, &head(QueryStatus::CODE)),
                 false,
             ),
         ];
@@ -398,7 +510,7 @@ mod tests {
     fn a_component_that_was_itself_held_up_probes_twice_before_a_peer_dies() {
         let (mut life, start) = (Life::default(), Instant::now());
         life.watch(start, CLIENT, Rank::Controller);
-        life.hear(start, CLIENT, Some(ReportHeartbeatPulse::CODE));
+        life.hear(start, CLIENT, &head(ReportHeartbeatPulse::CODE));
         for (at, sent) in [(60, 1), (61, 1), (62, 0)] {
             let now = start + at * Life::SILENCE;
             assert_eq!(life.poll_dead(), None);

@@ -145,7 +145,7 @@ impl Rig {
     fn wake(&mut self) {
         if self.client_lives {
             self.life.watch(self.now, CLIENT, Rank::Controller);
-            self.life.hear(self.now, CLIENT, None);
+            self.life.hear(self.now, CLIENT, &bytes::Bytes::new());
         }
         for service in &mut self.services {
             let mut context =

@@ -16,9 +16,9 @@ use super::events::{CommandTrial, EventSettings, Events, Outcome, Refusal};
 use super::inquiries::Inquiries;
 use super::life::{Life, Rank};
 use super::{
-    Change, Context, ControlId, ControlNews, Directory, Discovery, Handled, Inquiry, NoAnswer,
-    NotPublished, Outbox, Publication, Service, SessionId, SessionState, Standing, StopCause,
-    SubscriptionId, SubscriptionNews, UnsafeService, code_of,
+    Change, Context, ControlId, ControlNews, Directory, Discovery, Handled, Incarnation, Inquiry,
+    NoAnswer, NotPublished, Outbox, Publication, Service, SessionId, SessionState, Standing,
+    StopCause, SubscriptionId, SubscriptionNews, UnsafeService, code_of,
 };
 use safeguard::Faults;
 
@@ -75,17 +75,19 @@ impl Stack {
     /// Room for events that is kept while there are none.
     const EVENTS_AT_REST: usize = 4;
 
-    /// A component with its discovery and its other services.
+    /// A component with its discovery and its other services, to which [`Incarnation`] is added.
     #[must_use]
-    pub fn new(discovery: Discovery, services: Vec<Box<dyn Service>>) -> Self {
+    pub fn new(discovery: Discovery, mut services: Vec<Box<dyn Service>>) -> Self {
         let out = Outbox::new(discovery.id());
+        let incarnation = Incarnation::random();
+        services.push(Box::new(incarnation));
         let stack = Self {
             discovery,
             services,
             subscribers: Events::new(EventSettings::default()),
             control: Control::default(),
             standing: Standing::default(),
-            life: Life::default(),
+            life: Life::new(incarnation),
             mute: None,
             faults: Faults::default(),
             called: None,
@@ -132,6 +134,12 @@ impl Stack {
     #[must_use]
     pub const fn id(&self) -> JausId {
         self.out.source()
+    }
+
+    /// The component's incarnation.
+    #[must_use]
+    pub const fn incarnation(&self) -> Incarnation {
+        self.life.own()
     }
 
     /// The directory of known components.
@@ -208,8 +216,8 @@ impl Stack {
     /// Handles a message to this component.
     pub fn handle_message(&mut self, now: Instant, message: &Received) {
         self.end_overdue(now);
-        self.life
-            .hear(now, message.source, code_of(&message.payload));
+        self.life.hear(now, message.source, &message.payload);
+        self.end_control_of_restarted(now);
         self.discovery.hear(now, message);
         self.subscriptions.hear(now, message.source);
         let answered = self.inquiries.handle_message(now, message, &mut self.out);

@@ -9,7 +9,7 @@ use super::{Discovery, Kind, Profile, Scope, Service, Stack, Timing, code_of};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::{Path, Received};
-use crate::messages::core::{QueryHeartbeatPulse, ReportHeartbeatPulse};
+use crate::messages::core::{QueryHeartbeatPulse, QueryIncarnation, ReportHeartbeatPulse};
 use crate::wire::{Broadcast, Priority};
 
 /// The component.
@@ -74,7 +74,10 @@ impl StackRig {
         let mut said = Vec::new();
         while let Some(message) = self.stack.poll_transmit() {
             let client = message.destination;
-            if code_of(&message.payload) != Some(QueryHeartbeatPulse::CODE) {
+            let code = code_of(&message.payload);
+            if code == Some(QueryIncarnation::CODE) {
+                continue;
+            } else if code != Some(QueryHeartbeatPulse::CODE) {
                 said.push((client, message.payload));
             } else if !self.dead.contains(&client) {
                 said.extend(self.hear(client, &ReportHeartbeatPulse {}));

@@ -65,6 +65,8 @@ pub(crate) enum Fault {
     MotorFailed,
     /// The pose becomes NaN.
     NanPose,
+    /// The measured pose jumps by three metres and a quarter turn.
+    PoseJumps,
     /// The pose is no longer measured.
     FrozenPose,
     /// The pose is not measured for five seconds.
@@ -152,7 +154,7 @@ impl Driver {
 }
 
 impl Fault {
-    pub(crate) const ALL: [Self; 27] = [
+    pub(crate) const ALL: [Self; 28] = [
         Self::Killed,
         Self::Suspended,
         Self::CutOff,
@@ -180,6 +182,7 @@ impl Fault {
         Self::PositionJumps,
         Self::PositionVague,
         Self::ZoneSet,
+        Self::PoseJumps,
     ];
 
     /// Whether the fault is one of the GNSS receiver.
@@ -206,17 +209,19 @@ impl Cell {
     /// no velocity command for the gateway to pass on.
     pub(crate) fn of_local_drivers() -> impl Iterator<Item = Self> {
         Self::all().filter(|cell| {
-            let is_general = !cell.fault.is_of_receiver() && cell.fault != Fault::ZoneSet;
+            let is_special = matches!(cell.fault, Fault::ZoneSet | Fault::PoseJumps);
+            let is_general = !cell.fault.is_of_receiver() && !is_special;
             let is_possible = cell.fault != Fault::Gateway || !cell.driver.is_velocity();
             is_general && is_possible && !cell.driver.is_global()
         })
     }
 
     /// The drivers on the globe with all faults but those of the gateway, which the RA addresses
-    /// differently, and all drivers of the library with zones.
+    /// differently, all drivers of the library with zones, and all that drive by a pose with jumps.
     pub(crate) fn of_the_globe_and_zones() -> impl Iterator<Item = Self> {
         Self::all().filter(|cell| match cell.fault {
             Fault::ZoneSet => cell.driver != Driver::Own,
+            Fault::PoseJumps => cell.driver.needs_pose(),
             fault => fault != Fault::Gateway && cell.driver.is_global(),
         })
     }
@@ -232,7 +237,9 @@ impl Cell {
     /// later.
     pub(crate) const fn stops_by_itself(self) -> bool {
         match self.fault {
-            Fault::NanPose | Fault::FrozenPose | Fault::DiskStall => self.driver.needs_pose(),
+            Fault::NanPose | Fault::PoseJumps | Fault::FrozenPose | Fault::DiskStall => {
+                self.driver.needs_pose()
+            }
             Fault::VehicleClock | Fault::ControllerClock | Fault::ZoneSet => false,
             _ => true,
         }
@@ -276,6 +283,7 @@ impl fmt::Display for Fault {
             Self::Dropped => "component dropped",
             Self::MotorFailed => "motor fault",
             Self::NanPose => "NaN pose",
+            Self::PoseJumps => "pose jumps",
             Self::FrozenPose => "frozen pose",
             Self::DiskStall => "5 s disk stall",
             Self::VehicleClock => "vehicle's clock stepped",

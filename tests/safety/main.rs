@@ -12,6 +12,7 @@
 //! | vector, and effort and velocity that are held | 2 s after the controller's last message |
 //! | waypoint, list, path segment | 5 s after the controller's last message |
 //! | any | 5 s after the last Request Control |
+//! | any, the controller restarted | 0.5 s after the new process is there |
 //! | any, its program hung | the actuator's deadline |
 //! | global vector and waypoint, no position | 2.5 s after the receiver's fault |
 //! | global vector and waypoint, a doubtful position | 0.5 s |
@@ -42,7 +43,7 @@ mod world;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use cell::Cell;
+use cell::{Cell, Fault};
 use sim::seeds;
 use table::Table;
 
@@ -74,6 +75,16 @@ fn fresh_seeds_stop() {
         "fresh_seeds_stop",
         FRESH_SEEDS,
         Cell::of_local_drivers().collect(),
+    );
+}
+
+#[test]
+fn fresh_seeds_of_controllers_that_restart_stop() {
+    let all = Cell::of_local_drivers().chain(Cell::of_the_globe_and_zones());
+    check_fresh_seeds(
+        "fresh_seeds_of_controllers_that_restart_stop",
+        FRESH_SEEDS / 3,
+        all.filter(|cell| cell.fault == Fault::Restarted).collect(),
     );
 }
 

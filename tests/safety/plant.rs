@@ -1,5 +1,6 @@
 //! The vehicle's hardware: it keeps moving while its program hangs or is dead.
 
+use std::f64::consts::FRAC_PI_2;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
@@ -51,6 +52,8 @@ pub(crate) enum Sensor {
     Stalled,
     /// Its samples are not numbers.
     Unknown,
+    /// Its samples are three metres and a quarter turn off.
+    Displaced,
 }
 
 /// The plant, shared by its program and the world.
@@ -174,6 +177,11 @@ impl Plant {
         if self.sensor == Sensor::Unknown {
             let pose = &mut self.sample.pose;
             [pose.x, pose.y, pose.yaw] = [f64::NAN; 3];
+        }
+        if self.sensor == Sensor::Displaced {
+            let pose = &mut self.sample.pose;
+            pose.y += 3.0;
+            pose.yaw += FRAC_PI_2;
         }
     }
 }

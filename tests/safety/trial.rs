@@ -101,6 +101,8 @@ impl Trial {
     const BRAKES: Duration = Duration::from_millis(1500);
     /// Braking distance in metres from the speeds in these trials, with the fence's reaction.
     const BRAKING_DISTANCE: f64 = 1.2;
+    /// A controller that has restarted is noticed within this time.
+    const RESTART: Duration = Duration::from_millis(500);
     /// Tolerance for the end of control after the vehicle notices its cause.
     const AT_ONCE: Duration = Duration::from_millis(100);
 
@@ -188,7 +190,7 @@ impl Trial {
             Fault::Hung => Some(Plant::DEADLINE + Duration::from_millis(1)),
             Fault::Stopped | Fault::Dropped => Some(Duration::ZERO),
             Fault::MotorFailed => Some(Duration::from_millis(200)),
-            Fault::NanPose => Some(Duration::from_millis(200)),
+            Fault::NanPose | Fault::PoseJumps => Some(Duration::from_millis(200)),
             Fault::FrozenPose | Fault::DiskStall => Some(Duration::from_secs(1)),
             Fault::ReceiverSilent
             | Fault::ReceiverFrozen
@@ -222,8 +224,11 @@ impl Trial {
             Fault::CutToController => self.cut(&[(vehicle, controller)]),
             Fault::Restarted => {
                 self.world.network.kill(controller);
-                self.run_between(100, 3000);
+                // Half of them faster than every limit on silence.
+                let longest = self.random.choose(&[150, 3000]);
+                self.run_between(1, longest);
                 self.world.restart_controller(self.insists);
+                self.sudden = Some(self.world.network.now() + Self::RESTART);
             }
             Fault::TakenOver => self.take_over(),
             Fault::ReleaseLost => {
@@ -240,6 +245,7 @@ impl Trial {
                 self.outlast(|plant| plant.fault = None);
             }
             Fault::NanPose => self.spoil_pose(Sensor::Unknown),
+            Fault::PoseJumps => self.spoil_pose(Sensor::Displaced),
             Fault::FrozenPose | Fault::DiskStall => self.spoil_pose(Sensor::Stalled),
             Fault::VehicleClock | Fault::ControllerClock => self.step_clock(),
             Fault::ReceiverSilent

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::page_link::PageLinkQuality;
 use super::state::{Fleet, State, Tree};
 
 /// One frame to a page.
@@ -12,6 +13,8 @@ pub(super) enum Said<'a> {
     Hello {
         /// Protocol version.
         version: u32,
+        /// Number of the page at the station.
+        page: u64,
         token_needed: bool,
         operator: String,
         authority: u8,
@@ -21,6 +24,15 @@ pub(super) enum Said<'a> {
     State(&'a State),
     Fleet(&'a Fleet),
     Tree(&'a Tree),
+    /// The links from page to station and from station to vehicle, once a second.
+    Link {
+        #[serde(flatten)]
+        page: PageLinkQuality,
+        vehicle_round_trip_ms: Option<u64>,
+        vehicle_loss_percent: Option<u8>,
+    },
+    /// The session has handled a setpoint or the end of manual drive.
+    Ok,
     /// A request succeeded.
     Done {
         id: u64,

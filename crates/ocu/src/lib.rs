@@ -8,9 +8,18 @@
 
 mod answer;
 mod base_map;
+mod events;
+#[expect(clippy::disallowed_methods, reason = "the subscriptions' delays")]
+mod following;
 mod georeference;
+mod handover;
+mod map_overlay;
 mod missing;
+mod orders;
+pub mod ownership;
 pub(crate) mod page;
+pub mod page_link;
+mod pages;
 mod picture;
 mod report;
 pub mod request;
@@ -28,10 +37,12 @@ mod session;
 pub mod state;
 mod station;
 pub mod stick;
+mod stop_monitor;
 mod tls;
 mod token;
 mod tree;
 pub mod users;
+mod vehicle_link;
 
 pub use base_map::{BaseMap, BaseMapError};
 pub use station::{Listen, OpenStation, Station};

@@ -13,6 +13,8 @@ pub(super) enum Absence {
     Gone,
     /// Its reports have stopped.
     Silent,
+    /// It has restarted, and knows nothing of what it did before.
+    Restarted,
 }
 
 impl Absence {
@@ -21,6 +23,16 @@ impl Absence {
         match self {
             Self::Gone => "gone",
             Self::Silent => "silent",
+            Self::Restarted => "restarted",
+        }
+    }
+
+    /// The same after its name, for people.
+    pub(super) const fn words(self) -> &'static str {
+        match self {
+            Self::Gone => "is gone",
+            Self::Silent => "is silent",
+            Self::Restarted => "has restarted",
         }
     }
 }

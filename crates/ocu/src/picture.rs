@@ -9,13 +9,16 @@ use std::time::{Duration, Instant};
 
 pub(super) use self::part::{Depth, Part};
 use super::georeference::Georeference;
+use super::map_overlay::MapOverlay;
 use super::missing::{Absence, GonePart, GoneParts};
 use super::report::{Mission, MissionStage, Report};
 use super::role::Role;
 use super::state::{self, age};
+use super::stop_monitor::StopMonitor;
 use jaus::address::JausId;
 use jaus::service::{ComponentEntry, Directory, SampleAge, State};
 use jaus_vehicle::messages::handoff::enhanced_access_control;
+use jaus_vehicle::motion;
 
 /// The known state of a vehicle.
 #[derive(Debug)]
@@ -32,9 +35,15 @@ pub(super) struct Picture {
     georeference: Georeference,
     velocity: Option<Sample<state::Velocity>>,
     mission: Option<Sample<Mission>>,
+    /// Whether the planner of the mission has restarted since it reported it, and whether it was
+    /// lost before it came back.
+    has_planner_restarted: bool,
+    was_planner_lost: bool,
     path: Vec<[f64; 2]>,
     maps: Vec<state::Map>,
     store: Option<JausId>,
+    stop_monitor: StopMonitor,
+    overlay: MapOverlay,
 }
 
 /// A reported value with its reporter and sample time. The time comes from the report's time stamp,
@@ -68,9 +77,13 @@ impl Picture {
             georeference: Georeference::default(),
             velocity: None,
             mission: None,
+            has_planner_restarted: false,
+            was_planner_lost: false,
             path: Vec::new(),
             maps: Vec::new(),
             store: None,
+            stop_monitor: StopMonitor::default(),
+            overlay: MapOverlay::default(),
         }
     }
 
@@ -97,6 +110,8 @@ impl Picture {
         (self.pose, self.velocity, self.mission) = (None, None, None);
         (self.path, self.maps, self.store) = (Vec::new(), Vec::new(), None);
         self.georeference = Georeference::default();
+        self.stop_monitor = StopMonitor::default();
+        self.overlay.forget();
     }
 
     pub(super) const fn parts(&self) -> &BTreeMap<JausId, Part> {
@@ -181,6 +196,7 @@ impl Picture {
 
     pub(super) fn handle_time(&mut self, now: Instant) {
         self.gone.handle_time(now);
+        self.was_planner_lost |= self.lost_planner(now).is_some();
     }
 
     /// Handles a report of a part of the vehicle.
@@ -203,8 +219,11 @@ impl Picture {
                 self.pose = Some(Sample { what, by, at });
             }
             Report::GlobalPose(fix) => {
-                let fresh = |it: &&Sample<_>| now.saturating_duration_since(it.at) < Self::PAIR;
-                let local = self.pose.as_ref().filter(fresh).map(|it| &it.what);
+                let local = self
+                    .pose
+                    .as_ref()
+                    .filter(|it| is_within(now, it, Self::PAIR));
+                let local = local.map(|it| &it.what);
                 self.georeference.handle_fix(now, fix, local);
             }
             Report::Velocity(what, sampled) => {
@@ -214,15 +233,50 @@ impl Picture {
                 let source = self.velocity.map(|known| known.by);
                 if what.x.is_some() || source.is_none_or(|source| source == by) {
                     self.velocity = Some(Sample { what, by, at });
+                    let emergency = self.in_emergency().next().is_some();
+                    self.stop_monitor.handle_velocity(now, &what, emergency);
                 }
             }
-            Report::Mission(what) => self.mission = Some(Sample { what, by, at: now }),
+            Report::Mission(what) => self.handle_mission(now, by, what),
             Report::Path(path) => self.path = path,
             Report::Maps(maps) => {
                 self.maps = maps;
                 self.store = Some(by);
             }
+            Report::Zones(zones) => self.overlay.handle_zones(zones),
+            Report::Scan(scan) => {
+                let pose = self.pose.filter(|it| is_within(now, it, Self::PAIR));
+                let pose = pose.and_then(|it| located(&it.what));
+                self.overlay.handle_scan(now, pose, scan.as_ref());
+            }
             Report::Subscription { .. } => {}
+        }
+    }
+
+    /// Handles the report of a mission. A planner that drove and has none any more has restarted:
+    /// its mission ended without a report, and is kept for that.
+    fn handle_mission(&mut self, now: Instant, by: JausId, what: Mission) {
+        if what.stage.is_idle() {
+            self.handle_planner_restart(by);
+            if self.has_planner_restarted {
+                return;
+            }
+        }
+        (self.has_planner_restarted, self.was_planner_lost) = (false, false);
+        self.mission = Some(Sample { what, by, at: now });
+    }
+
+    /// Handles the restart of a planner, unless it was known to be lost before.
+    pub(super) fn handle_planner_restart(&mut self, planner: JausId) {
+        let drove = |it: &Sample<Mission>| it.by == planner && it.what.stage.is_driven();
+        let is_new = !self.was_planner_lost && self.mission.as_ref().is_some_and(drove);
+        self.has_planner_restarted |= is_new;
+    }
+
+    /// The operator drives on: that the planner has restarted is known.
+    pub(super) fn forget_planner_restart(&mut self) {
+        if std::mem::take(&mut self.has_planner_restarted) {
+            self.mission = None;
         }
     }
 
@@ -277,7 +331,14 @@ impl Picture {
             is_expected && part.is_silent(now, self.depth.silent())
         });
         let silent = silent.map(|(id, part)| (*id, &*part.name, Absence::Silent));
-        gone.chain(silent)
+        gone.chain(silent).chain(self.restarted_planner(now))
+    }
+
+    /// A planner that has restarted while it drove is missing as the one that it was.
+    fn restarted_planner(&self, now: Instant) -> Option<(JausId, &str, Absence)> {
+        let lost = self.lost_planner(now);
+        let (id, how) = lost.filter(|(_, how)| *how == Absence::Restarted)?;
+        Some((id, &self.parts.get(&id)?.name, how))
     }
 
     /// The condition of any component of the vehicle that discovery knows, for the tree.
@@ -305,13 +366,16 @@ impl Picture {
         self.missing(now).map(describe).collect()
     }
 
-    /// The planner, if it was lost while it drove. When all parts are silent, the network is to
+    /// The planner, if it was lost or has restarted while it drove. When all parts are silent, the network is to
     /// blame, and the planner does not count as lost.
     pub(super) fn lost_planner(&self, now: Instant) -> Option<(JausId, Absence)> {
         let known = self.mission.as_ref();
         let planner = known.filter(|it| it.what.stage.is_driven())?.by;
         if self.gone.get(planner).is_some() {
             return Some((planner, Absence::Gone));
+        }
+        if self.has_planner_restarted {
+            return Some((planner, Absence::Restarted));
         }
         let part = self.parts.get(&planner)?;
         let mut others = self.parts.iter().filter(|(id, _)| **id != planner);
@@ -340,6 +404,63 @@ impl Picture {
             .iter()
             .filter(|(_, part)| part.is(State::Emergency));
         stopped.map(|(id, _)| *id)
+    }
+
+    /// The velocity, if its sample is fresh enough to tell whether the vehicle is at rest.
+    fn fresh_velocity(&self, now: Instant) -> Option<state::Velocity> {
+        let limit = self.depth.velocity_counts();
+        let fresh = self.velocity.filter(|it| is_within(now, it, limit));
+        fresh.map(|it| it.what)
+    }
+
+    /// Whether the vehicle is at rest by its measured velocity; `None` if that is unknown.
+    pub(super) fn at_rest(&self, now: Instant) -> Option<bool> {
+        StopMonitor::at_rest(&self.fresh_velocity(now)?)
+    }
+
+    /// Whether the vehicle moves in an emergency and does not slow down.
+    pub(super) fn is_runaway(&self, now: Instant) -> bool {
+        self.stop_monitor.is_runaway() && self.fresh_velocity(now).is_some()
+    }
+
+    /// Why a driver holds the vehicle. Of several drivers the one nearest to the motors counts: the
+    /// others wait for it.
+    pub(super) fn hold_reason(&self, now: Instant) -> Option<state::HoldReason> {
+        if self.in_emergency().next().is_some() {
+            return None;
+        }
+        let holding = self
+            .parts
+            .iter()
+            .filter_map(|(id, part)| Some((part.role, id, part.hold_reason(now)?)));
+        let (role, id, reason) = holding.min_by_key(|(role, ..)| *role)?;
+        Some(state::HoldReason {
+            role: role.name(),
+            id: id.to_string(),
+            reason: reason.to_owned(),
+        })
+    }
+
+    /// The components in Failure, each with a description.
+    pub(super) fn faults(&self) -> impl Iterator<Item = (JausId, String)> {
+        let failed = self
+            .parts
+            .iter()
+            .filter(|(_, part)| part.is(State::Failure));
+        failed.map(|(id, part)| {
+            let reason = part.stage.as_ref().map_or("", |it| &*it.reason);
+            let reason = if reason.is_empty() {
+                String::new()
+            } else {
+                format!(": {reason}")
+            };
+            (*id, format!("{} {id} reports a failure{reason}", part.name))
+        })
+    }
+
+    /// The overlay of the map for a page that has the zones of a revision.
+    pub(super) fn overlay_state(&self, known_zones: u32) -> state::Overlay {
+        self.overlay.state(known_zones)
     }
 
     /// Snapshot of the vehicle. `obstacle` returns why a part is not under control.
@@ -375,15 +496,19 @@ impl Picture {
             missing: self.missing_state(now),
             stale: self.stale(now),
             emergency: if emergency_wanted { all } else { any },
+            at_rest: self.at_rest(now),
+            runaway: self.is_runaway(now),
+            held: self.hold_reason(now),
+            overlay: self.overlay.revision(now),
         })
     }
 
-    /// The vehicle in the list of vehicles. The flags state whether the station has selected it,
-    /// controls it, and is requested to hand it over.
+    /// The vehicle in the list of vehicles, with the operator of this station who has it. The flags
+    /// state whether the station controls it, and is requested to hand it over.
     pub(super) fn fleet_state(
         &self,
         now: Instant,
-        selected: bool,
+        driver: String,
         (held, requested): (bool, bool),
     ) -> state::FleetVehicle {
         let principal = self.principal().and_then(|id| self.parts.get(&id));
@@ -402,9 +527,12 @@ impl Picture {
         state::FleetVehicle {
             subsystem: self.vehicle,
             name: self.name.clone(),
-            selected,
+            driver,
             presence,
             state: status.map(|known| state_name(known.what)),
+            speed: self.fresh_velocity(now).and_then(|it| it.x),
+            at_rest: self.at_rest(now),
+            runaway: self.is_runaway(now),
             controller: holder.map(|(id, _)| id.to_string()),
             authority: holder.map(|(_, authority)| authority),
             held,
@@ -487,6 +615,19 @@ impl Picture {
 
 /// Condition of a component without a known state.
 pub(super) const PRESENT: &str = "present";
+
+fn is_within<T>(now: Instant, sample: &Sample<T>, limit: Duration) -> bool {
+    now.saturating_duration_since(sample.at) < limit
+}
+
+/// The pose for calculations; `None` if a coordinate is unknown.
+fn located(pose: &state::Pose) -> Option<motion::Pose> {
+    let (x, y) = pose.x.zip(pose.y)?;
+    Some(motion::Pose {
+        yaw: pose.yaw?,
+        ..motion::Pose::at(x, y)
+    })
+}
 
 fn state_name(code: u8) -> &'static str {
     State::from_code(code).map_or("unknown", State::name)

@@ -5,12 +5,17 @@ use super::state;
 use jaus::address::JausId;
 use jaus::messages::core::report_time::TimeStamp;
 use jaus::messages::core::{ReportControl, ReportStatus};
-use jaus::messages::mobility::{ReportGlobalPose, ReportLocalPose, ReportVelocityState};
+use jaus::messages::mobility::{
+    ReportGlobalPose, ReportLocalOperatingZone, ReportLocalPose, ReportVelocityState,
+};
 use jaus::service::{Age, SampleStamp};
-use jaus_vehicle::ground::StageState;
+use jaus_vehicle::ground::{StageState, reported_scan, reported_zones};
+use jaus_vehicle::messages::environment_sensing::ReportRangeSensorData;
 use jaus_vehicle::messages::ground::{
     ReportMission, ReportPlannedPath, ReportRasterMaps, ReportStage,
 };
+use jaus_vehicle::sensing::Scan;
+use jaus_vehicle::zones::Zones;
 
 /// A report of a part.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +32,10 @@ pub(super) enum Report {
     Mission(Mission),
     Path(Vec<[f64; 2]>),
     Maps(Vec<state::Map>),
+    /// The operating zones, or why they are unusable.
+    Zones(Result<Zones, String>),
+    /// What the range sensor sees; `None` if it does not measure.
+    Scan(Option<Scan>),
     /// A subscription has lost or regained its reports.
     Subscription {
         is_up: bool,
@@ -88,7 +97,7 @@ pub(super) struct Mission {
 pub(super) struct MissionStage(u8);
 
 impl MissionStage {
-    const NAMES: [&str; 11] = [
+    const NAMES: [&str; 12] = [
         "idle",
         "map",
         "planning",
@@ -100,11 +109,17 @@ impl MissionStage {
         "arrived",
         "failed",
         "stopped",
+        "waiting",
     ];
 
     pub(super) fn name(self) -> &'static str {
         let name = Self::NAMES.get(usize::from(self.0));
         name.copied().unwrap_or("unknown")
+    }
+
+    /// Whether no mission was given since the planner started.
+    pub(super) const fn is_idle(self) -> bool {
+        self.0 == 0
     }
 
     pub(super) const fn awaits_approval(self) -> bool {
@@ -123,6 +138,11 @@ impl MissionStage {
 }
 
 impl Mission {
+    /// Why it is blocked or has ended; empty otherwise.
+    pub(super) fn reason(&self) -> &str {
+        &self.reason
+    }
+
     /// Snapshot for pages, without the path.
     pub(super) fn state(&self) -> state::Mission {
         state::Mission {
@@ -205,6 +225,18 @@ impl From<ReportMission> for Report {
             remaining: f64::from(report.remaining),
             reason: report.reason.to_string(),
         })
+    }
+}
+
+impl From<ReportLocalOperatingZone> for Report {
+    fn from(report: ReportLocalOperatingZone) -> Self {
+        Self::Zones(reported_zones(&report))
+    }
+}
+
+impl From<ReportRangeSensorData> for Report {
+    fn from(report: ReportRangeSensorData) -> Self {
+        Self::Scan(reported_scan(&report).map(|(_, scan)| scan))
     }
 }
 

@@ -3,6 +3,8 @@
 use jaus::address::JausId;
 use serde::Deserialize;
 
+use super::page_link::Seen;
+
 /// One frame from a page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Frame {
@@ -10,7 +12,7 @@ pub struct Frame {
     #[serde(default)]
     pub id: Option<u64>,
     /// The subsystem number of the vehicle that the page shows. A request for another vehicle than
-    /// the selected one is refused, except an emergency.
+    /// the page's is refused, except an emergency.
     #[serde(default)]
     pub vehicle: Option<u16>,
     /// The content.
@@ -27,6 +29,13 @@ pub enum Said {
         /// The token, as printed or stored in a file.
         token: String,
     },
+    /// A state has arrived.
+    Received {
+        /// Its number.
+        seen: u64,
+    },
+    /// A state is shown.
+    Seen(Seen),
     /// The user is active, which keeps the session from becoming idle.
     Active,
     /// Enables or disables the message view.
@@ -60,7 +69,7 @@ pub struct MessageFilter {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum OperatorRequest {
-    /// Select another vehicle: the one to control and drive.
+    /// Select another vehicle for this page: the one to control and drive.
     Select {
         /// Its subsystem number.
         subsystem: u16,
@@ -100,9 +109,14 @@ pub enum OperatorRequest {
         forward: f64,
         /// Right, -1 to 1.
         turn: f64,
+        /// What the operator sees. Without it, the vehicle is not driven.
+        #[serde(flatten)]
+        seen: Option<Seen>,
     },
     /// End manual drive.
     DriveEnd,
+    /// Take over from the planner: stop the mission, and take control of the drivers.
+    TakeOver,
     /// Plan a path to a destination.
     Destination {
         /// Metres north.
@@ -118,11 +132,62 @@ pub enum OperatorRequest {
         /// The mission to approve.
         mission: u32,
     },
+    /// Continue a mission that a fault has stopped.
+    Continue {
+        /// The mission to continue.
+        mission: u32,
+    },
     /// Stop the mission.
     Stop,
 }
 
+/// The frames that pages send most often, as arrays.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum ShortFrame {
+    Drive(u64, u64, f64, f64),
+    Seen(u64, u64),
+    Received((u64,)),
+}
+
+impl Frame {
+    /// Reads a frame. An array of numbers is the short form of the most frequent ones: `[seen]` of
+    /// `received`, `[seen, held_ms]` of `seen`, and `[seen, held_ms, forward, turn]` of `drive`.
+    ///
+    /// # Errors
+    /// If the text is no frame.
+    pub fn read(text: &str) -> Result<Self, serde_json::Error> {
+        if !text.starts_with('[') {
+            return serde_json::from_str(text);
+        }
+        let said = match serde_json::from_str(text)? {
+            ShortFrame::Received((seen,)) => Said::Received { seen },
+            ShortFrame::Seen(seq, held_ms) => Said::Seen(Seen { seq, held_ms }),
+            ShortFrame::Drive(seq, held_ms, forward, turn) => {
+                Said::OperatorRequest(OperatorRequest::Drive {
+                    forward,
+                    turn,
+                    seen: Some(Seen { seq, held_ms }),
+                })
+            }
+        };
+        Ok(Self {
+            id: None,
+            vehicle: None,
+            said,
+        })
+    }
+}
+
 impl OperatorRequest {
+    /// Whether it stops vehicles, for which the right to observe them suffices.
+    pub(crate) const fn is_stop(&self) -> bool {
+        matches!(
+            self,
+            Self::Emergency { on: true } | Self::EmergencyAll { on: true }
+        )
+    }
+
     /// Its name in the audit log.
     pub(crate) const fn name(&self) -> &'static str {
         match self {
@@ -139,8 +204,10 @@ impl OperatorRequest {
             Self::EmergencyAll { on: false } => "clear emergency of all",
             Self::Drive { .. } => "drive",
             Self::DriveEnd => "end drive",
+            Self::TakeOver => "take over from mission",
             Self::Destination { .. } => "plan mission",
             Self::Approve { .. } => "approve mission",
+            Self::Continue { .. } => "continue mission",
             Self::Stop => "stop mission",
         }
     }
@@ -159,7 +226,9 @@ impl OperatorRequest {
     pub(crate) fn details(&self) -> Option<String> {
         match self {
             Self::Destination { x, y, .. } => Some(format!("to x {x} m, y {y} m")),
-            Self::Approve { mission } => Some(format!("mission {mission}")),
+            Self::Approve { mission } | Self::Continue { mission } => {
+                Some(format!("mission {mission}"))
+            }
             Self::Handover { operator, .. } => Some(format!("requested by {operator}")),
             _ => None,
         }
@@ -171,8 +240,13 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<Frame, serde_json::Error> {
-        serde_json::from_str(text)
+        Frame::read(text)
     }
+
+    const SEEN: Seen = Seen {
+        seq: 12,
+        held_ms: 40,
+    };
 
     #[test]
     fn every_frame_of_the_protocol_is_understood() {
@@ -208,8 +282,26 @@ mod tests {
                 OperatorRequest::Drive {
                     forward: 0.5,
                     turn: -1.0,
+                    seen: None,
                 },
             ),
+            (
+                r#"{"type":"drive","forward":0.5,"turn":-1,"seen":12,"held_ms":40}"#,
+                OperatorRequest::Drive {
+                    forward: 0.5,
+                    turn: -1.0,
+                    seen: Some(SEEN),
+                },
+            ),
+            (
+                "[12,40,0.5,-1]",
+                OperatorRequest::Drive {
+                    forward: 0.5,
+                    turn: -1.0,
+                    seen: Some(SEEN),
+                },
+            ),
+            (r#"{"type":"take_over"}"#, OperatorRequest::TakeOver),
             (r#"{"type":"drive_end"}"#, OperatorRequest::DriveEnd),
             (
                 r#"{"type":"destination","x":1,"y":-2.5,"speed":null}"#,
@@ -222,6 +314,10 @@ mod tests {
             (
                 r#"{"type":"approve","mission":3}"#,
                 OperatorRequest::Approve { mission: 3 },
+            ),
+            (
+                r#"{"type":"continue","mission":3}"#,
+                OperatorRequest::Continue { mission: 3 },
             ),
             (r#"{"type":"stop"}"#, OperatorRequest::Stop),
         ];
@@ -242,6 +338,16 @@ mod tests {
             token: "abc".into(),
         };
         assert_eq!((frame.id, frame.said), (Some(7), said));
+        for text in [r#"{"type":"seen","seen":12,"held_ms":40}"#, "[12,40]"] {
+            assert_eq!(read(text).unwrap().said, Said::Seen(SEEN), "{text}");
+        }
+        for text in [r#"{"type":"received","seen":12}"#, "[12]"] {
+            assert_eq!(
+                read(text).unwrap().said,
+                Said::Received { seen: 12 },
+                "{text}"
+            );
+        }
         let frame = read(r#"{"type":"stop","vehicle":101}"#).unwrap();
         assert_eq!(frame.vehicle, Some(101));
         let frame = read(r#"{"type":"messages","on":true,"filter":{"text":"x"}}"#).unwrap();
@@ -264,6 +370,11 @@ mod tests {
             r#"{"type":"select","subsystem":70000}"#,
             r#"{"type":"drive","forward":"fast","turn":0}"#,
             r#"{"type":"emergency","on":true,"id":-1}"#,
+            "[12,40,0.5]",
+            "[12,40,0.5,0.5,0.5]",
+            "[12,-1]",
+            "[12,NaN,0.5,0]",
+            "[12.5,1]",
         ] {
             assert!(read(text).is_err(), "{text}");
         }

@@ -2,10 +2,11 @@
 
 use jaus::messages::core::management;
 use jaus::messages::mobility::{
-    global_pose_sensor, local_path_segment_driver, local_pose_sensor, local_vector_driver,
-    primitive_driver, velocity_state_sensor,
+    global_pose_sensor, local_operating_zone, local_path_segment_driver, local_pose_sensor,
+    local_vector_driver, primitive_driver, velocity_state_sensor,
 };
 use jaus::service::{ComponentEntry, Kind, SubsystemEntry};
+use jaus_vehicle::messages::environment_sensing::range_sensor;
 use jaus_vehicle::messages::ground::{mission_planner, raster_maps, stage};
 
 /// Role of a component. A component with several roles has the first of them.
@@ -19,13 +20,16 @@ pub(super) enum Role {
     PoseSensor,
     GlobalPoseSensor,
     Store,
+    RangeSensor,
+    /// A store of operating zones without maps.
+    ZoneStore,
     /// Another component with Management.
     Other,
 }
 
 impl Role {
     /// In the order of the chain of command.
-    const ALL: [(Self, &'static str); 8] = [
+    const ALL: [(Self, &'static str); 10] = [
         (Self::PrimitiveDriver, primitive_driver::URN),
         (Self::VectorDriver, local_vector_driver::URN),
         (Self::PathDriver, local_path_segment_driver::URN),
@@ -34,6 +38,8 @@ impl Role {
         (Self::PoseSensor, local_pose_sensor::URN),
         (Self::GlobalPoseSensor, global_pose_sensor::URN),
         (Self::Store, raster_maps::URN),
+        (Self::RangeSensor, range_sensor::URN),
+        (Self::ZoneStore, local_operating_zone::URN),
     ];
 
     /// The role of a component; `None` if it is irrelevant to an operator.
@@ -53,6 +59,8 @@ impl Role {
             Self::PoseSensor => "pose_sensor",
             Self::GlobalPoseSensor => "global_pose_sensor",
             Self::Store => "knowledge_store",
+            Self::RangeSensor => "range_sensor",
+            Self::ZoneStore => "zone_store",
             Self::Other => "other",
         }
     }
@@ -68,6 +76,8 @@ impl Role {
             Self::PoseSensor => "the pose sensor",
             Self::GlobalPoseSensor => "the global pose sensor",
             Self::Store => "the knowledge store",
+            Self::RangeSensor => "the range sensor",
+            Self::ZoneStore => "the store of operating zones",
             Self::Other => "the component",
         }
     }
@@ -83,6 +93,8 @@ impl Role {
             Self::PoseSensor => Some("Pose Sensor"),
             Self::GlobalPoseSensor => Some("Global Pose Sensor"),
             Self::Store => Some("Knowledge Store"),
+            Self::RangeSensor => Some("Range Sensor"),
+            Self::ZoneStore => Some("Zone Store"),
             Self::Other => None,
         }
     }
@@ -93,6 +105,19 @@ impl Role {
             self,
             Self::PrimitiveDriver | Self::VectorDriver | Self::PathDriver | Self::Planner
         )
+    }
+
+    /// Whether this component is a driver of the chain, which may hold the vehicle.
+    pub(super) const fn is_driver(self) -> bool {
+        matches!(
+            self,
+            Self::PrimitiveDriver | Self::VectorDriver | Self::PathDriver
+        )
+    }
+
+    /// Whether a subsystem that has only such components is no vehicle.
+    const fn is_accessory(self) -> bool {
+        matches!(self, Self::RangeSensor | Self::ZoneStore)
     }
 }
 
@@ -124,6 +149,6 @@ pub(super) fn reports_velocity(component: &ComponentEntry) -> bool {
 /// Whether a subsystem has components that an operator can use, and is not another operator's.
 pub(super) fn is_vehicle(subsystem: &SubsystemEntry) -> bool {
     let kind = subsystem.identification().map(|it| it.kind);
-    kind != Some(Kind::OperatorControlUnit)
-        && subsystem.components().any(|it| Role::of(it).is_some())
+    let is_part = |it| Role::of(it).is_some_and(|role| !role.is_accessory());
+    kind != Some(Kind::OperatorControlUnit) && subsystem.components().any(is_part)
 }

@@ -1,11 +1,11 @@
-//! Snapshots for pages: the selected vehicle, the list of vehicles, and the tree of components. Each
+//! Snapshots for pages: the vehicle of the page, the list of vehicles, and the tree of components. Each
 //! one is complete, so that a reconnecting page needs nothing else. Unknown values are `null`.
 
 use std::time::Instant;
 
 use serde::Serialize;
 
-/// Snapshot of the selected vehicle.
+/// Snapshot of the vehicle that a page has selected.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct State {
     /// Snapshot counter.
@@ -24,29 +24,39 @@ pub struct State {
     pub mission: Option<Mission>,
     /// The map to show.
     pub map: Option<Map>,
+    /// Number of the latest event in the log of the station.
+    pub events: u64,
 }
 
 /// The list of vehicles.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Fleet {
     /// The vehicles, by subsystem number.
     pub vehicles: Vec<FleetVehicle>,
+    /// Whether all vehicles are to be in emergency, also those that appear later.
+    pub all_stopped: bool,
 }
 
 /// A vehicle in the list.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FleetVehicle {
     /// Subsystem number.
     pub subsystem: u16,
     /// Name.
     pub name: String,
-    /// Whether it is the selected vehicle.
-    pub selected: bool,
+    /// The operator of this station who controls it, with the page; empty if none does.
+    pub driver: String,
     /// `present`, `silent` if its reports have ceased, `gone` if discovery has lost it, or
     /// `unknown` if it was never discovered.
     pub presence: &'static str,
     /// Management state of its primitive driver, or of the part that stands in for it.
     pub state: Option<&'static str>,
+    /// Measured forward speed in metres per second; `null` without a fresh measurement.
+    pub speed: Option<f64>,
+    /// Whether it is at rest by that measurement; `null` without one.
+    pub at_rest: Option<bool>,
+    /// Whether it moves in an emergency and does not slow down.
+    pub runaway: bool,
     /// JAUS id of the operator in control.
     pub controller: Option<String>,
     /// Authority of that operator.
@@ -134,9 +144,70 @@ pub struct VehicleState {
     pub missing: Vec<Missing>,
     /// Why the picture is too old to drive by; `null` if it is not.
     pub stale: Option<String>,
-    /// Whether the vehicle is in emergency. If this operator has set it: whether every part has
-    /// confirmed it.
+    /// Whether the vehicle reports an emergency. If this operator has set it: whether every part has
+    /// confirmed it. It says nothing of the vehicle's motion.
     pub emergency: bool,
+    /// Whether the vehicle is at rest by its measured velocity; `null` without a fresh measurement.
+    pub at_rest: Option<bool>,
+    /// Whether the vehicle moves in an emergency and does not slow down.
+    pub runaway: bool,
+    /// Why a driver holds the vehicle although it is commanded to move; `null` if none does.
+    pub held: Option<HoldReason>,
+    /// Revisions of the overlay of the map, which has its own request.
+    pub overlay: OverlayRevision,
+}
+
+/// Why a driver holds the vehicle.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct HoldReason {
+    /// Role of the driver, for example `primitive_driver`.
+    pub role: &'static str,
+    /// JAUS id of the driver.
+    pub id: String,
+    /// The reason, in the driver's words.
+    pub reason: String,
+}
+
+/// Revisions of the parts of an [`Overlay`]; 0 before the first report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct OverlayRevision {
+    /// Revision of the zones.
+    pub zones: u32,
+    /// Revision of the scan and the obstacles.
+    pub scan: u32,
+    /// Milliseconds since the last scan.
+    pub scan_age_ms: Option<u64>,
+}
+
+/// What lies over the map: operating zones, the last scan, and obstacles. Coordinates are metres
+/// north and east.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Overlay {
+    /// Revision of the zones.
+    pub zones_revision: u32,
+    /// The zones; `null` if the page has them.
+    pub zones: Option<Vec<Zone>>,
+    /// Number of further zones, which are not sent.
+    pub omitted_zones: usize,
+    /// Why the vehicle's zones cannot be shown; empty if they can.
+    pub problem: String,
+    /// Revision of the scan and the obstacles.
+    pub scan_revision: u32,
+    /// Where the last scan met something.
+    pub scan: Vec<[f64; 2]>,
+    /// Side length of an obstacle in metres.
+    pub cell_m: f64,
+    /// Middles of the cells in which scans of the last 30 s have shown something.
+    pub obstacles: Vec<[f64; 2]>,
+}
+
+/// An operating zone.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Zone {
+    /// 1 for the zone that the vehicle must stay in, greater for one that it must keep out of.
+    pub number: u16,
+    /// Vertices of the polygon.
+    pub points: Vec<[f64; 2]>,
 }
 
 /// Pose of a vehicle in the local frame.
@@ -255,9 +326,13 @@ pub struct Control {
     pub held: bool,
     /// Whether control is wanted.
     pub wanted: bool,
-    /// Name of the user who drives: who last took control, drove or approved a mission. `null`
-    /// unless this station has or wants control.
+    /// Name of the user who has the vehicle, or had it last. `null` unless this station has or wants
+    /// control.
     pub user: Option<String>,
+    /// Number of the page that has the vehicle. No other page can drive or release it.
+    pub page: Option<u64>,
+    /// Whether the planner drives for this station. The operator has to take over before driving.
+    pub planner_drives: bool,
     /// Why control is not complete.
     pub reason: String,
     /// JAUS id of the operator whose control this station has requested.
@@ -290,7 +365,8 @@ pub struct Drive {
     pub forward: f64,
     /// Right, -1 to 1.
     pub turn: f64,
-    /// Why the station ended manual drive although the stick was not released; empty otherwise.
+    /// Why the station refused or ended manual drive although the stick was not released; empty
+    /// otherwise.
     pub reason: String,
 }
 
@@ -326,10 +402,39 @@ pub struct Mission {
 pub struct LostPlanner {
     /// JAUS id.
     pub id: String,
-    /// `gone` or `silent`, as for [`Missing`].
+    /// `gone`, `silent` or `restarted`, as for [`Missing`].
     pub how: &'static str,
     /// Whether this station has stopped the drivers, which requires that it controlled the planner.
     pub told_to_stop: bool,
+}
+
+/// Events of the station's vehicles.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Events {
+    /// Number of the latest event; 0 if there is none.
+    pub latest: u64,
+    /// The events, oldest first.
+    pub events: Vec<LoggedEvent>,
+}
+
+/// Something that happened to a vehicle.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct LoggedEvent {
+    /// Its number, counted from 1 since the station started.
+    pub number: u64,
+    /// Time of day, RFC 3339 in UTC.
+    pub time: String,
+    /// Milliseconds since it happened, whatever has happened to the clock.
+    pub age_ms: u64,
+    /// Subsystem number of the vehicle.
+    pub vehicle: u16,
+    /// What it concerns: `control`, `drive`, `mission`, `emergency`, `fault`, `missing`, `hold`,
+    /// `setpoint`, or `log` for the log itself.
+    pub kind: &'static str,
+    /// How much it matters: `info`, `warn` or `bad`.
+    pub level: &'static str,
+    /// What happened.
+    pub text: String,
 }
 
 /// A map of the vehicle's world model, without its cells, which have their own request.

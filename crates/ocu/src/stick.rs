@@ -1,14 +1,10 @@
-//! The stick of manual drive: its holder, its position, and the dead-man rule that stops the
+//! The stick of manual drive of one vehicle: its position, and the dead-man rule that stops the
 //! vehicle when pushes cease.
 
 use std::time::{Duration, Instant};
 
 use jaus::codec::OutOfRange;
 use jaus::messages::mobility::SetWrenchEffort;
-
-/// Identifies one page connection, for example the one that holds the stick.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct PageId(pub u64);
 
 /// Stick position, each axis from -1 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -17,12 +13,7 @@ pub struct Push {
     turn: f64,
 }
 
-/// Error: another page is driving.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("another page is driving; it must let go first")]
-pub struct Busy;
-
-/// One stick for all pages. The first page to push holds it until it releases it or falls silent.
+/// The stick of one vehicle.
 #[derive(Debug, Default)]
 pub struct Stick {
     phase: Phase,
@@ -35,11 +26,8 @@ enum Phase {
     /// No page drives, and the vehicle has confirmed it.
     #[default]
     Rest,
-    Driven {
-        page: PageId,
-        push: Push,
-        heard: Instant,
-    },
+    /// A page drives, until its next push is due.
+    Driven { push: Push, until: Instant },
     /// No page drives any more, and the vehicle is being stopped.
     Stopping { since: Instant },
 }
@@ -87,36 +75,32 @@ impl Push {
 }
 
 impl Stick {
-    /// Dead-man timeout: without a push for this time, the vehicle stops.
-    pub const DEAD_MAN: Duration = Duration::from_millis(300);
+    /// Dead-man timeout: without a push for this time, the vehicle stops. It runs from the operator's
+    /// hand: what a push waits on its way to the station is part of it.
+    pub const DEAD_MAN: Duration = Duration::from_millis(250);
     /// Maximum time to repeat the stop command without an acknowledgement. By then the vehicle's
     /// own timeout has stopped it.
     pub const STOPPING: Duration = Duration::from_secs(3);
 
-    /// Handles a push from a page.
-    ///
-    /// # Errors
-    /// If another page holds the stick.
-    pub fn handle_push(&mut self, now: Instant, page: PageId, push: Push) -> Result<(), Busy> {
+    /// Handles a push that has waited for `waited` on its way. One that has waited for longer than
+    /// [`DEAD_MAN`](Self::DEAD_MAN) has no effect.
+    pub fn handle_push(&mut self, now: Instant, waited: Duration, push: Push) {
         self.handle_time(now);
-        match &self.phase {
-            Phase::Driven { page: holder, .. } if *holder != page => Err(Busy),
-            _ => {
-                self.phase = Phase::Driven {
-                    page,
-                    push,
-                    heard: now,
-                };
-                self.fell_silent = false;
-                Ok(())
-            }
+        let left = Self::DEAD_MAN.saturating_sub(waited);
+        if left.is_zero() {
+            return;
         }
+        self.phase = Phase::Driven {
+            push,
+            until: now + left,
+        };
+        self.fell_silent = false;
     }
 
-    /// Handles a release by a page or its disconnection. Only the holder can release the stick.
-    pub fn handle_release(&mut self, now: Instant, page: PageId) {
-        if matches!(self.phase, Phase::Driven { page: holder, .. } if holder == page) {
-            self.stop(now);
+    /// Releases the stick.
+    pub fn stop(&mut self, now: Instant) {
+        if matches!(self.phase, Phase::Driven { .. }) {
+            self.phase = Phase::Stopping { since: now };
         }
     }
 
@@ -130,19 +114,12 @@ impl Stick {
     /// Applies the timeouts: releases a stick without pushes.
     pub fn handle_time(&mut self, now: Instant) {
         match self.phase {
-            Phase::Driven { heard, .. } if now >= heard + Self::DEAD_MAN => {
+            Phase::Driven { until, .. } if now >= until => {
                 self.stop(now);
                 self.fell_silent = true;
             }
             Phase::Stopping { since } if now >= since + Self::STOPPING => self.phase = Phase::Rest,
             _ => {}
-        }
-    }
-
-    /// Releases the stick, whichever page holds it.
-    pub fn stop(&mut self, now: Instant) {
-        if matches!(self.phase, Phase::Driven { .. }) {
-            self.phase = Phase::Stopping { since: now };
         }
     }
 
@@ -157,19 +134,15 @@ impl Stick {
         }
     }
 
+    /// Forgets that the page fell silent: its operator is gone.
+    pub const fn forget_silence(&mut self) {
+        self.fell_silent = false;
+    }
+
     /// Whether driving ended because the page fell silent.
     #[must_use]
     pub const fn fell_silent(&self) -> bool {
         self.fell_silent
-    }
-
-    /// The page that drives.
-    #[must_use]
-    pub const fn driver(&self) -> Option<PageId> {
-        match self.phase {
-            Phase::Driven { page, .. } => Some(page),
-            Phase::Rest | Phase::Stopping { .. } => None,
-        }
     }
 
     /// The current push, if a page drives.
@@ -190,8 +163,7 @@ impl Stick {
 mod tests {
     use super::*;
 
-    const ONE: PageId = PageId(1);
-    const OTHER: PageId = PageId(2);
+    const AT_ONCE: Duration = Duration::ZERO;
 
     fn ahead() -> Push {
         Push::new(0.5, 0.0).unwrap()
@@ -202,18 +174,33 @@ mod tests {
     }
 
     #[test]
-    fn what_is_pushed_holds_until_300_ms_of_silence_and_then_the_vehicle_is_stopped() {
+    fn what_is_pushed_holds_until_250_ms_of_silence_and_then_the_vehicle_is_stopped() {
         let start = Instant::now();
         let mut stick = Stick::default();
-        stick.handle_push(start, ONE, ahead()).unwrap();
-        assert_eq!(stick.poll_push(start + ms(299)), Some(ahead()));
+        stick.handle_push(start, AT_ONCE, ahead());
+        assert_eq!(stick.poll_push(start + ms(249)), Some(ahead()));
         assert!(!stick.fell_silent());
-        assert_eq!(stick.poll_push(start + ms(300)), Some(Push::NONE));
+        assert_eq!(stick.poll_push(start + ms(250)), Some(Push::NONE));
         assert_eq!(stick.driven(), None);
         assert!(stick.fell_silent());
-        stick.handle_push(start + ms(400), ONE, ahead()).unwrap();
-        stick.handle_release(start + ms(500), ONE);
+        stick.handle_push(start + ms(400), AT_ONCE, ahead());
+        stick.stop(start + ms(500));
         assert!(!stick.fell_silent(), "it was let go");
+        stick.handle_push(start + ms(600), AT_ONCE, ahead());
+        stick.handle_time(start + ms(900));
+        stick.forget_silence();
+        assert!(!stick.fell_silent(), "the next operator did not");
+    }
+
+    #[test]
+    fn the_time_that_a_push_waits_on_its_way_is_part_of_the_silence() {
+        let start = Instant::now();
+        let mut stick = Stick::default();
+        stick.handle_push(start, ms(200), ahead());
+        assert_eq!(stick.poll_push(start + ms(49)), Some(ahead()));
+        assert_eq!(stick.poll_push(start + ms(50)), Some(Push::NONE));
+        stick.handle_push(start + ms(60), ms(250), ahead());
+        assert_eq!(stick.poll_push(start + ms(60)), Some(Push::NONE));
     }
 
     #[test]
@@ -222,7 +209,7 @@ mod tests {
         let mut stick = Stick::default();
         for step in 0..50 {
             let now = start + ms(100 * step);
-            stick.handle_push(now, ONE, ahead()).unwrap();
+            stick.handle_push(now, AT_ONCE, ahead());
             assert_eq!(stick.poll_push(now + ms(99)), Some(ahead()));
         }
     }
@@ -231,8 +218,8 @@ mod tests {
     fn the_vehicle_is_told_to_stop_until_it_acknowledges_that() {
         let start = Instant::now();
         let mut stick = Stick::default();
-        stick.handle_push(start, ONE, ahead()).unwrap();
-        stick.handle_release(start + ms(10), ONE);
+        stick.handle_push(start, AT_ONCE, ahead());
+        stick.stop(start + ms(10));
         assert_eq!(stick.poll_push(start + ms(20)), Some(Push::NONE));
         assert_eq!(stick.poll_push(start + ms(2000)), Some(Push::NONE));
         stick.handle_stopped();
@@ -243,7 +230,7 @@ mod tests {
     fn a_vehicle_that_never_acknowledges_is_left_to_its_own_rule() {
         let start = Instant::now();
         let mut stick = Stick::default();
-        stick.handle_push(start, ONE, ahead()).unwrap();
+        stick.handle_push(start, AT_ONCE, ahead());
         stick.stop(start);
         assert_eq!(
             stick.poll_push(start + Stick::STOPPING - ms(1)),
@@ -256,26 +243,11 @@ mod tests {
     fn a_late_acknowledgement_of_a_stop_does_not_stop_who_drives_again() {
         let start = Instant::now();
         let mut stick = Stick::default();
-        stick.handle_push(start, ONE, ahead()).unwrap();
+        stick.handle_push(start, AT_ONCE, ahead());
         stick.stop(start);
-        stick.handle_push(start + ms(10), ONE, ahead()).unwrap();
+        stick.handle_push(start + ms(10), AT_ONCE, ahead());
         stick.handle_stopped();
         assert_eq!(stick.poll_push(start + ms(20)), Some(ahead()));
-    }
-
-    #[test]
-    fn one_page_drives_at_a_time_and_the_next_may_once_the_first_lets_go_or_is_silent() {
-        let start = Instant::now();
-        let mut stick = Stick::default();
-        stick.handle_push(start, ONE, ahead()).unwrap();
-        assert_eq!(
-            stick.handle_push(start + ms(200), OTHER, ahead()),
-            Err(Busy)
-        );
-        stick.handle_release(start + ms(200), OTHER);
-        assert_eq!(stick.driven(), Some(ahead()), "it is not theirs to let go");
-        stick.handle_push(start + ms(300), OTHER, ahead()).unwrap();
-        assert_eq!(stick.handle_push(start + ms(400), ONE, ahead()), Err(Busy));
     }
 
     #[test]

@@ -54,6 +54,7 @@ fn every_service_of_each_set_is_there() {
         ("urn:jaus:jss:missionSpooler:", 1),
         ("urn:jaus:jss:iop:", 10 + 5),
         ("urn:jaus:jss:exp:aeodrs:", 1 + 1),
+        ("urn:jaus-rs:core:", 1),
         ("urn:jaus-rs:ground:", 5),
         ("urn:jaus-rs:ra33:", 16),
     ] {

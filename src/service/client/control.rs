@@ -7,14 +7,48 @@ use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
 use crate::messages::core::{
-    ConfirmControl, QueryControl, QueryStatus, QueryTimeout, RejectControl, ReleaseControl,
-    ReportControl, ReportStatus, ReportTimeout, RequestControl,
+    ConfirmControl, QueryControl, QueryIncarnation, QueryStatus, QueryTimeout, RejectControl,
+    ReleaseControl, ReportControl, ReportStatus, ReportTimeout, RequestControl,
 };
-use crate::service::{Handled, NoAnswer, Outbox, Patience, code_of, read};
+use crate::service::{Directory, Handled, Incarnation, NoAnswer, Outbox, Patience, code_of, read};
 
 /// Identifies one request for control of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ControlId(u64);
+
+/// How a client tells its incarnation to the peer that it requests control of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::service) enum Introduction {
+    /// The peer does not offer [`Incarnation`].
+    None,
+    /// Before the first request: whether the peer offers it is not known.
+    Once(Incarnation),
+    /// Before each request until the peer has told its own.
+    Always(Incarnation),
+}
+
+impl Introduction {
+    /// That of a client to this peer.
+    pub(in crate::service) fn new(own: Incarnation, directory: &Directory, peer: JausId) -> Self {
+        match Incarnation::is_offered_by(directory, peer) {
+            Some(false) => Self::None,
+            None => Self::Once(own),
+            Some(true) => Self::Always(own),
+        }
+    }
+
+    /// What to send before a request.
+    const fn take(&mut self) -> Option<QueryIncarnation> {
+        match *self {
+            Self::None => None,
+            Self::Once(own) => {
+                *self = Self::None;
+                Some(own.query())
+            }
+            Self::Always(own) => Some(own.query()),
+        }
+    }
+}
 
 /// The progress of a request for control.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,6 +131,11 @@ struct Control {
     authority: u8,
     patience: Patience,
     state: State,
+    /// What the first requests are preceded by, so that the peer tells this client from an earlier
+    /// incarnation.
+    introduction: Introduction,
+    /// The peer's incarnation, if it has told it.
+    incarnation: Option<Incarnation>,
     /// How long control lasts, once the peer has reported it. Zero means for ever.
     lifetime: Option<Duration>,
     /// How often the peer was asked for its lifetime.
@@ -143,6 +182,7 @@ impl Controls {
         peer: JausId,
         authority: u8,
         patience: Patience,
+        introduction: Introduction,
         out: &mut Outbox,
     ) -> Result<ControlId, ControlRefused> {
         if !peer.is_unicast() {
@@ -159,6 +199,8 @@ impl Controls {
             authority,
             patience,
             state: State::Asking,
+            introduction,
+            incarnation: None,
             lifetime: None,
             lifetime_asked: 0,
             asked: 0,
@@ -252,6 +294,19 @@ impl Controls {
         Handled::Yes
     }
 
+    /// Handles the incarnation that a peer has told. Another one than before knows nothing of the
+    /// control that this client had.
+    pub(in crate::service) fn handle_incarnation(&mut self, peer: JausId, told: Incarnation) {
+        let Some(control) = self.all.get_mut(&peer) else {
+            return;
+        };
+        let before = control.incarnation.replace(told);
+        if control.state == State::Held && before.is_some_and(|before| before != told) {
+            let news = control.lose(ControlLost::Restarted);
+            self.news.extend(news.map(|news| (control.id, news)));
+        }
+    }
+
     pub(in crate::service) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
         let news = &mut self.news;
         self.all.retain(|&peer, control| {
@@ -341,6 +396,12 @@ impl Control {
 
     fn request(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
         let authority_code = self.authority;
+        // Sent before the request: what an earlier incarnation of this client held ends first.
+        if self.incarnation.is_none()
+            && let Some(query) = self.introduction.take()
+        {
+            out.send(peer, &query);
+        }
         out.send(peer, &RequestControl { authority_code });
         if self.asked == 0 {
             self.first_asked = now;

@@ -14,8 +14,8 @@ mod subscriptions;
 mod tests;
 mod topic;
 
-pub(super) use control::Controls;
 pub use control::{ControlId, ControlLost, ControlNews, ControlRefused};
+pub(super) use control::{Controls, Introduction};
 pub use news::{Outage, SubscriptionEnd, SubscriptionNews};
 pub use rejection::Rejection;
 pub use session::{

@@ -250,6 +250,11 @@ impl Control {
             .is_some_and(|controller| controller.id == client)
     }
 
+    /// Whether the component is ready to move for this client.
+    pub(super) fn is_acting_for(&self, client: JausId) -> bool {
+        self.has_management() && self.standing.state == State::Ready && self.is_controller(client)
+    }
+
     pub(super) const fn has_management(&self) -> bool {
         self.management.is_some()
     }

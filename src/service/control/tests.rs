@@ -1,6 +1,7 @@
 //! Tests of each transition of Access Control and Management on a whole component, in virtual time.
 
 mod emergencies;
+mod restarts;
 mod stopping;
 
 use std::time::Duration;

@@ -7,10 +7,11 @@ use bytes::Bytes;
 use super::{Event, Stack};
 use crate::address::JausId;
 use crate::endpoint::Received;
-use crate::service::client::{Sessions, Surroundings};
+use crate::service::client::{Introduction, Sessions, Surroundings};
 use crate::service::{
-    Audience, CannotSubscribe, ControlId, ControlNews, ControlRefused, Handled, Inquiry, Patience,
-    QueryOptions, SessionId, SessionOrder, SessionSettings, SubscriptionId, Topic,
+    Audience, CannotSubscribe, ControlId, ControlNews, ControlRefused, Handled, Incarnation,
+    Inquiry, Patience, QueryOptions, SessionId, SessionOrder, SessionSettings, SubscriptionId,
+    Topic,
 };
 
 impl Stack {
@@ -78,8 +79,10 @@ impl Stack {
         authority: u8,
         patience: Patience,
     ) -> Result<ControlId, ControlRefused> {
-        self.controls
-            .request(now, peer, authority, patience, &mut self.out)
+        let (own, directory) = (self.life.own(), self.discovery.directory());
+        let introduction = Introduction::new(own, &directory, peer);
+        let (controls, out) = (&mut self.controls, &mut self.out);
+        controls.request(now, peer, authority, patience, introduction, out)
     }
 
     /// Releases control, or cancels a request for it.
@@ -119,6 +122,7 @@ impl Stack {
     fn sessions(&mut self) -> (&mut Sessions, Surroundings<'_>) {
         let around = Surroundings {
             directory: self.discovery.directory(),
+            own: self.life.own(),
             controls: &mut self.controls,
             out: &mut self.out,
         };
@@ -166,6 +170,9 @@ impl Stack {
             ..
         } = self;
         sessions.handle_message(message);
+        if let Some(told) = Incarnation::told_in(&message.payload) {
+            controls.handle_incarnation(message.source, told);
+        }
         match subscriptions.handle_message(now, message, out) {
             Handled::Yes => Handled::Yes,
             Handled::No => controls.handle_message(now, message, out),

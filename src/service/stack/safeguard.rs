@@ -8,7 +8,7 @@ use super::Stack;
 use crate::service::control::Condition;
 use crate::service::life::Rank;
 use crate::service::safety;
-use crate::service::{Context, Service, StopCause, UnsafeService};
+use crate::service::{Context, Incarnation, Service, StopCause, UnsafeService};
 
 /// What keeps the component in failure.
 #[derive(Debug, Default)]
@@ -103,6 +103,7 @@ impl Stack {
         let rank = |client| {
             let ranks = [
                 (moving.contains(&client), Rank::MovingController),
+                (control.is_acting_for(client), Rank::ReadyController),
                 (control.is_controller(client), Rank::Controller),
                 (control.has_emergency_of(client), Rank::EmergencySetter),
                 (subscribers.has(client), Rank::Subscriber),
@@ -116,6 +117,24 @@ impl Stack {
             self.subscribers.forget(client);
         }
         self.warn_of_mute(now);
+    }
+
+    /// Ends the motion and the control of clients that have restarted: the new incarnation is a new
+    /// client.
+    pub(super) fn end_control_of_restarted(&mut self, now: Instant) {
+        while let Some(client) = self.life.poll_restarted() {
+            let is_moving = self
+                .services
+                .iter()
+                .any(|it| it.depends_on() == Some(client));
+            if !is_moving && !self.control.is_controller(client) {
+                continue;
+            }
+            tracing::warn!(id = %self.out.source(), %client, "the client in control has restarted");
+            self.stop(&StopCause::Restarted(client));
+            self.control.forget(client, &mut self.out);
+            self.follow_control(now);
+        }
     }
 
     /// Warns if the client in control could be dead: it never answers, and control has no timeout.
@@ -136,7 +155,15 @@ impl Stack {
     /// Watches the client in control, and those that a motion depends on.
     pub(super) fn watch_clients(&mut self, now: Instant) {
         if let Some(controller) = self.standing.controller {
-            self.life.watch(now, controller.id, Rank::Controller);
+            let (id, life) = (controller.id, &mut self.life);
+            let rank = match self.control.is_acting_for(id) {
+                true => Rank::ReadyController,
+                false => Rank::Controller,
+            };
+            life.watch(now, id, rank);
+            if Incarnation::is_offered_by(&self.discovery.directory(), id) == Some(true) {
+                life.introduce(now, id, &mut self.out);
+            }
         }
         for service in &self.services {
             if let Some(client) = service.depends_on() {

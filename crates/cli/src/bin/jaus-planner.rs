@@ -37,9 +37,14 @@ struct Flags {
     #[arg(long, value_name = "NAME", default_value = "traversability")]
     map: String,
 
-    /// The maximum number of attempts at a mission when a stage is blocked
+    /// The maximum number of attempts at a mission before the vehicle has been sent off
     #[arg(long, value_name = "COUNT", default_value = "3", value_parser = clap::value_parser!(u8).range(1..))]
     attempts: u8,
+
+    /// How often the vehicle drives on by itself after a fault has stopped it; at 0 the mission waits
+    /// until the operator continues it
+    #[arg(long, value_name = "COUNT", default_value = "0")]
+    retries: u8,
 
     /// The time to wait after a blocked attempt
     #[arg(long, value_name = "DURATION", default_value = "3s", value_parser = runtime::duration)]
@@ -95,6 +100,7 @@ impl Ready for Flags {
             },
             mission: Settings {
                 attempts: self.attempts,
+                retries: self.retries,
                 pause: self.pause,
                 patience: self.timeout,
                 stall: self.stall,

@@ -50,6 +50,9 @@ export const number = (value) => (typeof value === "number" && Number.isFinite(v
 /** A list from the network, at most `limit` entries of it. */
 export const list = (value, limit = 1000) => (Array.isArray(value) ? value.slice(0, limit) : []);
 
+/** The objects of a list from the network, at most `limit` of them. */
+export const objects = (value, limit = 1000) => list(value, limit).filter((one) => one !== null && typeof one === "object");
+
 /** A number with a fixed count of decimals and a true minus sign, or a dash. */
 export function figure(value, decimals) {
   if (number(value) === null) return "–";

@@ -1,48 +1,41 @@
-// Manual drive. Something must be held all the time: a finger on the stick, a key, a shoulder
-// button of the gamepad. While it is, the setpoint is repeated every 100 ms; when it is let go, or the
-// page is hidden, loses the connection or the control, driving ends at once and does not begin
-// again before everything has been let go.
+// Manual drive: shows what drives, and sends its setpoint every 100 ms for as long as input.js says that
+// somebody holds it.
 
 import { get, mark, plain, say, toast } from "./dom.js";
+import { DriveEnd } from "./drive_end.js";
 import { Gamepads } from "./gamepad.js";
+import { Input } from "./input.js";
+import { InputEvents } from "./input_events.js";
 
 const PERIOD = 100;
-/** How much a key adds with each repetition, so that a touch of it is a touch. */
-const KEY_STEP = 0.2;
-const KEYS = new Map([
-  ["KeyW", [1, 0]], ["ArrowUp", [1, 0]],
-  ["KeyS", [-1, 0]], ["ArrowDown", [-1, 0]],
-  ["KeyA", [0, -1]], ["ArrowLeft", [0, -1]],
-  ["KeyD", [0, 1]], ["ArrowRight", [0, 1]],
-]);
+/** Distance of the knob's middle from the stick's rim, in CSS pixels. */
+const RIM = 36;
 
 export class Drive {
   #link;
   #limit = 0.5;
-  #stick = null;
-  #stickPointer = null;
-  #keys = new Set();
-  #keyed = [0, 0];
-  #gamepads;
+  #input = new Input();
+  #events;
   #timer = 0;
-  /** Whether all must be let go before driving may begin. */
-  #locked = false;
   #obstacle = "No reports from the vehicle yet.";
+  #isShown = false;
   #confirmed = null;
   /** Why the station ended driving although nothing was let go. */
   #halt = "";
+  #end = new DriveEnd();
+  /** Why a driver of the vehicle holds it; empty if none does. */
+  #holdReason = "";
 
   constructor(link, emergency) {
     this.#link = link;
-    this.#gamepads = new Gamepads(() => this.#input(), emergency);
-    this.#listenStick();
+    this.#events = new InputEvents(this.#input, get("stick"), () => this.#handleInput());
+    new Gamepads((pads) => this.#events.handlePads(pads), () => {
+      this.end("emergency stop");
+      emergency();
+    });
     for (const button of get("limit").querySelectorAll("button")) {
       button.addEventListener("click", () => this.#setLimit(Number(button.dataset.limit)));
     }
-    addEventListener("keyup", (event) => this.#keyUp(event.code));
-    addEventListener("blur", () => this.release());
-    addEventListener("pagehide", () => this.release());
-    document.addEventListener("visibilitychange", () => document.hidden && this.release());
     this.#render([0, 0], null);
   }
 
@@ -50,93 +43,61 @@ export class Drive {
   update(state, obstacle) {
     this.#obstacle = obstacle;
     this.#confirmed = state?.drive ?? null;
-    const halt = plain(state?.drive?.reason, 200);
-    if (halt && halt !== this.#halt) toast("bad", `Driving ended: ${halt}`);
-    this.#halt = halt;
+    const ended = this.#end.update(state);
+    if (ended) toast("bad", `Driving ended: ${ended}`);
+    this.#halt = plain(state?.drive?.reason, 200);
+    this.#holdReason = plain(state?.vehicle?.held?.reason, 200);
     mark(get("stick"), "aria-disabled", String(Boolean(obstacle)));
-    if (obstacle && this.#timer) this.release();
+    this.#hinder();
     if (!this.#timer) this.#render([0, 0], null);
   }
 
-  /** Lets go of everything: driving ends. */
-  release() {
-    this.#locked = this.#held();
-    this.#stop();
+  /** Says whether the Drive view is shown: nothing drives in another one. */
+  show(isShown) {
+    if (!isShown) this.#events.end("the Drive view was left");
+    this.#isShown = isShown;
+    this.#hinder();
+  }
+
+  /** Ends driving: what is held has to be let go and taken up again. */
+  end(reason) {
+    this.#events.end(reason);
   }
 
   /** A key that went down; true if it drives. */
   keyDown(event) {
-    if (!KEYS.has(event.code) || event.ctrlKey || event.altKey || event.metaKey) return false;
-    if (!event.repeat) {
-      this.#keys.add(event.code);
-      this.#input();
-    }
-    return true;
+    return this.#isShown && this.#events.keyDown(event);
   }
 
-  #keyUp(code) {
-    if (this.#keys.delete(code)) this.#input();
+  #hinder() {
+    const obstacle = this.#events.isCovered ? "Close the dialog first." : this.#isShown ? this.#obstacle : "Open the Drive view to drive.";
+    this.#input.hinder(obstacle, performance.now());
+    this.#handleInput();
   }
 
-  #held() {
-    return this.#stick !== null || this.#keys.size > 0 || this.#gamepads.held;
-  }
-
-  /** Something was taken up or let go. */
-  #input() {
-    if (!this.#held()) {
-      this.#locked = false;
-      this.#stop();
-    } else if (!this.#locked && !this.#timer) {
-      this.#start();
-    }
-  }
-
-  #start() {
-    if (this.#obstacle) {
-      this.#locked = true;
-      toast("warn", this.#obstacle);
-      return;
-    }
-    this.#timer = setInterval(() => this.#tick(), PERIOD);
-    this.#tick();
-  }
-
-  #stop() {
-    this.#keyed = [0, 0];
-    if (this.#timer) {
-      clearInterval(this.#timer);
+  /** Something was taken up, or a drive may be over. */
+  #handleInput() {
+    if (this.#input.owner && !this.#timer) {
+      this.#tick();
+    } else if (!this.#input.owner && this.#timer) {
+      clearTimeout(this.#timer);
       this.#timer = 0;
-      this.#link.send({ type: "drive_end" });
+      this.#link.release();
+      this.#render([0, 0], null);
     }
-    this.#render([0, 0], null);
+    const notice = this.#input.takeNotice();
+    if (notice) toast("warn", notice);
   }
 
   #tick() {
-    const [direction, source] = this.#direction();
-    const [forward, turn] = direction.map((value) => Math.round(value * this.#limit * 1000) / 1000);
-    if (!this.#link.send({ type: "drive", forward, turn })) {
-      this.release();
-      return;
-    }
-    this.#render([forward, turn], source);
-  }
-
-  /** Where the operator wants to go, each -1 to 1, and by what. */
-  #direction() {
-    if (this.#stick) return [this.#stick, "Stick"];
-    if (this.#keys.size) {
-      const target = [0, 0];
-      for (const code of this.#keys) KEYS.get(code).forEach((value, axis) => (target[axis] += value));
-      this.#keyed = this.#keyed.map((value, axis) => {
-        const wanted = Math.sign(target[axis]);
-        // Towards more in steps, towards less at once.
-        if (wanted === 0 || Math.sign(value) === -wanted) return wanted * KEY_STEP;
-        return wanted * Math.min(1, Math.abs(value) + KEY_STEP);
-      });
-      return [this.#keyed, "Keys"];
-    }
-    return [this.#gamepads.axes, "Gamepad"];
+    const now = performance.now();
+    const setpoint = this.#input.poll(now, this.#events.captured);
+    // A proof that expires ends the drive then, not with the next setpoint. A timer may be early by a fraction.
+    this.#timer = setTimeout(() => this.#tick(), Math.min(PERIOD, this.#input.expiry - now + 1));
+    if (!setpoint) return this.#handleInput();
+    const [forward, turn] = setpoint.vector.map((value) => Math.round(value * this.#limit * 1000) / 1000);
+    if (!this.#link.setpoint({ forward, turn })) return this.end("the connection takes no commands");
+    this.#render([forward, turn], setpoint.source);
   }
 
   #setLimit(limit) {
@@ -146,40 +107,9 @@ export class Drive {
     }
   }
 
-  #listenStick() {
-    const stick = get("stick");
-    const move = (event) => {
-      const box = stick.getBoundingClientRect();
-      const reach = box.width / 2 - 36;
-      const x = (event.clientX - box.left - box.width / 2) / reach;
-      const y = (event.clientY - box.top - box.height / 2) / reach;
-      const far = Math.max(1, Math.hypot(x, y));
-      this.#stick = [quiet(-y / far), quiet(x / far)];
-    };
-    stick.addEventListener("pointerdown", (event) => {
-      if (this.#stickPointer !== null || event.button > 0) return;
-      event.preventDefault();
-      stick.focus({ preventScroll: true });
-      stick.setPointerCapture(event.pointerId);
-      this.#stickPointer = event.pointerId;
-      move(event);
-      this.#input();
-    });
-    stick.addEventListener("pointermove", (event) => event.pointerId === this.#stickPointer && move(event));
-    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
-      stick.addEventListener(end, (event) => {
-        if (event.pointerId !== this.#stickPointer) return;
-        this.#stickPointer = this.#stick = null;
-        this.#input();
-      });
-    }
-    stick.addEventListener("contextmenu", (event) => event.preventDefault());
-  }
-
   #render([forward, turn], source) {
     const knob = get("stick-knob");
-    const reach = get("stick").clientWidth / 2 - 36;
-    const scale = reach / this.#limit;
+    const scale = (get("stick").clientWidth / 2 - RIM) / this.#limit;
     knob.style.transform = `translate(${turn * scale}px, ${-forward * scale}px)`;
     bar(get("forward-bar"), get("forward-value"), forward);
     bar(get("turn-bar"), get("turn-value"), turn);
@@ -188,12 +118,16 @@ export class Drive {
     mark(tag, "data-on", source ? "yes" : null);
     mark(get("stick"), "data-on", source ? "yes" : null);
     say(get("drive-line"), this.#line(source));
+    mark(get("drive-line"), "data-held", source && this.#holdReason ? "yes" : null);
   }
 
   #line(source) {
+    if (source && this.#holdReason) return `Held: ${this.#holdReason}`;
     if (source) return this.#confirmed?.active ? "Driving: commands are being sent" : "Sending";
     if (this.#obstacle) return this.#obstacle;
-    return this.#halt ? `Stopped: ${this.#halt}` : "Ready: nothing is sent until you hold something";
+    if (!this.#isShown) return "Keys and gamepad are off: touch here to use them";
+    const ending = this.#input.ending || this.#halt;
+    return ending ? `Stopped: ${ending}` : "Ready: nothing is sent until you hold something";
   }
 }
 
@@ -203,6 +137,3 @@ function bar(element, output, value) {
   const percent = Math.round(value * 100);
   say(output, `${percent < 0 ? "−" : ""}${Math.abs(percent)} %`);
 }
-
-/** A little way from the middle is still the middle. */
-const quiet = (value) => (Math.abs(value) < 0.08 ? 0 : value);

@@ -1,21 +1,28 @@
 // Emergency stop of the selected vehicle and of all: one touch or key, from anywhere, in any
-// condition. The request is repeated until the vehicles report that they have stopped, over
-// reconnections as well. Clearing it takes two.
+// condition. The request is repeated until the vehicles report their emergency, over reconnections
+// as well; that they have stopped shows in their speed. Clearing it takes two.
 
 import { get, mark, say, show, toast } from "./dom.js";
+import { StopLink } from "./stop_link.js";
+import { pendingStops, stopAllWords, stopCondition, stopWords } from "./stopping.js";
 
-const REPEAT = 500;
+const CLEAR_TEXT = "The vehicle can move again once a client resumes and commands it. Check it first.";
 const touch = matchMedia("(hover: none)");
 
 export class Emergency {
   #link;
+  #stops;
   /** Whether the operator has stopped the vehicle and it has not confirmed that yet. */
   #wanted = false;
-  #confirmed = false;
+  /** How far the vehicle's stop is; null while it reports no emergency. */
+  #condition = null;
+  #speed = null;
   #refusal = "";
   /** The same for all vehicles. */
   #wantedAll = false;
   #vehicles = [];
+  /** Whether the station stops vehicles that join. */
+  #latched = false;
   /** Why the station takes no requests from this page; empty if it does. */
   #barred = "";
   #unbar;
@@ -23,17 +30,19 @@ export class Emergency {
   /** Calls `unbar` when the operator stops a vehicle and the station takes no requests. */
   constructor(link, unbar) {
     this.#link = link;
+    this.#stops = new StopLink(link);
+    this.#stops.addEventListener("refused", ({ detail }) => this.#refuse(detail));
+    link.addEventListener("hello", () => this.#stops.start());
+    link.addEventListener("barred", () => this.#stops.close());
     this.#unbar = unbar;
     get("estop").addEventListener("click", () => this.stop());
     get("estop-all").addEventListener("click", () => this.stopAll());
     get("estop-clear").addEventListener("click", () => this.#openSheet());
     get("clear-no").addEventListener("click", () => this.#closeSheet());
     get("clear-yes").addEventListener("click", () => this.#clear("emergency"));
-    get("clear-all").addEventListener("click", () => this.#clear("emergency_all"));
-    setInterval(() => {
-      if (this.#wantedAll) this.#send("emergency_all");
-      else if (this.#wanted) this.#send("emergency");
-    }, REPEAT);
+    for (const id of ["clear-all", "latch-clear"]) {
+      get(id).addEventListener("click", () => this.#clear("emergency_all"));
+    }
     this.#render();
   }
 
@@ -71,52 +80,61 @@ export class Emergency {
     return true;
   }
 
-  /** Takes a state, the list of vehicles, and why the station takes no requests. */
-  update(state, vehicles, barred) {
+  /**
+   * Takes a state with whether it is live, the list of vehicles with whether all are to be stopped, and
+   * why the station takes no requests.
+   */
+  update(state, live, { vehicles, allStopped }, barred) {
     this.#vehicles = vehicles;
+    this.#latched = allStopped;
     this.#barred = barred;
-    this.#confirmed = state?.vehicle?.emergency === true;
-    if (this.#confirmed) this.#wanted = false;
-    if (this.#moving() === 0) this.#wantedAll = false;
+    this.#condition = stopCondition(state?.vehicle, live);
+    this.#speed = state?.vehicle?.velocity?.x;
+    if (this.#condition) this.#wanted = false;
+    if (pendingStops(vehicles) === 0) this.#wantedAll = false;
+    if (!this.#wanted && !this.#wantedAll) this.#stops.cancel();
     this.#render();
   }
 
-  /** How many of the vehicles that are present have not reported their emergency. */
-  #moving() {
-    return this.#vehicles.filter(({ presence, state }) => presence === "present" && state !== "emergency").length;
+  #send(type) {
+    if (type === "emergency_all") this.#stops.stopAll();
+    else if (this.#link.vehicle !== null) this.#stops.stop(this.#link.vehicle);
   }
 
-  async #send(type) {
-    if (!this.#link.open || !this.#link.settled) return;
-    const reason = await this.#link.ask({ type, on: true });
-    if (reason === null || !(this.#wanted || this.#wantedAll)) return;
+  #refuse(reason) {
     if (this.#refusal !== reason) toast("bad", `Emergency stop: ${reason}`);
     this.#refusal = reason;
   }
 
   #render() {
-    const how = this.#confirmed ? "stopped" : this.#wanted ? "wanted" : this.#barred ? "barred" : "ready";
+    const how = this.#condition ?? (this.#wanted ? "wanted" : this.#barred ? "barred" : "ready");
     document.body.dataset.emergency = how;
-    const [word, detail] = {
-      ready: ["Emergency stop", touch.matches ? "stops the vehicle at once" : "Esc or Space"],
-      barred: ["Emergency stop", this.#barred],
-      wanted: ["Stopping", this.#link.open ? this.#refusal || "not confirmed yet" : "NOT SENT: no connection"],
-      stopped: ["Emergency", "the vehicle is stopped"],
-    }[how];
+    const [word, detail] = this.#condition
+      ? stopWords(this.#condition, this.#speed)
+      : {
+          ready: ["Emergency stop", touch.matches ? "stops the vehicle at once" : "Esc or Space"],
+          barred: ["Emergency stop", this.#barred],
+          wanted: ["Stopping", this.#link.open ? this.#refusal || "not confirmed yet" : "NOT SENT: no connection"],
+        }[how];
     say(get("estop-word"), word);
     say(get("estop-detail"), detail);
-    mark(get("estop"), "aria-pressed", String(["wanted", "stopped"].includes(how)));
-    const [count, moving] = [this.#vehicles.length, this.#moving()];
+    mark(get("estop"), "aria-pressed", String(this.#condition !== null || how === "wanted"));
+    show(get("runaway"), this.#condition === "runaway");
+    const count = this.#vehicles.length;
     show(get("estop-all"), count > 1);
-    const all = this.#wantedAll ? `${moving} not stopped yet` : moving === 0 ? "all are stopped" : `${count} vehicles`;
-    say(get("estop-all-detail"), all);
+    say(get("estop-all-detail"), stopAllWords(this.#vehicles, this.#wantedAll));
     mark(get("estop-all"), "data-wanted", this.#wantedAll ? "yes" : null);
-    show(get("clear-all"), count - moving > 1);
-    show(get("estop-clear"), this.#confirmed && !this.#barred);
-    if (!this.#confirmed) show(get("clear-sheet"), false);
+    show(get("latch"), this.#latched);
+    get("latch-clear").disabled = Boolean(this.#barred);
+    const stopped = this.#vehicles.filter(({ state }) => state === "emergency").length;
+    show(get("clear-all"), stopped > 1 || this.#latched);
+    show(get("estop-clear"), this.#condition !== null && !this.#barred);
+    if (this.#condition === null) show(get("clear-sheet"), false);
   }
 
   #openSheet() {
+    const moves = this.#condition !== "stopped";
+    say(get("clear-text"), `${moves ? "The vehicle is not known to be at rest. " : ""}${CLEAR_TEXT}`);
     show(get("clear-sheet"), true);
     get("clear-no").focus();
   }
@@ -130,7 +148,7 @@ export class Emergency {
   async #clear(type) {
     this.#closeSheet();
     const reason = await this.#link.ask({ type, on: false });
-    if (reason === null) toast("good", "Emergency cleared.");
+    if (reason === null) toast("good", type === "emergency_all" ? "All emergencies cleared." : "Emergency cleared.");
     else toast("bad", reason);
   }
 }

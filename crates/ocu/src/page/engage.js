@@ -1,5 +1,6 @@
 // From arrival to driving by hand with one button: takes control, makes the vehicle ready, and then
-// leaves it to the stick and the keys.
+// leaves it to the stick and the keys. While a mission drives, taking over from it is a button of its own, which
+// stops the mission first: no stick and no key does that.
 
 import { get, mark, plain, say, show, toast } from "./dom.js";
 import { part } from "./status.js";
@@ -9,23 +10,37 @@ const GRACE = 2_000;
 
 export class Engage {
   #ask;
+  #mission;
   #ready;
   /** When control or Resume was asked for last; null while the button is not at work. */
   #asked = null;
   #resumed = false;
+  /** Whether a mission is being stopped first. */
+  #isTakingOver = false;
 
   /** Sends requests by `ask`, and calls `ready` when the vehicle can be driven. */
-  constructor(ask, ready) {
+  constructor(ask, mission, ready) {
     this.#ask = ask;
+    this.#mission = mission;
     this.#ready = ready;
-    get("by-hand").addEventListener("click", () => this.#begin());
+    get("by-hand").addEventListener("click", () => this.#begin({ type: "control", on: true }));
+    get("take-over").addEventListener("click", () => {
+      this.#isTakingOver = true;
+      this.#begin({ type: "take_over" });
+    });
   }
 
   /** Takes a state; `obstacle` says what prevents driving even after control and Resume, or is empty. */
   update(state, operable, obstacle) {
     const { held, wanted, asking } = state?.control ?? {};
-    const mode = part(state, "primitive_driver")?.state;
-    if (this.#asked !== null) this.#go(Boolean(held || wanted || asking), held, mode, operable, obstacle);
+    const driver = part(state, "primitive_driver");
+    const mode = driver?.state;
+    if (this.#asked !== null && this.#isTakingOver) this.#stopMission(operable, obstacle);
+    else if (this.#asked !== null) this.#go(Boolean(held || wanted || asking), held && driver?.ours, mode, operable, obstacle);
+    const canTakeOver = Boolean(operable && held && !obstacle && (this.#mission.drives || this.#isTakingOver));
+    show(get("take-over"), canTakeOver);
+    get("take-over").disabled = this.#asked !== null;
+    show(get("limit"), !canTakeOver);
     const done = held && mode === "ready";
     const button = get("by-hand");
     show(button, operable && Boolean(mode) && !obstacle && !done && document.body.dataset.mission !== "under-way");
@@ -34,9 +49,20 @@ export class Engage {
     mark(button, "aria-busy", this.#asked === null ? null : "true");
   }
 
-  #begin() {
+  #begin(request) {
     [this.#asked, this.#resumed] = [performance.now(), false];
-    this.#request({ type: "control", on: true });
+    this.#request(request);
+  }
+
+  /** Goes on by hand once the mission is over. */
+  #stopMission(operable, obstacle) {
+    if (!operable || obstacle) return this.#end(obstacle);
+    if (!this.#mission.drives) {
+      this.#isTakingOver = false;
+      this.#begin({ type: "control", on: true });
+    } else if (performance.now() - this.#asked > GRACE) {
+      this.#end("The mission did not stop");
+    }
   }
 
   /** The next step, once the one before has shown its effect. */
@@ -59,7 +85,7 @@ export class Engage {
   }
 
   #end(reason) {
-    this.#asked = null;
+    [this.#asked, this.#isTakingOver] = [null, false];
     if (reason) toast("warn", plain(reason, 140));
   }
 }

@@ -1,13 +1,14 @@
 // The list of vehicles: which there are, how they are, who controls them, and which one is selected.
 // Rows are kept and changed in place, so that focus stays where it is.
 
-import { duration, get, list, make, mark, number, plain, say, show, words } from "./dom.js";
+import { duration, figure, get, list, make, mark, number, plain, say, show, words } from "./dom.js";
 
 const MOST = 256;
 
 export class Fleet {
   #select;
   #vehicles = [];
+  #allStopped = false;
   #rows = new Map();
 
   /** Calls `select` with the number of a vehicle that the operator chooses. */
@@ -21,13 +22,20 @@ export class Fleet {
     return this.#vehicles;
   }
 
+  /** Whether *Stop all* is latched: the station stops vehicles that join. */
+  get allStopped() {
+    return this.#allStopped;
+  }
+
   /** Takes a list of vehicles. */
-  handle({ vehicles }) {
+  handle({ vehicles, all_stopped: allStopped }) {
+    this.#allStopped = allStopped === true;
     this.#vehicles = list(vehicles, MOST).filter((one) => number(one?.subsystem) !== null);
   }
 
-  /** Shows the list and the selected vehicle; `usable` says whether another one can be selected. */
-  update(state, usable) {
+  /** Shows the list and the selected vehicle; `usable` says whether another one can be selected, and
+   * `page` is the number of this page at the station. */
+  update(state, usable, page) {
     const chosen = number(state?.vehicle?.subsystem);
     const name = plain(state?.vehicle?.name, 40) || "Vehicle";
     const count = this.#vehicles.length;
@@ -38,7 +46,7 @@ export class Fleet {
     const left = new Set(this.#rows.keys());
     for (const vehicle of this.#vehicles) {
       left.delete(vehicle.subsystem);
-      this.#showRow(vehicle, vehicle.subsystem === chosen, usable);
+      this.#showRow(vehicle, vehicle.subsystem === chosen, usable, page);
     }
     for (const gone of left) {
       this.#rows.get(gone).remove();
@@ -52,7 +60,7 @@ export class Fleet {
     (rows.find((row) => row.firstChild.ariaCurrent === "true") ?? rows[0])?.firstChild.focus();
   }
 
-  #showRow(vehicle, chosen, usable) {
+  #showRow(vehicle, chosen, usable, page) {
     const row = this.#rows.get(vehicle.subsystem) ?? this.#create(vehicle.subsystem);
     const button = row.firstChild;
     const [, name, mode, detail] = button.children;
@@ -62,7 +70,7 @@ export class Fleet {
     button.disabled = !usable;
     say(name, `${plain(vehicle.name, 40) || "Vehicle"} · ${vehicle.subsystem}`);
     say(mode, condition(vehicle));
-    say(detail, `${controller(vehicle)} · ${news(vehicle)}`);
+    say(detail, `${controller(vehicle, page)} · ${news(vehicle)}`);
   }
 
   #create(number) {
@@ -94,16 +102,23 @@ export class Fleet {
 }
 
 /** The vehicle's state in words; while it is on a mission, the mission's. */
-function condition({ presence, state, mission }) {
+export function condition({ presence, state, mission, at_rest: rest, speed, runaway }) {
   if (presence === "unknown") return "Not found yet";
   if (presence !== "present") return words(presence);
-  if (state === "ready" && mission) return words(mission);
-  return words(state ?? "unknown");
+  if (runaway === true) return "RUNAWAY";
+  if (state === "emergency" && rest === false) return `Emergency, ${pace(speed) || "moving"}`;
+  const mode = state === "ready" && mission ? words(mission) : words(state ?? "unknown");
+  return rest === false && pace(speed) ? `${mode}, ${pace(speed)}` : mode;
 }
 
-function controller({ held, requested, controller: id, authority }) {
+const pace = (speed) => (number(speed) !== null && Math.abs(speed) >= 0.05 ? `${figure(Math.abs(speed), 1)} m/s` : "");
+
+/** Who drives or controls the vehicle, in words. */
+export function controller({ held, driver, requested, controller: id, authority }, page) {
   if (requested) return "another operator requests control";
-  if (held) return "you control it";
+  if (driver?.endsWith(`(page ${page})`)) return "you control it";
+  if (driver) return `${plain(driver, 48)} controls it`;
+  if (held) return "this station controls it";
   if (!id) return "nobody controls it";
   return `${plain(id, 16)} controls it${number(authority) === null ? "" : ` (${authority})`}`;
 }

@@ -1,7 +1,8 @@
 // The connection to jaus-ocu: opens the WebSocket, opens it again with growing pauses, carries
-// requests and their answers, and knows how old the last state is.
+// setpoints, requests and their answers, and knows how old the last state is.
 
 import { number, plain } from "./dom.js";
+import { Flow } from "./flow.js";
 
 const FIRST_PAUSE = 500;
 const LONGEST_PAUSE = 8_000;
@@ -11,7 +12,10 @@ export const STALE = 1_000;
 const DEAD = 5_000;
 /** More waiting than this means that the network does not take what we say. */
 const BACKLOG = 16_384;
+/** A state is not waited for to be drawn longer than this. */
+const DRAWN = 500;
 const KEY = "jaus-token";
+const VEHICLE = "jaus-vehicle";
 
 export class Link extends EventTarget {
   #socket = null;
@@ -25,7 +29,11 @@ export class Link extends EventTarget {
   #waiting = new Map();
   #token = takeToken();
   /** The vehicle that the page shows: what is asked is meant for it. */
-  #vehicle = null;
+  #vehicle = number(Number(sessionStorage.getItem(VEHICLE) ?? NaN));
+  /** The number of this page at the station; null before the first connection. */
+  #page = null;
+  #quality = null;
+  #flow = new Flow((frame) => this.#transmit(frame));
   /** Resolves to whether the page may connect. */
   #admit;
   /** Number of tries to connect: an earlier one that is still waiting gives up. */
@@ -43,7 +51,7 @@ export class Link extends EventTarget {
   /** `barred`, `connecting`, `live`, `stale` or `lost`. */
   get condition() {
     if (this.#barred) return "barred";
-    if (this.open && this.#stateAt > this.#opened) return this.age > STALE ? "stale" : "live";
+    if (this.open && this.#stateAt > this.#opened) return this.age > STALE || !this.#returns ? "stale" : "live";
     return this.#retryAt || this.#stateAt ? "lost" : "connecting";
   }
 
@@ -54,6 +62,29 @@ export class Link extends EventTarget {
   /** Milliseconds since the last state; infinite if there was none. */
   get age() {
     return this.#stateAt ? performance.now() - this.#stateAt : Infinity;
+  }
+
+  /** The subsystem number of the vehicle that the page shows; null if there is none. */
+  get vehicle() {
+    return this.#vehicle;
+  }
+
+  /** The number of this page at the station; null before the first connection. */
+  get page() {
+    return this.#page;
+  }
+
+  /** What the station has measured: round trips in milliseconds and losses in percent of the hop from
+   * page to station and of the one from station to vehicle, null if unknown, and whether the way back to
+   * the station works. Null before the first measurement. */
+  get quality() {
+    return this.#quality;
+  }
+
+  /** Whether the station receives what this page says, early enough to drive by. */
+  get #returns() {
+    const { wayBack, roundTripMs } = this.#quality ?? { wayBack: true };
+    return wayBack && (roundTripMs ?? 0) <= STALE;
   }
 
   /** Milliseconds until the next try to connect. */
@@ -97,6 +128,17 @@ export class Link extends EventTarget {
     return this.#transmit({ vehicle: this.#vehicle, ...request });
   }
 
+  /** Drives the vehicle, each axis from -1 to 1. Repeated every 100 ms while something is held. The
+   * newest setpoint replaces one that waits; false if the station cannot be reached. */
+  setpoint(push) {
+    return this.open && this.#flow.setpoint(push);
+  }
+
+  /** Ends driving. */
+  release() {
+    this.#flow.release();
+  }
+
   /** Uses a token from now on; resolves like `ask`. */
   async useToken(token) {
     const reason = await this.ask({ type: "token", token });
@@ -134,7 +176,11 @@ export class Link extends EventTarget {
     if (number !== this.#tries) return;
     if (this.#barred) return this.#emit("barred", null);
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
-    const socket = new WebSocket(`${scheme}//${location.host}/ws`);
+    const query = new URLSearchParams();
+    if (this.#vehicle !== null) query.set("vehicle", this.#vehicle);
+    // The station may not have noticed yet that the connection before is gone.
+    if (this.#page !== null) query.set("replaces", this.#page);
+    const socket = new WebSocket(`${scheme}//${location.host}/ws?${query}`);
     this.#socket = socket;
     this.#receivedAt = performance.now();
     this.settled = false;
@@ -156,14 +202,30 @@ export class Link extends EventTarget {
     if (frame === null || typeof frame !== "object") return;
     switch (frame.type) {
       case "hello":
+        this.#page = number(frame.page);
+        this.#flow.reset();
+        this.#quality = null;
         this.#emit("hello", frame);
         break;
       case "state":
         this.#stateAt = performance.now();
         this.#pause = FIRST_PAUSE;
         this.#retryAt = 0;
-        this.#vehicle = number(frame.vehicle?.subsystem);
+        this.#note(number(frame.vehicle?.subsystem));
         this.#emit("state", frame);
+        this.#show(number(frame.seq));
+        break;
+      case "ok":
+        this.#flow.confirmed();
+        break;
+      case "link":
+        this.#quality = {
+          roundTripMs: number(frame.round_trip_ms),
+          vehicleRoundTripMs: number(frame.vehicle_round_trip_ms),
+          lossPercent: number(frame.loss_percent),
+          vehicleLossPercent: number(frame.vehicle_loss_percent),
+          wayBack: frame.way_back === true,
+        };
         break;
       case "fleet":
       case "tree":
@@ -181,6 +243,27 @@ export class Link extends EventTarget {
       case "lost":
         this.#emit(frame.type, frame);
     }
+  }
+
+  /** Confirms a state once it is drawn. */
+  #show(seq) {
+    // A hidden page draws nothing, but still gets states: an alarm sounds there too.
+    if (document.hidden) return this.#flow.received(seq);
+    const socket = this.#socket;
+    const drawn = (isShown) => {
+      clearTimeout(timer);
+      cancelAnimationFrame(frame);
+      if (socket !== this.#socket) return;
+      isShown ? this.#flow.shown(seq) : this.#flow.received(seq);
+    };
+    const timer = setTimeout(() => drawn(false), DRAWN);
+    const frame = requestAnimationFrame(() => drawn(true));
+  }
+
+  #note(vehicle) {
+    if (vehicle === null || vehicle === this.#vehicle) return;
+    this.#vehicle = vehicle;
+    sessionStorage.setItem(VEHICLE, vehicle);
   }
 
   #answer(id, reason) {

@@ -6,6 +6,7 @@ import { get, mark, plain, say, show, toast, typing } from "./dom.js";
 import { Drive } from "./drive.js";
 import { Emergency } from "./emergency.js";
 import { Engage } from "./engage.js";
+import { Events } from "./events.js";
 import { Fleet } from "./fleet.js";
 import { keepFocus } from "./focus.js";
 import { Handover } from "./handover.js";
@@ -13,7 +14,8 @@ import { Link } from "./link.js";
 import { MapView } from "./map.js";
 import { Messages } from "./messages.js";
 import { Mission } from "./mission.js";
-import { part, showControl, showLink, showMissing, showStatus } from "./status.js";
+import { Sound } from "./sound.js";
+import { part, showControl, showHeld, showLink, showMissing, showStatus } from "./status.js";
 import { followTheme } from "./theme.js";
 import { showSystem, showTree } from "./tree.js";
 
@@ -24,8 +26,10 @@ const mission = new Mission(ask, map);
 const emergency = new Emergency(link, () => unbar());
 const drive = new Drive(link, () => emergency.stop());
 const fleet = new Fleet((subsystem) => selectVehicle(subsystem));
-const engage = new Engage(ask, () => readyToDrive());
+const engage = new Engage(ask, mission, () => readyToDrive());
 const handover = new Handover(ask);
+const events = new Events();
+const sound = new Sound();
 new Messages(link);
 followTheme(() => map.recolour());
 
@@ -41,6 +45,8 @@ let authority = null;
 link.addEventListener("hello", async ({ detail }) => {
   trusted = account.users ? account.operates : !detail.token_needed;
   map.offerBaseMap(detail.base_map);
+  map.reconnect();
+  events.reset();
   authority = detail.authority;
   if (detail.token_needed && !trusted && link.token) await offer(link.token);
   else show(get("token-sheet"), detail.token_needed && !trusted && !watching());
@@ -73,9 +79,11 @@ function render() {
   const operable = live && trusted && Boolean(state?.vehicle);
   const barred = account.missing || (link.open && link.settled && !trusted);
   const hint = account.users ? account.hindrance : "enter the token to use it";
-  emergency.update(state, fleet.vehicles, barred ? hint : "");
-  fleet.update(state, live && trusted);
+  emergency.update(state, live, fleet, barred ? hint : "");
+  sound.update(state, live, fleet.vehicles);
+  fleet.update(state, live, link.page);
   const hindrance = hindered(live);
+  if (state) mission.update(state, operable);
   drive.update(state, hindrance || uncontrolled());
   const mode = part(state, "primitive_driver")?.state;
   get("resume").disabled = !operable || !state.control?.held || mode !== "standby";
@@ -85,14 +93,15 @@ function render() {
 }
 
 function renderState(live, operable, hindrance) {
-  showControl(state, authority, operable, account);
+  showControl(state, authority, operable, account, link.page);
   engage.update(state, operable, hindrance);
   handover.update(state, operable);
   showStatus(state, Number.isFinite(link.age) ? link.age : 0);
   showMissing(state, live);
+  showHeld(state, live);
   map.update(state, live, link.token);
-  mission.update(state, operable);
   showSystem(state);
+  events.update(state, live, fleet.vehicles, link.token);
 }
 
 /** Why this page cannot drive now, even with control of a ready vehicle; empty if one can. */
@@ -106,12 +115,11 @@ function hindered(live) {
 
 /** What is still missing for driving; empty if nothing is. */
 function uncontrolled() {
-  if (!state.control?.wanted) return "Press Drive by hand first";
+  if (!state.control?.wanted) return mission.drives ? "A mission drives: take control first" : "Press Drive by hand first";
+  if (mission.drives) return "A mission drives: press Take over first";
   const driver = part(state, "primitive_driver");
   if (state.control.held && driver?.ours && driver.state === "standby") return "In standby: press Drive by hand first";
-  // While control is asked for, as when the operator takes over from the planner, what is held is
-  // sent already and acts as soon as the vehicle agrees.
-  return state.control.held ? "" : sentence(state.control.reason);
+  return state.control.held ? "" : sentence(state.control.reason) || "Taking control";
 }
 
 const sentence = (text) => plain(text, 140).replace(/^./, (letter) => letter.toUpperCase());
@@ -139,10 +147,19 @@ get("control-button").addEventListener("click", () => {
 get("resume").addEventListener("click", () => ask({ type: "resume" }));
 get("standby").addEventListener("click", () => ask({ type: "standby" }));
 get("vehicle-button").addEventListener("click", () => showFleet());
+for (const [id, stop] of [["estop", () => emergency.stop()], ["estop-all", () => emergency.stopAll()]]) {
+  get(id).addEventListener("click", () => drive.end("emergency stop"));
+  // While one finger holds the stick, browsers make no click of a second one.
+  get(id).addEventListener("pointerdown", ({ button }) => {
+    if (button > 0) return;
+    drive.end("emergency stop");
+    stop();
+  });
+}
 
 /** Selects a vehicle: the one before stops, unless it is on a mission. */
 async function selectVehicle(subsystem) {
-  drive.release();
+  drive.end("another vehicle was selected");
   mission.forget();
   await ask({ type: "select", subsystem });
 }
@@ -200,12 +217,14 @@ get("control-text").addEventListener("click", () => {
   if (!trusted && link.open && !account.users) openTokenSheet();
 });
 
-// Views of small screens, and keys.
+// Views, and keys. On a large screen mission and manual drive are both shown: the one that is touched or
+// has the focus is the view.
 
 function select(view) {
   const { body } = document;
   body.dataset.view = view;
-  if (["vehicles", "system", "messages"].includes(view)) body.dataset.inspect = view;
+  drive.show(view === "drive");
+  if (["vehicles", "system", "events", "messages"].includes(view)) body.dataset.inspect = view;
   for (const button of document.querySelectorAll("[data-show]")) {
     mark(button, "aria-pressed", String(button.dataset.show === view));
     button.classList.toggle("inspected", button.dataset.show === body.dataset.inspect);
@@ -214,10 +233,16 @@ function select(view) {
 for (const button of document.querySelectorAll("[data-show]")) {
   button.addEventListener("click", () => select(button.dataset.show));
 }
+for (const panel of document.querySelectorAll(".panel.operate")) {
+  for (const type of ["pointerdown", "focusin"]) {
+    panel.addEventListener(type, () => document.body.dataset.view !== panel.dataset.panel && select(panel.dataset.panel), true);
+  }
+}
 select("mission");
 
 addEventListener("keydown", (event) => {
-  if (emergency.key(event) || typing()) return;
+  if (emergency.key(event)) return drive.end("emergency stop");
+  if (typing()) return;
   if (event.code === "KeyV" && !event.ctrlKey && !event.metaKey && !event.altKey) {
     event.preventDefault();
     return showFleet();

@@ -1,8 +1,10 @@
-// The map: geographic map, raster, grid, trail, planned path, destination and vehicle on a canvas that is
-// moved by one finger, zoomed by two, and tapped to choose a destination. X of the local frame is up, Y right.
+// The map: geographic map, raster, zones, obstacles, grid, trail, planned path, destination and vehicle on a
+// canvas that is moved by one finger, zoomed by two, and tapped to choose a destination. X of the local frame is up, Y right.
 
 import { BaseMap, degreesOf } from "./basemap.js";
 import { figure, get, list, mark, number, say, show } from "./dom.js";
+import { Overlay, paintScan, paintZones } from "./overlay.js";
+import { Painter } from "./painter.js";
 import { Raster } from "./raster.js";
 
 const SMALLEST_SCALE = 0.05;
@@ -16,6 +18,7 @@ export class MapView {
   #context = this.#canvas.getContext("2d");
   #raster = new Raster(null);
   #base = new BaseMap(() => this.#draw());
+  #overlay = new Overlay();
   #camera = { x: 0, y: 0, scale: 24 };
   /** What the first view shows: `raster`, `vehicle`, or nothing yet. */
   #placed = "";
@@ -69,12 +72,19 @@ export class MapView {
     const isGiven = mission?.stage !== "idle" && number(x) !== null && number(y) !== null;
     this.#destination = isGiven ? { x, y } : null;
     this.#raster.update(state.map, token, () => this.#draw());
+    this.#overlay.update(state, live, token, () => this.#draw());
+    this.#overlay.showNote();
     const empty = get("map-empty");
     show(empty, !this.#raster.picture && !this.#base.shown);
     say(empty, this.#raster.problem || "Waiting for the map");
     this.#place();
     if (this.#following) this.#follow();
     this.#draw();
+  }
+
+  /** The connection is new: what was fetched may be of another station. */
+  reconnect() {
+    this.#overlay.reset();
   }
 
   /** Takes whether the station has a map file. */
@@ -97,7 +107,7 @@ export class MapView {
   /** Reads the colours again, after the style has changed. */
   recolour() {
     const style = getComputedStyle(document.documentElement);
-    for (const name of ["ground", "grid", "grid-strong", "trail", "path", "destination", "vehicle", "vehicle-edge", "stale", "ink", "halo"]) {
+    for (const name of ["ground", "grid", "grid-strong", "trail", "path", "destination", "vehicle", "vehicle-edge", "stale", "ink", "halo", "zone", "zone-out", "obstacle"]) {
       this.#colours[name] = style.getPropertyValue(`--map-${name}`).trim();
     }
     for (const name of ["land", "green", "landuse", "water", "building", "other", "road", "opacity", "cells"]) {
@@ -297,16 +307,21 @@ export class MapView {
     context.fillRect(0, 0, width, height);
     this.#paintBaseMap(width, height);
     this.#paintRaster();
-    this.#paintGrid(width, height);
+    const overlay = this.#overlay.content;
+    const toScreen = (place) => this.#toScreen(place);
+    paintZones(context, overlay, toScreen, { width, height }, this.#colours);
+    const painter = new Painter(context, this.#colours, toScreen, this.#camera.scale);
+    painter.grid(width, height, this.#toWorld(0, 0), this.#toWorld(width, height));
+    paintScan(context, overlay, toScreen, this.#camera.scale, this.#colours);
     context.globalAlpha = this.#over ? 0.4 : 1;
-    this.#paintLine(this.#path.map(([x, y]) => ({ x, y })), "path", 5, []);
+    painter.line(this.#path.map(([x, y]) => ({ x, y })), "path", 5, []);
     context.globalAlpha = 1;
-    this.#paintLine(this.#trail, "trail", 3, [1, 6]);
-    if (this.#destination) this.#paintPin(this.#destination, true);
-    if (this.#draft) this.#paintPin(this.#draft, false);
-    if (this.#pose) this.#paintVehicle();
-    this.#paintScale(height);
-    this.#paintNorth(width);
+    painter.line(this.#trail, "trail", 3, [1, 6]);
+    if (this.#destination) painter.pin(this.#destination, true);
+    if (this.#draft) painter.pin(this.#draft, false);
+    if (this.#pose) painter.vehicle(this.#pose, this.#poseFresh);
+    painter.scale(height);
+    painter.north(width, this.#base.frame?.heading ?? 0);
   }
 
   #paintBaseMap(width, height) {
@@ -337,138 +352,6 @@ export class MapView {
     this.#context.lineWidth = 1.5;
     this.#context.strokeRect(left, bottom - tall, wide, tall);
   }
-
-  #paintGrid(width, height) {
-    const step = roundStep(44 / this.#camera.scale);
-    const [top, bottom] = [this.#toWorld(0, 0), this.#toWorld(width, height)];
-    const context = this.#context;
-    context.lineWidth = 1;
-    const line = (index, from, to) => {
-      context.strokeStyle = this.#colours[index % 5 === 0 ? "grid-strong" : "grid"];
-      context.beginPath();
-      context.moveTo(...from);
-      context.lineTo(...to);
-      context.stroke();
-    };
-    for (let index = Math.ceil(bottom.x / step); index * step <= top.x; index++) {
-      const y = Math.round(this.#toScreen({ x: index * step, y: 0 })[1]) + 0.5;
-      line(index, [0, y], [width, y]);
-    }
-    for (let index = Math.ceil(top.y / step); index * step <= bottom.y; index++) {
-      const x = Math.round(this.#toScreen({ x: 0, y: index * step })[0]) + 0.5;
-      line(index, [x, 0], [x, height]);
-    }
-  }
-
-  #paintLine(places, colour, width, dash) {
-    if (places.length < 2) return;
-    const context = this.#context;
-    context.lineJoin = context.lineCap = "round";
-    context.beginPath();
-    for (const place of places) context.lineTo(...this.#toScreen(place));
-    context.setLineDash([]);
-    if (!dash.length) {
-      context.strokeStyle = this.#colours.halo;
-      context.lineWidth = width + 4;
-      context.stroke();
-    }
-    context.setLineDash(dash);
-    context.strokeStyle = this.#colours[colour];
-    context.lineWidth = width;
-    context.stroke();
-    context.setLineDash([]);
-  }
-
-  /** A pin whose tip is the place: filled for the mission's, hollow for one that is only chosen. */
-  #paintPin(place, filled) {
-    const context = this.#context;
-    const [x, y] = this.#toScreen(place);
-    context.beginPath();
-    context.moveTo(x, y);
-    context.bezierCurveTo(x - 4, y - 12, x - 13, y - 16, x - 13, y - 26);
-    context.arc(x, y - 26, 13, Math.PI, 0);
-    context.bezierCurveTo(x + 13, y - 16, x + 4, y - 12, x, y);
-    context.fillStyle = filled ? this.#colours.destination : this.#colours.halo;
-    context.strokeStyle = filled ? this.#colours.halo : this.#colours.destination;
-    context.lineWidth = filled ? 2 : 3.5;
-    context.fill();
-    context.stroke();
-    context.beginPath();
-    context.arc(x, y - 26, 5, 0, 2 * Math.PI);
-    context.fillStyle = filled ? this.#colours.halo : this.#colours.destination;
-    context.fill();
-  }
-
-  #paintVehicle() {
-    const context = this.#context;
-    context.save();
-    context.translate(...this.#toScreen(this.#pose));
-    context.beginPath();
-    if (this.#pose.yaw === null) {
-      context.arc(0, 0, 11, 0, 2 * Math.PI);
-    } else {
-      context.rotate(this.#pose.yaw);
-      context.moveTo(0, -21);
-      context.lineTo(14, 15);
-      context.lineTo(0, 8);
-      context.lineTo(-14, 15);
-      context.closePath();
-    }
-    context.lineJoin = "round";
-    context.lineWidth = 3;
-    context.fillStyle = this.#poseFresh ? this.#colours.vehicle : this.#colours.stale;
-    context.strokeStyle = this.#colours["vehicle-edge"];
-    context.fill();
-    context.stroke();
-    context.restore();
-  }
-
-  #paintScale(height) {
-    const context = this.#context;
-    const length = roundStep(70 / this.#camera.scale);
-    const [x, y, wide] = [16, height - 18, length * this.#camera.scale];
-    const bar = () => {
-      context.beginPath();
-      context.moveTo(x, y - 7);
-      context.lineTo(x, y);
-      context.lineTo(x + wide, y);
-      context.lineTo(x + wide, y - 7);
-      context.stroke();
-    };
-    const label = length >= 1000 ? `${length / 1000} km` : length >= 1 ? `${length} m` : `${length * 100} cm`;
-    context.font = "600 14px system-ui, sans-serif";
-    context.textAlign = "left";
-    context.lineCap = context.lineJoin = "round";
-    [context.strokeStyle, context.lineWidth] = [this.#colours.halo, 6];
-    bar();
-    context.lineWidth = 4;
-    context.strokeText(label, x + 6, y - 7);
-    [context.strokeStyle, context.lineWidth, context.fillStyle] = [this.#colours.ink, 2, this.#colours.ink];
-    bar();
-    context.fillText(label, x + 6, y - 7);
-  }
-
-  /** An arrow to true north if the frame's place on the globe is known, otherwise along X. */
-  #paintNorth(width) {
-    const context = this.#context;
-    const [x, middle] = [width / 2, 18];
-    context.save();
-    context.translate(x, middle);
-    context.rotate(-(this.#base.frame?.heading ?? 0));
-    context.translate(-x, -middle);
-    context.font = "700 14px system-ui, sans-serif";
-    context.textAlign = "center";
-    [context.strokeStyle, context.lineWidth, context.fillStyle] = [this.#colours.halo, 4, this.#colours.ink];
-    context.strokeText("N", x, 28);
-    context.fillText("N", x, 28);
-    context.beginPath();
-    context.moveTo(x, 4);
-    context.lineTo(x + 6, 14);
-    context.lineTo(x - 6, 14);
-    context.closePath();
-    context.fill();
-    context.restore();
-  }
 }
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
@@ -480,10 +363,4 @@ function spread(places) {
   const y = places.reduce((sum, place) => sum + place[1], 0) / places.length;
   const size = places.length > 1 ? Math.hypot(places[0][0] - places[1][0], places[0][1] - places[1][1]) : 0;
   return { x, y, size };
-}
-
-/** The next of 1, 2, 5 times a power of ten. */
-function roundStep(least) {
-  const power = 10 ** Math.floor(Math.log10(least));
-  return [1, 2, 5, 10].map((digit) => digit * power).find((step) => step >= least * 0.999);
 }

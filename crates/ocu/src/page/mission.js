@@ -14,14 +14,27 @@ const STAGES = [
   ["driving", "Driving"],
   ["arrived", "Arrived"],
 ];
+/** The stages in which the planner has the drivers. */
+const DRIVEN = ["path", "vector", "primitive", "driving"];
 const OVER = ["idle", "arrived", "failed", "stopped", "lost"];
 
 /** A planner reports its mission 4 times a second; an older report, in milliseconds, is marked as old. */
 const OLD = 2_000;
 
+/**
+ * Why the mission does not go on. The planner keeps the reason of an earlier attempt while the next one
+ * drives well; then only what holds the vehicle now counts.
+ */
+export function currentReason(stage, mission, vehicle) {
+  const reason = plain(mission.reason, 255);
+  if (!DRIVEN.includes(stage) || reason.startsWith("returns:")) return reason;
+  const held = plain(vehicle?.held?.reason, 255);
+  return held ? `held: ${held}` : "";
+}
+
 /** What became of a mission whose planner is lost, and what is left to the operator. */
 function lostPlanner({ id, how, told_to_stop: stopped }) {
-  const loss = `The planner ${plain(id, 16)} is ${plain(how, 10)}`;
+  const loss = `The planner ${plain(id, 16)} ${how === "restarted" ? "restarted while it drove" : `is ${plain(how, 10)}`}`;
   return stopped
     ? `${loss}. The vehicle was stopped: press Emergency stop if it still moves.`
     : `${loss}. This station does not control the drivers: press Emergency stop if the vehicle still moves.`;
@@ -32,6 +45,8 @@ export class Mission {
   #map;
   #stages = new Map();
   #mission = null;
+  /** Whether this station has let the planner drive, and its mission is not over. */
+  #isOurs = false;
   #furthest = { mission: null, index: -1 };
   #operable = false;
   /** Whether the vehicle has reported an emergency since a mission was under way, or may have before this page looked. */
@@ -47,6 +62,7 @@ export class Mission {
     }
     get("stages").append(...this.#stages.values());
     get("approve").addEventListener("click", () => this.#ask({ type: "approve", mission: this.#mission?.mission }, "Mission approved"));
+    get("continue").addEventListener("click", () => this.#ask({ type: "continue", mission: this.#mission?.mission }, "Mission continued"));
     get("stop").addEventListener("click", () => this.#ask({ type: "stop" }, "Mission stopped"));
     const form = get("destination");
     form.addEventListener("submit", (event) => {
@@ -81,9 +97,15 @@ export class Mission {
     return this.#mission?.stage === "awaiting_approval";
   }
 
+  /** Whether a mission drives the vehicle, or begins to: the operator has to take over first. */
+  get drives() {
+    return this.#isOurs || (!this.#mission?.lost && DRIVEN.includes(this.#mission?.stage));
+  }
+
   update(state, operable) {
     const mission = state.mission && typeof state.mission === "object" ? state.mission : null;
     this.#mission = mission;
+    this.#isOurs = state.control?.planner_drives === true;
     this.#operable = operable;
     const lost = mission?.lost ?? null;
     const stage = lost ? "lost" : plain(mission?.stage ?? "idle", 30);
@@ -98,6 +120,9 @@ export class Mission {
     show(get("attempt"), attempts > 0 && !OVER.includes(stage));
     say(get("attempt"), `Attempt ${number(mission?.attempt) ?? 0} of ${attempts}`);
     get("approve").disabled = !operable || !this.waits || Boolean(state.vehicle?.stale);
+    show(get("approve"), stage !== "waiting");
+    show(get("continue"), stage === "waiting");
+    get("continue").disabled = !operable || Boolean(state.vehicle?.stale);
     get("stop").disabled = !operable || !mission || OVER.includes(stage);
     get("plan").disabled = !operable;
     document.body.dataset.mission = OVER.includes(stage) ? "over" : "under-way";
@@ -109,7 +134,7 @@ export class Mission {
     // A mission that ended does not say where: it was where it was seen last.
     if (index >= 0) this.#furthest.index = index;
     const reached = index >= 0 ? index : stage === "idle" ? -1 : this.#furthest.index;
-    const ended = { failed: "failed", stopped: "stopped", lost: "failed" }[stage];
+    const ended = { failed: "failed", stopped: "stopped", lost: "failed", waiting: "waiting" }[stage];
     STAGES.forEach(([key, name], position) => {
       let how = position < reached ? "done" : position > reached ? "ahead" : "active";
       if (position === reached && ended) how = ended;
@@ -149,10 +174,11 @@ export class Mission {
       arrived: "Arrived",
       failed: "Failed",
       stopped: "Stopped",
+      waiting: "Stopped for a fault, and waits for Continue",
     }[stage] ?? words(stage);
     const left = number(mission.remaining_m);
     const far = left !== null && !OVER.includes(stage) ? `, ${figure(left, 1)} m to go` : "";
-    const reason = this.#isCleared(stage, vehicle, mission.reason) ? "the emergency is cleared; plan again" : plain(mission.reason, 255);
+    const reason = this.#isCleared(stage, vehicle, mission.reason) ? "the emergency is cleared; plan again" : currentReason(stage, mission, vehicle);
     const age = number(mission.age_ms) ?? 0;
     const old = age > OLD ? ` (${duration(age)} old)` : "";
     say(line, `${what}${far}${reason ? `: ${reason}` : ""}${old}`);

@@ -1,27 +1,45 @@
 // The top bar and the status panel: how good the connection is, who is in control, and how the
 // vehicle moves.
 
-import { duration, figure, get, list, mark, number, plain, say, show, toast, words } from "./dom.js";
+import { duration, figure, get, list, mark, number, objects, plain, say, show, toast, words } from "./dom.js";
 
 const FRESH = 1_000;
 
 /** The part of a role, or undefined. */
 export const part = (state, role) => list(state?.vehicle?.parts, 64).find((one) => one?.role === role);
 
+/** A round trip and a loss in few letters, for example `0.12 s, 3 % lost`; empty if they are not known. */
+export function hop(roundTrip, loss) {
+  const time = number(roundTrip) === null ? "" : roundTrip < 995 ? `${Math.round(roundTrip)} ms` : `${figure(roundTrip / 1000, 1)} s`;
+  const lost = number(loss) !== null && loss >= 0.5 ? `${Math.round(Math.min(loss, 100))} % lost` : "";
+  return [time, lost].filter(Boolean).join(", ");
+}
+
+/** The two hops in words: from this page to the station, and from there to the vehicle. */
+export function hops(quality) {
+  const station = hop(quality?.roundTripMs, quality?.lossPercent);
+  const vehicle = hop(quality?.vehicleRoundTripMs, quality?.vehicleLossPercent);
+  return [station && `station ${station}`, vehicle && `vehicle ${vehicle}`].filter(Boolean).join(" · ");
+}
+
 /** Shows how good the connection is, everywhere that it matters. */
 export function showLink(link, state) {
   const condition = link.condition;
   document.body.dataset.link = condition;
   const age = Number.isFinite(link.age) ? duration(link.age) : "";
+  const quality = link.quality ?? null;
   const [word, detail] = {
     barred: ["Not logged in", ""],
     connecting: ["Connecting", ""],
-    live: ["Live", ""],
+    live: ["Live", hops(quality)],
     stale: ["Stale", age],
     lost: ["Reconnecting", link.retryIn > 950 ? `in ${Math.ceil(link.retryIn / 1000)} s` : "now"],
   }[condition];
   say(get("link-word"), word);
   say(get("link-detail"), detail);
+  mark(get("link-pill"), "title", condition === "live" ? `Round trip and loss: ${hops(quality) || "not measured yet"}` : null);
+  const slow = quality !== null && (quality.wayBack === false || Math.max(...["roundTripMs", "vehicleRoundTripMs"].map((key) => number(quality[key]) ?? 0)) > 1_000);
+  mark(get("link-pill"), "data-slow", condition === "live" && slow ? "yes" : null);
   const banner = get("banner");
   // The age changes all the time: a screen reader hears the sentence alone, and once.
   const [text, old] = {
@@ -34,21 +52,22 @@ export function showLink(link, state) {
 }
 
 /** How a part is missing, in words. */
-const absence = ({ name, id, how }) => `${plain(name, 40)} ${plain(id, 16)} is ${how === "gone" ? "gone" : "silent"}`;
+const absence = ({ name, id, how }) => `${plain(name, 40)} ${plain(id, 16)} ${ABSENCE[how] ?? "is silent"}`;
+const ABSENCE = { gone: "is gone", restarted: "restarted while it drove: the vehicle was stopped" };
 
 /** The ids of the parts that were missing when that was last shown. */
 let missed = new Set();
 
 /** Says which parts of the vehicle are missing, for as long as they are. Without a live connection there is no news of them. */
 export function showMissing(state, live) {
-  const parts = list(state.vehicle?.parts, 64);
-  const missing = list(state.vehicle?.missing, 64);
+  const parts = objects(state.vehicle?.parts, 64);
+  const missing = objects(state.vehicle?.missing, 64);
   const now = new Set(missing.map(({ id }) => plain(id, 16)));
   for (const { id, role } of parts) {
     if (missed.has(id) && !now.has(id)) toast("good", `${words(role)} ${plain(id, 16)} is back`);
   }
   missed = now;
-  const silent = missing.filter(({ how }) => how !== "gone");
+  const silent = missing.filter(({ how }) => how === "silent");
   // All parts at once: the network is the reason, or the whole vehicle.
   const all = parts.length > 1 && silent.length === parts.length;
   const texts = all
@@ -64,10 +83,10 @@ export function showMissing(state, live) {
 let holderHere = "you";
 
 /** Shows who controls, and offers to take, request or release control. */
-export function showControl(state, authority, operable, account) {
-  const { held, wanted, asking, reason, user } = state.control ?? {};
-  const isOther = account.users && Boolean(user) && user !== account.user;
-  holderHere = isOther ? plain(user, 32) : "you";
+export function showControl(state, authority, operable, account, ownPage) {
+  const { held, wanted, asking, reason, user, page } = state.control ?? {};
+  const isOther = number(page) !== null && page !== ownPage;
+  holderHere = !isOther ? "you" : account.users && user !== account.user ? plain(user, 32) : "another page";
   const driver = part(state, "primitive_driver");
   const [word, detail] = held
     ? [isOther ? `${holderHere} has control` : "You have control", number(authority) === null ? "" : `authority ${authority}`]
@@ -84,7 +103,7 @@ export function showControl(state, authority, operable, account) {
   const offer = outranks ? "Request control" : "Take control";
   say(button, asking ? "Withdraw" : held || wanted ? "Release" : offer);
   button.classList.toggle("primary", !held && !wanted && !asking);
-  button.disabled = !operable;
+  button.disabled = !operable || isOther;
 }
 
 function holder(driver) {
@@ -116,6 +135,15 @@ export function showStatus(state, late) {
   // There is room for one age only: what is old is often old for one reason.
   const oldest = Math.max(...old.map(([, age]) => age + late));
   say(get("state-old"), old.length ? `${duration(oldest)} old: ${old.map(([name]) => name).join(", ")}` : "");
+}
+
+/** Shows why a driver of the vehicle holds it, where the operator looks. */
+export function showHeld(state, live) {
+  const reason = live ? plain(state.vehicle?.held?.reason, 200) : "";
+  const notice = get("held");
+  show(notice, reason !== "");
+  // Distances in the reason change all the time: a screen reader hears it once.
+  say(get("held-text"), reason ? `Held: ${reason}` : "");
 }
 
 /** Who commands a part, in words. */

@@ -33,6 +33,14 @@ impl Depth {
             Self::Full => Duration::from_secs(2),
         }
     }
+
+    /// An older velocity does not say whether the vehicle is at rest.
+    pub(super) const fn velocity_counts(self) -> Duration {
+        match self {
+            Self::Brief => Duration::from_millis(2500),
+            Self::Full => Duration::from_secs(1),
+        }
+    }
 }
 
 /// A component of the vehicle.
@@ -111,6 +119,14 @@ impl Part {
             let silence = now.saturating_duration_since(heard);
             (is_periodic && silence >= limit) || (self.is_down && silence >= Self::DOWN)
         })
+    }
+
+    /// Why it holds the vehicle, by its latest report.
+    pub(super) fn hold_reason(&self, now: Instant) -> Option<&str> {
+        let stage = self.stage.as_ref().filter(|_| self.role.is_driver())?;
+        let holds = matches!(stage.state, "active" | "blocked") && !stage.reason.is_empty();
+        let is_current = self.was_heard_within(Depth::Full.silent(), now);
+        (holds && is_current).then_some(&*stage.reason)
     }
 
     pub(super) fn was_heard_within(&self, limit: Duration, now: Instant) -> bool {

@@ -4,11 +4,11 @@ use super::*;
 use jaus::messages::core::{ReportStatus, management};
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::messages::mobility::{
-    ReportLocalPose, ReportVelocityState, local_pose_sensor, primitive_driver,
+    ReportLocalPose, ReportVelocityState, local_pose_sensor, local_vector_driver, primitive_driver,
     velocity_state_sensor,
 };
 use jaus::service::Offer;
-use jaus_vehicle::messages::ground::{ReportMission, mission_planner};
+use jaus_vehicle::messages::ground::{ReportMission, ReportStage, mission_planner, stage};
 
 const DRIVER: JausId = JausId::new(101, 2, 33);
 const SENSORS: JausId = JausId::new(101, 2, 40);
@@ -281,4 +281,173 @@ fn a_planner_that_is_silent_while_others_report_is_lost_after_2_s() {
     assert_eq!(picture.lost_planner(now - ms(1)), None);
     picture.handle_report(now, PLANNER, mission(7).into());
     assert_eq!(picture.lost_planner(now), None);
+}
+
+#[test]
+fn a_planner_that_drove_and_reports_no_mission_has_restarted() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), planner()]);
+    picture.handle_report(start, PLANNER, mission(7).into());
+    picture.handle_report(start + ms(250), PLANNER, mission(0).into());
+    let lost = Some((PLANNER, Absence::Restarted));
+    // The mission does not vanish without a word, however long the new planner reports none.
+    for time in [250, 500, 60_000] {
+        let now = start + ms(time);
+        picture.handle_report(now, PLANNER, mission(0).into());
+        assert_eq!(picture.lost_planner(now), lost, "{time} ms");
+        let shown = picture.mission_state(now, true).unwrap();
+        assert_eq!(shown.lost.map(|it| it.how), Some("restarted"));
+        assert!(
+            picture
+                .missing(now)
+                .any(|(id, _, how)| (id, Some(how)) == (PLANNER, lost.map(|it| it.1)))
+        );
+    }
+    let now = start + ms(60_250);
+    picture.handle_report(now, PLANNER, mission(2).into());
+    assert_eq!(picture.lost_planner(now), None, "a new mission");
+}
+
+#[test]
+fn a_planner_that_ends_its_mission_has_not_restarted() {
+    let start = Instant::now();
+    for stage in [8, 9, 10] {
+        let mut picture = picture(start, &[driver(), planner()]);
+        for stage in [7, stage, 0] {
+            picture.handle_report(start, PLANNER, mission(stage).into());
+        }
+        assert_eq!(picture.lost_planner(start), None, "{stage}");
+    }
+}
+
+#[test]
+fn a_planner_whose_restart_its_session_has_noticed_is_lost_before_it_reports() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), planner()]);
+    picture.handle_report(start, PLANNER, mission(3).into());
+    picture.handle_planner_restart(PLANNER);
+    assert_eq!(picture.lost_planner(start), None, "it did not drive");
+    picture.handle_report(start, PLANNER, mission(7).into());
+    picture.handle_planner_restart(PLANNER);
+    assert_eq!(
+        picture.lost_planner(start),
+        Some((PLANNER, Absence::Restarted))
+    );
+}
+
+#[test]
+fn a_planner_that_was_lost_before_it_is_back_is_not_lost_again() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), planner()]);
+    picture.handle_report(start, PLANNER, mission(7).into());
+    picture.set_parts(start, [driver()].iter());
+    picture.handle_time(start);
+    picture.set_parts(start, [driver(), planner()].iter());
+    picture.handle_report(start, PLANNER, mission(0).into());
+    assert_eq!(picture.lost_planner(start), None);
+}
+
+#[test]
+fn the_restart_of_a_planner_is_forgotten_once_the_operator_drives_on() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), planner()]);
+    picture.handle_report(start, PLANNER, mission(7).into());
+    picture.handle_report(start, PLANNER, mission(0).into());
+    picture.forget_planner_restart();
+    picture.handle_report(start, PLANNER, mission(0).into());
+    assert_eq!(picture.lost_planner(start), None);
+}
+
+fn moving(speed: f64) -> ReportVelocityState {
+    let mut report = ReportVelocityState::default();
+    report.set_velocity_x_m_per_s(speed).unwrap();
+    report.set_yaw_rate_rad_per_s(0.0).unwrap();
+    report
+}
+
+fn shown(picture: &Picture, now: Instant) -> state::VehicleState {
+    // The directory, which decides whether there is a vehicle at all, is empty here.
+    picture.vehicle_state(now, false, |_| None).unwrap()
+}
+
+#[test]
+fn an_emergency_does_not_count_as_a_stop_before_the_speed_is_measured() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), sensors()]);
+    let emergency = ReportStatus {
+        status: (State::Emergency as u8).into(),
+        ..ReportStatus::default()
+    };
+    picture.handle_report(start, DRIVER, emergency.into());
+    let rest = |picture: &Picture, now| {
+        let shown = shown(picture, now);
+        assert!(shown.emergency);
+        shown.at_rest
+    };
+    assert_eq!(rest(&picture, start), None, "no velocity was reported");
+    picture.handle_report(start, SENSORS, moving(1.7).into());
+    assert_eq!(rest(&picture, start), Some(false));
+    picture.handle_report(start + ms(100), SENSORS, moving(0.0).into());
+    assert_eq!(rest(&picture, start + ms(1099)), Some(true));
+    assert_eq!(rest(&picture, start + ms(1100)), None, "the sample is old");
+    let unknown = ReportVelocityState::default();
+    picture.handle_report(start + ms(1100), SENSORS, unknown.into());
+    assert_eq!(rest(&picture, start + ms(1100)), None);
+}
+
+#[test]
+fn a_vehicle_that_keeps_moving_in_emergency_is_a_runaway_while_its_speed_is_known() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), sensors()]);
+    for tenth in 0..=12 {
+        let now = start + ms(100 * tenth);
+        let emergency = ReportStatus {
+            status: (State::Emergency as u8).into(),
+            ..ReportStatus::default()
+        };
+        assert!(!shown(&picture, now).runaway, "{tenth}");
+        if tenth < 11 {
+            picture.handle_report(now, DRIVER, emergency.into());
+            picture.handle_report(now, SENSORS, moving(0.6).into());
+        }
+        if tenth == 10 {
+            break;
+        }
+    }
+    assert!(shown(&picture, start + ms(1000)).runaway);
+    assert!(
+        picture
+            .fleet_state(start + ms(1000), true, (false, false))
+            .runaway
+    );
+    assert!(!shown(&picture, start + ms(2000)).runaway);
+}
+
+#[test]
+fn the_reason_of_the_driver_nearest_to_the_motors_says_why_the_vehicle_is_held() {
+    let start = Instant::now();
+    let vector = component(
+        JausId::new(101, 2, 35),
+        &[management::URN, local_vector_driver::URN, stage::URN],
+    );
+    let vector_id = vector.id;
+    let mut picture = picture(start, &[driver(), vector, sensors()]);
+    let report = |state: u8, reason: &str| ReportStage {
+        state: state.into(),
+        reason: reason.into(),
+        ..ReportStage::default()
+    };
+    assert_eq!(shown(&picture, start).held, None);
+    let obstacle = "an obstacle is 0.4 m away: turn or drive back";
+    picture.handle_report(start, vector_id, report(3, obstacle).into());
+    let held = shown(&picture, start).held.unwrap();
+    assert_eq!((held.role, &*held.reason), ("vector_driver", obstacle));
+    let edge = "the edge of the operating zone is 0.2 m away: turn or drive back";
+    picture.handle_report(start, DRIVER, report(2, edge).into());
+    let held = shown(&picture, start).held.unwrap();
+    assert_eq!((held.role, &*held.reason), ("primitive_driver", edge));
+    assert_eq!(shown(&picture, start + ms(1500)).held, None, "it is old");
+    picture.handle_report(start, DRIVER, report(2, "").into());
+    picture.handle_report(start, vector_id, report(0, "stopped: released").into());
+    assert_eq!(shown(&picture, start).held, None, "nothing holds it");
 }

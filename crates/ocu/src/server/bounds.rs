@@ -9,10 +9,10 @@ pub(super) const LARGEST_FRAME: usize = 4096;
 
 /// A token bucket rate: a burst, and a sustained rate.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Rate {
-    pub(super) burst: u32,
+pub(crate) struct Rate {
+    pub(crate) burst: u32,
     /// Refill period of one token.
-    pub(super) period: Duration,
+    pub(crate) period: Duration,
 }
 
 /// Frames of a page: a burst for those that it sends after a delay, and five times the rate of a
@@ -24,18 +24,18 @@ pub(super) const FRAMES: Rate = Rate {
 
 /// A token bucket. It stores when it will be full again, which determines how many tokens it holds.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bucket {
+pub(crate) struct Bucket {
     full: Instant,
 }
 
 impl Bucket {
     /// A full bucket.
-    pub(super) const fn new(now: Instant) -> Self {
+    pub(crate) const fn new(now: Instant) -> Self {
         Self { full: now }
     }
 
     /// Takes a token. Without one, returns the time until there is one.
-    pub(super) fn take(&mut self, now: Instant, rate: Rate) -> Result<(), Duration> {
+    pub(crate) fn take(&mut self, now: Instant, rate: Rate) -> Result<(), Duration> {
         let full = self.full.max(now) + rate.period;
         let latest = now + rate.period * rate.burst;
         if full > latest {

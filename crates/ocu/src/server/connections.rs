@@ -26,8 +26,8 @@ use crate::tls::Tls;
 
 /// Connection limit: more than all pages need, and far below the usual limit of open files.
 const MOST: usize = 256;
-/// Connections of one address: eight pages with six requests each, and their sockets.
-const SHARE: usize = 64;
+/// Connections of one address: eight pages with six requests each, and their three sockets.
+const SHARE: usize = 72;
 /// Deadline of a TLS handshake.
 const HANDSHAKE: Duration = Duration::from_secs(10);
 /// Deadline of a request's header, also of the next one on the same connection.

@@ -3,13 +3,15 @@
 
 mod attempts;
 mod base_map;
-mod bounds;
+pub(super) mod bounds;
 mod connections;
 mod gate;
 mod guard;
 mod login;
 mod logins;
+mod looks;
 mod socket;
+mod stop_socket;
 mod trail;
 mod view;
 mod visitor;
@@ -20,7 +22,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use axum::extract::ws::WebSocketUpgrade;
-use axum::extract::{ConnectInfo, Path, Request, State};
+use axum::extract::{ConnectInfo, Path, Query, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
@@ -34,10 +36,11 @@ use tokio::time::interval;
 
 use self::attempts::Attempts;
 pub(super) use self::gate::{Gate, UserGate};
+use self::socket::Introduction;
 pub(super) use self::trail::Trail;
 use super::base_map::BaseMap;
+use super::orders::{Access, Order};
 use super::page::{self, File};
-use super::session::{Access, Order};
 use super::tls::Tls;
 use super::users::UserRole;
 use jaus::address::JausId;
@@ -69,6 +72,8 @@ struct Shared {
     dictionary: Dictionary,
     /// Limits the number of pages.
     places: Places,
+    /// Limits the number of connections for stops.
+    stop_places: Places,
     /// Limits failed logins.
     attempts: Mutex<Attempts>,
     /// Limits the number of tiles of the map file that are read at once.
@@ -111,6 +116,8 @@ impl Server {
     const PAGES: usize = 32;
     /// Maximum number of pages of one address.
     const PAGES_OF_ADDRESS: usize = 8;
+    /// Connections for stops of one page.
+    const STOPS_OF_PAGE: usize = 2;
     /// Interval of checking sessions and the users file.
     const CHECK: Duration = Duration::from_secs(1);
 
@@ -120,6 +127,10 @@ impl Server {
             access,
             dictionary: Dictionary::of(jaus_vehicle::messages::registry()),
             places: Places::new(Self::PAGES, Self::PAGES_OF_ADDRESS),
+            stop_places: Places::new(
+                Self::PAGES * Self::STOPS_OF_PAGE,
+                Self::PAGES_OF_ADDRESS * Self::STOPS_OF_PAGE,
+            ),
             attempts: Mutex::new(Attempts::new()),
             readers: Arc::new(Semaphore::new(base_map::READERS)),
             pages: AtomicU64::new(0),
@@ -145,7 +156,10 @@ impl Server {
         });
         files
             .route("/ws", get(serve_page))
+            .route("/stop", get(serve_stops))
             .route("/map/{vehicle}/{map}", get(serve_map))
+            .route("/overlay/{vehicle}", get(looks::serve_overlay))
+            .route("/events", get(looks::serve_events))
             .route("/base-map", get(base_map::describe))
             .route("/base-map/{zoom}/{x}/{y}", get(base_map::serve))
             .route("/session", get(login::session))
@@ -247,6 +261,7 @@ async fn serve_map(
 async fn serve_page(
     State(shared): State<Arc<Shared>>,
     ConnectInfo(address): ConnectInfo<SocketAddr>,
+    Query(introduction): Query<Introduction>,
     headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
@@ -272,7 +287,29 @@ async fn serve_page(
         .max_message_size(bounds::LARGEST_FRAME)
         .max_frame_size(bounds::LARGEST_FRAME)
         .on_upgrade(async move |socket| {
-            socket::serve(socket, shared, visitor).await;
+            socket::serve(socket, shared, visitor, introduction).await;
+            drop(place);
+        })
+}
+
+async fn serve_stops(
+    State(shared): State<Arc<Shared>>,
+    ConnectInfo(address): ConnectInfo<SocketAddr>,
+    headers: HeaderMap,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    let Some(visitor) = shared.admission.gate.visitor(&headers, address) else {
+        return (StatusCode::UNAUTHORIZED, "log in first\n").into_response();
+    };
+    let Ok(place) = shared.stop_places.take(Source::of(address)) else {
+        shared.counters.no_place.fetch_add(1, Relaxed);
+        return (StatusCode::SERVICE_UNAVAILABLE, "too many connections\n").into_response();
+    };
+    upgrade
+        .max_message_size(bounds::LARGEST_FRAME)
+        .max_frame_size(bounds::LARGEST_FRAME)
+        .on_upgrade(async move |socket| {
+            stop_socket::serve(socket, shared, visitor).await;
             drop(place);
         })
 }
@@ -324,7 +361,7 @@ impl Shared {
         match shown.map(|it| self.admits(it, address)) {
             Some(Ok(())) => Ok(()),
             _ => {
-                let words = "the map requires the token: send Authorization: Bearer TOKEN\n";
+                let words = "this requires the token: send Authorization: Bearer TOKEN\n";
                 Err((StatusCode::UNAUTHORIZED, words))
             }
         }

@@ -1,29 +1,33 @@
 //! The WebSocket of one page: requests to the session, snapshots and answers back. Reading and
 //! writing are independent, so that a page that reads slowly can still stop the vehicle.
 
-use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt, StreamExt};
-use tokio::sync::mpsc;
-use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
+use serde::Deserialize;
+use tokio::sync::{Notify, mpsc, watch};
+use tokio::time::{MissedTickBehavior, interval, interval_at, sleep, timeout};
 
 use super::Shared;
 use super::bounds::{Bucket, FRAMES};
 use super::view::{self, MessageView};
 use super::visitor::Visitor;
 use crate::answer::Said as Answer;
+use crate::orders::{
+    DriveOrder, OpenedPage, Order, Reply, Snapshot, StopOrder, StopReply, StopTarget, json,
+};
+use crate::ownership::{Owner, PageId};
+use crate::page_link::{PageLink, Seen, TooOld};
 use crate::request::{Frame, MessageFilter, OperatorRequest, Said};
-use crate::session::{Order, Reply};
-use crate::stick::PageId;
 use crate::users::UserRole;
 use jaus_view::Filter;
 
 /// Version of the protocol between page and station.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Limit of queued answers per page. Further answers are dropped.
 const ANSWERS: usize = 64;
 /// A page that accepts no data for this time is disconnected.
@@ -42,11 +46,54 @@ const CHECK: Duration = Duration::from_secs(1);
 const SESSION_ENDED: u16 = 4001;
 /// Minimum interval between refusals of requests without an id.
 const REFUSAL: Duration = Duration::from_secs(1);
+/// Interval of the frames about the links.
+const LINK: Duration = Duration::from_secs(1);
+
+/// What a page says when it connects.
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct Introduction {
+    /// The vehicle to show.
+    vehicle: Option<u16>,
+    /// The number of the same page's previous connection.
+    replaces: Option<u64>,
+}
+
+/// The link to the page. The reader notes confirmations, and the writer the states that it sends.
+#[derive(Default)]
+struct SharedLink {
+    link: Mutex<PageLink>,
+    /// The link may take another state.
+    confirmed: Notify,
+}
+
+impl SharedLink {
+    fn lock(&self) -> MutexGuard<'_, PageLink> {
+        self.link.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 /// Serves a page until either side closes the connection.
-pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, visitor: Visitor) {
+pub(super) async fn serve(
+    socket: WebSocket,
+    shared: Arc<Shared>,
+    visitor: Visitor,
+    introduction: Introduction,
+) {
     let page = PageId(shared.pages.fetch_add(1, Relaxed));
     let visitor = Arc::new(visitor);
+    let (states, snapshots) = watch::channel(Snapshot::default());
+    let opened = OpenedPage {
+        operator: Owner {
+            page,
+            user: Arc::clone(&visitor.user),
+        },
+        vehicle: introduction.vehicle,
+        replaces: introduction.replaces.map(PageId),
+        states,
+    };
+    // On error the session has ended, which the writer notices.
+    let _ = shared.access.orders.send(Order::Opened(opened)).await;
+    let link = SharedLink::default();
     let (mut sink, mut stream) = socket.split();
     let (answers, waiting) = mpsc::channel(ANSWERS);
     let (views, chosen) = mpsc::channel(ANSWERS);
@@ -54,18 +101,27 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, visitor: Visit
         page,
         shared: &shared,
         visitor: &visitor,
+        link: &link,
+        snapshots: snapshots.clone(),
         answers,
         views,
         frames: Bucket::new(Instant::now()),
         wrong_tokens: 0,
         refused: None,
     };
+    let writer = Writer {
+        page,
+        shared: &shared,
+        visitor: &visitor,
+        link: &link,
+        snapshots,
+    };
     let parting = tokio::select! {
         parting = reader.run(&mut stream) => parting,
-        () = write(&mut sink, &shared, &visitor, waiting, chosen) => None,
+        () = writer.run(&mut sink, waiting, chosen) => None,
         parting = supervise(&shared, &visitor) => Some(parting),
     };
-    // Release the stick first, since the page that may hold it is gone.
+    // First of all, the vehicles that the page drives have lost their operator.
     let _ = shared.access.orders.send(Order::Gone(page)).await;
     if let Some((code, reason)) = parting {
         let frame = CloseFrame {
@@ -85,10 +141,10 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, visitor: Visit
 }
 
 /// Code and reason of the Close frame.
-type Parting = (u16, &'static str);
+pub(super) type Parting = (u16, &'static str);
 
 /// Waits until the visitor has to go: without the token in time, or at the end of the session.
-async fn supervise(shared: &Shared, visitor: &Visitor) -> Parting {
+pub(super) async fn supervise(shared: &Shared, visitor: &Visitor) -> Parting {
     if let Some(gate) = shared.admission.gate.users() {
         while gate.holds(visitor, false) {
             sleep(CHECK).await;
@@ -106,6 +162,9 @@ struct Reader<'s> {
     page: PageId,
     shared: &'s Shared,
     visitor: &'s Arc<Visitor>,
+    link: &'s SharedLink,
+    /// The state of the page's vehicle, as the session last knew it.
+    snapshots: watch::Receiver<Snapshot>,
     answers: mpsc::Sender<Utf8Bytes>,
     /// The filter for the page's message view.
     views: mpsc::Sender<Option<Filter>>,
@@ -149,7 +208,8 @@ impl Reader<'_> {
     }
 
     async fn handle(&mut self, text: &str) -> Option<Parting> {
-        let frame: Frame = match serde_json::from_str(text) {
+        let now = Instant::now();
+        let frame = match Frame::read(text) {
             Ok(frame) => frame,
             Err(error) => {
                 self.refuse(None, &format!("not a request: {error}"));
@@ -162,9 +222,23 @@ impl Reader<'_> {
             return Some((SESSION_ENDED, "the session has ended"));
         }
         match frame.said {
+            Said::Received { seen } => {
+                self.link.lock().handle_received(now, seen);
+                self.link.confirmed.notify_one();
+            }
+            Said::Seen(seen) => {
+                // A page that has not shown it learns nothing from a refusal.
+                let _ = self.link.lock().handle_seen(now, seen);
+                self.link.confirmed.notify_one();
+            }
             Said::Token { token } => return self.show(frame.id, &token).await,
             Said::Active => {}
             Said::Messages { on, filter } => self.choose(frame.id, on, &filter).await,
+            Said::OperatorRequest(OperatorRequest::Drive {
+                forward,
+                turn,
+                seen,
+            }) => self.drive(frame.id, (forward, turn), seen).await,
             Said::OperatorRequest(request) => {
                 self.request(frame.id, frame.vehicle, request).await;
             }
@@ -210,25 +284,96 @@ impl Reader<'_> {
         self.say(id.map(|id| Answer::Done { id }).as_ref());
     }
 
-    async fn request(&mut self, id: Option<u64>, vehicle: Option<u16>, request: OperatorRequest) {
-        let reply = self.reply(id);
-        let (visitor, trail) = (self.visitor.clone(), self.shared.admission.trail.clone());
-        let reply: Reply = Box::new(move |result| {
-            trail.request(&visitor, vehicle, &request, &result);
-            reply(result);
-        });
+    /// Judges the age of a setpoint, and passes it on. The session confirms it, so that the page
+    /// sends the next one only then.
+    async fn drive(&mut self, id: Option<u64>, (forward, turn): (f64, f64), seen: Option<Seen>) {
+        let now = Instant::now();
+        let vehicle = self.snapshots.borrow().vehicle;
+        let waited = match seen {
+            Some(seen) => self.link.lock().handle_setpoint(now, seen, vehicle),
+            None => Err(TooOld::Unseen),
+        };
+        self.link.confirmed.notify_one();
+        let request = OperatorRequest::Drive {
+            forward,
+            turn,
+            seen,
+        };
+        let reply = self.recorded(id, vehicle, request);
         if !self.visitor.may(UserRole::Drive) {
             return reply(Err(self.why_not()));
         }
-        let order = Order::OperatorRequest {
+        let order = DriveOrder {
             page: self.page,
-            user: self.visitor.user.clone(),
             vehicle,
-            request,
+            forward,
+            turn,
+            waited,
+            at: now,
             reply,
         };
         // On error the session has ended, which the writer notices.
-        let _ = self.shared.access.orders.send(order).await;
+        let _ = self.shared.access.orders.send(Order::Drive(order)).await;
+    }
+
+    async fn request(&mut self, id: Option<u64>, vehicle: Option<u16>, request: OperatorRequest) {
+        let reply = self.recorded(id, vehicle, request);
+        let may_drive = self.visitor.may(UserRole::Drive);
+        // Selecting is looking at another vehicle.
+        let needs_less = request.is_stop() || matches!(request, OperatorRequest::Select { .. });
+        if !may_drive && !(needs_less && self.visitor.may(UserRole::Observe)) {
+            return reply(Err(self.why_not()));
+        }
+        let access = &self.shared.access;
+        // On error the session has ended, which the writer notices.
+        if request.is_stop() {
+            let target = match (request, vehicle) {
+                (OperatorRequest::EmergencyAll { .. }, _) => StopTarget::All,
+                (_, Some(vehicle)) => StopTarget::Vehicle(vehicle),
+                (_, None) => StopTarget::OfPage(self.page),
+            };
+            let reply = StopReply::Confirmed(reply);
+            let user = Arc::clone(&self.visitor.user);
+            let order = StopOrder {
+                target,
+                user,
+                reply,
+            };
+            let _ = access.stops.send(order).await;
+        } else {
+            let order = Order::OperatorRequest {
+                page: self.page,
+                vehicle,
+                request,
+                may_drive,
+                reply,
+            };
+            let _ = access.orders.send(order).await;
+        }
+    }
+
+    /// The callback for the result of a request, which also records it and confirms setpoints.
+    fn recorded(
+        &mut self,
+        id: Option<u64>,
+        vehicle: Option<u16>,
+        request: OperatorRequest,
+    ) -> Reply {
+        let reply = self.reply(id);
+        let (visitor, trail) = (self.visitor.clone(), self.shared.admission.trail.clone());
+        let answers = self.answers.clone();
+        Box::new(move |result| {
+            let is_drive = matches!(
+                request,
+                OperatorRequest::Drive { .. } | OperatorRequest::DriveEnd
+            );
+            if is_drive {
+                say(&answers, &Answer::Ok);
+            }
+            let who = (&*visitor.user, visitor.address);
+            trail.request(who, vehicle, &request, &result);
+            reply(result);
+        })
     }
 
     /// Why the visitor may not change anything.
@@ -275,10 +420,7 @@ impl Reader<'_> {
 
 /// Queues an answer for the page. Drops it if the queue is full.
 fn say(answers: &mpsc::Sender<Utf8Bytes>, answer: &Answer<'_>) {
-    // Serialisation cannot fail for numbers and text.
-    if let Ok(json) = serde_json::to_string(answer) {
-        let _ = answers.try_send(json.into());
-    }
+    let _ = answers.try_send(Utf8Bytes::from(&*json(answer)));
 }
 
 /// The next message of the view, if there is one.
@@ -290,56 +432,102 @@ async fn next_message(view: &mut Option<MessageView<'_>>) -> Option<Utf8Bytes> {
 }
 
 /// Sends all data to the page until it stops accepting or the session has ended.
-async fn write(
-    sink: &mut SplitSink<WebSocket, Message>,
-    shared: &Shared,
-    visitor: &Visitor,
-    mut answers: mpsc::Receiver<Utf8Bytes>,
-    mut chosen: mpsc::Receiver<Option<Filter>>,
-) {
-    let mut view = None;
-    let mut snapshots = shared.access.snapshots.clone();
-    snapshots.mark_changed();
-    let mut pings = interval(PING);
-    pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let hello = Answer::Hello {
-        version: VERSION,
-        token_needed: shared.admission.gate.token().is_some(),
-        operator: shared.admission.operator.to_string(),
-        authority: shared.admission.authority,
-        base_map: shared.admission.base_map.is_some(),
-    };
-    let mut next = serde_json::to_string(&hello)
-        .ok()
-        .map(|it| Message::Text(it.into()));
-    loop {
-        if let Some(message) = next.take() {
-            match timeout(STUCK, sink.send(message)).await {
-                Ok(Ok(())) => {}
-                Ok(Err(_)) | Err(_) => return,
+struct Writer<'s> {
+    page: PageId,
+    shared: &'s Shared,
+    visitor: &'s Visitor,
+    link: &'s SharedLink,
+    snapshots: watch::Receiver<Snapshot>,
+}
+
+impl Writer<'_> {
+    async fn run(
+        mut self,
+        sink: &mut SplitSink<WebSocket, Message>,
+        mut answers: mpsc::Receiver<Utf8Bytes>,
+        mut chosen: mpsc::Receiver<Option<Filter>>,
+    ) {
+        let mut view = None;
+        let mut lists = self.shared.access.lists.clone();
+        lists.mark_changed();
+        let mut pings = interval(PING);
+        pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut links = interval_at(tokio::time::Instant::now() + LINK, LINK);
+        links.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut next = Some(self.hello());
+        loop {
+            if let Some(message) = next.take() {
+                match timeout(STUCK, sink.send(message)).await {
+                    Ok(Ok(())) => {}
+                    Ok(Err(_)) | Err(_) => return,
+                }
             }
+            // All that is not an answer waits until the link has carried the last state.
+            let may_send = self.visitor.may(UserRole::Observe) && self.link.lock().may_send();
+            next = tokio::select! {
+                biased;
+                answer = answers.recv() => match answer {
+                    Some(json) => Some(Message::Text(json)),
+                    None => return,
+                },
+                _ = links.tick(), if may_send => Some(self.links()),
+                list = lists.next(), if may_send => match list {
+                    Some(json) => Some(text(&json)),
+                    None => return,
+                },
+                changed = self.snapshots.changed(), if may_send => match changed {
+                    Ok(()) => self.state(),
+                    Err(_) => return,
+                },
+                () = self.link.confirmed.notified(), if !may_send => None,
+                _ = pings.tick() => Some(Message::Ping(axum::body::Bytes::new())),
+                Some(filter) = chosen.recv() => {
+                    view = filter.zip(self.shared.admission.node.as_ref()).map(|(filter, node)| {
+                        MessageView::new(node, &self.shared.dictionary, filter)
+                    });
+                    None
+                }
+                message = next_message(&mut view), if may_send => match message {
+                    Some(json) => Some(Message::Text(json)),
+                    None => return,
+                },
+            };
         }
-        next = tokio::select! {
-            biased;
-            answer = answers.recv() => match answer {
-                Some(json) => Some(Message::Text(json)),
-                None => return,
-            },
-            snapshot = snapshots.next(), if visitor.may(UserRole::Observe) => match snapshot {
-                Some(json) => Some(Message::Text(Utf8Bytes::from(&*json))),
-                None => return,
-            },
-            _ = pings.tick() => Some(Message::Ping(axum::body::Bytes::new())),
-            Some(filter) = chosen.recv() => {
-                view = filter.zip(shared.admission.node.as_ref()).map(|(filter, node)| {
-                    MessageView::new(node, &shared.dictionary, filter)
-                });
-                None
-            }
-            message = next_message(&mut view) => match message {
-                Some(json) => Some(Message::Text(json)),
-                None => return,
-            },
-        };
     }
+
+    fn hello(&self) -> Message {
+        let admission = &self.shared.admission;
+        text(&json(&Answer::Hello {
+            version: VERSION,
+            page: self.page.0,
+            token_needed: admission.gate.token().is_some(),
+            operator: admission.operator.to_string(),
+            authority: admission.authority,
+            base_map: admission.base_map.is_some(),
+        }))
+    }
+
+    /// The state of the page's vehicle; `None` before the first.
+    fn state(&mut self) -> Option<Message> {
+        let snapshot = self.snapshots.borrow_and_update();
+        if snapshot.json.is_empty() {
+            return None;
+        }
+        let mut link = self.link.lock();
+        link.handle_sent(Instant::now(), snapshot.seq, snapshot.vehicle);
+        Some(text(&snapshot.json))
+    }
+
+    fn links(&self) -> Message {
+        let vehicle = self.snapshots.borrow().link;
+        text(&json(&Answer::Link {
+            page: self.link.lock().quality(Instant::now()),
+            vehicle_round_trip_ms: vehicle.round_trip_ms,
+            vehicle_loss_percent: vehicle.loss_percent,
+        }))
+    }
+}
+
+fn text(json: &str) -> Message {
+    Message::Text(Utf8Bytes::from(json))
 }

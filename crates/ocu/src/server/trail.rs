@@ -7,7 +7,6 @@ use jaus::address::JausId;
 use jaus_audit::{AuditLog, Entry, Outcome};
 
 use super::logins::{Ending, Login};
-use super::visitor::Visitor;
 use crate::request::OperatorRequest;
 
 /// The audit log of a station, if it has one.
@@ -56,7 +55,7 @@ impl Trail {
     /// The result of a request. Granted commands of manual drive are too many for a log.
     pub(super) fn request(
         &self,
-        visitor: &Visitor,
+        (user, address): (&str, SocketAddr),
         vehicle: Option<u16>,
         request: &OperatorRequest,
         result: &Result<(), String>,
@@ -74,8 +73,8 @@ impl Trail {
             } else {
                 Outcome::Refused
             };
-            let entry = Entry::new(&visitor.user, request.name(), outcome);
-            let entry = entry.address(visitor.address.ip());
+            let entry = Entry::new(user, request.name(), outcome);
+            let entry = entry.address(address.ip());
             let entry = match request.vehicle(vehicle) {
                 Some(subsystem) => entry.to(subsystem),
                 None => entry,

@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use super::Reply;
 use super::client::Client;
+use crate::orders::Reply;
 use crate::picture::Picture;
 use jaus::address::JausId;
 
@@ -13,6 +13,10 @@ use jaus::address::JausId;
 #[derive(Default)]
 pub(super) struct Alarm {
     wanted: bool,
+    /// When it was set.
+    since: Option<Instant>,
+    /// When it was last sent to all parts that have not confirmed it.
+    shouted: Option<Instant>,
     /// Until when clearing is repeated.
     clearing: Option<Instant>,
     /// Parts with a delivery in progress.
@@ -30,6 +34,10 @@ struct Waiting {
 impl Alarm {
     /// How long a requester waits for the parts.
     const PATIENCE: Duration = Duration::from_secs(3);
+    /// How long a new emergency is repeated fast.
+    const FRESH: Duration = Duration::from_secs(1);
+    const FAST_REPEAT: Duration = Duration::from_millis(90);
+    const REPEAT: Duration = Duration::from_millis(500);
     /// Limit of waiting requesters. Further ones are answered immediately.
     const MOST_WAITING: usize = 64;
 
@@ -37,44 +45,33 @@ impl Alarm {
         self.wanted
     }
 
-    /// Sets the emergency. May be repeated at any rate.
-    pub(super) fn set(
-        &mut self,
-        now: Instant,
-        picture: &Picture,
-        client: &mut Client,
-        reply: Reply,
-    ) {
-        if !self.wanted {
+    /// Sets the emergency, and sends it at once. Returns whether it is new. May be repeated at any
+    /// rate.
+    pub(super) fn set(&mut self, now: Instant, picture: &Picture, client: &mut Client) -> bool {
+        let is_new = !self.wanted;
+        if is_new {
             tracing::info!("emergency: stopping vehicle {}", picture.vehicle());
+            self.since = Some(now);
+            self.shouted = None;
         }
         self.wanted = true;
         self.clearing = None;
-        for part in picture.not_in_emergency(now) {
-            client.shout(part);
-        }
-        self.await_end(now, true, reply);
         self.handle_time(now, picture, client);
+        is_new
     }
 
     /// Clears the emergency.
-    pub(super) fn clear(
-        &mut self,
-        now: Instant,
-        picture: &Picture,
-        client: &mut Client,
-        reply: Reply,
-    ) {
+    pub(super) fn clear(&mut self, now: Instant, picture: &Picture, client: &mut Client) {
         if self.wanted {
             tracing::info!("emergency: cleared for vehicle {}", picture.vehicle());
         }
         self.wanted = false;
         self.clearing = Some(now + Self::PATIENCE);
-        self.await_end(now, false, reply);
         self.handle_time(now, picture, client);
     }
 
-    fn await_end(&mut self, now: Instant, on: bool, reply: Reply) {
+    /// Replies when all parts have confirmed the start or the end of the emergency.
+    pub(super) fn await_end(&mut self, now: Instant, on: bool, picture: &Picture, reply: Reply) {
         let until = now + Self::PATIENCE;
         if self.waiting.len() < Self::MOST_WAITING {
             self.waiting.push(Waiting { on, until, reply });
@@ -82,6 +79,25 @@ impl Alarm {
             reply(Err(
                 "too many pending requests; the emergency is being sent".to_owned(),
             ));
+        }
+        self.answer(now, picture);
+    }
+
+    /// Sends the emergency to the parts that have not confirmed it, without waiting for
+    /// acknowledgements: a lost packet must not cost more than a repetition.
+    fn shout(&mut self, now: Instant, picture: &Picture, client: &Client) {
+        let is_fresh = self.since.is_some_and(|since| now < since + Self::FRESH);
+        let pause = if is_fresh {
+            Self::FAST_REPEAT
+        } else {
+            Self::REPEAT
+        };
+        if self.shouted.is_some_and(|at| now < at + pause) {
+            return;
+        }
+        self.shouted = Some(now);
+        for part in picture.not_in_emergency(now) {
+            client.shout(part);
         }
     }
 
@@ -92,6 +108,9 @@ impl Alarm {
 
     /// Starts the pending deliveries and answers waiting requesters.
     pub(super) fn handle_time(&mut self, now: Instant, picture: &Picture, client: &mut Client) {
+        if self.wanted {
+            self.shout(now, picture, client);
+        }
         let left: Vec<JausId> = if self.wanted {
             picture.not_in_emergency(now).collect()
         } else if self.clearing.is_some_and(|until| now < until) {

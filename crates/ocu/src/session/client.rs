@@ -1,19 +1,20 @@
 //! The session's JAUS client: each operation is a separate job that reports its completion.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bytes::Bytes;
 use tokio::task::{AbortHandle, JoinSet};
-use tokio::time::timeout;
+use tokio::time::{Instant, timeout};
 
-use super::Reply;
+use crate::orders::Reply;
 use crate::state::Edition;
 use crate::stick::Push;
 use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::component::{
-    Component, DeliverError, Retake, Session, SessionError, SessionSettings, TargetState,
+    Component, DeliverError, QueryOptions, Retake, Session, SessionError, SessionSettings,
+    TargetState,
 };
 use jaus::messages::core::{QueryStatus, ReportStatus};
 
@@ -31,8 +32,13 @@ pub(super) enum Finished {
         reply: Reply,
         result: Result<(), String>,
     },
-    /// The primitive driver received the stick's setpoint, or did not acknowledge it.
-    Steered { push: Push, acknowledged: bool },
+    /// The primitive driver has acknowledged the end of manual drive, or has not.
+    Stopped { vehicle: u16, acknowledged: bool },
+    /// Round trip of a query to a vehicle; `None` without an answer.
+    Probed {
+        vehicle: u16,
+        round_trip: Option<Duration>,
+    },
     /// Result of a request for map cells.
     Mapped {
         store: JausId,
@@ -51,31 +57,21 @@ pub(super) struct Client {
     component: Component,
     authority: u8,
     jobs: JoinSet<Finished>,
-    effort: Option<Effort>,
-}
-
-/// The last effort sent, until it is acknowledged or replaced.
-struct Effort {
-    push: Push,
-    sent: Instant,
-    job: AbortHandle,
 }
 
 /// Timeout of a job that a requester waits for.
 const PATIENCE: Duration = Duration::from_secs(3);
+/// Timeout of a query that measures the round trip.
+const PROBE_PATIENCE: Duration = Duration::from_secs(2);
 /// Timeout for a part to confirm an emergency before it is repeated.
 const ALARM_PATIENCE: Duration = Duration::from_millis(700);
 
 impl Client {
-    /// An effort without acknowledgement for this time is replaced by a newer one.
-    const EFFORT_PATIENCE: Duration = Duration::from_millis(100);
-
     pub(super) fn new(component: Component, authority: u8) -> Self {
         Self {
             component,
             authority,
             jobs: JoinSet::new(),
-            effort: None,
         }
     }
 
@@ -92,7 +88,7 @@ impl Client {
         loop {
             match self.jobs.join_next().await {
                 Some(Ok(finished)) => return Some(finished),
-                // An effort replaced by a newer one.
+                // A stop that a newer setpoint has replaced.
                 Some(Err(_)) => {}
                 None => std::future::pending().await,
             }
@@ -100,8 +96,25 @@ impl Client {
     }
 
     /// Starts a job.
-    pub(super) fn start(&mut self, job: impl Future<Output = Finished> + Send + 'static) {
-        self.jobs.spawn(job);
+    pub(super) fn start(
+        &mut self,
+        job: impl Future<Output = Finished> + Send + 'static,
+    ) -> AbortHandle {
+        self.jobs.spawn(job)
+    }
+
+    /// Measures the round trip to a part of a vehicle.
+    pub(super) fn probe(&mut self, peer: JausId) {
+        let component = self.component.clone();
+        self.jobs.spawn(async move {
+            let sent = Instant::now();
+            let options = QueryOptions::default().within(PROBE_PATIENCE);
+            let answer = component.query_with(options, peer, &QueryStatus {}).await;
+            Finished::Probed {
+                vehicle: peer.subsystem(),
+                round_trip: answer.is_ok().then(|| sent.elapsed()),
+            }
+        });
     }
 
     /// Begins a session, which leaves the part as it is found. Another client may have taken control
@@ -154,34 +167,6 @@ impl Client {
                 tracing::warn!("vehicle {vehicle} has not confirmed its release");
             }
             Finished::Left { vehicle }
-        });
-    }
-
-    /// Sends the stick's setpoint to the primitive driver. The newest one counts: an older one
-    /// still in flight is dropped when it is late, and immediately if the vehicle has to stop.
-    pub(super) fn steer(&mut self, now: Instant, session: &Arc<Session>, push: Push) {
-        if let Some(effort) = self.effort.take_if(|it| !it.job.is_finished()) {
-            let stops = push == Push::NONE && effort.push != Push::NONE;
-            let late = now.saturating_duration_since(effort.sent) >= Self::EFFORT_PATIENCE;
-            if !stops && !late {
-                self.effort = Some(effort);
-                return;
-            }
-            effort.job.abort();
-        }
-        let Ok(message) = push.effort() else {
-            // Cannot happen: a push is within the range of the message.
-            return;
-        };
-        let session = Arc::clone(session);
-        let job = self.jobs.spawn(async move {
-            let acknowledged = session.deliver(&message).await.is_ok();
-            Finished::Steered { push, acknowledged }
-        });
-        self.effort = Some(Effort {
-            push,
-            sent: now,
-            job,
         });
     }
 

@@ -1,14 +1,13 @@
-//! The vehicles of the station, one of which is selected: those of the settings, or all that
-//! Discovery finds.
+//! The vehicles of the station: those of the settings, or all that Discovery finds.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Instant;
 
 use tokio::sync::mpsc;
 
-use super::following::Sighting;
 use super::vehicle::Vehicle;
+use crate::following::Sighting;
 use crate::picture::{Depth, PRESENT};
 use crate::role;
 use crate::state;
@@ -25,7 +24,6 @@ pub(super) struct Fleet {
     directory: Arc<Directory>,
     lost: LostComponents,
     vehicles: BTreeMap<u16, Vehicle>,
-    selected: Option<u16>,
 }
 
 impl Fleet {
@@ -43,16 +41,16 @@ impl Fleet {
             directory: Arc::default(),
             lost: LostComponents::default(),
             vehicles: BTreeMap::new(),
-            selected: None,
             chosen,
         };
         for number in fleet.chosen.clone() {
             fleet.add(number);
         }
-        if let Some(&first) = fleet.chosen.first() {
-            fleet.select(first);
-        }
         fleet
+    }
+
+    pub(super) fn get(&self, number: u16) -> Option<&Vehicle> {
+        self.vehicles.get(&number)
     }
 
     pub(super) fn get_mut(&mut self, number: u16) -> Option<&mut Vehicle> {
@@ -63,38 +61,25 @@ impl Fleet {
         self.vehicles.contains_key(&number)
     }
 
-    /// All vehicles, each with whether it is selected.
-    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = (bool, &mut Vehicle)> {
-        let selected = self.selected;
-        let all = self.vehicles.iter_mut();
-        all.map(move |(number, vehicle)| (selected == Some(*number), vehicle))
+    /// Whether a vehicle is known or may be discovered.
+    pub(super) fn may_come(&self, number: u16) -> bool {
+        self.chosen.is_empty() || self.chosen.contains(&number)
     }
 
-    pub(super) const fn selected_number(&self) -> Option<u16> {
-        self.selected
+    /// The numbers of all vehicles.
+    pub(super) fn numbers(&self) -> impl Iterator<Item = u16> {
+        self.vehicles.keys().copied()
     }
 
-    pub(super) fn selected(&self) -> Option<&Vehicle> {
-        self.vehicles.get(&self.selected?)
+    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Vehicle> {
+        self.vehicles.values_mut()
     }
 
-    pub(super) fn selected_mut(&mut self) -> Option<&mut Vehicle> {
-        self.vehicles.get_mut(&self.selected?)
-    }
-
-    /// Selects a vehicle of the list.
-    pub(super) fn select(&mut self, number: u16) {
-        let before = self.selected.replace(number);
-        for number in before.into_iter().chain([number]) {
-            self.set_depth(number);
-        }
-    }
-
-    /// Follows all reports of the selected vehicle and of those under control, and few of others.
-    pub(super) fn set_depth(&mut self, number: u16) {
-        let is_selected = self.selected == Some(number);
-        if let Some(vehicle) = self.vehicles.get_mut(&number) {
-            let is_full = is_selected || vehicle.is_wanted();
+    /// Follows all reports of the vehicles that pages show and of those under control, and few of
+    /// others.
+    pub(super) fn set_depths(&mut self, shown: &BTreeSet<u16>) {
+        for (number, vehicle) in &mut self.vehicles {
+            let is_full = shown.contains(number) || vehicle.is_wanted();
             vehicle.set_depth(if is_full { Depth::Full } else { Depth::Brief });
         }
     }
@@ -115,11 +100,6 @@ impl Fleet {
         let joined = joined.collect();
         for vehicle in self.vehicles.values_mut() {
             vehicle.handle_directory(now, &directory);
-        }
-        if self.selected.is_none()
-            && let Some(first) = self.first()
-        {
-            self.select(first);
         }
         joined
     }
@@ -145,8 +125,12 @@ impl Fleet {
         true
     }
 
-    /// The vehicle to begin with: preferably one that calls itself a vehicle.
-    fn first(&self) -> Option<u16> {
+    /// The vehicle to begin with: the first of the settings, or one that preferably calls itself a
+    /// vehicle.
+    pub(super) fn first(&self) -> Option<u16> {
+        if let Some(&first) = self.chosen.first() {
+            return Some(first);
+        }
         let is_named = |number: &&u16| {
             let known = self.directory.subsystem(**number);
             let identification = known.and_then(SubsystemEntry::identification);
@@ -157,29 +141,24 @@ impl Fleet {
     }
 
     /// Drops vehicles that have stayed away, and those that turned out to be none.
-    pub(super) fn drop_absent(&mut self) {
+    pub(super) fn drop_absent(&mut self, shown: &BTreeSet<u16>) {
         let Self {
-            chosen,
-            selected,
-            directory,
-            ..
+            chosen, directory, ..
         } = self;
         self.vehicles.retain(|number, vehicle| {
             let known = directory.subsystem(*number);
             let is_other = known.is_some_and(|it| !role::is_vehicle(it));
             let is_absent = vehicle.picture.is_empty() || is_other;
-            !is_absent || *selected == Some(*number) || chosen.contains(number)
+            !is_absent || shown.contains(number) || chosen.contains(number)
         });
     }
 
     /// The list of vehicles.
-    pub(super) fn state(&self, now: Instant) -> state::Fleet {
-        let vehicles = self
-            .vehicles
-            .iter()
-            .map(|(number, vehicle)| vehicle.fleet_state(now, self.selected == Some(*number)));
+    pub(super) fn state(&self, now: Instant, all_stopped: bool) -> state::Fleet {
+        let vehicles = self.vehicles.values();
         state::Fleet {
-            vehicles: vehicles.collect(),
+            vehicles: vehicles.map(|it| it.fleet_state(now)).collect(),
+            all_stopped,
         }
     }
 

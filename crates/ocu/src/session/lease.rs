@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::sync::Arc;
 
-use super::Reply;
 use super::client::Client;
+use super::hold::Hold;
+use crate::orders::Reply;
 use crate::picture::Picture;
 use crate::role::Role;
 use crate::state;
@@ -36,18 +37,6 @@ pub(super) enum Wanted {
     Everything,
     /// The planner only, which controls the drivers itself.
     Planner,
-}
-
-/// The lease of one part.
-#[derive(Default)]
-struct Hold {
-    /// `None` until the session has begun.
-    session: Option<Arc<Session>>,
-    /// Whether the vehicle was resumed since this part was ready. A part that reports the end of
-    /// an emergency later than others, or is under control later, would otherwise stand by for good.
-    resuming: bool,
-    /// The state that was logged.
-    logged: Option<SessionState>,
 }
 
 impl Wanted {
@@ -97,8 +86,13 @@ impl Lease {
 
     /// The session with a part, if the part is held.
     pub(super) fn held(&self, part: JausId) -> Option<Arc<Session>> {
-        let session = self.holds.get(&part)?.session.as_ref()?;
-        session.state().held().map(|_| Arc::clone(session))
+        self.holds.get(&part)?.held()
+    }
+
+    /// Whether a part under control has restarted and is not yet under control again.
+    pub(super) fn has_restarted(&self, part: JausId) -> bool {
+        let state = self.holds.get(&part).map(Hold::state);
+        matches!(state, Some(SessionState::Lost { why, .. }) if why.is_restart())
     }
 
     /// The sessions with all held parts.
@@ -177,27 +171,20 @@ impl Lease {
     }
 
     fn set_target(&mut self, target: TargetState) {
+        let is_new = self.target.replace(target) != Some(target);
         for hold in self.holds.values_mut() {
-            hold.resuming = target == TargetState::Ready;
-        }
-        if self.target.replace(target) == Some(target) {
-            return;
-        }
-        for session in self.holds.values().filter_map(|it| it.session.as_ref()) {
-            direct(session, target);
+            hold.set_target(target, is_new);
         }
     }
 
     /// Handles the begin of a session.
     pub(super) fn handle_begun(&mut self, part: JausId, begun: Result<Session, SessionError>) {
-        // The part is no longer wanted. Dropping the session releases it.
-        let Some(hold @ Hold { session: None, .. }) = self.holds.get_mut(&part) else {
-            return;
-        };
         match begun {
             Ok(session) => {
-                direct(&session, self.target.unwrap_or(TargetState::AsFound));
-                hold.session = Some(Arc::new(session));
+                // Of a part that is no longer wanted, the session is dropped, which releases it.
+                if let Some(hold) = self.holds.get_mut(&part) {
+                    hold.begin(session, self.target.unwrap_or(TargetState::AsFound));
+                }
             }
             Err(error) => tracing::warn!(%part, %error, "no session"),
         }
@@ -229,7 +216,7 @@ impl Lease {
             let part = picture.parts().get(id);
             let keeps = part.is_some_and(|part| wanted.takes_in(part.role));
             if !keeps {
-                free.extend(hold.session.take());
+                free.extend(hold.take());
             }
             keeps
         });
@@ -305,39 +292,5 @@ impl Lease {
             Some(format!("{}: {why}", role.words()))
         });
         reasons.collect::<Vec<_>>().join("; ")
-    }
-}
-
-impl Hold {
-    fn state(&self) -> SessionState {
-        let session = self.session.as_ref();
-        session.map_or(SessionState::Seeking, |it| it.state())
-    }
-
-    /// Makes it ready if the operator resumed the vehicle while it could not be.
-    fn resume(&mut self) {
-        let state = self.state();
-        if !self.resuming || !matches!(state, SessionState::Ready(_) | SessionState::Standby(_)) {
-            return;
-        }
-        self.resuming = false;
-        if let (SessionState::Standby(_), Some(session)) = (state, &self.session) {
-            direct(session, TargetState::Ready);
-        }
-    }
-
-    /// Logs a new state.
-    fn log(&mut self) {
-        let state = self.state();
-        if self.logged.replace(state) != Some(state) {
-            tracing::info!("{state}");
-        }
-    }
-}
-
-/// Orders the state of a part. Without its component, the session has no further use.
-fn direct(session: &Session, target: TargetState) {
-    if let Err(error) = session.set_target(target) {
-        tracing::debug!(%error, "not ordered");
     }
 }

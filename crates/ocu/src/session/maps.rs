@@ -4,13 +4,11 @@
 use bytes::Bytes;
 
 use super::client::{Client, Finished};
+use crate::orders::CellsReply;
 use crate::state::{Edition, Map};
 use jaus::address::JausId;
 use jaus::component::Component;
 use jaus_vehicle::ground::{RasterEdition, fetch_cells};
-
-/// Callback for the cells or the reason why there are none.
-pub(crate) type CellsReply = Box<dyn FnOnce(Result<Bytes, String>) + Send>;
 
 /// The cached map, and the requesters waiting for a map.
 #[derive(Default)]

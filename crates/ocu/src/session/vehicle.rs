@@ -9,15 +9,18 @@ use tokio::sync::mpsc;
 
 use super::alarm::Alarm;
 use super::client::Client;
-use super::following::{Following, Sighting};
-use super::handover::{Content, Handover};
+use super::driving::ManualDrive;
 use super::lease::{Lease, Wanted};
 use super::maps::Maps;
+use crate::following::{Following, Sighting};
+use crate::handover::{Content, Handover};
 use crate::missing::Absence;
+use crate::ownership::Ownership;
 use crate::picture::{Depth, Picture};
 use crate::report::Report;
 use crate::role::Role;
 use crate::state;
+use crate::vehicle_link::VehicleLink;
 use jaus::address::JausId;
 use jaus::component::{Component, Session};
 use jaus::service::{Directory, State};
@@ -29,6 +32,14 @@ pub(super) struct Vehicle {
     pub(super) alarm: Alarm,
     pub(super) maps: Maps,
     pub(super) handover: Handover,
+    pub(super) ownership: Ownership,
+    pub(super) manual: ManualDrive,
+    pub(super) link: VehicleLink,
+    /// Whether its operator has gone to another vehicle while it is on a mission. It is released at
+    /// the end.
+    pub(super) is_left: bool,
+    /// Whether it is being stopped and released. Until then it is not driven.
+    pub(super) is_leaving: bool,
     following: Following,
     /// The missing parts that have been logged.
     missing: BTreeMap<JausId, Absence>,
@@ -43,6 +54,11 @@ impl Vehicle {
             alarm: Alarm::default(),
             maps: Maps::default(),
             handover: Handover::default(),
+            ownership: Ownership::default(),
+            manual: ManualDrive::default(),
+            link: VehicleLink::default(),
+            is_left: false,
+            is_leaving: false,
             missing: BTreeMap::new(),
         }
     }
@@ -57,8 +73,10 @@ impl Vehicle {
     }
 
     pub(super) fn set_depth(&mut self, depth: Depth) {
-        self.picture.set_depth(depth);
-        self.following.follow(&self.picture);
+        if self.picture.depth() != depth {
+            self.picture.set_depth(depth);
+            self.following.follow(&self.picture);
+        }
     }
 
     pub(super) fn handle_directory(&mut self, now: Instant, directory: &Arc<Directory>) {
@@ -86,23 +104,8 @@ impl Vehicle {
         self.handover
             .handle_time(now, client.authority(), client.component());
         self.lease.handle_time(&self.picture, client);
-    }
-
-    /// Gives up what is left of control after another operator has taken it. The station does not
-    /// take it again by itself.
-    fn yield_to_other(&mut self) {
-        let own = self.picture.own();
-        let Some((other, authority)) = self.picture.holder().filter(|(id, _)| *id != own) else {
-            return;
-        };
-        if self.is_wanted() && self.lease.is_taken(&self.picture) {
-            let ending = format!(
-                "{other} has taken control with authority {authority}; the vehicle was stopped"
-            );
-            tracing::warn!("vehicle {}: {ending}", self.number());
-            self.handover.ending = Some(ending);
-            drop(self.release());
-        }
+        self.handle_driving(now, client);
+        self.handle_ownership(now);
     }
 
     /// Handles a message about a handover.
@@ -134,7 +137,7 @@ impl Vehicle {
         for (id, name, how) in self.picture.missing(now) {
             missing.insert(id, how);
             if self.missing.get(&id) != Some(&how) {
-                tracing::warn!("{name} {id} is {}", how.name());
+                tracing::warn!("{name} {id} {}", how.words());
             }
         }
         for id in self.missing.keys().filter(|id| !missing.contains_key(id)) {
@@ -143,44 +146,6 @@ impl Vehicle {
             }
         }
         self.missing = missing;
-    }
-
-    /// Stops the vehicle after the planner was lost while driving for this operator. Its drivers
-    /// have no supervising client left, so the station takes control and sends them to standby.
-    fn stop_after_lost_planner(&mut self, now: Instant) {
-        let Some((planner, how)) = self.picture.lost_planner(now) else {
-            return;
-        };
-        if self.lease.wanted() == Wanted::Planner {
-            tracing::warn!(
-                "the planner {planner} is {} while it drives: stopping the vehicle",
-                how.name()
-            );
-            self.lease.want_stopped(&self.picture);
-        }
-    }
-
-    /// Whether it is in emergency, or is to be.
-    pub(super) fn is_stopped(&self) -> bool {
-        self.alarm.is_wanted() || self.picture.in_emergency().next().is_some()
-    }
-
-    /// Whether its planner drives it.
-    pub(super) fn is_driven_by_planner(&self) -> bool {
-        let mission = self.picture.mission();
-        mission.is_some_and(|it| it.stage.is_driven())
-    }
-
-    /// Whether it is on a mission of this station, which goes on while another vehicle is selected.
-    /// A planner that was lost counts: the station keeps the vehicle stopped.
-    pub(super) fn is_on_mission(&self, now: Instant) -> bool {
-        let mission = self.picture.mission();
-        let goes_on = mission.is_some_and(|it| !it.stage.is_over());
-        match self.lease.wanted() {
-            Wanted::Nothing => false,
-            Wanted::Planner => goes_on,
-            Wanted::Everything => self.picture.lost_planner(now).is_some(),
-        }
     }
 
     /// Releases control. Returns the sessions to release.
@@ -209,10 +174,19 @@ impl Vehicle {
         part.is_some_and(|part| part.is(state))
     }
 
-    pub(super) fn fleet_state(&self, now: Instant, selected: bool) -> state::FleetVehicle {
+    pub(super) fn fleet_state(&self, now: Instant) -> state::FleetVehicle {
         let held = !self.lease.all_held().is_empty();
         let requested = self.handover.is_requested();
-        self.picture.fleet_state(now, selected, (held, requested))
+        let owner = self.ownership.owner();
+        let driver = owner.map_or_else(String::new, ToString::to_string);
+        self.picture.fleet_state(now, driver, (held, requested))
+    }
+
+    /// Asks a part for the round trip.
+    pub(super) fn probe(&self, client: &mut Client) {
+        if let Some(part) = self.picture.principal() {
+            client.probe(part);
+        }
     }
 
     pub(super) fn state(&self, now: Instant) -> Option<state::VehicleState> {
@@ -222,7 +196,12 @@ impl Vehicle {
     }
 
     pub(super) fn control_state(&self) -> state::Control {
+        let owner = self.ownership.owner();
+        let user = self.ownership.user().filter(|_| self.is_wanted());
         state::Control {
+            user: user.map(ToString::to_string),
+            page: owner.map(|it| it.page.0),
+            planner_drives: self.is_driven_by_planner(),
             asking: self.handover.holder().map(|it| it.to_string()),
             requests: self.handover.requests(),
             handover: self.handover.ending.clone().unwrap_or_default(),

@@ -54,8 +54,7 @@ async fn a_higher_authority_takes_over_the_vehicle_stops_and_both_see_it() {
         .until(|state| tells(state, "43.1.1 has taken control with authority 250"))
         .await;
     assert_eq!(state["control"]["wanted"], false);
-    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
-    first.ask(push).await.unwrap_err();
+    first.drive(0.5).await.unwrap_err();
 
     second
         .until(|state| is_held(state) && driver_of(state)["state"] == "standby")
@@ -98,8 +97,7 @@ async fn an_equal_authority_asks_and_a_grant_stops_the_vehicle_and_hands_it_over
     first
         .until(|state| tells(state, "handed over to 43.1.1") && !is_held(state))
         .await;
-    let moves = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
-    let refused = second.ask(moves).await.unwrap_err();
+    let refused = second.drive(0.5).await.unwrap_err();
     assert!(refused.contains("resume first"), "{refused}");
     second.ask(json!({"type": "resume"})).await.unwrap();
     second

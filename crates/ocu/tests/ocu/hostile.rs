@@ -64,8 +64,8 @@ async fn without_the_token_a_page_may_look_and_change_nothing_not_even_by_guessi
         .await;
     for request in [
         json!({"type": "control", "on": true}),
-        json!({"type": "emergency", "on": true}),
-        json!({"type": "select", "subsystem": 101}),
+        json!({"type": "emergency", "on": false}),
+        json!({"type": "resume"}),
     ] {
         let refused = page.ask(request).await.unwrap_err();
         assert!(refused.contains("token"), "{refused}");

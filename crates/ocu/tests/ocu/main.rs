@@ -18,4 +18,7 @@ mod handover;
 mod hostile;
 mod looking;
 mod missing;
+mod page;
+mod stop;
+mod truth;
 mod users;

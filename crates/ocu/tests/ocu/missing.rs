@@ -6,10 +6,12 @@ use std::time::{Duration, UNIX_EPOCH};
 
 use jaus::component::{Component, Handlers, Kind, Management, Time, TimeOfDay};
 use jaus_test_kit::waiting::within_limit;
-use jaus_vehicle::messages::ground::{QueryMission, ReportMission, mission_planner};
+use jaus_vehicle::messages::ground::{
+    ContinueMission, QueryMission, ReportMission, mission_planner,
+};
 use serde_json::{Value, json};
 
-use crate::scene::{Scene, driver_of};
+use crate::scene::{Page, Scene, driver_of};
 
 fn missing(state: &Value) -> Vec<&Value> {
     let missing = state["vehicle"]["missing"].as_array();
@@ -30,8 +32,7 @@ async fn a_driver_that_ends_is_named_and_nobody_drives_until_it_is_back() {
     assert_eq!(part["id"], "101.1.1");
     let why = &state["vehicle"]["stale"];
     assert_eq!(why, "the primitive driver 101.1.1 is gone");
-    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
-    page.ask(push).await.unwrap_err();
+    page.drive(0.5).await.unwrap_err();
 
     scene.start_rover().await;
     page.until(|state| missing(state).is_empty() && state["vehicle"]["stale"].is_null())
@@ -80,13 +81,11 @@ async fn a_pose_that_freezes_ends_manual_drive_although_it_is_still_reported() {
     let mut page = scene.driver().await;
     page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
     frozen.store(true, Ordering::Relaxed);
-    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
     let refused = within_limit(async {
         loop {
-            if let Err(refused) = page.ask(push.clone()).await {
+            if let Err(refused) = page.drive(0.5).await {
                 return refused;
             }
-            tokio::time::sleep(Duration::from_millis(100)).await;
         }
     })
     .await;
@@ -114,8 +113,7 @@ async fn a_pose_that_always_arrives_late_by_the_clock_of_its_sensor_is_too_old_t
     let state = page.until(|state| age(state) >= Some(2900)).await;
     assert!(age(&state) < Some(10_000), "{state}");
     scene.until(|scene| scene.speed() == 0.0).await;
-    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
-    let refused = page.ask(push).await.unwrap_err();
+    let refused = page.drive(0.5).await.unwrap_err();
     assert!(refused.contains("stale"), "{refused}");
 }
 
@@ -138,8 +136,9 @@ async fn a_page_that_falls_silent_while_it_drives_is_told_why_the_vehicle_stoppe
     assert_eq!(state["drive"]["reason"], "", "it was let go");
 }
 
-/// A planner with mission 7 in the given stage.
+/// A planner with mission 7 in the given stage, which drives when it is told to continue.
 pub(crate) fn planner(scene: &Scene, stage: Arc<AtomicU8>) -> Component {
+    let continued = Arc::clone(&stage);
     let mission = Handlers::new(mission_planner::LATEST).answer(move |_: QueryMission| {
         let stage = stage.load(Ordering::Relaxed).into();
         ReportMission {
@@ -148,6 +147,13 @@ pub(crate) fn planner(scene: &Scene, stage: Arc<AtomicU8>) -> Component {
             ..ReportMission::default()
         }
     });
+    let mission = mission
+        .command(move |command: ContinueMission, _, _| {
+            if command.mission == 7 {
+                continued.store(7, Ordering::Relaxed);
+            }
+        })
+        .on_stop(|_| {});
     scene.attach(
         36,
         Component::builder(Kind::Vehicle, "Rover")
@@ -156,11 +162,8 @@ pub(crate) fn planner(scene: &Scene, stage: Arc<AtomicU8>) -> Component {
     )
 }
 
-#[tokio::test]
-async fn a_planner_that_ends_while_it_drives_is_named_and_the_station_stops_the_vehicle() {
-    let scene = Scene::new().await;
-    let stage = Arc::new(AtomicU8::new(3));
-    let planner = planner(&scene, Arc::clone(&stage));
+/// A page whose operator has approved mission 7 of a planner, which drives.
+async fn on_mission(scene: &Scene, stage: &AtomicU8) -> Page {
     let mut page = scene.page().await;
     page.until(|state| state["mission"]["stage"] == "awaiting_approval")
         .await;
@@ -176,6 +179,15 @@ async fn a_planner_that_ends_while_it_drives_is_named_and_the_station_stops_the_
     stage.store(7, Ordering::Relaxed);
     page.until(|state| state["mission"]["stage"] == "driving" && driver_of(state)["ours"] == false)
         .await;
+    page
+}
+
+#[tokio::test]
+async fn a_planner_that_ends_while_it_drives_is_named_and_the_station_stops_the_vehicle() {
+    let scene = Scene::new().await;
+    let stage = Arc::new(AtomicU8::new(3));
+    let planner = planner(&scene, Arc::clone(&stage));
+    let mut page = on_mission(&scene, &stage).await;
 
     drop(planner);
     let stopped = |state: &Value| {
@@ -185,7 +197,48 @@ async fn a_planner_that_ends_while_it_drives_is_named_and_the_station_stops_the_
     };
     let state = page.until(stopped).await;
     assert_eq!(state["mission"]["lost"]["id"], "101.1.36");
-    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
-    let refused = page.ask(push).await.unwrap_err();
+    let refused = page.drive(0.5).await.unwrap_err();
     assert!(refused.contains("resume first"), "{refused}");
+}
+
+#[tokio::test]
+async fn a_planner_that_restarts_while_it_drives_is_named_and_the_station_stops_the_vehicle() {
+    let scene = Scene::new().await;
+    let stage = Arc::new(AtomicU8::new(3));
+    let first = planner(&scene, Arc::clone(&stage));
+    let mut page = on_mission(&scene, &stage).await;
+
+    drop(first);
+    scene.until(|scene| scene.is_free(36)).await;
+    stage.store(0, Ordering::Relaxed);
+    let _second = planner(&scene, Arc::clone(&stage));
+    let stopped = |state: &Value| {
+        state["mission"]["lost"]["told_to_stop"] == true && driver_of(state)["state"] == "standby"
+    };
+    let state = page.until(stopped).await;
+    assert_eq!(state["mission"]["lost"]["how"], "restarted", "{state}");
+    assert_eq!(missing(&state)[0]["how"], "restarted");
+    // The operator drives on.
+    page.ask(json!({"type": "resume"})).await.unwrap();
+    page.until(|state| state["mission"]["lost"].is_null() && missing(state).is_empty())
+        .await;
+}
+
+#[tokio::test]
+async fn a_mission_that_a_fault_has_stopped_goes_on_when_the_operator_continues_it() {
+    let scene = Scene::new().await;
+    let stage = Arc::new(AtomicU8::new(11));
+    let _planner = planner(&scene, Arc::clone(&stage));
+    let mut page = scene.page().await;
+    page.until(|state| state["mission"]["stage"] == "waiting")
+        .await;
+    let go_on = json!({"type": "continue", "mission": 7});
+    page.ask(go_on.clone()).await.unwrap_err();
+    page.ask(json!({"type": "control", "on": true}))
+        .await
+        .unwrap();
+    page.ask(json!({"type": "resume"})).await.unwrap();
+    page.ask(go_on).await.unwrap();
+    page.until(|state| state["mission"]["stage"] == "driving" && driver_of(state)["ours"] == false)
+        .await;
 }

@@ -33,9 +33,6 @@ use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 use tokio_tungstenite::tungstenite::{Error, Message};
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
 
-/// Attempts at a step that must reach the station before the previous one expires.
-pub(crate) const ATTEMPTS: u32 = 20;
-
 /// A vehicle that is one component, and a station that observes it.
 pub(crate) struct Scene {
     pub(crate) vehicle: Vehicle,
@@ -172,14 +169,15 @@ impl Scene {
     }
 
     pub(crate) async fn start_rover(&mut self) {
-        // The component number is free once the old one has detached.
-        let is_gone = || {
-            let components = self.nodes[0].components();
-            components.iter().all(|it| it.id.component() != 1)
-        };
-        until(is_gone).await;
+        until(|| self.is_free(1)).await;
         let frozen = self.frozen.as_ref();
         self.rover = Some(rover(&self.vehicle, &self.nodes[0], self.timeout, frozen));
+    }
+
+    /// Whether a component number of the vehicle is free: the old component has detached.
+    pub(crate) fn is_free(&self, component: u8) -> bool {
+        let components = self.nodes[0].components();
+        components.iter().all(|it| it.id.component() != component)
     }
 
     /// Ends this station without notice to its pages.
@@ -314,6 +312,8 @@ pub(crate) struct Page {
     pub(crate) socket: Socket,
     pub(crate) hello: Value,
     last_id: u64,
+    /// Number of the last state, and when it was read.
+    seen: Option<(u64, Instant)>,
 }
 
 impl Page {
@@ -325,7 +325,18 @@ impl Page {
         address: SocketAddr,
         headers: &[(&'static str, &str)],
     ) -> Result<Self, Box<Error>> {
-        let mut request = format!("ws://{address}/ws").into_client_request().unwrap();
+        Self::open_at(&format!("ws://{address}/ws"), headers).await
+    }
+
+    /// Opens a page again after its connection was lost, as the page of the browser does.
+    pub(crate) async fn reopen(&self, address: SocketAddr, vehicle: u16) -> Self {
+        let page = &self.hello["page"];
+        let url = format!("ws://{address}/ws?vehicle={vehicle}&replaces={page}");
+        Self::open_at(&url, &[]).await.unwrap()
+    }
+
+    async fn open_at(url: &str, headers: &[(&'static str, &str)]) -> Result<Self, Box<Error>> {
+        let mut request = url.into_client_request().unwrap();
         for (name, value) in headers {
             request.headers_mut().insert(*name, value.parse().unwrap());
         }
@@ -334,14 +345,25 @@ impl Page {
             socket,
             hello: Value::Null,
             last_id: 0,
+            seen: None,
         };
         page.hello = page.next().await;
         assert_eq!(page.hello["type"], "hello");
         Ok(page)
     }
 
-    /// The next message from the station.
+    /// The next message from the station. A state is confirmed.
     pub(crate) async fn next(&mut self) -> Value {
+        let said = self.next_unconfirmed().await;
+        if said["type"] == "state" {
+            let seq = said["seq"].as_u64().unwrap();
+            self.seen = Some((seq, Instant::now()));
+            self.say(&json!([seq, 0])).await;
+        }
+        said
+    }
+
+    pub(crate) async fn next_unconfirmed(&mut self) -> Value {
         loop {
             match within_limit(self.socket.next())
                 .await
@@ -353,6 +375,29 @@ impl Page {
                 other => panic!("{other:?}"),
             }
         }
+    }
+
+    /// A setpoint by the last state that was read.
+    pub(crate) fn push(&self, forward: f64) -> Value {
+        let (seq, at) = self.seen.unwrap_or((0, Instant::now()));
+        let held = u64::try_from(at.elapsed().as_millis()).unwrap();
+        json!({"type": "drive", "forward": forward, "turn": 0.0, "seen": seq, "held_ms": held})
+    }
+
+    /// Asks to drive by a fresh state.
+    pub(crate) async fn drive(&mut self, forward: f64) -> Result<(), String> {
+        // One that has waited to be read may be old.
+        for _ in 0..2 {
+            self.state().await;
+        }
+        let push = self.push(forward);
+        self.ask(push).await
+    }
+
+    /// Reads for this time.
+    pub(crate) async fn read_for(&mut self, time: Duration) {
+        let end = tokio::time::Instant::now() + time;
+        while tokio::time::timeout_at(end, self.next()).await.is_ok() {}
     }
 
     /// The next state.
@@ -443,9 +488,8 @@ impl Page {
     pub(crate) async fn drive_until(&mut self, scene: &Scene, wanted: impl Fn(&Scene) -> bool) {
         within_limit(async {
             while !wanted(scene) {
-                self.say(&json!({"type": "drive", "forward": 0.5, "turn": 0.0}))
-                    .await;
-                tokio::time::sleep(Duration::from_millis(100)).await;
+                self.say(&self.push(0.5)).await;
+                self.read_for(Duration::from_millis(100)).await;
             }
         })
         .await;

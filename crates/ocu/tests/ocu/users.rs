@@ -189,7 +189,7 @@ async fn after_five_failures_an_address_has_to_wait_even_with_the_right_password
 }
 
 #[tokio::test]
-async fn one_who_observes_sees_the_vehicle_and_changes_nothing() {
+async fn one_who_observes_sees_the_vehicle_may_stop_it_and_changes_nothing_else() {
     let guarded = Guarded::new().await;
     let cookie = guarded.login("carl").await;
     let mut page = guarded.page(&cookie).await;
@@ -197,8 +197,7 @@ async fn one_who_observes_sees_the_vehicle_and_changes_nothing() {
         .await;
     for request in [
         json!({"type": "control", "on": true}),
-        json!({"type": "emergency", "on": true}),
-        json!({"type": "select", "subsystem": 101}),
+        json!({"type": "emergency", "on": false}),
         json!({"type": "drive", "forward": 1, "turn": 0}),
         json!({"type": "stop"}),
     ] {
@@ -206,6 +205,9 @@ async fn one_who_observes_sees_the_vehicle_and_changes_nothing() {
         assert!(refused.contains("requires the role drive"), "{refused}");
     }
     assert!(!guarded.scene.is_controlled());
+    page.ask(json!({"type": "emergency", "on": true}))
+        .await
+        .unwrap();
     let (head, _) = guarded.get("/sessions", &cookie).await;
     assert!(head.starts_with("http/1.1 403"), "{head}");
     until(|| guarded.has_recorded(&["carl", "take control", "refused", "role drive"])).await;

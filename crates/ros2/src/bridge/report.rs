@@ -45,7 +45,8 @@ impl From<ReportMission> for Report {
     fn from(report: ReportMission) -> Self {
         let end = match report.stage {
             Stage::ARRIVED => Some(MissionEnd::Arrived),
-            Stage::FAILED | Stage::STOPPED | Stage::IDLE => {
+            // ROS has no way to continue a mission that a fault has stopped: a new goal replaces it.
+            Stage::FAILED | Stage::STOPPED | Stage::IDLE | Stage::WAITING => {
                 Some(MissionEnd::Failed(report.reason.to_string()))
             }
             _ => None,

@@ -25,6 +25,7 @@ mod can;
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 mod gpio;
 mod h_bridge;
+mod motion_monitor;
 mod motor;
 mod motor_thread;
 mod pulses;

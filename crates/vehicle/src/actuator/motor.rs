@@ -41,23 +41,71 @@ impl Default for MotorConfig {
 /// Injects and clears a fault of a [`SimulatedMotor`] or a
 /// [`SimulatedServo`](super::SimulatedServo). Cheap to clone; all clones share one state.
 #[derive(Debug, Clone, Default)]
-pub struct FaultSwitch(Arc<Mutex<Option<String>>>);
+pub struct FaultSwitch(Arc<Mutex<Option<SimulatedFault>>>);
+
+/// What is wrong with a simulated motor or servo.
+#[derive(Debug, Clone)]
+enum SimulatedFault {
+    /// It does not move, and reports why.
+    Broken(String),
+    /// It multiplies the propulsion, and reports nothing.
+    Factor(f64),
+    /// It keeps this propulsion, whatever it is commanded, and reports nothing.
+    Stuck(f64),
+}
 
 impl FaultSwitch {
     /// Sets a fault: the motor no longer turns the wheel but can still brake, and the servo no longer
     /// moves.
     pub fn fail(&self, reason: impl Into<String>) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(reason.into());
+        self.set(Some(SimulatedFault::Broken(reason.into())));
+    }
+
+    /// Sets a fault that the motor does not report: it turns so many times faster than commanded,
+    /// and the wrong way if the factor is negative. It still brakes.
+    pub fn multiply(&self, factor: f64) {
+        self.set(Some(SimulatedFault::Factor(factor)));
+    }
+
+    /// Sets a fault that the motor does not report: it keeps this share of full propulsion, from -1
+    /// to 1, whatever it is commanded, and does not brake.
+    pub fn stick(&self, drive: f64) {
+        self.set(Some(SimulatedFault::Stuck(drive)));
     }
 
     /// Clears the fault.
     pub fn mend(&self) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        self.set(None);
+    }
+
+    fn set(&self, fault: Option<SimulatedFault>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = fault;
     }
 
     pub(super) fn fault(&self) -> Option<String> {
-        let fault = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        fault.clone()
+        match &*self.0.lock().unwrap_or_else(PoisonError::into_inner) {
+            Some(SimulatedFault::Broken(reason)) => Some(reason.clone()),
+            _ => None,
+        }
+    }
+
+    /// What a motor makes of a command.
+    fn distort(&self, command: Command) -> Command {
+        match &*self.0.lock().unwrap_or_else(PoisonError::into_inner) {
+            None => command,
+            Some(SimulatedFault::Broken(_)) => Command {
+                drive: 0.0,
+                ..command
+            },
+            Some(SimulatedFault::Factor(factor)) => Command {
+                drive: command.drive * factor,
+                ..command
+            },
+            Some(SimulatedFault::Stuck(drive)) => Command {
+                drive: *drive,
+                brake: 0.0,
+            },
+        }
     }
 }
 
@@ -105,7 +153,7 @@ impl SimulatedMotor {
         self.switch.clone()
     }
 
-    fn step(&mut self, seconds: f64) {
+    fn step(&mut self, command: Command, seconds: f64) {
         let MotorConfig {
             top,
             response,
@@ -119,10 +167,10 @@ impl SimulatedMotor {
             self.unevenness = self.unevenness * keep + spread * self.noise.normal();
         }
         let before = self.speed;
-        let wanted = self.command.drive.clamp(-1.0, 1.0) * top * (1.0 + self.unevenness);
+        let wanted = command.drive.clamp(-1.0, 1.0) * top * (1.0 + self.unevenness);
         // Exact solution of the lag, so the result does not depend on the step length.
         self.speed += (wanted - self.speed) * (1.0 - (-seconds / response).exp());
-        let braked = braking * self.command.brake.clamp(0.0, 1.0) * seconds;
+        let braked = braking * command.brake.clamp(0.0, 1.0) * seconds;
         self.speed -= self.speed.clamp(-braked, braked);
         self.travel += (before + self.speed) / 2.0 * seconds;
     }
@@ -135,13 +183,11 @@ impl Actuator for SimulatedMotor {
         if self.deadline.has_passed(now) {
             self.command = Command::STOP;
         }
-        if self.fault().is_some() {
-            self.command.drive = 0.0;
-        }
+        let command = self.switch.distort(self.command);
         let mut left = since.min(Self::LONGEST_GAP);
         while !left.is_zero() {
             let step = left.min(Self::STEP);
-            self.step(step.as_secs_f64());
+            self.step(command, step.as_secs_f64());
             left -= step;
         }
     }

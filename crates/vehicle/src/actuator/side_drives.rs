@@ -2,14 +2,15 @@
 
 use std::time::Instant;
 
+use super::motion_monitor::MonitoredDrive;
 use super::{Actuator, Command, Drivetrain, WheelsConfig};
 use crate::motion::{Effort, Limits, Velocity};
 
 /// The drives of the left and the right side.
 #[derive(Debug)]
 pub struct SideDrives<A> {
-    left: A,
-    right: A,
+    left: MonitoredDrive<A>,
+    right: MonitoredDrive<A>,
     /// Distance between left and right wheels in metres.
     track: f64,
     /// Speed of a drive at full propulsion, in metres per second.
@@ -19,8 +20,8 @@ pub struct SideDrives<A> {
 impl<A: Actuator> SideDrives<A> {
     pub(super) const fn new(left: A, right: A, config: &WheelsConfig) -> Self {
         Self {
-            left,
-            right,
+            left: MonitoredDrive::new(left, "left drive", config.top),
+            right: MonitoredDrive::new(right, "right drive", config.top),
             track: config.track,
             top: config.top,
         }

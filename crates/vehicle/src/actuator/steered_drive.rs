@@ -2,13 +2,14 @@
 
 use std::time::Instant;
 
+use super::motion_monitor::MonitoredDrive;
 use super::{Actuator, Command, Drivetrain, Steering, WheelsConfig};
 use crate::motion::{Ackermann, Effort, Limits, Velocity};
 
 /// The drive of the rear axle, and the steering of the front axle.
 #[derive(Debug)]
 pub struct SteeredDrive<A, S> {
-    drive: A,
+    drive: MonitoredDrive<A>,
     steering: S,
     geometry: Ackermann,
     /// Distance between left and right wheels in metres.
@@ -29,7 +30,7 @@ impl<A: Actuator, S: Steering> SteeredDrive<A, S> {
         geometry: Ackermann,
     ) -> Self {
         Self {
-            drive,
+            drive: MonitoredDrive::new(drive, "drive", config.top),
             steering,
             geometry,
             track: config.track,

@@ -6,7 +6,8 @@
 //! needed here; the others are ignored.
 //!
 //! No status frame tells a fault. A controller in fault lets its motor coast and reports a duty cycle
-//! of 0, so a controller that does not follow its command has a fault. One that falls silent too.
+//! of 0, so a controller that does not follow its command has a fault. One that falls silent too, and
+//! one that reports a duty cycle without a command, against it, or far above it.
 //!
 //! The controller stops its motor by itself when no command arrives for its timeout, which can only be
 //! set in VESC Tool and is 1 s at first.
@@ -15,6 +16,7 @@ use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::motion_monitor::MotionMonitor;
 use super::motor_thread::{MotorLine, MotorThread};
 use super::{Actuator, CanBus, CanFrame, Command};
 
@@ -75,6 +77,8 @@ struct Vesc {
     duty: Option<(Instant, f64)>,
     tachometer: Option<(Instant, i32)>,
     travel: f64,
+    /// Compares the duty cycle with the command.
+    monitor: MotionMonitor,
     /// Since when it has not followed its command.
     idle_since: Option<Instant>,
     /// When it was last found to be in fault.
@@ -102,6 +106,7 @@ impl Vesc {
             duty: None,
             tachometer: None,
             travel: 0.0,
+            monitor: MotionMonitor::new(1.0),
             idle_since: None,
             failed_at: None,
         }
@@ -162,6 +167,9 @@ impl Vesc {
             ));
         }
         self.check_duty(now);
+        if let Some(fault) = self.monitor.fault() {
+            return Some(format!("motor controller {id} {fault}: cut its power"));
+        }
         let failed_at = self.failed_at?;
         (now.saturating_duration_since(failed_at) <= Self::HOLD).then(|| {
             format!("motor controller {id} does not follow its command: VESC Tool shows its fault")
@@ -169,6 +177,16 @@ impl Vesc {
     }
 
     fn check_duty(&mut self, now: Instant) {
+        if let Some((_, duty)) = self.duty {
+            let command = match self.share == 0.0 {
+                true => Command::STOP,
+                false => Command {
+                    drive: self.share,
+                    brake: 0.0,
+                },
+            };
+            self.monitor.handle_speed(now, command, duty);
+        }
         let (wanted, least) = Self::FOLLOWS;
         let drives = self.duty.is_some_and(|(_, duty)| duty.abs() >= least);
         if self.share.abs() < wanted || drives {
@@ -397,6 +415,30 @@ mod tests {
             "nothing is commanded any more"
         );
         assert_eq!(bench.run(200, [0.0; 2]), None);
+    }
+
+    #[test]
+    fn a_controller_that_turns_without_a_command_or_against_it_is_a_fault() {
+        for (share, duty, says) in [
+            (0.0, 0.3, "turns without a command"),
+            (0.5, -0.4, "turns the wrong way"),
+            (0.2, 0.9, "turns faster than commanded"),
+        ] {
+            let mut vesc = Vesc::new(10, 1.0);
+            let mut now = Instant::now();
+            let mut fault = None;
+            for _ in 0..60 {
+                now += Duration::from_millis(20);
+                vesc.command(share);
+                let [high, low] = ((duty * 1000.0) as i16).to_be_bytes();
+                let status = [0, 0, 0, 0, 0, 0, high, low];
+                vesc.handle_frame(now, &CanFrame::new(0x90A, &status));
+                vesc.handle_frame(now, &CanFrame::new(0x1B0A, &[0; 8]));
+                fault = vesc.fault(now);
+            }
+            let fault = fault.unwrap();
+            assert!(fault.contains(says), "{fault}");
+        }
     }
 
     #[test]

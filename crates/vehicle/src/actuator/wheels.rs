@@ -240,7 +240,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::actuator::{MotorConfig, SimulatedMotor};
+    use crate::actuator::{FaultSwitch, MotorConfig, SimulatedMotor};
     use crate::motion::{Frame, Goal, Pilot};
 
     fn rover() -> (Pilot, Odometer) {
@@ -349,6 +349,43 @@ mod tests {
             );
             switch.mend();
             assert!(drive(&mut wheels, 2.0).x > 0.9, "it works again");
+        }
+    }
+
+    #[test]
+    fn motion_without_a_command_is_a_fault_that_stops_both_sides() {
+        for (fault, says) in [
+            (|it: &FaultSwitch| it.stick(0.5), "without a command"),
+            (|it: &FaultSwitch| it.multiply(-1.0), "the wrong way"),
+            (|it: &FaultSwitch| it.multiply(4.0), "faster than commanded"),
+        ] as [(fn(&FaultSwitch), &str); 3]
+        {
+            let [left, right] = [1, 2].map(|seed| {
+                SimulatedMotor::new(MotorConfig {
+                    seed,
+                    ..MotorConfig::default()
+                })
+            });
+            let switch = left.fault_switch();
+            let odometer = Odometer::new(7);
+            let wheels = Wheels::new(left, right, WheelsConfig::default(), odometer.clone());
+            let mut pilot = Pilot::new(wheels, Frame::default());
+            let start = Instant::now();
+            pilot.handle_time(start);
+            pilot.pursue(effort(0.3, 0.0));
+            let now = run(&mut pilot, start, 2.0);
+            assert_eq!(odometer.fault(), None);
+            fault(&switch);
+            if says == "without a command" {
+                pilot.stop();
+            }
+            let now = run(&mut pilot, now, 1.8);
+            let told = odometer.fault().unwrap_or_default();
+            assert!(told.contains(says), "{told}");
+            let before = odometer.count();
+            run(&mut pilot, now, 0.5);
+            let after = odometer.count();
+            assert!((after.right - before.right).abs() < 1e-3, "{says}");
         }
     }
 

@@ -21,5 +21,6 @@ pub use planner::{MissionPlanner, Missions, News};
 pub use range_sensor::{RangeSensor, reported_scan};
 pub use raster_cells::{RasterEdition, fetch_cells};
 pub use raster_maps::RasterMaps;
+pub(crate) use raster_maps::refuse_map_change;
 pub use stage::{StageBoard, StageReport, StageState};
 pub use world_store::WorldStore;

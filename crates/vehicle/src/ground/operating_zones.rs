@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use crate::motion::Frame;
-use crate::world::{Change, Outline};
+use crate::world::{Change, Outline, World};
 use crate::zones::{Point, Polygon, ZoneId, Zones};
 use jaus::codec::{Message, OutOfRange, ServiceId};
 use jaus::endpoint::Received;
@@ -57,6 +57,24 @@ impl OperatingZones {
         let before = self.excursion(0);
         *self.place.lock().unwrap_or_else(PoisonError::into_inner) = place;
         before != self.excursion(0)
+    }
+
+    /// Whether a message sets zones that do not exist yet, and so only restricts a vehicle.
+    pub(crate) fn only_adds(&self, message: &Received) -> bool {
+        let outlines = match code_of(&message.payload) {
+            Some(SetLocalOperatingZone::CODE) => read(message).map(|set| from_local(&set)),
+            Some(SetGlobalOperatingZone::CODE) => read(message).map(|set| from_global(&set)),
+            _ => None,
+        };
+        let Some(Ok(outlines)) = outlines else {
+            return false;
+        };
+        let is_new = |world: &World| {
+            outlines
+                .iter()
+                .all(|it| !world.zones().contains_key(&it.id))
+        };
+        self.store.ask(is_new).unwrap_or_default()
     }
 
     fn set(

@@ -9,8 +9,8 @@ use std::time::Instant;
 use crate::messages::ground::report_planned_path::{MissionRec, PointRec};
 use crate::messages::ground::set_destination::Approved;
 use crate::messages::ground::{
-    ApproveMission, QueryMission, QueryPlannedPath, ReportMission, ReportPlannedPath,
-    SetDestination, StopMission, mission_planner, report_mission,
+    ApproveMission, ContinueMission, QueryMission, QueryPlannedPath, ReportMission,
+    ReportPlannedPath, SetDestination, StopMission, mission_planner, report_mission,
 };
 use crate::mission::{Destination, Mission, Path, Report, Settings};
 use jaus::address::JausId;
@@ -132,6 +132,13 @@ impl Service for MissionPlanner {
                     }
                 });
             }
+            Some(ContinueMission::CODE) => {
+                self.command(message, context, |command: ContinueMission, mission| {
+                    if let Err(refusal) = mission.resume(now, command.mission) {
+                        tracing::info!(%refusal, "not continued");
+                    }
+                });
+            }
             Some(StopMission::CODE) => {
                 let reason = format!("{} has stopped the mission", message.source);
                 self.command(message, context, |_: StopMission, mission| {
@@ -211,7 +218,7 @@ fn why_stopped(before: &Standing, now: &Standing) -> String {
             format!("{id} has taken control of the planner")
         }
         (State::Ready | State::Standby, None) if before.controller.is_some() => {
-            "control of the planner has shut down".to_owned()
+            "the control of the planner's client has ended".to_owned()
         }
         (state, _) => format!("the planner went to the state {state}"),
     }
@@ -360,7 +367,11 @@ mod tests {
                 Some(STRANGER),
                 "42.2.1 has taken control of the planner",
             ),
-            (State::Ready, None, "control of the planner has shut down"),
+            (
+                State::Ready,
+                None,
+                "the control of the planner's client has ended",
+            ),
         ] {
             let mut bench = Bench::new();
             bench.go(3.0);
@@ -436,6 +447,30 @@ mod tests {
     }
 
     #[test]
+    fn only_the_client_in_control_continues_a_mission_that_a_fault_has_stopped() {
+        let mut bench = driving(LostLink::Stop);
+        let now = bench.rig.now;
+        let _ = bench.missions.tell(|mission| {
+            let run = mission.report().run;
+            mission.handle_setback(now, run, "the pose is 0.8 s old");
+        });
+        let report = bench.report();
+        assert_eq!(report.stage, report_mission::Stage::WAITING);
+        assert_eq!(report.reason.as_str(), Some("the pose is 0.8 s old"));
+        bench.rig.send(CLIENT, &ApproveMission { mission: 1 });
+        bench.rig.send(STRANGER, &ContinueMission { mission: 1 });
+        bench.rig.send(CLIENT, &ContinueMission { mission: 2 });
+        assert_eq!(bench.report().stage, report_mission::Stage::WAITING);
+        bench.rig.send(CLIENT, &ContinueMission { mission: 1 });
+        let report = bench.report();
+        assert_eq!(
+            (report.stage, report.attempt),
+            (report_mission::Stage::MAP, 2)
+        );
+        assert_eq!(report.reason.as_str(), Some(""));
+    }
+
+    #[test]
     fn the_operator_stops_it() {
         let mut bench = Bench::new();
         bench.go(3.0);
@@ -473,6 +508,7 @@ mod tests {
             (Stage::Arrived, report_mission::Stage::ARRIVED),
             (Stage::Failed, report_mission::Stage::FAILED),
             (Stage::Stopped, report_mission::Stage::STOPPED),
+            (Stage::Waiting, report_mission::Stage::WAITING),
         ] {
             assert_eq!(report_mission::Stage(stage as u8), number);
         }

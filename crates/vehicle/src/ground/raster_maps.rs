@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use bytes::Bytes;
 
+use crate::messages::ground::report_raster_change::Result_ as ChangeResult;
 use crate::messages::ground::report_raster_maps::MapRec;
 use crate::messages::ground::{
     CreateRasterMap, DeleteRasterMap, QueryRasterCells, QueryRasterMaps, ReportRasterCells,
@@ -15,7 +16,7 @@ use jaus::endpoint::Received;
 use jaus::service::{Context, Handled, Service, code_of, read};
 
 use super::WorldStore;
-use super::world_store::Answer;
+use super::world_store::{Answer, refused};
 
 /// Reports maps and cells to any client, and accepts changes from clients that may command the
 /// component. Every change is answered once it is on disk, or with the reason for the refusal.
@@ -159,6 +160,21 @@ impl Service for RasterMaps {
     }
 }
 
+/// Answers a change of a map that is refused for this reason.
+pub(crate) fn refuse_map_change(message: &Received, why: &str, context: &mut Context<'_>) {
+    let about = match code_of(&message.payload) {
+        Some(CreateRasterMap::CODE) => read(message).map(|it: CreateRasterMap| (it.request_id, 0)),
+        Some(SetRasterCells::CODE) => {
+            read(message).map(|it: SetRasterCells| (it.request_id, it.map))
+        }
+        _ => read(message).map(|it: DeleteRasterMap| (it.request_id, it.map)),
+    };
+    if let Some((request_id, map)) = about {
+        let answer = refused(request_id, map, ChangeResult::FAILED, why);
+        context.reply_until_acknowledged(message, &answer);
+    }
+}
+
 fn wanted(create: &CreateRasterMap) -> Raster {
     Raster {
         name: create.name.to_string_lossy().into_owned(),
@@ -191,7 +207,6 @@ mod tests {
 
     use super::*;
     use crate::messages::ground::ReportRasterChange;
-    use crate::messages::ground::report_raster_change::Result_ as ChangeResult;
     use crate::motion::Frame;
     use crate::world::World;
     use jaus::service::rig::{CLIENT, Rig};

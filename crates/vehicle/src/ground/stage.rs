@@ -40,6 +40,9 @@ pub enum StageState {
     Blocked = 3,
     /// The command is complete.
     Done = 4,
+    /// Stopped for a fault. The command is dropped, and a new one is needed, also when the fault is
+    /// gone.
+    Halted = 5,
 }
 
 impl StageState {
@@ -52,6 +55,7 @@ impl StageState {
             report_stage::State::ACTIVE => Some(Self::Active),
             report_stage::State::BLOCKED => Some(Self::Blocked),
             report_stage::State::DONE => Some(Self::Done),
+            report_stage::State::HALTED => Some(Self::Halted),
             _ => None,
         }
     }
@@ -65,6 +69,7 @@ impl StageState {
             Self::Active => "active",
             Self::Blocked => "blocked",
             Self::Done => "done",
+            Self::Halted => "halted",
         }
     }
 }

@@ -319,7 +319,12 @@ fn creation(request_id: u8, numbers: impl Iterator<Item = u32>) -> ReportVksObje
     }
 }
 
-fn refused(request_id: u8, map: u16, result: ChangeResult, reason: &str) -> ReportRasterChange {
+pub(super) fn refused(
+    request_id: u8,
+    map: u16,
+    result: ChangeResult,
+    reason: &str,
+) -> ReportRasterChange {
     ReportRasterChange {
         request_id,
         map,

@@ -1,86 +1,24 @@
-//! The mission state machine: stages that start in sequence as each one succeeds, and restart from
-//! the first when one is blocked.
+//! The mission state machine: stages that start in sequence as each one succeeds. Until the path is
+//! handed over, a blocked stage restarts from the first. After that a block stops the vehicle, and
+//! the mission waits for the operator, unless [`Settings::retries`] allows a restart of motion.
 
+mod refusal;
+mod settings;
 mod stage;
 mod watch;
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use jaus::address::JausId;
 
+pub use refusal::{NotPlanned, Refusal};
+pub use settings::{Destination, Settings};
 pub use stage::{Link, LinkState, Stage};
 use watch::Links;
 
 use super::lost_link::Trail;
 use super::{LostLink, Path, Point};
-
-/// Retry limits, timeouts and defaults of a mission.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Maximum number of attempts, at least one.
-    pub attempts: u8,
-    /// Delay between a blocked attempt and the next one.
-    pub pause: Duration,
-    /// Timeout for a stage to start or recover.
-    pub patience: Duration,
-    /// How long a stage may report a block before the attempt fails.
-    pub settling: Duration,
-    /// How long the vehicle may drive without progress.
-    pub stall: Duration,
-    /// Maximum number of new paths in one attempt because the map has changed on the way.
-    pub detours: u8,
-    /// Default speed limit in metres per second, for destinations without one.
-    pub speed: f64,
-    /// Behaviour when the operator's link is lost.
-    pub lost_link: LostLink,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            attempts: 3,
-            pause: Duration::from_secs(3),
-            patience: Duration::from_secs(15),
-            settling: Duration::from_secs(1),
-            stall: Duration::from_secs(60),
-            detours: 10,
-            speed: 1.0,
-            lost_link: LostLink::Stop,
-        }
-    }
-}
-
-/// Destination of a mission.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Destination {
-    /// X in the local frame, in metres.
-    pub x: f64,
-    /// Y in the local frame, in metres.
-    pub y: f64,
-    /// Speed limit in metres per second.
-    pub speed: Option<f64>,
-}
-
-impl Destination {
-    /// The highest speed limit that a client may request, in metres per second.
-    pub const MAX_SPEED: f64 = 100.0;
-
-    /// Describes what is invalid, with a remedy.
-    fn mistake(&self) -> Option<String> {
-        let Self { x, y, speed } = *self;
-        if !x.is_finite() || !y.is_finite() {
-            return Some(format!(
-                "the destination north {x} m, east {y} m is invalid: set finite numbers of metres"
-            ));
-        }
-        let speed = speed.filter(|&speed| !(speed > 0.0 && speed <= Self::MAX_SPEED))?;
-        Some(format!(
-            "a speed of {speed} m/s is out of range: set one above 0 and up to {} m/s",
-            Self::MAX_SPEED
-        ))
-    }
-}
 
 /// One attempt of one mission. Results of earlier attempts are ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -127,28 +65,6 @@ pub struct Report {
     pub reason: String,
 }
 
-/// Why an approval was refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Refusal {
-    /// The approval concerns a mission that has been replaced.
-    #[error("cannot approve mission {wanted}: mission {current} replaced it")]
-    Replaced {
-        /// The mission in the approval.
-        wanted: u32,
-        /// The current mission.
-        current: u32,
-    },
-    /// The mission is over.
-    #[error("cannot approve mission {mission}: it is over ({stage})")]
-    Over {
-        /// The mission in the approval.
-        mission: u32,
-        /// Its final stage.
-        stage: Stage,
-    },
-}
-
 /// The current mission of a planner: the last one requested.
 #[derive(Debug)]
 pub struct Mission {
@@ -157,6 +73,14 @@ pub struct Mission {
     approved: bool,
     /// Whether the mission waits for a new lease after a lost link.
     held: bool,
+    /// Whether the path has been handed over, so that the vehicle may have moved.
+    has_driven: bool,
+    /// Whether the vehicle returns after a lost link.
+    returns: bool,
+    /// Whether the reason is that of an earlier attempt.
+    is_reason_past: bool,
+    /// Number of restarts by itself.
+    retried: u8,
     /// Number of new paths in this attempt.
     detours: u8,
     /// The path driven from its start.
@@ -187,6 +111,10 @@ impl Mission {
             },
             approved: false,
             held: false,
+            has_driven: false,
+            returns: false,
+            is_reason_past: false,
+            retried: 0,
             detours: 0,
             trail: Trail::default(),
             path: Arc::default(),
@@ -225,6 +153,8 @@ impl Mission {
             ..Report::default()
         };
         self.approved = approved;
+        (self.has_driven, self.returns, self.retried) = (false, false, 0);
+        self.is_reason_past = false;
         self.trail = Trail::default();
         self.path = Arc::default();
         match destination.mistake() {
@@ -237,18 +167,11 @@ impl Mission {
     /// Records the operator's approval of the path, or of the mission before a path exists.
     ///
     /// # Errors
-    /// If the mission is over or was replaced.
+    /// If the mission is over, was replaced, or waits to be [continued](Self::resume).
     pub fn approve(&mut self, now: Instant, mission: u32) -> Result<(), Refusal> {
-        let current = self.report.run.mission;
-        let stage = self.report.stage;
-        if mission != current {
-            return Err(Refusal::Replaced {
-                wanted: mission,
-                current,
-            });
-        }
-        if !stage.is_under_way() {
-            return Err(Refusal::Over { mission, stage });
+        let stage = self.current(mission)?;
+        if stage == Stage::Waiting {
+            return Err(Refusal::Waiting { mission });
         }
         self.approved = true;
         if self.held {
@@ -259,6 +182,39 @@ impl Mission {
             self.hand_over(now);
         }
         Ok(())
+    }
+
+    /// Continues a mission that a fault has stopped, on behalf of the operator: plans from where the
+    /// vehicle is, and drives.
+    ///
+    /// # Errors
+    /// If the mission is over, was replaced, or does not wait.
+    pub fn resume(&mut self, now: Instant, mission: u32) -> Result<(), Refusal> {
+        let stage = self.current(mission)?;
+        if stage != Stage::Waiting {
+            return Err(Refusal::NotWaiting { mission, stage });
+        }
+        self.next_attempt();
+        self.report.reason.clear();
+        self.retried = 0;
+        self.approved = true;
+        self.begin(now);
+        Ok(())
+    }
+
+    /// The stage of a mission that is neither over nor replaced.
+    fn current(&self, mission: u32) -> Result<Stage, Refusal> {
+        let (current, stage) = (self.report.run.mission, self.report.stage);
+        if mission != current {
+            return Err(Refusal::Replaced {
+                wanted: mission,
+                current,
+            });
+        }
+        if !stage.is_under_way() {
+            return Err(Refusal::Over { mission, stage });
+        }
+        Ok(stage)
     }
 
     /// Ends an active mission with a reason: a request of the operator, a takeover or an emergency.
@@ -313,8 +269,8 @@ impl Mission {
             return self.end(Stage::Stopped, &reason);
         };
         self.held = false;
-        // No retries: another attempt would drive to the destination.
-        self.report.run.attempt = self.report.attempts;
+        self.returns = true;
+        self.next_attempt();
         self.report.progress = 0;
         self.report.remaining = back.length();
         if let Some(&(x, y)) = back.points().last() {
@@ -397,6 +353,7 @@ impl Mission {
         }
         self.detours += 1;
         self.halt();
+        self.is_reason_past = false;
         reason.clone_into(&mut self.report.reason);
         self.report.progress = 0;
         self.enter(now, Stage::Planning);
@@ -424,7 +381,9 @@ impl Mission {
 
     /// Fails the attempt for a reason that no driver has reported.
     pub fn handle_setback(&mut self, now: Instant, run: Run, reason: &str) {
-        if self.report.run == run && self.again.is_none() && self.report.stage.is_under_way() {
+        let stage = self.report.stage;
+        let is_active = stage.is_under_way() && stage != Stage::Waiting;
+        if self.report.run == run && self.again.is_none() && is_active {
             self.set_back(now, reason);
         }
     }
@@ -485,6 +444,7 @@ impl Mission {
     }
 
     fn hand_over(&mut self, now: Instant) {
+        self.has_driven = true;
         self.enter(now, Stage::Path);
         let speed = self.report.destination.speed.unwrap_or(self.settings.speed);
         self.action = Some(Action::HandOver(
@@ -503,6 +463,10 @@ impl Mission {
                 return self.end(Stage::Arrived, "");
             }
             self.enter(now, next);
+            if next == Stage::Driving && std::mem::take(&mut self.is_reason_past) {
+                // Why the earlier attempt has failed no longer matters.
+                self.report.reason.clear();
+            }
         }
         let lost = self.links.give_up_at(self.report.stage, &self.settings);
         if let Some((_, reason)) = lost.filter(|&(at, _)| at <= now) {
@@ -510,18 +474,37 @@ impl Mission {
         }
     }
 
-    /// Handles a failed attempt: schedules another one, unless it was the last.
+    /// Handles a failed attempt: schedules another one if nothing has moved yet, and waits for the
+    /// operator otherwise.
     fn set_back(&mut self, now: Instant, reason: &str) {
         let Report { run, attempts, .. } = self.report;
-        if run.attempt >= attempts {
+        let may_retry = match self.has_driven {
+            true => self.retried < self.settings.retries,
+            false => run.attempt < attempts,
+        };
+        if self.returns || (!self.has_driven && !may_retry) {
+            // The return has no operator who could continue it.
             return self.end(Stage::Failed, reason);
         }
         self.halt();
-        self.report.run.attempt += 1;
-        self.report.stage = Stage::Map;
         self.report.progress = 0;
         reason.clone_into(&mut self.report.reason);
+        if !may_retry {
+            self.report.stage = Stage::Waiting;
+            return;
+        }
+        self.is_reason_past = true;
+        self.retried += u8::from(self.has_driven);
+        self.next_attempt();
+        self.report.stage = Stage::Map;
         self.again = now.checked_add(self.settings.pause);
+    }
+
+    /// Counts an attempt, so that results of the one before are ignored.
+    fn next_attempt(&mut self) {
+        let report = &mut self.report;
+        report.run.attempt = report.run.attempt.wrapping_add(1).max(1);
+        report.attempts = report.attempts.max(report.run.attempt);
     }
 
     fn end(&mut self, stage: Stage, reason: &str) {
@@ -551,24 +534,6 @@ impl Mission {
                 "the stage \"{stage}\" took longer than {} s",
                 self.settings.patience.as_secs()
             ),
-        }
-    }
-}
-
-/// Why planning failed.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NotPlanned {
-    /// The reason, as text for the operator.
-    pub reason: String,
-    /// Whether a retry would fail in the same way.
-    pub hopeless: bool,
-}
-
-impl From<super::NoPath> for NotPlanned {
-    fn from(error: super::NoPath) -> Self {
-        Self {
-            reason: error.to_string(),
-            hopeless: !error.may_pass(),
         }
     }
 }

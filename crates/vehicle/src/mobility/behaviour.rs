@@ -34,6 +34,11 @@ pub(super) trait Behaviour: Send {
         let _ = (controls, context);
     }
 
+    /// Handles the end of a client's control: what it has set for its own commands is void.
+    fn handle_control_end(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
+        let _ = (controls, context);
+    }
+
     /// Handles a stop of the vehicle: active and standby commands become void.
     fn handle_stop(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
         let _ = (controls, context);

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::clock::SampleClock;
 use super::place::Place;
-use crate::motion::{Pilot, Ticket, Trouble};
+use crate::motion::{GlobalPose, Jump, JumpCheck, Pilot, Pose, Ticket, Trouble};
 use jaus::messages::core::set_element::ElementRec;
 use jaus::messages::mobility::{
     QueryActiveElement, QueryGlobalPathSegment, QueryGlobalPathSegmentExt, QueryGlobalWaypoint,
@@ -50,6 +50,8 @@ impl Travel {
     }
 }
 
+/// A limit below this lets nothing move, in metres or radians per second.
+const LEAST_MOTION: f64 = 0.01;
 /// Interval between checks while a fault persists.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -62,6 +64,8 @@ pub(super) struct Controls {
     /// The fault that prevents driving, until it clears.
     trouble: Option<StopCause>,
     looked: Option<Instant>,
+    /// Whether the command in force moves nothing because of a limit.
+    is_held: bool,
     /// The list that the list drivers execute.
     pub(super) elements: Elements,
     pub(super) travel: Travel,
@@ -79,6 +83,7 @@ impl Controls {
             stops: 0,
             trouble: None,
             looked: None,
+            is_held: false,
             elements: Elements::new(),
             travel: Travel::default(),
             clock: None,
@@ -99,6 +104,11 @@ impl Controls {
             self.guard.finish();
         }
         self.follow_trouble(now, context);
+        let held = self.held();
+        if let Some(why) = held.as_ref().filter(|_| !self.is_held) {
+            tracing::warn!("the vehicle does not move: {why}");
+        }
+        self.is_held = held.is_some();
     }
 
     /// Advances to `now`, but not beyond the expiry of the setpoint in force.
@@ -135,6 +145,59 @@ impl Controls {
                 context.recover();
             }
         }
+    }
+
+    /// Sets the pose in the local frame. A vehicle that drives by it stops, unless the change is
+    /// small.
+    pub(super) fn set_pose(&mut self, pose: Pose) {
+        let before = self.pilot.motion().pose;
+        self.stop_after(Jump::between(&before, &pose, JumpCheck::RECKONED), false);
+        self.pilot.set_pose(pose);
+        self.handle_new_frame();
+    }
+
+    /// Sets the pose on the globe. A vehicle that drives by it stops, unless the change is small.
+    pub(super) fn set_global_pose(&mut self, pose: GlobalPose) {
+        let local = |pose: &GlobalPose| self.pilot.frame().to_local(pose);
+        let (before, after) = (local(&self.pilot.global_pose()), local(&pose));
+        self.stop_after(Jump::between(&before, &after, JumpCheck::RECKONED), true);
+        self.pilot.set_global_pose(pose);
+        self.handle_new_frame();
+    }
+
+    /// Stops after a jump of the pose in the local frame, or with `on_globe` of the one on the globe,
+    /// if the goal is in that frame.
+    fn stop_after(&mut self, jump: Option<Jump>, on_globe: bool) {
+        let is_place_on_globe = matches!(
+            self.travel.place,
+            Some(Place::Global(_) | Place::GlobalPath(_))
+        );
+        let is_steered = match self.is_travelling() && self.pilot.is_under_way() {
+            true => is_place_on_globe == on_globe,
+            false => self.pilot.holds_heading(on_globe),
+        };
+        if let Some(jump) = jump.filter(|_| is_steered) {
+            tracing::warn!("stopped: {jump}");
+            self.halt(&StopCause::Fault(jump.to_string()));
+        }
+    }
+
+    /// Why a command in force moves nothing, if a limit that the client in control has set is the
+    /// reason.
+    pub(super) fn held(&self) -> Option<String> {
+        let limits = self.pilot.limits();
+        let still = |limit: f64| limit < LEAST_MOTION;
+        let is_held = still(limits.speed) && still(limits.reverse) && still(limits.yaw_rate);
+        let what = match (still(limits.speed), still(limits.reverse)) {
+            _ if is_held => "any motion",
+            (true, _) => "the speed forward",
+            (_, true) => "the speed in reverse",
+            _ if still(limits.yaw_rate) => "the yaw rate",
+            _ => return None,
+        };
+        self.pilot.is_under_way().then(|| {
+            format!("{what} is limited to 0 by Set Velocity Command: set a higher limit, or Reset")
+        })
     }
 
     /// Whether a fault prevents driving.
@@ -359,7 +422,7 @@ pub(super) fn changed(context: &mut Context<'_>) {
 impl From<Trouble> for StopCause {
     fn from(trouble: Trouble) -> Self {
         match trouble {
-            Trouble::Fault(what) => Self::Fault(what),
+            Trouble::Fault(what) | Trouble::PoseJumped(what) => Self::Fault(what),
             Trouble::PoseStale(age) => Self::PoseStale(age),
             Trouble::PoseUnknown => Self::PoseUnknown,
         }

@@ -76,8 +76,7 @@ fn pose(exchange: &Exchange<'_, '_>) -> GlobalPose {
 fn set(pose: GlobalPose, exchange: &mut Exchange<'_, '_>) {
     let (latitude, longitude, yaw) = (pose.latitude, pose.longitude, pose.yaw);
     tracing::info!(source = %exchange.message.source, latitude, longitude, yaw, "global pose set");
-    exchange.controls.pilot.set_global_pose(pose);
-    exchange.controls.handle_new_frame();
+    exchange.controls.set_global_pose(pose);
     changed(exchange.context);
 }
 

@@ -62,8 +62,7 @@ fn pose(exchange: &Exchange<'_, '_>) -> Pose {
 fn set(pose: Pose, exchange: &mut Exchange<'_, '_>) {
     let (x, y, yaw) = (pose.x, pose.y, pose.yaw);
     tracing::info!(source = %exchange.message.source, x, y, yaw, "local pose set");
-    exchange.controls.pilot.set_pose(pose);
-    exchange.controls.handle_new_frame();
+    exchange.controls.set_pose(pose);
     changed(exchange.context);
 }
 

@@ -111,6 +111,13 @@ impl Vehicle {
         self.lock().guard.last_stop().cloned()
     }
 
+    /// Why the command in force moves nothing, if a limit set by the client in control is the
+    /// reason.
+    #[must_use]
+    pub fn held(&self) -> Option<String> {
+        self.lock().held()
+    }
+
     /// The latest pose and velocity.
     #[must_use]
     pub fn motion(&self) -> Motion {
@@ -347,8 +354,15 @@ impl Service for OnVehicle {
         self.behaviour.handle_stop(&mut controls, context);
     }
 
-    /// Discards commands stored in standby when the component becomes ready.
+    /// Discards commands stored in standby when the component becomes ready, and limits when the
+    /// control of the client that set them ends.
     fn handle_standing(&mut self, _: Instant, before: &Standing, context: &mut Context<'_>) {
+        let client = |standing: &Standing| standing.controller.map(|client| client.id);
+        let had_control = client(before);
+        if had_control.is_some() && had_control != client(context.standing()) {
+            let mut controls = self.vehicle.lock();
+            self.behaviour.handle_control_end(&mut controls, context);
+        }
         if context.standing().may_act() && !before.may_act() {
             let mut controls = self.vehicle.lock();
             self.behaviour.handle_stop(&mut controls, context);

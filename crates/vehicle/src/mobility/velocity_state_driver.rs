@@ -107,6 +107,12 @@ impl Behaviour for VelocityStateDriver {
         Some(SetVelocityCommand::NAME)
     }
 
+    fn handle_control_end(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
+        self.default = Velocity::default();
+        controls.pilot.reset_limits();
+        changed(context);
+    }
+
     fn handle_stop(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
         self.current = Velocity::default();
         self.ticket = None;

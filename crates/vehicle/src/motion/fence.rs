@@ -7,7 +7,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::{Drive, Effort, Limits, Motion, Pose, Velocity};
+use super::{Drive, Effort, JumpCheck, Limits, Motion, Pose, Velocity};
 use crate::zones::{Clearance, Point, Zones};
 
 /// Dimensions and delays of a vehicle for its fence.
@@ -47,8 +47,13 @@ struct State {
 }
 
 /// A pose that another component measures.
-#[derive(Debug, Clone, Copy, Default)]
-struct Located(Option<(Pose, Instant)>);
+#[derive(Debug)]
+struct Located {
+    pose: Option<(Pose, Instant)>,
+    jumps: JumpCheck,
+    /// Why the pose does not count before it is confirmed.
+    doubt: Option<String>,
+}
 
 /// Speeds that a fence allows, in metres per second and not negative.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,12 +89,17 @@ impl Fence {
     }
 
     /// A fence for a platform whose own pose is not in the frame of the zones: it holds the vehicle
-    /// while there are zones but no [pose](Self::handle_pose) from elsewhere.
+    /// while there are zones but no [pose](Self::handle_pose) from elsewhere, or one that has jumped
+    /// further than a vehicle with these limits can drive.
     #[must_use]
-    pub fn located_elsewhere(config: FenceConfig) -> Self {
+    pub fn located_elsewhere(config: FenceConfig, limits: &Limits) -> Self {
         Self(Arc::new(Mutex::new(State {
             config,
-            located: Some(Located::default()),
+            located: Some(Located {
+                pose: None,
+                jumps: JumpCheck::new(limits, JumpCheck::RECKONED),
+                doubt: None,
+            }),
             ..State::default()
         })))
     }
@@ -107,9 +117,33 @@ impl Fence {
         self.lock().obstacles = obstacles;
     }
 
-    /// Sets the pose that another component measured at `sampled_at`; `None` if it is unknown.
+    /// Sets the pose that another component measured, and when; `None` if it is unknown. If it
+    /// jumps while there are zones, the vehicle is held until the pose is
+    /// [confirmed](Self::confirm_pose).
     pub fn handle_pose(&self, pose: Option<(Pose, Instant)>) {
-        self.lock().located = Some(Located(pose));
+        let mut state = self.lock();
+        let has_zones = !state.zones.is_empty();
+        let Some(located) = &mut state.located else {
+            return;
+        };
+        located.pose = pose;
+        let Some((pose, at)) = pose else {
+            return;
+        };
+        let jump = located.jumps.handle_pose(at, &pose);
+        if let Some(jump) = jump.filter(|_| has_zones) {
+            tracing::error!("{jump}: the vehicle is held");
+            located.doubt = Some(format!(
+                "{jump} while zones are set: check it, then take control again"
+            ));
+        }
+    }
+
+    /// Lets the pose count again after a jump, because somebody has taken or given up control since.
+    pub fn confirm_pose(&self) {
+        if let Some(located) = &mut self.lock().located {
+            located.doubt = None;
+        }
     }
 
     /// Why the vehicle may not go where its command leads, if so.
@@ -131,6 +165,11 @@ impl Fence {
         state.held = None;
         if state.zones.is_empty() && state.obstacles.is_empty() {
             return Bounds::NONE;
+        }
+        let doubt = state.located.as_ref().and_then(|it| it.doubt.clone());
+        if doubt.is_some() {
+            state.held = doubt;
+            return Bounds::HOLD;
         }
         let Some(pose) = state.pose(now, motion) else {
             let why = "zones are set, but the pose is unknown or too old: restore the pose \
@@ -169,10 +208,10 @@ impl Fence {
 impl State {
     /// The pose in the zones' frame; `None` if it is unknown or too old.
     fn pose(&self, now: Instant, motion: &Motion) -> Option<Pose> {
-        let pose = match self.located {
+        let pose = match &self.located {
             None => motion.pose,
-            Some(Located(pose)) => {
-                let (pose, at) = pose?;
+            Some(located) => {
+                let (pose, at) = located.pose?;
                 let age = now.saturating_duration_since(at);
                 (age <= Fence::MAX_POSE_AGE).then_some(pose)?
             }

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use super::course::{Course, Setpoint};
 use super::fence::Bounds;
 use super::{
-    Curve, Drive, Effort, Fence, Frame, GlobalPose, Limits, Motion, Platform, Pose, Velocity,
-    Waypoint, wrap,
+    Curve, Drive, Effort, Fence, Frame, GlobalPose, JumpCheck, Limits, Motion, Platform, Pose,
+    Velocity, Waypoint, wrap,
 };
 
 /// A motion goal of a vehicle.
@@ -63,6 +63,8 @@ pub enum Trouble {
     PoseStale(Duration),
     /// Part of the pose is unknown (NaN).
     PoseUnknown,
+    /// The pose has changed further than the vehicle can have moved, as text for the operator.
+    PoseJumped(String),
 }
 
 /// Identifies one goal of a [`Pilot`], to distinguish it from later ones.
@@ -85,6 +87,8 @@ pub struct Pilot {
     time: Option<Instant>,
     /// Maximum age of a pose to steer by.
     max_pose_age: Duration,
+    /// Compares the poses on the way to a goal.
+    jumps: JumpCheck,
     fence: Fence,
     /// The trouble that ended the last goal, until it is taken.
     trouble: Option<Trouble>,
@@ -113,6 +117,7 @@ impl Pilot {
             steps: 0,
             time: None,
             max_pose_age: Self::MAX_POSE_AGE,
+            jumps: JumpCheck::new(&limits, JumpCheck::RECKONED),
             fence: Fence::default(),
             trouble: None,
         }
@@ -164,6 +169,12 @@ impl Pilot {
     pub fn pursue(&mut self, goal: Goal) -> Ticket {
         self.tickets += 1;
         let ticket = Ticket(self.tickets);
+        let course = self.course.as_ref().filter(|course| !course.has_arrived);
+        if !course.is_some_and(|course| course.goal.needs_pose()) {
+            // A vehicle that does not drive by its pose may be put anywhere. A repeated goal must not
+            // hide a jump.
+            self.jumps.forget();
+        }
         let course = Course::new(goal, ticket, &self.motion().pose, &self.limits);
         self.course = Some(course);
         ticket
@@ -187,6 +198,17 @@ impl Pilot {
     /// unknown or too old for a goal that needs one.
     pub const fn take_trouble(&mut self) -> Option<Trouble> {
         self.trouble.take()
+    }
+
+    /// Whether the goal is a heading measured from the local X axis, or with `north` from true north.
+    pub(crate) fn holds_heading(&self, north: bool) -> bool {
+        let course = self.course.as_ref().filter(|course| !course.has_arrived);
+        match course.map(|course| course.goal) {
+            Some(Goal::Vector { heading, .. }) => {
+                matches!(heading, Some(Heading::North(_))) == north
+            }
+            _ => false,
+        }
     }
 
     /// The fault of the platform, if any.
@@ -280,6 +302,7 @@ impl Pilot {
             yaw: wrap(pose.yaw),
             ..pose
         };
+        self.jumps.forget();
         self.frame = Frame::joining(&pose, &self.global_pose());
         self.platform.set_pose(pose);
     }
@@ -341,7 +364,8 @@ impl Pilot {
         if let Some(course) = course {
             let is_steered = course.goal.needs_pose();
             let trouble = is_steered.then(|| self.pose_trouble(time)).flatten();
-            if let Some(trouble) = self.fault().or(trouble) {
+            let jump = is_steered.then(|| self.jump()).flatten();
+            if let Some(trouble) = self.fault().or(trouble).or(jump) {
                 self.trouble = Some(trouble);
                 self.course = None;
             }
@@ -381,6 +405,21 @@ impl Pilot {
                 }
             }
         }
+    }
+
+    /// The jump of the pose since the last control step, of a platform that reports when it measured.
+    fn jump(&mut self) -> Option<Trouble> {
+        let motion = self.motion();
+        let at = motion.sampled_at?;
+        let (metres, radians) = JumpCheck::RECKONED;
+        let error = |rms: Option<f64>| 2.0 * rms.unwrap_or_default();
+        let noise = (
+            metres + error(motion.position_rms),
+            radians + error(motion.attitude_rms),
+        );
+        self.jumps.set_noise(noise);
+        let jump = self.jumps.handle_pose(at, &motion.pose)?;
+        Some(Trouble::PoseJumped(jump.to_string()))
     }
 
     fn drive(&mut self, command: Drive) {

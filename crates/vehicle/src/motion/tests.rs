@@ -357,3 +357,38 @@ fn a_new_pose_moves_the_frame_and_not_the_vehicle() {
     let pose = track.arrive(waypoint(Waypoint::at(-995.0, -1000.0), 1.0), 60.0);
     assert!(pose.distance(-995.0, -1000.0) < 0.5);
 }
+
+#[test]
+fn a_jump_of_the_pose_ends_a_goal_that_needs_it_also_when_the_goal_is_repeated() {
+    for repeats in [false, true] {
+        let Track { mut now, .. } = Track::new();
+        let observed = Observed::default();
+        let mut pilot = Pilot::new(observed.clone(), Frame::default());
+        let goal = Goal::Vector {
+            speed: 1.0,
+            heading: Some(Heading::Local(0.0)),
+        };
+        let mut drive = |y: f64, steps: u32| {
+            for _ in 0..steps {
+                now += Pilot::STEP;
+                observed.set(Motion {
+                    pose: Pose::at(0.0, y),
+                    velocity: Velocity::forward(1.0, 0.0),
+                    sampled_at: Some(now),
+                    ..Motion::default()
+                });
+                if repeats || !pilot.is_under_way() {
+                    pilot.pursue(goal);
+                }
+                pilot.handle_time(now);
+            }
+            pilot.take_trouble()
+        };
+        assert_eq!(drive(0.0, 50), None);
+        let trouble = drive(3.0, 1);
+        assert!(
+            matches!(trouble, Some(Trouble::PoseJumped(_))),
+            "{trouble:?}"
+        );
+    }
+}

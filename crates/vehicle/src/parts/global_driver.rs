@@ -71,11 +71,12 @@ impl Part for GlobalDriver {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let remote_platform = RemotePlatform::new(RemotePlatformSettings {
             limits: self.limits,
+            noise: GlobalPoses::noise(self.max_rms),
             stale: self.stale,
             needs_scan: false,
             by_heading: false,
         });
-        let fence = Fence::located_elsewhere(self.fence);
+        let fence = Fence::located_elsewhere(self.fence, &self.limits);
         // The first pose determines the frame.
         let pilot = Pilot::new(remote_platform.clone(), Frame::default());
         let vehicle = Vehicle::new(pilot.with_fence(fence.clone()));
@@ -92,12 +93,7 @@ impl Part for GlobalDriver {
         let zones = Sense::zones(&component)?;
         let local_poses = Sense::pose(&component, Self::HZ)?;
         let velocities = Sense::velocity(&component, Self::HZ)?;
-        let global = GlobalPoses::new(
-            remote_platform.clone(),
-            vehicle.clone(),
-            self.max_rms,
-            self.limits,
-        );
+        let global = GlobalPoses::new(remote_platform.clone(), vehicle.clone(), self.max_rms);
         let own = component.clone();
         let next = Next {
             component,
@@ -115,7 +111,7 @@ impl Part for GlobalDriver {
             end = poses.steer(global) => end,
             end = velocities.steer(&remote_platform) => end,
             end = zones.enclose(&fence) => end,
-            end = local_poses.locate(&fence) => end,
+            end = local_poses.locate(&fence, &own) => end,
             end = next.run() => end,
             end = shut_down(&own) => end,
         }

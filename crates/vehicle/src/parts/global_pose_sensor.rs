@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::drivers::Sense;
+use super::drivers::{ChainControl, Sense};
 use super::navigation_inputs;
 use super::turn_rates::TurnRates;
 use super::{Gyro, IioDevice, Part, PartError, Readings, Slot, Telemetry};
@@ -15,14 +15,19 @@ use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odo
 use crate::mobility::Vehicle;
 use crate::motion::{Frame, GlobalPose, Motion, Observed, Pilot, Pose, WheelCount};
 use crate::navigation::{IioImu, Navigator, NavigatorConfig};
+use jaus::codec::Message;
 use jaus::component::Component;
-use jaus::messages::mobility::{QueryGlobalPose, QueryGlobalPoseExt};
+use jaus::messages::core::SetTime;
+use jaus::messages::mobility::{
+    QueryGlobalPose, QueryGlobalPoseExt, SetGeomagneticProperty, SetGlobalPose, SetGlobalPoseExt,
+};
 use jaus::node::now;
 
 /// Reports the pose on the globe, with its standard errors.
 ///
 /// It offers Global Pose Sensor. A client in control may set the heading, which is otherwise unknown
-/// until the vehicle has moved; the position is always measured. It finds Wheel Odometry in its
+/// until the vehicle has moved, but while a driver of its subsystem is controlled, only the client at
+/// the head of that chain of drivers. The position is always measured. It finds Wheel Odometry in its
 /// subsystem; without it, the pose is that of the receiver alone. A pose that is too old or too uncertain
 /// (`navigator`) is omitted from the reports.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,8 +96,9 @@ impl GlobalPoseSensor {
         let observed = Observed::new(unknown(None));
         let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
             .with_clock(slot.time.clone());
+        let chain = ChainControl::default();
         let component = slot
-            .timed_component("Global Pose Sensor")
+            .guarded_component("Global Pose Sensor", chain.guard(GUARDED))
             .offer(vehicle.global_pose_sensor())
             .live_on(slot.port)?;
         slot.telemetry.attach(&component);
@@ -104,6 +110,7 @@ impl GlobalPoseSensor {
             (None, Some(Gyro::Component)) => TurnRates::of_component(&component, self.hz)?,
             (None, _) => TurnRates::Absent,
         };
+        let own = component.clone();
         let sensor = Running {
             component,
             telemetry: slot.telemetry,
@@ -112,9 +119,20 @@ impl GlobalPoseSensor {
             navigator: Navigator::new(self.navigator),
             is_lost: false,
         };
-        sensor.work(inputs.receiver, rates, counts).await
+        tokio::select! {
+            end = sensor.work(inputs.receiver, rates, counts) => end,
+            end = chain.track(&own) => end,
+        }
     }
 }
+
+/// What changes the pose that drivers drive by.
+const GUARDED: &[u16] = &[
+    SetGlobalPose::CODE,
+    SetGlobalPoseExt::CODE,
+    SetGeomagneticProperty::CODE,
+    SetTime::CODE,
+];
 
 struct Running {
     component: Component,

@@ -9,18 +9,27 @@ use bytes::Bytes;
 use tokio::sync::mpsc;
 use tokio::time::timeout;
 
-use super::drivers::Sense;
+use super::drivers::{ChainControl, Sense};
 use super::{Part, PartError, Slot};
-use crate::ground::{OperatingZones, WorldStore};
+use crate::ground::{OperatingZones, WorldStore, refuse_map_change};
+use crate::messages::ground::{CreateRasterMap, DeleteRasterMap, SetRasterCells};
 use crate::motion::Frame;
 use crate::world::{Change, Done, OpenError, Picture, Raster, World};
+use jaus::codec::Message;
 use jaus::component::{AccessControl, Component};
-use jaus::messages::mobility::QueryExcursion;
+use jaus::messages::mobility::{
+    DeleteZone, QueryExcursion, SetGlobalOperatingZone, SetLocalOperatingZone,
+};
 
 /// Stores the world of a vehicle and serves it to all clients.
 ///
 /// It offers Vector Knowledge Store and Raster Maps, whose changes it accepts from any client, and
 /// Local and Global Operating Zone, whose changes it accepts from the client in control.
+///
+/// While a driver of its subsystem is controlled, it accepts changes of maps and zones only from the
+/// client at the head of that chain of drivers. Exceptions: zones that are new, because they only
+/// restrict; and maps changed by components of the subsystem, because a vehicle may map while it
+/// drives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnowledgeStore {
     /// The file. It is created if it does not exist.
@@ -107,9 +116,16 @@ impl Part for KnowledgeStore {
         });
         let store = store.open_to_all();
         let zones = store.operating_zones();
+        let chain = ChainControl::default();
+        let (subsystem, known) = (slot.port.id().subsystem(), zones.clone());
+        let zone_guard = chain.guard(ZONES).unless(move |it| known.only_adds(it));
+        let map_guard = chain.guard(MAPS).or_else(refuse_map_change);
+        let map_guard = map_guard.unless(move |it| it.source.subsystem() == subsystem);
         let component = slot
             .component("Vector Knowledge Store")
             .access_control(AccessControl::new())
+            .offer(zone_guard)
+            .offer(map_guard)
             .offer(store.vector_knowledge_store())
             .offer(store.raster_maps())
             .offer(zones.clone())
@@ -121,9 +137,23 @@ impl Part for KnowledgeStore {
             failure = failures.recv() => Err(failure.map_or(PartError::NodeStopped, PartError::Broken)),
             () = gone(&component) => Err(PartError::NodeStopped),
             end = follow(&component, &zones) => end,
+            end = chain.track(&component) => end,
         }
     }
 }
+
+/// What changes zones.
+const ZONES: &[u16] = &[
+    SetLocalOperatingZone::CODE,
+    SetGlobalOperatingZone::CODE,
+    DeleteZone::CODE,
+];
+/// What changes maps.
+const MAPS: &[u16] = &[
+    CreateRasterMap::CODE,
+    SetRasterCells::CODE,
+    DeleteRasterMap::CODE,
+];
 
 /// How long a position counts without a new one.
 const PATIENCE: Duration = Duration::from_secs(2);

@@ -36,6 +36,8 @@ use jaus::link::custom::CustomLink;
 use jaus::node::{Node, Port, time_of_day};
 use jaus::service::{Time, TimeOfDay};
 
+use drivers::ChainGuard;
+
 pub use communicator::{Communicator, DEBUG_ADDRESS};
 pub use global_driver::GlobalDriver;
 pub use global_pose_sensor::{GlobalPoseSensor, NavigationInputs};
@@ -133,7 +135,16 @@ impl Slot {
     /// Like [`component`](Self::component), and the component offers the slot's time as a service.
     /// With that of a sensor, clients measure how old its samples are.
     fn timed_component(&self, name: &str) -> Builder {
-        self.component(name)
+        self.timed(self.component(name))
+    }
+
+    /// Like `timed_component`, with a guard that sees each message before the other services do.
+    fn guarded_component(&self, name: &str, guard: ChainGuard) -> Builder {
+        self.timed(self.component(name).offer(guard))
+    }
+
+    fn timed(&self, builder: Builder) -> Builder {
+        builder
             .access_control(AccessControl::new())
             .offer(Time::new(self.time.clone()))
     }

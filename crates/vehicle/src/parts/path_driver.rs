@@ -10,7 +10,7 @@ use super::drivers::{
 use super::{Part, PartError, Slot};
 use crate::ground::StageBoard;
 use crate::mobility::Vehicle;
-use crate::motion::{Fence, FenceConfig, Frame, Limits, Motion, Pilot};
+use crate::motion::{Fence, FenceConfig, Frame, JumpCheck, Limits, Motion, Pilot};
 use jaus::messages::mobility::{SetLocalVector, local_vector_driver, set_local_vector};
 
 /// Follows the segments of a list by sending headings and speeds to the vector driver, based on the
@@ -69,6 +69,7 @@ impl Part for PathDriver {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let remote_platform = RemotePlatform::new(RemotePlatformSettings {
             limits: self.limits,
+            noise: JumpCheck::RECKONED,
             stale: self.stale,
             needs_scan: self.needs_range_sensor,
             by_heading: true,

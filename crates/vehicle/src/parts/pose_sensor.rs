@@ -10,21 +10,24 @@ use std::time::{Duration, Instant};
 
 use tokio::time::timeout;
 
-use super::drivers::Sense;
+use super::drivers::{ChainControl, Sense};
 use super::keeper::{Keeper, keeper};
 use super::pose_file::{self, Kept};
 use super::{Part, PartError, Slot, Telemetry};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::Vehicle;
 use crate::motion::{DeadReckoning, Frame, Motion, Observed, Pilot, Pose, WheelCount};
+use jaus::codec::Message;
 use jaus::component::Component;
-use jaus::messages::mobility::{QueryLocalPose, QueryLocalPoseExt};
+use jaus::messages::core::SetTime;
+use jaus::messages::mobility::{QueryLocalPose, QueryLocalPoseExt, SetLocalPose, SetLocalPoseExt};
 use jaus::node::now;
 use jaus::service::SampleAge;
 
 /// Estimates the pose by dead reckoning from a start pose and the wheel travel since.
 ///
-/// It offers Local Pose Sensor. A client in control may set the pose. Without wheel reports the
+/// It offers Local Pose Sensor. A client in control may set the pose and the time, but while a driver
+/// of its subsystem is controlled, only the client at the head of that chain of drivers. Without wheel reports the
 /// pose is omitted from its own reports. It stores pose and counts in a small file, so that after a
 /// restart it resumes without losing the travel in between.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,8 +59,9 @@ impl Part for PoseSensor {
         let observed = Observed::new(standing(Pose::UNKNOWN, None));
         let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
             .with_clock(slot.time.clone());
+        let chain = ChainControl::default();
         let component = slot
-            .timed_component("Local Pose Sensor")
+            .guarded_component("Local Pose Sensor", chain.guard(GUARDED))
             .offer(vehicle.local_pose_sensor())
             .live_on(slot.port)?;
         slot.telemetry.attach(&component);
@@ -70,6 +74,7 @@ impl Part for PoseSensor {
             "wheel travel",
         )?;
         let (keeper, kept) = keeper();
+        let own = component.clone();
         let sensor = Running {
             component,
             telemetry: slot.telemetry,
@@ -80,7 +85,10 @@ impl Part for PoseSensor {
         };
         let reckoning = sensor.reckon(counts, self.silence);
         let Some(file) = &self.file else {
-            return reckoning.await;
+            return tokio::select! {
+                end = reckoning => end,
+                end = chain.track(&own) => end,
+            };
         };
         // A stalled disk must not delay the pose.
         let writing = kept.write(PAUSE, async |kept: Kept| {
@@ -88,10 +96,14 @@ impl Part for PoseSensor {
         });
         tokio::select! {
             end = reckoning => end,
+            end = chain.track(&own) => end,
             () = writing => Err(PartError::NodeStopped),
         }
     }
 }
+
+/// What changes the pose that drivers drive by.
+const GUARDED: &[u16] = &[SetLocalPose::CODE, SetLocalPoseExt::CODE, SetTime::CODE];
 
 /// Minimum interval between writes. The wheel counts cover the travel in between.
 const PAUSE: Duration = Duration::from_millis(500);

@@ -109,7 +109,7 @@ impl PrimitiveDriver {
             PartError::Broken(format!("cannot start the stop input thread: {error}"))
         })?;
         let odometer = Odometer::new(random());
-        let fence = Fence::located_elsewhere(self.fence);
+        let fence = Fence::located_elsewhere(self.fence, &self.wheels.limits);
         let pilot = drives.pilot(self.wheels, odometer.clone(), interlock.clone());
         let pilot = pilot.with_fence(fence.clone());
         let policy = MotionPolicy::Expire(self.silence);
@@ -140,7 +140,7 @@ impl PrimitiveDriver {
         let component = driver.component.clone();
         tokio::select! {
             end = driver.watch() => end,
-            end = poses.locate(&fence) => end,
+            end = poses.locate(&fence, &component) => end,
             end = zones.enclose(&fence) => end,
             end = shut_down(&component) => end,
         }
@@ -250,13 +250,13 @@ impl Running {
             ..StageReport::default()
         };
         if let Some(fault) = self.odometer.fault() {
-            return report(StageState::Blocked, fault);
+            return report(StageState::Halted, fault);
         }
         if let Some(reason) = watchman.emergency() {
             return report(StageState::Blocked, reason.to_owned());
         }
         if let Some(StopCause::Fault(fault)) = self.vehicle.last_stop() {
-            return report(StageState::Blocked, fault);
+            return report(StageState::Halted, fault);
         }
         if let Some(cause) = self.vehicle.last_stop() {
             let reason = format!("stopped: {cause}");

@@ -10,7 +10,9 @@ use super::drivers::{
 use super::{Part, PartError, Slot};
 use crate::ground::StageBoard;
 use crate::mobility::Vehicle;
-use crate::motion::{Effort, Fence, FenceConfig, Frame, Limits, Motion, Pilot, Throttle};
+use crate::motion::{
+    Effort, Fence, FenceConfig, Frame, JumpCheck, Limits, Motion, Pilot, Throttle,
+};
 use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
 
 /// Holds the commanded speed and heading by sending efforts to the primitive driver, based on the
@@ -68,6 +70,7 @@ impl Part for VectorDriver {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let remote_platform = RemotePlatform::new(RemotePlatformSettings {
             limits: self.limits,
+            noise: JumpCheck::RECKONED,
             stale: self.stale,
             needs_scan: self.needs_range_sensor,
             by_heading: false,

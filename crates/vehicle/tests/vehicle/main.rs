@@ -1,5 +1,6 @@
 //! The reference vehicle: missions, sensors, the store under power cuts, faults, and hostile clients.
 
+mod beliefs;
 mod inertial;
 mod mission;
 mod navigation;

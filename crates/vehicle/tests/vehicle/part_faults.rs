@@ -65,7 +65,7 @@ async fn a_motor_fault_stops_both_sides_and_is_a_failure_until_it_is_gone() {
     scene
         .until("the reason", || async {
             let stage = scene.stage(PRIMITIVE).await?;
-            let is_told = stage.state == StageState::Blocked && stage.reason == "no current";
+            let is_told = stage.state == StageState::Halted && stage.reason == "no current";
             is_told.then_some(())
         })
         .await;

@@ -42,7 +42,7 @@ const BEGIN: Duration = Duration::from_secs(1_700_000_000);
 
 /// A client, the multicast group that it shares with the parts, and the time of day.
 pub(crate) struct Scene {
-    group: Group,
+    pub(crate) group: Group,
     time: TimeOfDay,
     pub(crate) client: Component,
     _node: Node,

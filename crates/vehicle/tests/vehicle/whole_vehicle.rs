@@ -15,6 +15,7 @@ use jaus::address::JausId;
 use jaus::component::Control;
 use jaus::messages::mobility::QueryLocalPose;
 use jaus_vehicle::messages::ground::QueryPlannedPath;
+use jaus_vehicle::mission::Settings;
 use jaus_vehicle::motion::Ackermann;
 use jaus_vehicle::parts::{
     KnowledgeStore, Part, PathDriver, Planner, PoseSensor, PrimitiveDriver, SteeringGear,
@@ -31,6 +32,8 @@ pub(crate) struct WholeVehicle {
     directory: Directory,
     /// The geometry of a vehicle with steered wheels.
     steering: Option<Ackermann>,
+    /// How often the planner drives on by itself after a fault.
+    retries: u8,
     running: BTreeMap<JausId, Running>,
 }
 
@@ -49,10 +52,16 @@ impl WholeVehicle {
     /// Starts all parts. With `steering` the front wheels are steered; without, the vehicle turns
     /// on the spot.
     pub(crate) fn start(name: &str, steering: Option<Ackermann>) -> Self {
+        Self::with_retries(name, steering, 0)
+    }
+
+    /// Like [`start`](Self::start), with a planner that drives on by itself so often after a fault.
+    pub(crate) fn with_retries(name: &str, steering: Option<Ackermann>, retries: u8) -> Self {
         let mut vehicle = Self {
             scene: Scene::new(),
             directory: Directory::new(name),
             steering,
+            retries,
             running: BTreeMap::new(),
         };
         for id in Self::PARTS {
@@ -69,7 +78,16 @@ impl WholeVehicle {
                 let gear = self.steering.map(SteeringGear::simulated);
                 self.run(id, PrimitiveDriver::default().steering(gear));
             }
-            PLANNER => self.run(id, Planner::default().turning_radius(radius)),
+            PLANNER => {
+                let planner = Planner {
+                    mission: Settings {
+                        retries: self.retries,
+                        ..Settings::default()
+                    },
+                    ..Planner::default()
+                };
+                self.run(id, planner.turning_radius(radius));
+            }
             POSE => {
                 let sensor = PoseSensor {
                     file: Some(self.directory.0.join("pose.toml")),

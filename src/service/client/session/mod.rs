@@ -19,12 +19,12 @@ use self::examination::Examination;
 use self::held::Held;
 pub use self::settings::{Retake, SessionOrder, SessionSettings, TargetState};
 pub use self::state::{SessionLoss, SessionState};
-use super::Controls;
 use super::control::{ControlId, ControlLost, ControlNews, ControlRefused};
+use super::{Controls, Introduction};
 use crate::address::JausId;
 use crate::endpoint::Received;
 use crate::messages::core::management;
-use crate::service::{Audience, Directory, Outbox, Patience, State};
+use crate::service::{Audience, Directory, Incarnation, Outbox, Patience, State};
 
 /// Identifies one session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -33,6 +33,7 @@ pub struct SessionId(u64);
 /// What a session needs of its component.
 pub(in crate::service) struct Surroundings<'a> {
     pub(in crate::service) directory: Arc<Directory>,
+    pub(in crate::service) own: Incarnation,
     pub(in crate::service) controls: &'a mut Controls,
     pub(in crate::service) out: &'a mut Outbox,
 }
@@ -406,7 +407,8 @@ impl Session {
     fn ask(&mut self, now: Instant, peer: JausId, around: &mut Surroundings<'_>) {
         let (authority, patience) = (self.settings.authority, self.patience);
         let Surroundings { controls, out, .. } = around;
-        match controls.request(now, peer, authority, patience, out) {
+        let introduction = Introduction::new(around.own, &around.directory, peer);
+        match controls.request(now, peer, authority, patience, introduction, out) {
             Ok(control) => self.stage = Stage::Asking(peer, control),
             Err(why) => self.lose(now, peer, SessionLoss::Refused(why)),
         }

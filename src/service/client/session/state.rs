@@ -110,6 +110,12 @@ impl SessionLoss {
         }
     }
 
+    /// Whether the peer has restarted.
+    #[must_use]
+    pub const fn is_restart(self) -> bool {
+        matches!(self, Self::Control(ControlLost::Restarted))
+    }
+
     /// Whether another client has control.
     #[must_use]
     pub const fn is_opposition(self) -> bool {

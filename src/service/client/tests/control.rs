@@ -4,11 +4,14 @@ use std::time::Duration;
 
 use super::{Bench, CLIENT, OTHER, PEER};
 use crate::address::JausId;
+use crate::codec::Message;
 use crate::messages::core::{
-    ConfirmControl, QueryControl, QueryStatus, QueryTimeout, RejectControl, ReleaseControl,
-    ReportControl, ReportStatus, ReportTimeout, RequestControl,
+    ConfirmControl, QueryControl, QueryIncarnation, QueryStatus, QueryTimeout, RejectControl,
+    ReleaseControl, ReportControl, ReportIncarnation, ReportStatus, ReportTimeout, RequestControl,
 };
-use crate::service::{ControlId, ControlLost, ControlNews, ControlRefused, Event, Patience};
+use crate::service::{
+    ControlId, ControlLost, ControlNews, ControlRefused, Event, Patience, code_of,
+};
 
 fn confirm(code: u8) -> ConfirmControl {
     ConfirmControl {
@@ -416,5 +419,42 @@ fn who_has_taken_control_after_a_late_release_keeps_it() {
     assert_eq!(
         news(&mut bench),
         [ControlNews::Lost(ControlLost::Outranked)]
+    );
+}
+
+#[test]
+fn a_client_tells_its_incarnation_before_it_requests_control() {
+    let mut bench = Bench::new();
+    request(&mut bench);
+    let codes = |bench: &Bench| -> Vec<u16> {
+        let sent = bench.sent.iter().filter(|(to, _)| *to == PEER);
+        sent.filter_map(|(_, it)| code_of(it)).collect()
+    };
+    let told = [QueryIncarnation::CODE, RequestControl::CODE];
+    let all = codes(&bench);
+    let order: Vec<_> = all.iter().filter(|it| told.contains(it)).collect();
+    assert_eq!(order, [&told[0], &told[1]], "{all:04X?}");
+    // A peer whose services are not known may be another product, which is told once.
+    bench.run_ms(600);
+    let incarnation = bench.stack.incarnation().number();
+    assert_eq!(
+        bench.sent::<QueryIncarnation>(),
+        [QueryIncarnation { incarnation }]
+    );
+}
+
+#[test]
+fn control_is_lost_when_the_peer_is_another_incarnation() {
+    let (mut bench, _) = held(4);
+    let number = |incarnation| ReportIncarnation { incarnation };
+    bench.hear(PEER, &number(7));
+    bench.hear(OTHER, &number(8));
+    bench.hear(PEER, &number(7));
+    assert_eq!(news(&mut bench), []);
+    // As a component does that has been granted a renewal as if it were a first request.
+    bench.hear(PEER, &QueryIncarnation { incarnation: 8 });
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Lost(ControlLost::Restarted)]
     );
 }

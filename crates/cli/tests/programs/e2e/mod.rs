@@ -10,10 +10,12 @@ mod browser;
 mod by_hand;
 mod fleet;
 mod handover;
+mod input;
 mod keyboard;
 mod pictures;
 mod steps;
 mod system;
+mod truth;
 #[cfg(feature = "https")]
 mod users;
 mod watching;
@@ -50,6 +52,11 @@ fn a_mission_through_the_page_ends_by_the_death_of_the_planner_and_by_a_key() {
         plan(page, FAR, Some(SLOW));
         approve(page);
 
+        says_that_the_planner_has_restarted(system, page);
+        take_control(page);
+        plan(page, FAR, Some(SLOW));
+        approve(page);
+
         take_over_by_keyboard(page);
         emergency(page);
 
@@ -80,6 +87,11 @@ fn a_mission_through_the_page_survives_the_death_of_every_part() {
 #[test]
 fn a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once() {
     on_a_station(by_hand::run);
+}
+
+#[test]
+fn only_an_input_that_proves_itself_drives_and_each_event_ends_it() {
+    on_a_station(input::run);
 }
 
 #[test]
@@ -121,6 +133,11 @@ fn without_a_global_pose_the_page_says_why_there_is_no_geographic_map() {
 #[test]
 fn a_mission_is_planned_driven_and_stopped_by_keyboard_alone() {
     on_system(keyboard::run);
+}
+
+#[test]
+fn the_page_says_why_a_vehicle_is_held_and_that_it_has_stopped_only_when_it_has() {
+    on_system(truth::run);
 }
 
 #[test]
@@ -208,17 +225,50 @@ fn says_that_the_planner_is_gone(system: &System, page: &mut Browser) {
     comes_alive(page);
 }
 
-/// Holding a key drives the vehicle and ends a mission; releasing the key stops it.
+/// A planner that is killed while it drives and is back at once is another one: the vehicle stops,
+/// and the page says why.
+fn says_that_the_planner_has_restarted(system: &System, page: &mut Browser) {
+    page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) > 0.1");
+    system.kill("jaus-planner");
+    system.start("jaus-planner");
+    let rests = "Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05";
+    assert!(
+        page.holds_within(Duration::from_secs(2), rests),
+        "it drives on"
+    );
+    let line = "document.querySelector('#mission-line').textContent";
+    page.wait(&format!(
+        "/planner [0-9.]+ restarted while it drove. The vehicle was stopped/.test({line})"
+    ));
+    page.wait(
+        "document.querySelector('#missing').textContent.includes('restarted while it drove')",
+    );
+    look_from_all_screens(page, "3-planner-restarted");
+}
+
+/// Keys leave a mission alone, in every view. After *Take over* holding a key drives the vehicle, and releasing
+/// it stops it.
 fn take_over_by_keyboard(page: &mut Browser) {
-    page.press("[data-show=drive]");
-    page.key_down("KeyW", "w");
+    for view in ["system", "drive"] {
+        page.press(&format!("[data-show={view}]"));
+        page.hold_key("ArrowDown", "ArrowDown");
+        std::thread::sleep(Duration::from_secs(1));
+        assert_eq!(page.text("#drive-source"), "Idle", "in the view {view}");
+        assert_eq!(page.value("document.body.dataset.mission"), "under-way");
+        page.let_go_of_key("ArrowDown", "ArrowDown");
+    }
+    page.wait("document.querySelector('#drive-line').textContent.includes('Take over')");
+    look_from_all_screens(page, "4-take-over");
+    page.press("#take-over");
+    page.wait("document.body.dataset.mission === 'over'");
+    page.wait("document.querySelector('#drive-line').textContent.startsWith('Ready')");
+    page.hold_key("KeyW", "w");
     page.wait(
         "document.querySelector('#drive-line').textContent.includes('commands are being sent')",
     );
     page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.3");
     page.screenshot("4-keyboard");
-    page.wait("document.body.dataset.mission === 'over'");
-    page.key_up("KeyW", "w");
+    page.let_go_of_key("KeyW", "w");
     page.wait("document.querySelector('#drive-source').textContent === 'Idle'");
     page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
 }

@@ -158,9 +158,11 @@ impl Proxy {
         if let (Some(listing), Some(&role)) = (listing.clone(), role) {
             services.push(Box::new(Listed { listing, role }));
         }
+        let stack = Stack::new(discovery, services);
+        let motion = Motion::new(plan.id, stack.incarnation());
         Self {
             ra: plan.ra,
-            stack: Stack::new(discovery, services),
+            stack,
             ra_client: RaClient::new(plan.patience, plan.ids),
             kept_until: None,
             patience: plan.patience,
@@ -169,7 +171,7 @@ impl Proxy {
             in_emergency: false,
             in_standby: false,
             lease: Lease::new(plan.own, plan.ra, halt, terms),
-            motion: Motion::new(plan.id),
+            motion,
             readiness: Readiness::default(),
             listing,
             streams: Streams::new(plan.ra, plan.own),
@@ -204,6 +206,7 @@ impl Proxy {
         let client = message.source;
         self.end_overdue(now);
         self.motion.hear(now, message);
+        self.end_control_of_restarted(now, tally);
         match code_of(&message.payload) {
             Some(RequestControl::CODE) => {
                 if let Ok(request) = RequestControl::decode(&message.payload) {

@@ -12,7 +12,7 @@ use crate::gateway::counters::Tally;
 use crate::ids::RaComponent;
 use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
-use jaus::service::{Life, MotionGuard, Outbox, Rank, StopCause, Validity, code_of};
+use jaus::service::{Incarnation, Life, MotionGuard, Outbox, Rank, StopCause, Validity};
 
 /// Active motion command of an RA component, and the liveness of its client.
 #[derive(Debug)]
@@ -25,20 +25,19 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// No motion. `id` is the RA component's JAUS id.
-    pub(super) fn new(id: JausId) -> Self {
+    /// No motion. `id` is the RA component's JAUS id, `incarnation` that of its proxy.
+    pub(super) fn new(id: JausId, incarnation: Incarnation) -> Self {
         Self {
             guard: MotionGuard::default(),
             last: None,
-            life: Life::default(),
+            life: Life::new(incarnation),
             out: Outbox::new(id),
         }
     }
 
     /// Notes a message of a JAUS component.
     pub(super) fn hear(&mut self, now: Instant, message: &Received) {
-        let code = code_of(&message.payload);
-        self.life.hear(now, message.source, code);
+        self.life.hear(now, message.source, &message.payload);
     }
 
     /// Takes the next liveness probe.
@@ -110,7 +109,7 @@ impl Proxy {
         let moving = self.motion.guard.depends_on();
         let rank = |id| match (controller == Some(id), moving == Some(id)) {
             (false, _) => None,
-            (true, false) => Some(Rank::Controller),
+            (true, false) => Some(Rank::ReadyController),
             (true, true) => Some(Rank::MovingController),
         };
         let Motion { life, out, .. } = &mut self.motion;
@@ -118,6 +117,16 @@ impl Proxy {
         while let Some(dead) = self.motion.life.poll_dead() {
             tracing::warn!(client = %dead, component = %self.ra, "the client in control is lost");
             self.forget(now, dead, tally);
+        }
+    }
+
+    /// Ends the motion and the control of a client that has restarted.
+    pub(super) fn end_control_of_restarted(&mut self, now: Instant, tally: &mut Tally) {
+        while let Some(client) = self.motion.life.poll_restarted() {
+            if self.lease.controller().is_some_and(|it| it.id == client) {
+                tracing::warn!(%client, component = %self.ra, "the client in control has restarted");
+                self.forget(now, client, tally);
+            }
         }
     }
 
@@ -145,8 +154,12 @@ impl Proxy {
     fn watch(&mut self, now: Instant, client: JausId) {
         let rank = match self.motion.guard.depends_on() {
             Some(_) => Rank::MovingController,
-            None => Rank::Controller,
+            None => Rank::ReadyController,
         };
-        self.motion.life.watch(now, client, rank);
+        let Motion { life, out, .. } = &mut self.motion;
+        life.watch(now, client, rank);
+        if Incarnation::is_offered_by(&self.stack.directory(), client) == Some(true) {
+            life.introduce(now, client, out);
+        }
     }
 }

@@ -1,7 +1,6 @@
 use redb::backends::InMemoryBackend;
 
 use super::*;
-use crate::world::World;
 use jaus::address::JausId;
 use jaus::messages::mobility::delete_zone::ZoneIdRec;
 use jaus::messages::mobility::query_local_operating_zone::QueryZoneId;

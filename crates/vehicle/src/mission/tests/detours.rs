@@ -39,7 +39,7 @@ fn a_blocked_path_is_planned_again_at_once_but_not_forever() {
 }
 
 #[test]
-fn without_another_path_the_attempts_end_with_the_reason() {
+fn without_another_path_the_mission_waits_with_the_reason_after_its_retries() {
     let mut world = blocked();
     for attempt in 1..=SETTINGS.attempts {
         assert_eq!(world.run().attempt, attempt);
@@ -52,7 +52,7 @@ fn without_another_path_the_attempts_end_with_the_reason() {
         world.pass(SETTINGS.pause);
         world.map();
     }
-    assert_eq!((world.stage(), world.reason()), (Stage::Failed, "no way"));
+    assert_eq!((world.stage(), world.reason()), (Stage::Waiting, "no way"));
     block(&mut world);
-    assert_eq!(world.stage(), Stage::Failed);
+    assert_eq!(world.stage(), Stage::Waiting);
 }

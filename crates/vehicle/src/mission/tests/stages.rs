@@ -12,6 +12,7 @@ use crate::mission::{
 pub(super) const SECOND: Duration = Duration::from_secs(1);
 pub(super) const SETTINGS: Settings = Settings {
     attempts: 3,
+    retries: 2,
     pause: SECOND,
     patience: Duration::from_secs(10),
     settling: SECOND,
@@ -216,7 +217,7 @@ fn what_drivers_said_before_the_path_was_handed_over_does_not_count() {
 }
 
 #[test]
-fn a_blocked_stage_is_tried_again_from_the_start_until_the_limit() {
+fn a_blocked_stage_is_tried_again_from_the_start_as_often_as_the_setting_says() {
     let mut world = World::under_way(true);
     for attempt in 1..=3 {
         assert_eq!(world.run().attempt, attempt);
@@ -233,9 +234,78 @@ fn a_blocked_stage_is_tried_again_from_the_start_until_the_limit() {
             assert_eq!(world.take_actions(), [Action::FetchMap(run)]);
         }
     }
-    assert_eq!(world.stage(), Stage::Failed);
+    assert_eq!(world.stage(), Stage::Waiting);
     world.pass(SECOND * 1000);
     assert_eq!(world.take_actions(), []);
+}
+
+/// A mission with the default settings, which drives.
+fn by_default() -> World {
+    let mut world = World::under_way(true);
+    world.mission = Mission::new(Settings::default());
+    world.go(true);
+    world.drive();
+    world
+}
+
+#[test]
+fn a_mission_that_a_fault_has_stopped_moves_again_only_when_it_is_continued() {
+    let mut world = by_default();
+    world.set_back("the pose is 0.8 s old");
+    assert_eq!(world.stage(), Stage::Waiting);
+    assert_eq!(world.reason(), "the pose is 0.8 s old");
+    assert_eq!(world.take_actions(), [Action::Halt]);
+    for link in Link::ALL {
+        world.link(link, LinkState::Active);
+    }
+    world.pass(SECOND * 86_400);
+    let refusal = world.mission.approve(world.now, 1);
+    assert_eq!(refusal, Err(Refusal::Waiting { mission: 1 }));
+    assert_eq!(world.take_actions(), []);
+    world.mission.resume(world.now, 1).unwrap();
+    let run = world.run();
+    assert_eq!(world.take_actions(), [Action::FetchMap(run)]);
+    world.drive();
+    assert_eq!(world.reason(), "", "it drives well");
+    assert!(world.mission.resume(world.now, 1).is_err(), "once");
+}
+
+#[test]
+fn a_continued_mission_that_finds_no_path_waits_again() {
+    let mut world = by_default();
+    world.set_back("no pose");
+    world.mission.resume(world.now, 1).unwrap();
+    let run = world.run();
+    let why = Err("no store".to_owned());
+    world.mission.handle_map(world.now, run, why);
+    assert_eq!(
+        (world.stage(), world.reason()),
+        (Stage::Waiting, "no store")
+    );
+    world.pass(SECOND * 1000);
+    assert_eq!(world.stage(), Stage::Waiting);
+}
+
+#[test]
+fn the_reason_of_an_attempt_that_failed_is_not_told_of_one_that_drives_well() {
+    let mut world = World::under_way(true);
+    world.drive();
+    world.set_back("no control of 101.3.48");
+    assert_eq!(world.reason(), "no control of 101.3.48");
+    world.pass(SECOND);
+    world.drive();
+    assert_eq!((world.stage(), world.reason()), (Stage::Driving, ""));
+}
+
+#[test]
+fn a_mission_that_waits_can_be_stopped_and_replaced() {
+    let mut world = by_default();
+    world.set_back("no pose");
+    world.mission.stop("enough");
+    assert_eq!(world.stage(), Stage::Stopped);
+    assert!(world.mission.resume(world.now, 1).is_err());
+    world.go(true);
+    world.drive();
 }
 
 #[test]
@@ -407,10 +477,7 @@ fn what_is_over_cannot_be_approved() {
     let mut world = World::under_way(false);
     world.mission.stop("enough");
     let refusal = world.mission.approve(world.now, 1).unwrap_err();
-    assert_eq!(
-        refusal.to_string(),
-        "cannot approve mission 1: it is over (stopped)"
-    );
+    assert_eq!(refusal.to_string(), "mission 1 is over (stopped)");
 }
 
 /// Any possible event.
@@ -425,6 +492,7 @@ enum Event {
     Link(usize, u8),
     Progress(u8),
     Setback,
+    Continue,
     Late,
     Pass(u64),
 }
@@ -440,6 +508,7 @@ fn event() -> impl Strategy<Value = Event> {
         12 => (0..3_usize, 0..6_u8).prop_map(|(link, state)| Event::Link(link, state)),
         2 => any::<u8>().prop_map(Event::Progress),
         1 => Just(Event::Setback),
+        2 => Just(Event::Continue),
         2 => Just(Event::Late),
         4 => (0..20_000_u64).prop_map(Event::Pass),
     ]
@@ -477,6 +546,7 @@ impl World {
             }
             Event::Progress(progress) => mission.handle_progress(now, run, progress, 1.0),
             Event::Setback => mission.handle_setback(now, run, "gone"),
+            Event::Continue => _ = mission.resume(now, run.mission),
             Event::Late => {
                 let late = Run {
                     attempt: run.attempt.wrapping_sub(1),
@@ -502,7 +572,11 @@ proptest! {
             world.happen(event);
             let after = world.mission.report().clone();
             let actions = world.take_actions();
-            prop_assert!(after.run.attempt <= SETTINGS.attempts);
+            prop_assert!(after.run.attempt <= after.attempts);
+            if before.stage == Stage::Waiting && after.stage != Stage::Waiting {
+                let is_told = matches!(event, Event::Continue | Event::GoTo(_) | Event::Stop);
+                prop_assert!(is_told, "it waits: {:?}", event);
+            }
             prop_assert!(after.progress <= 100);
             let is_new = matches!(event, Event::GoTo(_));
             prop_assert!(is_new || before.run.mission == after.run.mission);
@@ -530,7 +604,7 @@ proptest! {
         // Without further events, the mission ends or waits for the operator.
         world.pass(Duration::from_secs(600));
         let stage = world.stage();
-        prop_assert!(!stage.is_under_way() || stage == Stage::AwaitingApproval
+        prop_assert!(!stage.is_under_way() || stage == Stage::AwaitingApproval || stage == Stage::Waiting
             || world.mission.poll_timeout().is_some() || stage == Stage::Idle);
         prop_assert_ne!(stage, Stage::Map);
     }

@@ -28,6 +28,8 @@ pub enum Stage {
     Failed = 9,
     /// The mission was ended by the operator or an emergency.
     Stopped = 10,
+    /// The vehicle was stopped for a fault, and waits until the operator continues the mission.
+    Waiting = 11,
 }
 
 impl Stage {
@@ -64,6 +66,7 @@ impl fmt::Display for Stage {
             Self::Arrived => "arrived",
             Self::Failed => "failed",
             Self::Stopped => "stopped",
+            Self::Waiting => "waiting",
         })
     }
 }

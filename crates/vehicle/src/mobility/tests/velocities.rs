@@ -72,6 +72,39 @@ fn limits_are_set_in_standby_kept_when_driving_and_gone_after_a_reset() {
 }
 
 #[test]
+fn limits_end_with_the_control_of_the_client_that_set_them() {
+    let greatest = CommandType::SET_MAX_ALLOWED;
+    for next in [None, Some(STRANGER)] {
+        let (mut rig, vehicle) = rig();
+        rig.send(CLIENT, &velocity(greatest, 0.0, 0.0));
+        rig.send(CLIENT, &velocity(CommandType::SET_MIN_ALLOWED, 0.0, 0.0));
+        let mut limit = SetAccelerationLimit {
+            command_type: AccelerationType::MAX_DECEL,
+            ..SetAccelerationLimit::default()
+        };
+        limit.set_acceleration_x_m_per_s2(0.1).unwrap();
+        rig.send(CLIENT, &limit);
+        let ahead = velocity(CommandType::SET_CURRENT_COMMAND, 1.0, 0.0);
+        rig.send(CLIENT, &ahead);
+        rig.run(seconds(1.0));
+        let why = vehicle.held().unwrap();
+        assert!(why.starts_with("any motion is limited to 0"), "{why}");
+        rig.stand(State::Standby, next);
+        rig.stand(State::Ready, Some(STRANGER));
+        assert!((told(&mut rig, greatest).0 - 2.0).abs() < 1e-3);
+        for _ in 0..30 {
+            rig.send(STRANGER, &ahead);
+            rig.run(seconds(0.1));
+        }
+        assert!((vehicle.motion().velocity.x - 1.0).abs() < 0.01);
+        assert_eq!(vehicle.held(), None);
+        vehicle.stop();
+        rig.run(seconds(1.0));
+        assert!(vehicle.motion().velocity.is_rest(), "full brakes");
+    }
+}
+
+#[test]
 fn a_speed_of_0_is_a_limit_that_no_driver_overcomes() {
     let (mut rig, vehicle) = rig();
     rig.send(CLIENT, &velocity(CommandType::SET_MAX_ALLOWED, 0.0, 0.0));
@@ -162,6 +195,28 @@ fn a_global_vector_keeps_its_heading_when_the_local_frame_is_set_anew_on_the_way
     rig.send(CLIENT, &turned);
     rig.run(seconds(5.0));
     assert!((vehicle.global_pose().yaw + 1.0).abs() < 0.01);
+}
+
+#[test]
+fn a_vector_ends_when_the_pose_that_it_is_held_by_is_set_elsewhere() {
+    let (mut rig, vehicle) = rig();
+    let mut vector = SetLocalVector::default();
+    vector.set_speed_m_per_s(1.0).unwrap();
+    vector.set_heading_rad(0.0).unwrap();
+    for (x, yaw, goes_on) in [(0.2, 0.0, true), (3.0, 0.0, false), (0.0, 1.5, false)] {
+        rig.send(CLIENT, &vector);
+        rig.run(seconds(5.0));
+        let here = vehicle.motion().pose;
+        let mut pose = SetLocalPose::default();
+        pose.set_x_m(here.x + x).unwrap();
+        pose.set_yaw_rad(here.yaw + yaw).unwrap();
+        rig.send(CLIENT, &pose);
+        rig.run(seconds(3.0));
+        assert_eq!(!vehicle.motion().velocity.is_rest(), goes_on, "{x} {yaw}");
+        let told = vehicle.last_stop().map(|cause| cause.to_string());
+        let is_told = told.is_some_and(|it| it.starts_with("the pose jumped by"));
+        assert_eq!(is_told, !goes_on);
+    }
 }
 
 #[test]

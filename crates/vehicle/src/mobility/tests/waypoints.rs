@@ -223,6 +223,19 @@ fn a_global_waypoint_stays_where_it_is_when_the_local_frame_moves() {
 }
 
 #[test]
+fn a_local_waypoint_is_given_up_when_the_pose_is_set_elsewhere_on_the_way() {
+    let (mut rig, vehicle) = rig();
+    rig.send(CLIENT, &local_waypoint(30.0, 0.0));
+    rig.send(CLIENT, &speed(2.0));
+    rig.run(seconds(5.0));
+    let mut pose = SetLocalPose::default();
+    pose.set_y_m(4.0).unwrap();
+    rig.send(CLIENT, &pose);
+    rig.run(seconds(3.0));
+    assert!(vehicle.motion().velocity.is_rest() && !vehicle.has_arrived());
+}
+
+#[test]
 fn a_new_pose_at_a_local_waypoint_does_not_set_the_vehicle_in_motion() {
     let (mut rig, vehicle) = rig();
     rig.send(CLIENT, &local_waypoint(3.0, 0.0));

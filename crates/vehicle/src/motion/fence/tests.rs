@@ -223,7 +223,7 @@ fn zones_that_go_let_the_command_in_force_go_on() {
 #[test]
 fn without_a_pose_a_driver_that_needs_one_from_elsewhere_stands_while_there_are_zones() {
     let mut bench = Bench::new(Zones::default());
-    bench.fence = Fence::located_elsewhere(FenceConfig::default());
+    bench.fence = Fence::located_elsewhere(FenceConfig::default(), &Limits::default());
     let rover = SkidSteer::new(SkidSteerConfig::default());
     bench.pilot = Pilot::new(rover, Frame::default()).with_fence(bench.fence.clone());
     bench.drive(effort(1.0, 0.0), 2);
@@ -249,4 +249,35 @@ fn without_a_pose_a_driver_that_needs_one_from_elsewhere_stands_while_there_are_
             bench.x()
         );
     }
+}
+
+#[test]
+fn a_pose_that_jumps_while_there_are_zones_holds_the_vehicle_until_it_is_confirmed() {
+    let mut bench = Bench::new(walled());
+    let fence = Fence::located_elsewhere(FenceConfig::default(), &Limits::default());
+    fence.set_zones(walled());
+    bench.fence = fence.clone();
+    let rover = SkidSteer::new(SkidSteerConfig::default());
+    bench.pilot = Pilot::new(rover, Frame::default()).with_fence(fence.clone());
+    bench.pilot.pursue(effort(1.0, 0.0));
+    // Drives with a pose that is `off` metres from the true one.
+    let mut drive = |off: f64, steps: u32| {
+        for _ in 0..steps {
+            bench.now += Pilot::STEP;
+            bench.pilot.handle_time(bench.now);
+            let pose = bench.pilot.motion().pose;
+            let believed = Pose::at(pose.x - off, pose.y);
+            fence.handle_pose(Some((believed, bench.now)));
+        }
+        bench.x()
+    };
+    let edge = drive(0.0, 500);
+    assert!((4.0..5.0).contains(&edge), "{edge:.2}");
+    let after = drive(4.0, 500);
+    assert!((after - edge).abs() < 0.1, "{edge:.2} to {after:.2}");
+    let why = fence.held().unwrap_or_default();
+    assert!(why.starts_with("the pose jumped by 4.0 m"), "{why}");
+    fence.confirm_pose();
+    let confirmed = drive(4.0, 100);
+    assert!(confirmed > after + 0.5, "{confirmed:.2}");
 }

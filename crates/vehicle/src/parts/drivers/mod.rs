@@ -1,6 +1,7 @@
 //! Common parts of the drivers of the chain: standing, sensor input, and the commands to the next
 //! driver.
 
+mod chain_control;
 mod fault_monitor;
 mod global_poses;
 mod next;
@@ -10,6 +11,7 @@ mod remote_platform;
 mod senses;
 mod standing;
 
+pub(super) use chain_control::{ChainControl, ChainGuard};
 pub(super) use fault_monitor::FaultMonitor;
 pub(super) use global_poses::GlobalPoses;
 pub(super) use next::{Language, Next};

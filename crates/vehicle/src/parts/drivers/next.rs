@@ -1,9 +1,9 @@
 //! The link from one driver to the next: a session, its commands, and standing down.
 //!
 //! Commands are acknowledged one at a time. While one is in flight, later ones wait, and only the
-//! latest is sent. When the next driver restarts, fails for a while or is briefly unreachable, the
-//! session takes control of it again. When it was stopped by an emergency or taken over, the driver
-//! stands down: it drops its command and waits for a new one.
+//! latest is sent. When a sensor fails, or when the next driver restarts, fails or is unreachable, the
+//! driver halts: it drops its command and waits for a new one, also when the fault is gone. When the
+//! next driver was stopped by an emergency or taken over, it stands down in the same way.
 #![expect(
     clippy::disallowed_methods,
     reason = "gives the driver its clock and timer"
@@ -68,7 +68,7 @@ impl<L: Language> Next<L> {
     const LINGER: Duration = Duration::from_millis(500);
     /// Timeout for the acknowledgement of a command. A later command then replaces it.
     const PATIENCE: Duration = Duration::from_millis(400);
-    /// Without any acknowledgement for this time, the driver reports that it is blocked.
+    /// Without any acknowledgement for this time, the driver halts.
     const SILENCE: Duration = Duration::from_secs(2);
 
     /// Runs until the component has stopped. The owner also notices that by other means.
@@ -76,13 +76,15 @@ impl<L: Language> Next<L> {
         let mut ticks = interval(L::PAUSE);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut watchman = Watchman::default();
-        let mut down: Option<String> = None;
+        let mut down: Option<Down> = None;
         loop {
             self.rest(&mut ticks, &mut watchman, down.take()).await;
             down = self.work(&mut ticks, &mut watchman).await?;
             if let Some(why) = &down {
-                tracing::warn!("motion suspended: {why}");
-                self.stand_down(&mut ticks, &mut watchman, why).await;
+                tracing::warn!("motion suspended: {}", why.reason());
+                if self.stand_down(&mut ticks, &mut watchman, why).await {
+                    down = None;
+                }
             }
         }
     }
@@ -93,7 +95,7 @@ impl<L: Language> Next<L> {
         &mut self,
         ticks: &mut Interval,
         watchman: &mut Watchman,
-        mut down: Option<String>,
+        mut down: Option<Down>,
     ) {
         let before = self.component.standing();
         while self.remote_platform.plan(now()) == Plan::Rest {
@@ -107,8 +109,10 @@ impl<L: Language> Next<L> {
                 let reason = format!("failure: {failure}");
                 let next = self.component.members(self.providers()).first().copied();
                 self.tell(StageState::Blocked, next, reason).await;
-            } else if let Some(reason) = down.as_deref().or(watchman.emergency()) {
-                self.tell_down(reason).await;
+            } else if let Some(down) = &down {
+                self.tell_down(down).await;
+            } else if let Some(reason) = watchman.emergency() {
+                self.tell_down(&Down::Deliberate(reason.to_owned())).await;
             } else if let Some(cause) = self.vehicle.last_stop() {
                 let why = format!("stopped: {cause}");
                 self.tell(StageState::Idle, None, why).await;
@@ -121,19 +125,37 @@ impl<L: Language> Next<L> {
         }
     }
 
-    /// Drops commands until the client has been silent for the settling time or control changes.
-    async fn stand_down(&self, ticks: &mut Interval, watchman: &mut Watchman, why: &str) {
+    /// Drops commands until the client has been silent for the settling time or control changes, and
+    /// as long as a sensor's fault has not become a failure. Returns whether control has changed.
+    async fn stand_down(
+        &mut self,
+        ticks: &mut Interval,
+        watchman: &mut Watchman,
+        why: &Down,
+    ) -> bool {
         let controller = self.component.standing().controller;
         self.vehicle.stop();
         let mut since = now();
-        while now() - since < self.settling {
+        loop {
             let standing = self.component.standing();
             watchman.note(standing);
-            self.tell_down(why).await;
-            ticks.tick().await;
             if standing.controller != controller {
-                return;
+                return true;
             }
+            let lack = match why {
+                Down::Fault(_) => self.remote_platform.lack(now()),
+                Down::Deliberate(_) => None,
+            };
+            let is_settled = now() - since >= self.settling;
+            if is_settled && (lack.is_none() || self.sensors.failure().is_some()) {
+                return false;
+            }
+            self.tell_down(why).await;
+            if lack.is_some() {
+                self.check_sensors(lack.as_ref().map(|lack| lack.why.as_str()))
+                    .await;
+            }
+            ticks.tick().await;
             if self.vehicle.is_under_way() {
                 self.vehicle.stop();
                 since = now();
@@ -147,7 +169,7 @@ impl<L: Language> Next<L> {
         &mut self,
         ticks: &mut Interval,
         watchman: &mut Watchman,
-    ) -> Result<Option<String>, PartError> {
+    ) -> Result<Option<Down>, PartError> {
         let settings = SessionSettings::new(self.authority).retake(Retake::WhenFree);
         let session = self.component.session(self.providers(), settings).await;
         let session = session.map_err(|_| PartError::NodeStopped)?;
@@ -171,10 +193,11 @@ impl<L: Language> Next<L> {
         session: &Session,
         ticks: &mut Interval,
         watchman: &mut Watchman,
-    ) -> Option<String> {
+    ) -> Option<Down> {
         let mut busy = now();
         let mut acknowledged = busy;
         let mut had_control = false;
+        let mut moved_at = None;
         loop {
             watchman.note(self.component.standing());
             let (start, state) = (now(), session.state());
@@ -184,13 +207,20 @@ impl<L: Language> Next<L> {
             } else if start - busy > Self::LINGER {
                 return None;
             }
-            if stands_down_in(state, had_control) {
-                return Some(state.to_string());
+            if let Some(down) = down_in(state, had_control) {
+                return Some(down).filter(|down| down.is_deliberate() || plan != Plan::Rest);
             }
             if let SessionState::Ready(peer) = state {
                 had_control = true;
                 let is_silent = start.saturating_duration_since(acknowledged) > Self::SILENCE;
-                let command = self.carry_out(start, plan, peer, is_silent).await;
+                if is_silent && plan != Plan::Rest {
+                    let why = format!("{peer} does not acknowledge commands");
+                    return Some(Down::Fault(why));
+                }
+                if let Some(why) = fault_of(start, &plan, &mut moved_at) {
+                    return Some(Down::Fault(why));
+                }
+                let command = self.carry_out(start, plan, peer).await;
                 match timeout(Self::PATIENCE, session.deliver(&command)).await {
                     Ok(Ok(())) => acknowledged = now(),
                     Ok(Err(error)) => tracing::debug!(%error, "not delivered"),
@@ -205,28 +235,20 @@ impl<L: Language> Next<L> {
     }
 
     /// Reports what the driver does, and returns the command for it.
-    async fn carry_out(
-        &mut self,
-        now: Instant,
-        plan: Plan,
-        peer: JausId,
-        is_silent: bool,
-    ) -> L::Command {
+    async fn carry_out(&mut self, now: Instant, plan: Plan, peer: JausId) -> L::Command {
         match plan {
             Plan::Go(order, motion) => {
                 self.check_sensors(None).await;
-                let silence = || format!("{peer} does not acknowledge commands");
-                let blocked = is_silent.then(silence).or_else(|| self.fence.held());
-                let (state, why) = match blocked {
+                let (state, why) = match self.fence.held() {
                     Some(why) => (StageState::Blocked, why),
                     None => (StageState::Active, String::new()),
                 };
                 self.tell(state, Some(peer), why).await;
                 self.language.command(now, order, &motion)
             }
-            Plan::Wait(why) => {
-                self.check_sensors(Some(&why)).await;
-                self.tell(StageState::Blocked, Some(peer), why).await;
+            Plan::Wait(lack) => {
+                self.check_sensors(Some(&lack.why)).await;
+                self.tell(StageState::Blocked, Some(peer), lack.why).await;
                 self.language.halt()
             }
             Plan::Rest => {
@@ -274,15 +296,21 @@ impl<L: Language> Next<L> {
         self.tell(stage, peer, why).await;
     }
 
-    /// Reports standing down: blocked, without a next driver.
-    async fn tell_down(&self, why: &str) {
-        self.tell(StageState::Blocked, None, why.to_owned()).await;
+    /// Reports standing down (blocked, without a next driver) or a halt.
+    async fn tell_down(&self, why: &Down) {
+        let state = match why {
+            Down::Deliberate(_) => StageState::Blocked,
+            Down::Fault(_) => StageState::Halted,
+        };
+        self.tell(state, None, why.reason().to_owned()).await;
     }
 
     async fn tell(&self, state: StageState, next: Option<JausId>, reason: String) {
         let progress = match state {
             StageState::Done => 100,
-            StageState::Active | StageState::Blocked => self.vehicle.progress(),
+            StageState::Active | StageState::Blocked | StageState::Halted => {
+                self.vehicle.progress()
+            }
             StageState::Idle | StageState::Engaging => 0,
         };
         let before = self.board.report();
@@ -304,24 +332,71 @@ impl<L: Language> Next<L> {
     }
 }
 
-/// Whether a state of the session was caused on purpose, so that nothing must move again on its own.
-/// Before it `had_control`, a session waits until another client releases the next driver.
-fn stands_down_in(state: SessionState, had_control: bool) -> bool {
-    match state {
-        // A failure ends without intervention, if `stood_down` does not find otherwise.
+/// Why a driver has dropped its command.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Down {
+    /// Someone has stopped the next driver, or has taken control of it.
+    Deliberate(String),
+    /// Something is broken or out of reach.
+    Fault(String),
+}
+
+impl Down {
+    fn reason(&self) -> &str {
+        match self {
+            Self::Deliberate(why) | Self::Fault(why) => why,
+        }
+    }
+
+    const fn is_deliberate(&self) -> bool {
+        matches!(self, Self::Deliberate(_))
+    }
+}
+
+/// A gap of samples up to this length is no fault: the vehicle waits, and continues.
+const GAP: Duration = Duration::from_millis(500);
+
+/// The fault that ends a command under way: a sensor that is missing for longer than [`GAP`] after
+/// the vehicle could move, which `moved_at` records. Before that, the order waits.
+fn fault_of(now: Instant, plan: &Plan, moved_at: &mut Option<Instant>) -> Option<String> {
+    match plan {
+        Plan::Rest => *moved_at = None,
+        Plan::Go(..) => *moved_at = Some(now),
+        Plan::Wait(lack) => {
+            let since = now.saturating_duration_since((*moved_at)?);
+            return (since.max(lack.lasts) >= GAP).then(|| lack.why.clone());
+        }
+    }
+    None
+}
+
+/// Why the driver must not go on by itself in a state of the session, if so. Before it
+/// `had_control`, a session waits until another client releases the next driver, and until that one
+/// is well.
+fn down_in(state: SessionState, had_control: bool) -> Option<Down> {
+    let is_deliberate = match state {
+        // A failure is a fault, if `stood_down` does not find otherwise.
         SessionState::Disabled { state, .. } => !SessionLoss::State(state).is_technical(),
         SessionState::Lost { why, .. } if why.is_opposition() => had_control,
         SessionState::Lost { why, .. } => !why.is_technical(),
         SessionState::Standby(_) => true,
         _ => false,
+    };
+    if is_deliberate {
+        return Some(Down::Deliberate(state.to_string()));
     }
+    let is_lost = matches!(
+        state,
+        SessionState::Disabled { .. } | SessionState::Lost { .. } | SessionState::Seeking
+    );
+    (is_lost && had_control).then(|| Down::Fault(state.to_string()))
 }
 
 /// Interval between two queries of the next driver's stage.
 const LOOK: Duration = Duration::from_millis(250);
 
-/// Waits until the next driver reports that it has stood down itself, and returns the reason.
-async fn stood_down(component: &Component, session: &Session) -> String {
+/// Waits until the next driver reports that it has stood down or halted itself.
+async fn stood_down(component: &Component, session: &Session) -> Down {
     let mut looks = 0;
     loop {
         sleep(LOOK).await;
@@ -342,8 +417,12 @@ async fn stood_down(component: &Component, session: &Session) -> String {
         // A stage from before the resume does not count.
         if is_current && let Ok(report) = component.query(peer, &QueryStage {}).await {
             let stage = StageReport::from(&report);
+            let why = format!("{peer}: {}", stage.reason);
             if stage.stands_down() {
-                return format!("{peer}: {}", stage.reason);
+                return Down::Deliberate(why);
+            }
+            if stage.state == StageState::Halted {
+                return Down::Fault(why);
             }
         }
     }
@@ -352,6 +431,7 @@ async fn stood_down(component: &Component, session: &Session) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parts::drivers::remote_platform::Lack;
     use jaus::component::{ControlLost, State};
 
     const PEER: JausId = JausId::new(101, 2, 33);
@@ -373,11 +453,9 @@ mod tests {
     }
 
     #[test]
-    fn it_goes_on_after_restarts_and_failures() {
+    fn a_restart_or_failure_of_the_next_driver_ends_the_command() {
         for state in [
             SessionState::Seeking,
-            SessionState::Ready(PEER),
-            SessionState::Preparing(PEER),
             disabled(State::Failure),
             disabled(State::Shutdown),
             lost(SessionLoss::State(State::Failure as u8)),
@@ -385,8 +463,48 @@ mod tests {
             lost(SessionLoss::Dropped),
             lost(SessionLoss::Gone),
         ] {
-            assert!(!stands_down_in(state, true), "{state}");
+            assert_eq!(down_in(state, true), Some(Down::Fault(state.to_string())));
+            assert_eq!(down_in(state, false), None, "it waits until it is well");
         }
+        for state in [SessionState::Ready(PEER), SessionState::Preparing(PEER)] {
+            assert_eq!(down_in(state, true), None);
+        }
+    }
+
+    #[test]
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "virtual time starts at any instant"
+    )]
+    fn a_gap_of_samples_ends_a_command_only_after_half_a_second_and_only_once_it_drives() {
+        let order = Order::Heading {
+            heading: 0.0,
+            speed: 1.0,
+        };
+        let start = Instant::now();
+        let lacks = |millis: u64| {
+            Plan::Wait(Lack {
+                why: "no pose".to_owned(),
+                lasts: Duration::from_millis(millis),
+            })
+        };
+        let mut moved_at = None;
+        let later = start + 10 * GAP;
+        assert_eq!(fault_of(later, &lacks(9000), &mut moved_at), None);
+        let go = Plan::Go(order, Motion::default());
+        assert_eq!(fault_of(later, &go, &mut moved_at), None);
+        for (millis, lasts, is_fault) in [
+            (40, 0, false),
+            (460, 0, false),
+            (500, 0, true),
+            (40, 600, true),
+        ] {
+            let at = later + Duration::from_millis(millis);
+            let fault = fault_of(at, &lacks(lasts), &mut moved_at);
+            assert_eq!(fault.is_some(), is_fault, "{millis} {lasts}");
+        }
+        assert_eq!(fault_of(later, &Plan::Rest, &mut moved_at), None);
+        assert_eq!(fault_of(later + 2 * GAP, &lacks(600), &mut moved_at), None);
     }
 
     #[test]
@@ -406,13 +524,13 @@ mod tests {
                 "101.2.33 is under control and stands by",
             ),
         ] {
-            assert!(stands_down_in(state, true), "{state}");
-            assert_eq!(state.to_string(), reason);
+            let down = Down::Deliberate(reason.to_owned());
+            assert_eq!(down_in(state, true), Some(down));
         }
     }
 
     #[test]
     fn it_waits_for_a_driver_that_another_client_has_from_the_beginning() {
-        assert!(!stands_down_in(lost(SessionLoss::Taken(OPERATOR)), false));
+        assert_eq!(down_in(lost(SessionLoss::Taken(OPERATOR)), false), None);
     }
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::{Order, RemotePlatform, RemotePlatformSettings};
 use crate::motion::{
-    Curve, Drive, Fence, FenceConfig, Frame, Goal, Limits, Pilot, Platform, SkidSteer,
+    Curve, Drive, Fence, FenceConfig, Frame, Goal, JumpCheck, Limits, Pilot, Platform, SkidSteer,
     SkidSteerConfig, Ticket, Velocity,
 };
 use crate::parts::drivers::remote_platform::Plan;
@@ -88,6 +88,7 @@ impl Bench {
     fn new(driver: Driver) -> Self {
         let remote_platform = RemotePlatform::new(RemotePlatformSettings {
             limits: Limits::default(),
+            noise: JumpCheck::RECKONED,
             stale: STALE,
             by_heading: driver == Driver::PathSegment,
             needs_scan: true,

@@ -4,7 +4,10 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::motion::{CommandDeadline, Drive, Limits, Motion, Platform, Pose, Velocity, wrap};
+use super::FaultMonitor;
+use crate::motion::{
+    CommandDeadline, Drive, JumpCheck, Limits, Motion, Platform, Pose, Velocity, wrap,
+};
 use crate::sensing::Scan;
 use crate::zones::Point;
 use jaus::service::{SampleAge, SampleStamp};
@@ -19,6 +22,9 @@ struct State {
     limits: Limits,
     motion: Motion,
     pose: SampleAge,
+    jumps: JumpCheck,
+    /// Why no pose counts before a time.
+    distrust: Option<(Instant, String)>,
     velocity: SampleAge,
     /// The scans of the range sensor.
     scan: SampleAge,
@@ -36,6 +42,8 @@ struct State {
 pub(in crate::parts) struct RemotePlatformSettings {
     /// Limits of the vehicle.
     pub(in crate::parts) limits: Limits,
+    /// Errors of the pose that are no jump, in metres and radians.
+    pub(in crate::parts) noise: (f64, f64),
     /// Maximum age of sensor samples. The vehicle stops when they are older.
     pub(in crate::parts) stale: Duration,
     /// Whether the next driver holds headings. Otherwise it needs velocity commands, which require
@@ -62,11 +70,24 @@ pub(in crate::parts) enum Plan {
     Rest,
     /// Carry out the order. The vehicle's motion is attached.
     Go(Order, Motion),
-    /// The order must wait, for the given reason.
-    Wait(String),
+    /// The order must wait.
+    Wait(Lack),
+}
+
+/// Why an order must wait.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::parts) struct Lack {
+    /// The reason, as text for the operator.
+    pub(in crate::parts) why: String,
+    /// How long the vehicle has certainly been without what it needs.
+    pub(in crate::parts) lasts: Duration,
 }
 
 impl RemotePlatform {
+    /// No pose counts for this time after a jump: a vehicle under way then comes to a stop and the
+    /// driver fails.
+    pub(in crate::parts) const DISTRUST: Duration =
+        FaultMonitor::LIMIT.saturating_add(Duration::from_secs(1));
     /// Time from the measurement of a scan to its report in seconds, at a scan rate of 10 Hz.
     const SCAN_LAG: f64 = 0.1;
 
@@ -76,6 +97,8 @@ impl RemotePlatform {
             limits: settings.limits,
             motion: Motion::default(),
             pose: SampleAge::default(),
+            jumps: JumpCheck::new(&settings.limits, settings.noise),
+            distrust: None,
             velocity: SampleAge::default(),
             scan: SampleAge::default(),
             last_scan: None,
@@ -87,6 +110,10 @@ impl RemotePlatform {
 
     /// Handles a sensor report of a pose: X, Y and yaw, sampled at `stamp` of the sensor's clock.
     /// Without a pose the sensor does not know the position, and the vehicle stops immediately.
+    ///
+    /// A pose that jumps is an error of the old one or of the new one, and nobody knows which. A
+    /// vehicle under way therefore has no pose for [`DISTRUST`](Self::DISTRUST). Then the new one
+    /// counts.
     pub(in crate::parts) fn handle_pose(
         &self,
         now: Instant,
@@ -97,11 +124,11 @@ impl RemotePlatform {
         match pose {
             None => state.pose.forget(),
             Some((x, y, yaw)) => {
-                state.pose.handle(now, stamp);
-                state.motion.pose = Pose {
+                let pose = Pose {
                     yaw,
                     ..Pose::at(x, y)
                 };
+                state.accept_pose(now, stamp, pose);
             }
         }
     }
@@ -160,21 +187,33 @@ impl RemotePlatform {
             return Plan::Rest;
         };
         if state.deadline.has_passed(now) {
-            return Plan::Wait("the driver's control loop is not running".to_owned());
+            return Plan::Wait(Lack::now(
+                "the driver's control loop is not running".to_owned(),
+            ));
         }
         match state.lack(now) {
-            Some(why) => Plan::Wait(why),
+            Some(lack) => Plan::Wait(lack),
             None => Plan::Go(order, state.motion),
         }
     }
 
     /// The sensor whose samples are missing or too old, if any.
-    pub(in crate::parts) fn lack(&self, now: Instant) -> Option<String> {
+    pub(in crate::parts) fn lack(&self, now: Instant) -> Option<Lack> {
         self.lock().lack(now)
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Lack {
+    /// A lack that has just begun.
+    const fn now(why: String) -> Self {
+        Self {
+            why,
+            lasts: Duration::ZERO,
+        }
     }
 }
 
@@ -201,7 +240,29 @@ impl State {
         }
     }
 
-    fn lack(&self, now: Instant) -> Option<String> {
+    /// Takes a pose, unless it does not count after a jump.
+    fn accept_pose(&mut self, now: Instant, stamp: Option<SampleStamp>, pose: Pose) {
+        let sampled_at = self.pose.handle(now, stamp);
+        let jump = self.jumps.handle_pose(sampled_at.unwrap_or(now), &pose);
+        if let Some(jump) = jump.filter(|_| self.order.is_some() && self.distrust.is_none()) {
+            tracing::error!("{jump}: it does not count for now");
+            self.distrust = Some((now + RemotePlatform::DISTRUST, jump.to_string()));
+        }
+        if self.distrust.as_ref().is_some_and(|(end, _)| now < *end) {
+            self.pose.forget();
+            return;
+        }
+        self.distrust = None;
+        self.motion.pose = pose;
+    }
+
+    fn lack(&self, now: Instant) -> Option<Lack> {
+        if let Some((_, why)) = self.distrust.as_ref().filter(|(end, _)| now < *end) {
+            return Some(Lack {
+                why: why.clone(),
+                lasts: Duration::MAX,
+            });
+        }
         let needs = [
             (&self.pose, "pose", true),
             (&self.velocity, "velocity", !self.settings.by_heading),
@@ -209,10 +270,11 @@ impl State {
         ];
         let mut needs = needs.into_iter().filter(|&(_, _, needed)| needed);
         needs.find_map(|(sensor, what, _)| match sensor.age(now) {
-            None => Some(format!("no {what} is known")),
-            Some(age) if age > self.settings.stale => {
-                Some(format!("the {what} is {:.1} s old", age.as_secs_f64()))
-            }
+            None => Some(Lack::now(format!("no {what} is known"))),
+            Some(age) if age > self.settings.stale => Some(Lack {
+                why: format!("the {what} is {:.1} s old", age.as_secs_f64()),
+                lasts: age,
+            }),
             Some(_) => None,
         })
     }
@@ -282,6 +344,7 @@ mod tests {
     fn remote_platform(by_heading: bool) -> RemotePlatform {
         RemotePlatform::new(RemotePlatformSettings {
             limits: Limits::default(),
+            noise: JumpCheck::RECKONED,
             stale: Duration::from_millis(600),
             by_heading,
             needs_scan: false,
@@ -290,7 +353,7 @@ mod tests {
 
     fn wait(plan: &Plan) -> &str {
         match plan {
-            Plan::Wait(why) => why,
+            Plan::Wait(lack) => &lack.why,
             other => panic!("{other:?}"),
         }
     }
@@ -320,6 +383,37 @@ mod tests {
         assert_eq!(wait(&remote_platform.plan(later)), "no pose is known");
         remote_platform.drive(Drive::Stop);
         assert_eq!(remote_platform.plan(later), Plan::Rest);
+    }
+
+    #[test]
+    fn a_pose_that_jumps_stops_a_vehicle_under_way_and_counts_later() {
+        for (x, yaw) in [(4.0, 0.5), (1.08, 2.0)] {
+            let mut remote_platform = remote_platform(true);
+            let mut now = Instant::now();
+            let mut plan = |x: f64, yaw: f64| {
+                now += Duration::from_millis(40);
+                remote_platform.handle_time(now);
+                remote_platform.head(0.0, 1.0);
+                remote_platform.handle_pose(now, None, Some((x, 2.0, yaw)));
+                remote_platform.plan(now)
+            };
+            assert!(matches!(plan(1.0, 0.5), Plan::Go(..)));
+            assert!(matches!(plan(1.04, 0.5), Plan::Go(..)));
+            assert!(wait(&plan(x, yaw)).starts_with("the pose jumped by"));
+            let plans: Vec<_> = (0..80).map(|_| plan(x, yaw)).collect();
+            assert!(wait(&plans[70]).starts_with("the pose jumped by"));
+            assert!(matches!(plans[76], Plan::Go(..)), "then it counts");
+        }
+    }
+
+    #[test]
+    fn a_vehicle_without_an_order_may_be_put_anywhere() {
+        let mut remote_platform = remote_platform(true);
+        let now = Instant::now();
+        remote_platform.handle_pose(now, None, Some((0.0, 0.0, 0.0)));
+        remote_platform.handle_pose(now, None, Some((9.0, 0.0, 0.0)));
+        remote_platform.head(0.0, 1.0);
+        assert!(matches!(remote_platform.plan(now), Plan::Go(..)));
     }
 
     #[test]

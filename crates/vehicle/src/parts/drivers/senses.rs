@@ -156,11 +156,21 @@ impl Sense<ReportLocalPose> {
 }
 
 impl Sense<ReportLocalPose> {
-    /// Passes all reports to a fence whose platform does not know its pose in the zones' frame.
-    pub(in crate::parts) async fn locate(mut self, fence: &Fence) -> Result<Infallible, PartError> {
+    /// Passes all reports to a fence whose platform does not know its pose in the zones' frame. Who
+    /// takes control of `driver` confirms a pose that has jumped.
+    pub(in crate::parts) async fn locate(
+        mut self,
+        fence: &Fence,
+        driver: &Component,
+    ) -> Result<Infallible, PartError> {
         let mut age = SampleAge::default();
+        let mut controller = None;
         loop {
             let report = self.next().await?;
+            let now_in_control = driver.standing().controller.map(|client| client.id);
+            if std::mem::replace(&mut controller, now_in_control) != now_in_control {
+                fence.confirm_pose();
+            }
             let pose = reported_pose(&report);
             let stamp = self.stamp(report.time_stamp.map(|it| it.0));
             if self.take_loss() || pose.is_none() {
@@ -272,7 +282,7 @@ impl Sense<ReportGlobalPose> {
     /// Passes all reports on.
     pub(in crate::parts) async fn steer(
         mut self,
-        mut poses: GlobalPoses,
+        poses: GlobalPoses,
     ) -> Result<Infallible, PartError> {
         loop {
             let report = self.next().await?;

@@ -181,8 +181,12 @@ pub(super) fn state(report: &ReportStage) -> LinkState {
         State::ENGAGING => LinkState::Engaging,
         State::ACTIVE => LinkState::Active,
         State::DONE => LinkState::Done,
-        State::BLOCKED if report.reason.is_empty() => LinkState::Blocked("blocked".to_owned()),
-        State::BLOCKED => LinkState::Blocked(report.reason.to_string_lossy().into_owned()),
+        State::BLOCKED | State::HALTED if report.reason.is_empty() => {
+            LinkState::Blocked("blocked".to_owned())
+        }
+        State::BLOCKED | State::HALTED => {
+            LinkState::Blocked(report.reason.to_string_lossy().into_owned())
+        }
         State(other) => LinkState::Blocked(format!("in the unknown state {other}")),
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{find_soon, hand_over::in_words, on_board};
 use crate::ground::{RasterEdition, fetch_cells, reported_zones};
 use crate::messages::ground::report_raster_maps::MapRec;
-use crate::messages::ground::{QueryRasterMaps, raster_maps};
+use crate::messages::ground::{QueryRasterMaps, QueryWheelOdometry, raster_maps, wheel_odometry};
 use crate::mission::{Point, Terrain};
 use crate::zones::Zones;
 use jaus::address::JausId;
@@ -128,8 +128,25 @@ pub(super) async fn fetch_pose(component: &Component) -> Result<Point, String> {
     let sensor = find_soon(component, sensors, "local pose sensor").await?;
     let query = QueryLocalPose::none().with_x().with_y();
     let pose = component.query(sensor, &query).await.map_err(in_words)?;
-    let place = pose.x_m().zip(pose.y_m());
-    place.ok_or_else(|| format!("{sensor} reports no pose: set the vehicle's pose"))
+    match pose.x_m().zip(pose.y_m()) {
+        Some(place) => Ok(place),
+        None => Err(format!(
+            "{sensor} reports no pose: {}",
+            why_no_pose(component).await
+        )),
+    }
+}
+
+/// Why a pose sensor knows no pose: most often it gets no wheel travel.
+async fn why_no_pose(component: &Component) -> String {
+    let providers = component.members(on_board(component, wheel_odometry::URN));
+    let Some(&wheels) = providers.first() else {
+        return "no wheel travel, because no primitive driver is known: start one".to_owned();
+    };
+    match component.query(wheels, &QueryWheelOdometry {}).await {
+        Ok(_) => "check it, and what it measures with".to_owned(),
+        Err(error) => format!("no wheel travel from the primitive driver ({error}): restart it"),
+    }
 }
 
 #[cfg(test)]

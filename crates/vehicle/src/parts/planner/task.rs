@@ -391,7 +391,13 @@ impl<'a> PlannerTask<'a> {
             }
             News::Emergency(link) => {
                 let reason = format!("an emergency stopped the {link}{}", self.named(link));
-                self.stop_if_driving(&reason).await;
+                self.tell(|mission, _| {
+                    let stage = mission.report().stage;
+                    if stage.is_handed_over() || stage == Stage::Waiting {
+                        mission.stop(&reason);
+                    }
+                })
+                .await;
             }
         }
     }

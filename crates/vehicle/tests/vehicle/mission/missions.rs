@@ -4,7 +4,7 @@ use jaus_test_kit::waiting::{until, within_limit};
 use jaus_vehicle::messages::ground::report_mission::Stage;
 use jaus_vehicle::messages::ground::report_stage::State;
 use jaus_vehicle::messages::ground::{
-    ApproveMission, QueryPlannedPath, ReportPlannedPath, StopMission,
+    ApproveMission, ContinueMission, QueryPlannedPath, ReportPlannedPath, StopMission,
 };
 
 use super::fake::{World, store};
@@ -42,7 +42,7 @@ async fn a_mission_is_planned_approved_and_driven_to_its_end() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_blocked_stage_is_tried_again_and_given_up_in_the_end() {
+async fn a_mission_that_a_blocked_stage_has_stopped_waits_until_it_is_continued() {
     let mut world = World::new(1021).await;
     world.go(9.5, 9.5, true).await;
     world.engage().await;
@@ -52,9 +52,19 @@ async fn a_blocked_stage_is_tried_again_and_given_up_in_the_end() {
         .stage
         .set(&component, State::BLOCKED, "no pose")
         .await;
-    let report = world.until_stage(Stage::FAILED).await;
-    assert_eq!((report.attempt, report.attempts), (3, 3));
+    let report = world.until_stage(Stage::WAITING).await;
     assert_eq!(report.reason.as_str(), Some("the vector driver: no pose"));
+    for driver in [&world.path, &world.vector] {
+        driver.stage.set(&driver.component, State::IDLE, "").await;
+    }
+    tokio::time::sleep(std::time::Duration::from_secs(60)).await;
+    let report = world.until(|_| true).await;
+    assert_eq!(report.stage, Stage::WAITING, "not by itself");
+    assert!(world.path.component.standing().controller.is_none());
+    let mission = report.mission;
+    let go_on = ContinueMission { mission };
+    world.control.deliver(&go_on).await.unwrap();
+    world.engage().await;
     world.shut_down().await;
 }
 

@@ -17,7 +17,7 @@ fn listed(steps: &[Step]) -> String {
 
 #[tokio::test(start_paused = true)]
 async fn a_mission_goes_through_the_whole_chain_though_the_path_driver_dies_on_the_way() {
-    let mut vehicle = WholeVehicle::start("chain", None);
+    let mut vehicle = WholeVehicle::with_retries("chain", None, 2);
     let tester = vehicle.client.clone();
     let test = MissionTest {
         subsystem: PATH.subsystem(),

@@ -119,7 +119,7 @@ impl<'s> Operator<'s> {
                     self.tell_pose(sensor).await?;
                     return Ok(Ending::Arrived);
                 }
-                Stage::FAILED | Stage::STOPPED => return Ok(Ending::Stopped),
+                Stage::FAILED | Stage::STOPPED | Stage::WAITING => return Ok(Ending::Stopped),
                 _ => {}
             }
         }
@@ -145,6 +145,7 @@ impl<'s> Operator<'s> {
             Stage::ARRIVED => "arrived".to_owned(),
             Stage::FAILED => "gives up".to_owned(),
             Stage::STOPPED => "stopped".to_owned(),
+            Stage::WAITING => "was stopped by a fault, and waits to be continued".to_owned(),
             _ => return Ok(()),
         };
         let reason = report.reason.to_string();

@@ -1,8 +1,8 @@
-//! The session's subscriptions to the reports of a vehicle's parts, renewed for as long as the part
+//! The station's subscriptions to the reports of a vehicle's parts, renewed for as long as the part
 //! exists: all of the selected vehicle, and the few of the others that the list of vehicles shows.
 
 use std::collections::BTreeMap;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
@@ -15,8 +15,15 @@ use jaus::address::JausId;
 use jaus::codec::Query;
 use jaus::component::{Component, SubscribeError, Update, When};
 use jaus::messages::core::{QueryControl, QueryStatus, access_control};
-use jaus::messages::mobility::{QueryGlobalPose, QueryLocalPose, QueryVelocityState};
+use jaus::messages::mobility::{
+    QueryGlobalPose, QueryLocalOperatingZone, QueryLocalPose, QueryVelocityState,
+    local_operating_zone,
+};
 use jaus::service::ComponentEntry;
+use jaus_vehicle::messages::environment_sensing::query_range_sensor_data::{
+    QueryRangeSensorDataRec, ReportCoordinateSystem,
+};
+use jaus_vehicle::messages::environment_sensing::{QueryRangeSensorData, range_sensor};
 use jaus_vehicle::messages::ground::{
     QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, mission_planner, raster_maps,
 };
@@ -45,10 +52,12 @@ struct Topics {
     stage: bool,
     pose: bool,
     global_pose: bool,
-    velocity: bool,
+    velocity: Option<When>,
     mission: bool,
     path: bool,
     maps: bool,
+    zones: bool,
+    scan: bool,
 }
 
 /// Rate of pose and velocity reports.
@@ -59,6 +68,14 @@ const GLOBAL_POSE: When = When::hz(5.0);
 const STATUS: When = When::hz(4.0);
 /// Rate of status reports of a vehicle that is only in the list.
 const BRIEF_STATUS: When = When::hz(1.0);
+/// Rate of velocity reports of a vehicle that is only in the list.
+const BRIEF_VELOCITY: When = When::hz(1.0);
+/// Rate of reports of the operating zones.
+const ZONES: When = When::hz(1.0);
+/// Least time between two scans.
+const SCAN: Duration = Duration::from_millis(500);
+/// A scan takes up the link for at most one part in this many of the time.
+const SCAN_SHARE: u32 = 4;
 /// Delay before a failed subscription is retried.
 const PAUSE: Duration = Duration::from_secs(1);
 
@@ -74,6 +91,7 @@ impl Topics {
         Self {
             status: (principal == Some(part.id)).then_some(BRIEF_STATUS),
             control: principal == Some(part.id) || part.offers(mission_planner::URN),
+            velocity: role::reports_velocity(part).then_some(BRIEF_VELOCITY),
             mission: part.offers(mission_planner::URN),
             ..Self::default()
         }
@@ -86,10 +104,12 @@ impl Topics {
             stage: role::tells_stage(part),
             pose: role::reports_pose(part),
             global_pose: role::reports_global_pose(part),
-            velocity: role::reports_velocity(part),
+            velocity: role::reports_velocity(part).then_some(MOTION),
             mission: part.offers(mission_planner::URN),
             path: part.offers(mission_planner::URN),
             maps: part.offers(raster_maps::URN),
+            zones: part.offers(local_operating_zone::URN),
+            scan: part.offers(range_sensor::URN),
         }
     }
 }
@@ -138,9 +158,9 @@ impl Following {
             let query = QueryGlobalPose::all();
             tasks.spawn(self.ask(peer, query, GLOBAL_POSE));
         }
-        if topics.velocity {
+        if let Some(rate) = topics.velocity {
             let query = QueryVelocityState::all();
-            tasks.spawn(self.ask(peer, query, MOTION));
+            tasks.spawn(self.ask(peer, query, rate));
         }
         if topics.mission {
             let rate = topics.status.unwrap_or(BRIEF_STATUS);
@@ -154,7 +174,40 @@ impl Following {
             let maps = QueryRasterMaps {};
             tasks.spawn(self.ask(peer, maps, When::OnChange));
         }
+        if topics.zones {
+            let zones = QueryLocalOperatingZone::default();
+            tasks.spawn(self.ask(peer, zones, ZONES));
+        }
+        if topics.scan {
+            tasks.spawn(self.poll_scan(peer));
+        }
         tasks
+    }
+
+    /// Queries scans until the future is dropped. A scan has thousands of octets: on a slow link the
+    /// next one is queried later, so that the reports by which the operator drives are not delayed.
+    fn poll_scan(&self, peer: JausId) -> impl Future<Output = ()> + Send + use<> {
+        let (component, sighted) = (self.component.clone(), self.sighted.clone());
+        let query = QueryRangeSensorData {
+            query_range_sensor_data_list: vec![QueryRangeSensorDataRec {
+                report_coordinate_system: ReportCoordinateSystem::VEHICLE_COORDINATE_SYSTEM,
+                ..QueryRangeSensorDataRec::default()
+            }],
+        };
+        async move {
+            loop {
+                let asked = Instant::now();
+                match component.query(peer, &query).await {
+                    Ok(report) => {
+                        if sighted.send((peer, report.into())).await.is_err() {
+                            return;
+                        }
+                    }
+                    Err(error) => tracing::debug!(%peer, %error, "no scan"),
+                }
+                sleep(SCAN.max(asked.elapsed() * SCAN_SHARE)).await;
+            }
+        }
     }
 
     /// Maintains one subscription until the future is dropped.

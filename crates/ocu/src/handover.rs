@@ -17,13 +17,13 @@ use jaus_vehicle::messages::handoff::{
 };
 use tokio::sync::mpsc;
 
-use crate::state;
+use super::state;
 
 /// A message about a handover, with the part of the vehicle that has sent it.
-pub(super) type Notice = (JausId, Content);
+pub(crate) type Notice = (JausId, Content);
 
 /// Content of a message about a handover.
-pub(super) enum Content {
+pub(crate) enum Content {
     /// What has become of our request.
     Answer(ConfirmHandoffRequest),
     /// The requests of other operators.
@@ -32,7 +32,7 @@ pub(super) enum Content {
 
 /// The service that receives the messages about handovers. Messages beyond the capacity of the
 /// channel are dropped; the vehicle repeats them.
-pub(super) fn service(notices: mpsc::Sender<Notice>) -> Handlers {
+pub(crate) fn service(notices: mpsc::Sender<Notice>) -> Handlers {
     let others = notices.clone();
     Handlers::new(handoff_controller::LATEST)
         .receive(move |answer: ConfirmHandoffRequest, from, _| {
@@ -45,12 +45,12 @@ pub(super) fn service(notices: mpsc::Sender<Notice>) -> Handlers {
 
 /// The handovers of one vehicle.
 #[derive(Default)]
-pub(super) struct Handover {
+pub(crate) struct Handover {
     asking: Option<Asking>,
     /// The requests of other operators, by the part of the vehicle that has passed them on.
     asked: BTreeMap<JausId, Asked>,
     /// How the last handover ended, for the operator.
-    pub(super) ending: Option<String>,
+    pub(crate) ending: Option<String>,
 }
 
 /// Our request.
@@ -90,7 +90,7 @@ impl Handover {
     const MOST: usize = 8;
 
     /// Requests control from the operator who has it.
-    pub(super) fn ask(&mut self, now: Instant, part: JausId, holder: JausId) {
+    pub(crate) fn ask(&mut self, now: Instant, part: JausId, holder: JausId) {
         self.ending = None;
         self.asking = Some(Asking {
             part,
@@ -102,12 +102,12 @@ impl Handover {
     }
 
     /// The operator whose control is requested.
-    pub(super) fn holder(&self) -> Option<JausId> {
+    pub(crate) fn holder(&self) -> Option<JausId> {
         Some(self.asking.as_ref()?.holder)
     }
 
     /// Withdraws the request; false if there is none.
-    pub(super) fn withdraw(&mut self, component: &Component) -> bool {
+    pub(crate) fn withdraw(&mut self, component: &Component) -> bool {
         let Some(asking) = self.asking.take() else {
             return false;
         };
@@ -117,7 +117,7 @@ impl Handover {
     }
 
     /// Repeats the request, and forgets requests that are over.
-    pub(super) fn handle_time(&mut self, now: Instant, authority: u8, component: &Component) {
+    pub(crate) fn handle_time(&mut self, now: Instant, authority: u8, component: &Component) {
         self.forget_lapsed(now);
         let Some(asking) = &mut self.asking else {
             return;
@@ -141,7 +141,7 @@ impl Handover {
     }
 
     /// Handles the vehicle's answer to our request. Returns whether control was granted.
-    pub(super) fn handle_answer(
+    pub(crate) fn handle_answer(
         &mut self,
         now: Instant,
         part: JausId,
@@ -166,7 +166,7 @@ impl Handover {
     }
 
     /// Handles a part's list of other operators' requests.
-    pub(super) fn handle_requests(
+    pub(crate) fn handle_requests(
         &mut self,
         now: Instant,
         part: JausId,
@@ -191,12 +191,12 @@ impl Handover {
     }
 
     /// Whether other operators request control.
-    pub(super) fn is_requested(&self) -> bool {
+    pub(crate) fn is_requested(&self) -> bool {
         !self.asked.is_empty()
     }
 
     /// The requests of other operators.
-    pub(super) fn requests(&self) -> Vec<state::HandoverRequest> {
+    pub(crate) fn requests(&self) -> Vec<state::HandoverRequest> {
         let asked = self.asked.iter();
         let requests = asked.flat_map(|(part, it)| it.requests.iter().map(move |it| (part, it)));
         requests
@@ -211,7 +211,7 @@ impl Handover {
 
     /// Decides about the request of another operator that a part has passed on. Returns the message
     /// for that part; `None` if there is no such request any more.
-    pub(super) fn decide(
+    pub(crate) fn decide(
         &mut self,
         part: JausId,
         operator: JausId,

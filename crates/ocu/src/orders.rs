@@ -1,0 +1,188 @@
+//! What passes between the pages' connections and the session: orders of the pages, and snapshots
+//! for them.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use serde::Serialize;
+use tokio::sync::{mpsc, oneshot, watch};
+
+use super::answer::Said;
+use super::ownership::{Owner, PageId};
+use super::page_link::TooOld;
+use super::request::OperatorRequest;
+use super::state::{Events, Overlay};
+use super::vehicle_link::VehicleLinkQuality;
+
+/// Callback for the result of a request: success, or the reason for failure.
+pub(super) type Reply = Box<dyn FnOnce(Result<(), String>) + Send>;
+
+/// Callback for the cells of a map, or the reason why there are none.
+pub(super) type CellsReply = Box<dyn FnOnce(Result<Bytes, String>) + Send>;
+
+/// A message from a page to the session.
+pub(super) enum Order {
+    Opened(OpenedPage),
+    OperatorRequest {
+        page: PageId,
+        /// The vehicle that the page means; `None` for the one that it has selected.
+        vehicle: Option<u16>,
+        request: OperatorRequest,
+        /// Whether the page's user may change vehicles, and not only observe them.
+        may_drive: bool,
+        reply: Reply,
+    },
+    Drive(DriveOrder),
+    /// Request for the cells of a map of a vehicle.
+    Cells {
+        vehicle: u16,
+        map: u16,
+        reply: CellsReply,
+    },
+    /// Request for what lies over the map of a vehicle, by a page that has the zones of a revision.
+    Overlay {
+        vehicle: u16,
+        zones: u32,
+        reply: oneshot::Sender<Option<Overlay>>,
+    },
+    /// Request for the events after the one with a number.
+    Events {
+        after: u64,
+        reply: oneshot::Sender<Events>,
+    },
+    /// A page is gone, and with it its operator.
+    Gone(PageId),
+}
+
+/// A page that has connected.
+pub(super) struct OpenedPage {
+    pub(super) operator: Owner,
+    /// The vehicle that the page wants to show.
+    pub(super) vehicle: Option<u16>,
+    /// The previous connection of the same page, which may not have ended yet.
+    pub(super) replaces: Option<PageId>,
+    pub(super) states: watch::Sender<Snapshot>,
+}
+
+/// A setpoint of manual drive.
+pub(super) struct DriveOrder {
+    pub(super) page: PageId,
+    /// The vehicle that the operator has seen.
+    pub(super) vehicle: Option<u16>,
+    pub(super) forward: f64,
+    pub(super) turn: f64,
+    /// How long it has waited on its way from the page, if it is not too old.
+    pub(super) waited: Result<Duration, TooOld>,
+    /// When it has arrived.
+    pub(super) at: Instant,
+    pub(super) reply: Reply,
+}
+
+/// A stop, which overtakes all orders.
+pub(super) struct StopOrder {
+    pub(super) target: StopTarget,
+    /// The user who stops, for the log of events.
+    pub(super) user: Arc<str>,
+    pub(super) reply: StopReply,
+}
+
+/// What is to be stopped.
+pub(super) enum StopTarget {
+    /// The vehicle of a page.
+    OfPage(PageId),
+    Vehicle(u16),
+    All,
+}
+
+/// When the sender of a stop gets its answer.
+pub(super) enum StopReply {
+    /// As soon as the stop is sent: whether it is new.
+    Taken(Box<dyn FnOnce(Result<bool, String>) + Send>),
+    /// When every part has confirmed it.
+    Confirmed(Reply),
+}
+
+/// The pages' interface to the session.
+#[derive(Clone)]
+pub(super) struct Access {
+    pub(super) orders: mpsc::Sender<Order>,
+    pub(super) stops: mpsc::Sender<StopOrder>,
+    pub(super) lists: Lists,
+}
+
+/// The state of a page's vehicle.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Snapshot {
+    pub(super) seq: u64,
+    pub(super) vehicle: Option<u16>,
+    pub(super) link: VehicleLinkQuality,
+    /// The snapshot as JSON; empty before the first.
+    pub(super) json: Arc<str>,
+}
+
+/// The last snapshots that are the same for all pages, as JSON; empty before the first.
+#[derive(Clone)]
+pub(super) struct Lists {
+    /// The list of vehicles, once a second.
+    fleet: watch::Receiver<Arc<str>>,
+    /// The tree of components, when it has changed.
+    tree: watch::Receiver<Arc<str>>,
+}
+
+impl Lists {
+    /// Makes all of them new, for a page that has just connected.
+    pub(super) fn mark_changed(&mut self) {
+        self.fleet.mark_changed();
+        self.tree.mark_changed();
+    }
+
+    /// The next new one; `None` when the session has ended. The returned future is cancel safe.
+    pub(super) async fn next(&mut self) -> Option<Arc<str>> {
+        loop {
+            let (changed, list) = tokio::select! {
+                biased;
+                changed = self.tree.changed() => (changed, &mut self.tree),
+                changed = self.fleet.changed() => (changed, &mut self.fleet),
+            };
+            changed.ok()?;
+            let json = list.borrow_and_update().clone();
+            if !json.is_empty() {
+                return Some(json);
+            }
+        }
+    }
+}
+
+/// The senders of [`Lists`].
+pub(super) struct Publisher {
+    fleet: watch::Sender<Arc<str>>,
+    tree: watch::Sender<Arc<str>>,
+}
+
+impl Publisher {
+    pub(super) fn new() -> (Self, Lists) {
+        let (fleet, fleets) = watch::channel(Arc::from(""));
+        let (tree, trees) = watch::channel(Arc::from(""));
+        let lists = Lists {
+            fleet: fleets,
+            tree: trees,
+        };
+        (Self { fleet, tree }, lists)
+    }
+
+    pub(super) fn fleet(&self, fleet: &Said<'_>) {
+        // Unlike `send`, `send_replace` never fails. The server holds a receiver even without pages.
+        self.fleet.send_replace(json(fleet));
+    }
+
+    pub(super) fn tree(&self, tree: &Said<'_>) {
+        self.tree.send_replace(json(tree));
+    }
+}
+
+/// A frame as JSON.
+pub(super) fn json(frame: &impl Serialize) -> Arc<str> {
+    // Serialisation cannot fail for numbers and text.
+    serde_json::to_string(frame).unwrap_or_default().into()
+}

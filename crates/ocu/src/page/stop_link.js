@@ -1,0 +1,160 @@
+// Connections that carry nothing but stops, kept open beside the one of link.js. A stop is sent on
+// all of them at once, so that it waits for no other frame and for no lost packet of another
+// connection. It is repeated until it is cancelled, over reconnections as well.
+
+const FIRST_PAUSE = 250;
+const LONGEST_PAUSE = 4_000;
+/** The station says something every second. A connection that is silent for so long is given up. */
+const DEAD = 3_500;
+/** Pauses between the repetitions of a stop in milliseconds; the last one goes on. */
+const REPEATS = [50, 100, 200, 500];
+/** With one packet in three lost, two connections bring a stop through in time. */
+const CONNECTIONS = 2;
+
+/** Sends stops to the station. Emits `refused` with the reason. */
+export class StopLink extends EventTarget {
+  #link;
+  #channels;
+  /** The stop that is repeated, as a frame here and as a request of `link`; null if there is none. */
+  #stop = null;
+  #timer = 0;
+  #repeats = 0;
+
+  /** Stops also by requests of `link`, whose token it shows to the station. */
+  constructor(link, connect = () => new WebSocket(address())) {
+    super();
+    this.#link = link;
+    const events = {
+      connect,
+      token: () => link.token,
+      opened: (channel) => this.#stop && channel.send(this.#stop.frame),
+      refused: (reason) => this.dispatchEvent(new CustomEvent("refused", { detail: reason })),
+    };
+    this.#channels = Array.from({ length: CONNECTIONS }, () => new Channel(events));
+  }
+
+  /** Opens the connections and keeps them open. */
+  start() {
+    for (const channel of this.#channels) channel.start();
+  }
+
+  /** Closes the connections. */
+  close() {
+    for (const channel of this.#channels) channel.close();
+  }
+
+  /** Whether a stop can be sent. */
+  get open() {
+    return this.#channels.some((channel) => channel.open);
+  }
+
+  /** Stops a vehicle until `cancel`. */
+  stop(subsystem) {
+    // Stopping all includes every vehicle.
+    if (this.#stop?.frame === "stop-all") return this.stopAll();
+    this.#begin(`stop ${subsystem}`, { type: "emergency", on: true, vehicle: subsystem });
+  }
+
+  /** Stops all vehicles until `cancel`. */
+  stopAll() {
+    this.#begin("stop-all", { type: "emergency_all", on: true });
+  }
+
+  /** Ends the repetitions: the vehicles have confirmed the stop. */
+  cancel() {
+    clearTimeout(this.#timer);
+    this.#stop = null;
+  }
+
+  #begin(frame, request) {
+    this.cancel();
+    this.#stop = { frame, request };
+    this.#repeats = 0;
+    this.#repeat();
+  }
+
+  #repeat() {
+    const { frame, request } = this.#stop;
+    const sent = this.#channels.map((channel) => channel.send(frame));
+    // The other connection comes second: it may be busy, and this one is enough on a good network.
+    if (!sent.includes(true) || this.#repeats > 0) this.#link.send(request);
+    const pause = REPEATS[Math.min(this.#repeats++, REPEATS.length - 1)];
+    this.#timer = setTimeout(() => this.#repeat(), pause);
+  }
+}
+
+/** One connection for stops, which opens again by itself. */
+class Channel {
+  #events;
+  #socket = null;
+  #pause = FIRST_PAUSE;
+  #timer = 0;
+
+  constructor(events) {
+    this.#events = events;
+  }
+
+  start() {
+    if (this.#socket) return;
+    clearTimeout(this.#timer);
+    this.#pause = FIRST_PAUSE;
+    this.#open();
+  }
+
+  close() {
+    clearTimeout(this.#timer);
+    const socket = this.#socket;
+    this.#socket = null;
+    socket?.close();
+  }
+
+  get open() {
+    return this.#socket?.readyState === 1;
+  }
+
+  /** Sends a frame unless an earlier one has not left the browser; false if it cannot be sent. */
+  send(frame) {
+    if (!this.open) return false;
+    if (this.#socket.bufferedAmount === 0) this.#socket.send(frame);
+    return true;
+  }
+
+  #open() {
+    const socket = this.#events.connect();
+    this.#socket = socket;
+    this.#watch(socket);
+    socket.addEventListener("open", () => {
+      if (socket !== this.#socket) return;
+      this.#pause = FIRST_PAUSE;
+      this.#watch(socket);
+      const token = this.#events.token();
+      if (token) socket.send(`token ${token}`);
+      this.#events.opened(this);
+    });
+    socket.addEventListener("message", ({ data }) => {
+      if (socket !== this.#socket) return;
+      this.#watch(socket);
+      if (String(data).startsWith("no ")) this.#events.refused(String(data).slice(3, 200));
+    });
+    socket.addEventListener("close", () => socket === this.#socket && this.#retry());
+  }
+
+  /** Gives the connection up unless the station says something in time. */
+  #watch(socket) {
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => {
+      this.#socket = null;
+      socket.close();
+      this.#retry();
+    }, DEAD);
+  }
+
+  #retry() {
+    clearTimeout(this.#timer);
+    this.#socket = null;
+    this.#timer = setTimeout(() => this.#open(), this.#pause);
+    this.#pause = Math.min(this.#pause * 2, LONGEST_PAUSE);
+  }
+}
+
+const address = () => `${location.protocol === "https:" ? "wss:" : "ws:"}//${location.host}/stop`;

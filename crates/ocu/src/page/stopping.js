@@ -1,0 +1,57 @@
+// What the page says about stopping, in words. "Stopped" depends on the measured speed alone: a
+// reported emergency says what the parts intend, not what the motor does.
+
+import { figure, number } from "./dom.js";
+
+/** Speed in words, for example `1.7 m/s`. */
+const speedWords = (speed) => `${figure(Math.abs(speed), 1)} m/s`;
+
+/**
+ * How far the stop of a vehicle is: `stopped`, `stopping`, `unknown` without a fresh speed, or
+ * `runaway`; null if no emergency is reported. `live` says whether the state itself is fresh.
+ */
+export function stopCondition(vehicle, live) {
+  if (vehicle?.emergency !== true) return null;
+  if (!live) return "unknown";
+  if (vehicle.runaway === true) return "runaway";
+  if (vehicle.at_rest === true) return "stopped";
+  return vehicle.at_rest === false ? "stopping" : "unknown";
+}
+
+/** The word and the detail on the emergency button while an emergency is reported. */
+export function stopWords(condition, speed) {
+  const known = number(speed) !== null && Math.abs(speed) >= 0.05;
+  return {
+    stopped: ["Emergency", "the vehicle is stopped"],
+    stopping: ["Stopping", known ? speedWords(speed) : "still moving"],
+    unknown: ["Emergency", "stop reported, speed unknown"],
+    runaway: ["RUNAWAY", known ? `moves in emergency: ${speedWords(speed)}` : "moves in emergency"],
+  }[condition];
+}
+
+/** The vehicles that are present, by how far their stop is. */
+function sorted(vehicles) {
+  const present = vehicles.filter(({ presence }) => presence === "present");
+  const inEmergency = present.filter(({ state }) => state === "emergency");
+  return {
+    present: present.length,
+    pending: present.length - inEmergency.length,
+    runaways: inEmergency.filter(({ runaway }) => runaway === true).length,
+    moving: inEmergency.filter(({ at_rest: rest }) => rest === false).length,
+    unknown: inEmergency.filter(({ at_rest: rest }) => rest !== true && rest !== false).length,
+  };
+}
+
+/** How many of the vehicles that are present have not reported their emergency. */
+export const pendingStops = (vehicles) => sorted(vehicles).pending;
+
+/** What *Stop all* has reached, in words. `wanted` says whether it is still being sent. */
+export function stopAllWords(vehicles, wanted) {
+  const { present, pending, runaways, moving, unknown } = sorted(vehicles);
+  if (runaways > 0) return `${runaways} RUNAWAY`;
+  if (wanted && pending > 0) return `${pending} not stopped yet`;
+  if (present === 0 || pending > 0) return `${vehicles.length} vehicles`;
+  if (moving > 0) return `${moving} still moving`;
+  if (unknown > 0) return `stop reported, ${unknown} unknown speed`;
+  return "all are stopped";
+}

@@ -1,0 +1,177 @@
+//! The WebSockets that carry nothing but stops, so that these wait for no other frame. The right to
+//! observe suffices.
+//!
+//! A page sends `stop SUBSYSTEM` or `stop-all`, and repeats it until the vehicles have confirmed the
+//! emergency. The answer is `ok SUBSYSTEM` or `ok all` when the emergency has been sent to the vehicle,
+//! or `no REASON`. Where reading requires the token, `token TOKEN` comes first. The station sends an
+//! empty frame every second.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::{Duration, Instant};
+
+use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
+use tokio::sync::mpsc;
+use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
+
+use super::Shared;
+use super::bounds::{Bucket, FRAMES};
+use super::socket::{Parting, supervise};
+use super::visitor::Visitor;
+use crate::orders::{StopOrder, StopReply, StopTarget};
+use crate::request::OperatorRequest;
+use crate::users::UserRole;
+
+/// Interval of empty frames, by which the page knows that the connection works.
+const PULSE: Duration = Duration::from_secs(1);
+/// Interval of pings. Their answers keep the connection from being idle.
+const PING: Duration = Duration::from_secs(10);
+/// A page that accepts no data for this time is disconnected.
+const STUCK: Duration = Duration::from_secs(5);
+/// Largest frame, except that with the token.
+const LARGEST: usize = 32;
+/// Delay of the reply to a wrong token.
+const WRONG_TOKEN: Duration = Duration::from_secs(1);
+/// Limit of queued answers. Further answers are dropped.
+const ANSWERS: usize = 8;
+
+/// Serves a connection until either side closes it.
+pub(super) async fn serve(mut socket: WebSocket, shared: Arc<Shared>, visitor: Visitor) {
+    let parting = tokio::select! {
+        parting = Stops::new(&shared, &visitor).run(&mut socket) => parting,
+        parting = supervise(&shared, &visitor) => Some(parting),
+    };
+    if let Some((code, reason)) = parting {
+        let reason = Utf8Bytes::from_static(reason);
+        let close = socket.send(Message::Close(Some(CloseFrame { code, reason })));
+        // Best effort: the page may not be reading.
+        let _ = timeout(STUCK, close).await;
+    }
+}
+
+struct Stops<'s> {
+    shared: &'s Shared,
+    visitor: &'s Visitor,
+    frames: Bucket,
+    answers: mpsc::Sender<String>,
+    waiting: mpsc::Receiver<String>,
+}
+
+impl<'s> Stops<'s> {
+    fn new(shared: &'s Shared, visitor: &'s Visitor) -> Self {
+        let (answers, waiting) = mpsc::channel(ANSWERS);
+        Self {
+            shared,
+            visitor,
+            frames: Bucket::new(Instant::now()),
+            answers,
+            waiting,
+        }
+    }
+
+    async fn run(mut self, socket: &mut WebSocket) -> Option<Parting> {
+        let mut pulses = interval(PULSE);
+        pulses.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut pings = interval(PING);
+        pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        loop {
+            let message = tokio::select! {
+                biased;
+                frame = socket.recv() => {
+                    if let Some(parting) = self.handle(frame?.ok()?).await {
+                        return Some(parting);
+                    }
+                    continue;
+                }
+                Some(answer) = self.waiting.recv() => Message::Text(answer.into()),
+                _ = pulses.tick() => Message::Text(Utf8Bytes::from_static("")),
+                _ = pings.tick() => Message::Ping(axum::body::Bytes::new()),
+            };
+            timeout(STUCK, socket.send(message)).await.ok()?.ok()?;
+        }
+    }
+
+    async fn handle(&mut self, message: Message) -> Option<Parting> {
+        if self.frames.take(Instant::now(), FRAMES).is_err() {
+            self.shared.counters.too_much.fetch_add(1, Relaxed);
+            return Some((close_code::POLICY, "too many frames"));
+        }
+        match message {
+            Message::Text(text) => match text.strip_prefix("token ") {
+                Some(token) => self.show(token).await,
+                None => self.stop(&text).await,
+            },
+            Message::Binary(_) => Some((close_code::UNSUPPORTED, "frames must be text")),
+            Message::Close(_) => Some((close_code::NORMAL, "")),
+            Message::Ping(_) | Message::Pong(_) => None,
+        }
+    }
+
+    /// Handles a token. A wrong one ends the connection.
+    async fn show(&self, token: &str) -> Option<Parting> {
+        if self.shared.admits(token, self.visitor.address).is_ok() {
+            if self.shared.admission.gate.token().is_some() {
+                self.visitor.trust();
+            }
+            return None;
+        }
+        sleep(WRONG_TOKEN).await;
+        Some((close_code::POLICY, "wrong token"))
+    }
+
+    async fn stop(&self, text: &str) -> Option<Parting> {
+        let target = match text.split_once(' ') {
+            _ if text.len() > LARGEST => None,
+            None if text == "stop-all" => Some(None),
+            Some(("stop", number)) => number.parse().ok().map(Some),
+            _ => None,
+        };
+        let Some(vehicle) = target else {
+            return Some((close_code::POLICY, "stop SUBSYSTEM or stop-all"));
+        };
+        if let Some(gate) = self.shared.admission.gate.users()
+            && !gate.holds(self.visitor, true)
+        {
+            return Some((close_code::POLICY, "the session has ended"));
+        }
+        if !self.visitor.may(UserRole::Observe) {
+            self.answer("no stopping requires the right to observe".to_owned());
+            return None;
+        }
+        let order = StopOrder {
+            target: vehicle.map_or(StopTarget::All, StopTarget::Vehicle),
+            user: Arc::clone(&self.visitor.user),
+            reply: self.reply(vehicle),
+        };
+        // On error the session has ended, and the connection with it.
+        let _ = self.shared.access.stops.send(order).await;
+        None
+    }
+
+    /// The callback that answers and records a stop. A repetition is not recorded.
+    fn reply(&self, vehicle: Option<u16>) -> StopReply {
+        let answers = self.answers.clone();
+        let trail = self.shared.admission.trail.clone();
+        let (user, address) = (self.visitor.user.clone(), self.visitor.address);
+        StopReply::Taken(Box::new(move |result| {
+            let request = match vehicle {
+                Some(_) => OperatorRequest::Emergency { on: true },
+                None => OperatorRequest::EmergencyAll { on: true },
+            };
+            let answer = match (&result, vehicle) {
+                (Ok(_), Some(vehicle)) => format!("ok {vehicle}"),
+                (Ok(_), None) => "ok all".to_owned(),
+                (Err(why), _) => format!("no {why}"),
+            };
+            if !matches!(result, Ok(false)) {
+                trail.request((&user, address), vehicle, &request, &result.map(|_| ()));
+            }
+            // A full queue means that the page has not read the answers before.
+            let _ = answers.try_send(answer);
+        }))
+    }
+
+    fn answer(&self, answer: String) {
+        let _ = self.answers.try_send(answer);
+    }
+}

@@ -1,0 +1,161 @@
+//! Emergencies of one vehicle and of all. Every page may set one at any time, whoever has the
+//! vehicle.
+
+use std::time::Instant;
+
+use tokio::sync::oneshot;
+
+use super::Session;
+use super::client::{Client, Finished};
+use super::control::{NO_VEHICLE, in_words};
+use super::vehicle::Vehicle;
+use crate::orders::{Reply, StopOrder, StopReply, StopTarget};
+
+impl Session {
+    /// Sends an emergency at once.
+    pub(super) fn handle_stop(&mut self, now: Instant, order: StopOrder) {
+        let StopOrder {
+            target,
+            user,
+            reply,
+        } = order;
+        let number = match target {
+            StopTarget::OfPage(page) => self.pages.vehicle(page),
+            StopTarget::Vehicle(number) => Some(number),
+            StopTarget::All => {
+                self.stop_all(now, reply);
+                return self.note_emergency_of_all(now, user, true);
+            }
+        };
+        self.note_emergency(now, number, user, true);
+        let vehicle = number.and_then(|number| self.fleet.get_mut(number));
+        let vehicle = vehicle.filter(|it| it.has_managed());
+        match (vehicle, reply) {
+            (Some(vehicle), StopReply::Taken(taken)) => {
+                taken(Ok(vehicle.set_emergency(now, &mut self.client)));
+            }
+            (Some(vehicle), StopReply::Confirmed(reply)) => {
+                vehicle.set_emergency(now, &mut self.client);
+                vehicle.await_emergency(now, true, reply);
+            }
+            (None, StopReply::Taken(taken)) => taken(Err(NO_VEHICLE.to_owned())),
+            (None, StopReply::Confirmed(reply)) => reply(Err(NO_VEHICLE.to_owned())),
+        }
+    }
+
+    /// Stops all vehicles, also those that appear later.
+    fn stop_all(&mut self, now: Instant, reply: StopReply) {
+        let is_new = !self.all_stopped;
+        self.all_stopped = true;
+        let vehicles = self.fleet.iter_mut().filter(|it| it.has_managed());
+        let mut stopped = Vec::new();
+        for vehicle in vehicles {
+            vehicle.set_emergency(now, &mut self.client);
+            stopped.push(vehicle);
+        }
+        match reply {
+            StopReply::Taken(taken) => taken(Ok(is_new)),
+            StopReply::Confirmed(reply) if stopped.is_empty() => reply(Err(NO_VEHICLE.to_owned())),
+            StopReply::Confirmed(reply) => {
+                await_all(now, true, stopped, &mut self.client, reply);
+            }
+        }
+        if is_new {
+            self.publish_fleet(now);
+        }
+    }
+
+    /// Clears the emergency of a vehicle. If it was the last one after a stop of all, vehicles that
+    /// appear later are not stopped either: nothing would show why.
+    pub(super) fn clear_emergency(&mut self, now: Instant, number: Option<u16>, reply: Reply) {
+        let Some(vehicle) = number.and_then(|number| self.fleet.get_mut(number)) else {
+            return reply(Err(NO_VEHICLE.to_owned()));
+        };
+        vehicle.clear_emergency(now, &mut self.client);
+        vehicle.await_emergency(now, false, reply);
+        if !self.fleet.iter_mut().any(|it| it.alarm.is_wanted()) {
+            self.all_stopped = false;
+            self.publish_fleet(now);
+        }
+    }
+
+    /// Clears the emergencies of all vehicles, and ends the stop of those that appear later.
+    pub(super) fn clear_all_emergencies(&mut self, now: Instant, reply: Reply) {
+        self.all_stopped = false;
+        let mut cleared: Vec<&mut Vehicle> = Vec::new();
+        for vehicle in self.fleet.iter_mut().filter(|it| it.is_stopped()) {
+            vehicle.clear_emergency(now, &mut self.client);
+            cleared.push(vehicle);
+        }
+        await_all(now, false, cleared, &mut self.client, reply);
+        self.publish_fleet(now);
+    }
+
+    /// Stops a vehicle that has appeared after all were stopped.
+    pub(super) fn stop_latecomer(&mut self, now: Instant, number: u16) {
+        if self.all_stopped
+            && let Some(vehicle) = self.fleet.get_mut(number)
+        {
+            vehicle.set_emergency(now, &mut self.client);
+        }
+    }
+}
+
+/// Replies when all parts of the vehicles have confirmed the start or the end of the emergency.
+fn await_all(
+    now: Instant,
+    on: bool,
+    vehicles: Vec<&mut Vehicle>,
+    client: &mut Client,
+    reply: Reply,
+) {
+    let mut results = Vec::new();
+    for vehicle in vehicles {
+        let (sender, result) = oneshot::channel();
+        let confirmed = Box::new(move |result| {
+            // Fails only if the requests are dropped at the end of the session.
+            let _ = sender.send(result);
+        });
+        vehicle.await_emergency(now, on, confirmed);
+        results.push((vehicle.number(), result));
+    }
+    client.start(async move {
+        let mut failures = Vec::new();
+        for (number, result) in results {
+            if let Ok(Err(why)) = result.await {
+                failures.push(format!("vehicle {number}: {why}"));
+            }
+        }
+        Finished::Requested {
+            reply,
+            result: in_words(&failures),
+        }
+    });
+}
+
+impl Vehicle {
+    pub(super) fn has_managed(&self) -> bool {
+        self.picture.parts().values().any(|part| part.managed)
+    }
+
+    /// Sets the emergency, and ends manual drive. Returns whether it is new.
+    fn set_emergency(&mut self, now: Instant, client: &mut Client) -> bool {
+        let is_new = self.alarm.set(now, &self.picture, client);
+        self.stop_driving(now, client);
+        self.lease.set_ready(false);
+        is_new
+    }
+
+    fn clear_emergency(&mut self, now: Instant, client: &mut Client) {
+        self.alarm.clear(now, &self.picture, client);
+    }
+
+    fn await_emergency(&mut self, now: Instant, on: bool, reply: Reply) {
+        self.alarm.await_end(now, on, &self.picture, reply);
+    }
+
+    /// Whether it is in emergency, or is to be.
+    pub(super) fn is_stopped(&self) -> bool {
+        self.alarm.is_wanted() || self.picture.in_emergency().next().is_some()
+    }
+}

@@ -1,0 +1,136 @@
+//! The connections that carry nothing but stops.
+
+use std::time::{Duration, Instant};
+
+use futures_util::{SinkExt, StreamExt};
+use jaus::component::State;
+use jaus_ocu::{Station, Token};
+use jaus_test_kit::waiting::within_limit;
+use serde_json::json;
+use tokio_tungstenite::connect_async;
+use tokio_tungstenite::tungstenite::Message;
+
+use crate::scene::{Scene, Socket, driver_of};
+
+async fn stops(scene: &Scene) -> Socket {
+    let url = format!("ws://{}/stop", scene.address);
+    within_limit(connect_async(url)).await.unwrap().0
+}
+
+/// Sends a frame. Returns the next that is not empty.
+async fn say(socket: &mut Socket, text: &str) -> String {
+    socket.send(Message::text(text)).await.unwrap();
+    loop {
+        match within_limit(socket.next()).await {
+            Some(Ok(Message::Text(answer))) if answer.is_empty() => {}
+            Some(Ok(Message::Text(answer))) => return answer.to_string(),
+            Some(Ok(Message::Ping(_))) => {}
+            Some(Ok(Message::Close(Some(frame)))) => return frame.reason.to_string(),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+fn emergency(scene: &Scene) -> bool {
+    let rover = scene.rover.as_ref().unwrap();
+    rover.standing().state == State::Emergency
+}
+
+#[tokio::test]
+async fn a_stop_acts_without_waiting_for_anything_that_the_page_has_sent_before() {
+    let scene = Scene::new().await;
+    let mut socket = stops(&scene).await;
+    let mut page = scene.driver().await;
+    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+    let start = Instant::now();
+    assert_eq!(say(&mut socket, "stop 101").await, "ok 101");
+    assert!(start.elapsed() < Duration::from_secs(1));
+    scene
+        .until(|scene| emergency(scene) && scene.speed() == 0.0)
+        .await;
+    for _ in 0..3 {
+        assert_eq!(say(&mut socket, "stop 101").await, "ok 101", "repeated");
+    }
+    page.ask(json!({"type": "emergency", "on": false}))
+        .await
+        .unwrap();
+    scene.until(|scene| !emergency(scene)).await;
+}
+
+#[tokio::test]
+async fn all_vehicles_are_stopped_by_one_frame() {
+    let scene = Scene::new().await;
+    let second = scene.another_vehicle(102);
+    let mut page = scene.page().await;
+    page.select(102).await;
+    let mut socket = stops(&scene).await;
+    assert_eq!(say(&mut socket, "stop-all").await, "ok all");
+    scene
+        .until(|scene| emergency(scene) && second.rover.standing().state == State::Emergency)
+        .await;
+}
+
+#[tokio::test]
+async fn a_stop_of_an_unknown_vehicle_is_refused_and_what_is_no_stop_ends_the_connection() {
+    let scene = Scene::new().await;
+    let mut socket = stops(&scene).await;
+    assert!(say(&mut socket, "stop 77").await.starts_with("no "));
+    for text in [
+        "",
+        "go 101",
+        "stop",
+        "stop 70000",
+        "stop 101 and something more than 32 octets",
+        r#"{"type":"control","on":true}"#,
+    ] {
+        let mut socket = stops(&scene).await;
+        let reason = say(&mut socket, text).await;
+        assert_eq!(reason, "stop SUBSYSTEM or stop-all", "{text}");
+    }
+}
+
+#[tokio::test]
+async fn where_looking_needs_the_token_stopping_needs_it_too() {
+    const TOKEN: &str = "correct-horse-battery";
+    for (to_read, may_stop) in [(true, false), (false, true)] {
+        let station = Station {
+            token: Token::new(TOKEN),
+            token_to_read: to_read,
+            ..Station::default()
+        };
+        let scene = Scene::with(station, 0).await;
+        let mut page = scene.page().await;
+        page.ask(json!({"type": "token", "token": TOKEN}))
+            .await
+            .unwrap();
+        page.until(|state| driver_of(state)["state"] == "standby")
+            .await;
+        let mut socket = stops(&scene).await;
+        let answer = say(&mut socket, "stop 101").await;
+        assert_eq!(answer.starts_with("ok"), may_stop, "{answer}");
+        assert_eq!(
+            say(&mut stops(&scene).await, "token wrong").await,
+            "wrong token"
+        );
+        let mut socket = stops(&scene).await;
+        socket
+            .send(Message::text(format!("token {TOKEN}")))
+            .await
+            .unwrap();
+        assert_eq!(say(&mut socket, "stop 101").await, "ok 101");
+    }
+}
+
+#[tokio::test]
+async fn a_connection_for_stops_says_something_every_second() {
+    let scene = Scene::new().await;
+    let mut socket = stops(&scene).await;
+    let start = Instant::now();
+    for _ in 0..3 {
+        match within_limit(socket.next()).await {
+            Some(Ok(Message::Text(_) | Message::Ping(_))) => {}
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(start.elapsed() < Duration::from_secs(3));
+}

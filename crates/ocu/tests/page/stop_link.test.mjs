@@ -1,0 +1,116 @@
+import assert from "node:assert/strict";
+import test, { mock } from "node:test";
+
+import { StopLink } from "../../src/page/stop_link.js";
+
+class Socket extends EventTarget {
+  readyState = 0;
+  bufferedAmount = 0;
+  sent = [];
+  send(frame) {
+    this.sent.push(frame);
+  }
+  close() {
+    this.readyState = 3;
+  }
+  open() {
+    this.readyState = 1;
+    this.dispatchEvent(new Event("open"));
+  }
+  fail() {
+    this.readyState = 3;
+    this.dispatchEvent(new Event("close"));
+  }
+  say(data) {
+    this.dispatchEvent(Object.assign(new Event("message"), { data }));
+  }
+}
+
+function rig(token = "") {
+  mock.timers.enable({ apis: ["setTimeout"] });
+  const sockets = [];
+  const requests = [];
+  const link = { token, send: (request) => requests.push(request.type) };
+  const stops = new StopLink(link, () => {
+    sockets.push(new Socket());
+    return sockets.at(-1);
+  });
+  stops.start();
+  return { stops, sockets, requests, sent: () => sockets.map(({ sent }) => sent.splice(0)) };
+}
+
+test.afterEach(() => mock.timers.reset());
+
+test("a stop goes out on every connection at once, and is repeated until it is cancelled", () => {
+  const { stops, sockets, requests, sent } = rig();
+  sockets.forEach((socket) => socket.open());
+  stops.stop(101);
+  assert.deepEqual(sent(), [["stop 101"], ["stop 101"]]);
+  assert.deepEqual(requests, []);
+  mock.timers.tick(50);
+  mock.timers.tick(100);
+  assert.deepEqual(sent(), [Array(2).fill("stop 101"), Array(2).fill("stop 101")]);
+  assert.deepEqual(requests, ["emergency", "emergency"]);
+  stops.cancel();
+  mock.timers.tick(3_000);
+  assert.deepEqual(sent(), [[], []]);
+});
+
+test("without a connection of its own, a stop takes the other one and the next that opens", () => {
+  const { stops, sockets, requests, sent } = rig();
+  assert.equal(stops.open, false);
+  stops.stopAll();
+  assert.deepEqual(requests, ["emergency_all"]);
+  sockets[1].open();
+  assert.deepEqual(sent(), [[], ["stop-all"]]);
+});
+
+test("nothing is added to what has not left the browser", () => {
+  const { stops, sockets, sent } = rig();
+  sockets[0].open();
+  sockets[0].bufferedAmount = 8;
+  stops.stop(101);
+  mock.timers.tick(200);
+  assert.deepEqual(sent()[0], []);
+});
+
+test("a connection that is lost or silent is opened again", () => {
+  const { sockets } = rig();
+  sockets.forEach((socket) => socket.open());
+  sockets[0].fail();
+  mock.timers.tick(250);
+  assert.equal(sockets.length, 3);
+  sockets[2].open();
+  mock.timers.tick(3_000);
+  sockets[2].say("");
+  mock.timers.tick(1_000);
+  assert.equal(sockets[1].readyState, 3, "this one was silent for 3.5 s");
+  assert.equal(sockets[2].readyState, 1);
+});
+
+test("the token comes first, and a refusal is told", () => {
+  const { stops, sockets, sent } = rig("secret");
+  let reason;
+  stops.addEventListener("refused", ({ detail }) => (reason = detail));
+  sockets[0].open();
+  stops.stop(7);
+  assert.deepEqual(sent()[0], ["token secret", "stop 7"]);
+  sockets[0].say("no vehicle 7 is unknown");
+  assert.equal(reason, "vehicle 7 is unknown");
+});
+
+test("a stop of all is not replaced by that of one vehicle", () => {
+  const { stops, sockets, sent } = rig();
+  sockets[0].open();
+  stops.stopAll();
+  stops.stop(101);
+  assert.deepEqual(sent()[0], ["stop-all", "stop-all"]);
+});
+
+test("a frame takes 32 octets at most", () => {
+  const { stops, sockets, sent } = rig();
+  sockets[0].open();
+  stops.stop(65_535);
+  stops.stopAll();
+  for (const frame of sent()[0]) assert.ok(frame.length <= 32, frame);
+});

@@ -1,0 +1,41 @@
+// What the page says about stopping.
+
+import assert from "node:assert/strict";
+import test from "node:test";
+
+import { pendingStops, stopAllWords, stopCondition, stopWords } from "../../src/page/stopping.js";
+
+const vehicle = (changes) => ({ emergency: true, at_rest: true, runaway: false, ...changes });
+
+test("an emergency is a stop only with a fresh speed that says so", () => {
+  assert.equal(stopCondition(vehicle({}), true), "stopped");
+  assert.equal(stopCondition(vehicle({ at_rest: false }), true), "stopping");
+  assert.equal(stopCondition(vehicle({ at_rest: null }), true), "unknown");
+  assert.equal(stopCondition(vehicle({ at_rest: undefined }), true), "unknown");
+  assert.equal(stopCondition(vehicle({}), false), "unknown", "the picture is old");
+  assert.equal(stopCondition(vehicle({ at_rest: false, runaway: true }), true), "runaway");
+  assert.equal(stopCondition(vehicle({ emergency: false }), true), null);
+  assert.equal(stopCondition(null, true), null);
+});
+
+test("the button says the speed while the vehicle stops, and 'stopped' in no other case", () => {
+  assert.deepEqual(stopWords("stopping", 1.68), ["Stopping", "1.7 m/s"]);
+  assert.deepEqual(stopWords("stopping", -0.4), ["Stopping", "0.4 m/s"]);
+  assert.deepEqual(stopWords("stopping", 0.0), ["Stopping", "still moving"], "it turns");
+  assert.deepEqual(stopWords("unknown", 0), ["Emergency", "stop reported, speed unknown"]);
+  for (const condition of ["stopping", "unknown", "runaway"]) {
+    assert.doesNotMatch(stopWords(condition, null).join(" "), /stopped/);
+  }
+});
+
+test("all are stopped only if each of them is measured at rest", () => {
+  const one = (changes) => ({ presence: "present", state: "emergency", at_rest: true, runaway: false, ...changes });
+  assert.equal(stopAllWords([one(), one()], false), "all are stopped");
+  assert.equal(stopAllWords([one(), one({ at_rest: false })], false), "1 still moving");
+  assert.equal(stopAllWords([one(), one({ at_rest: null })], true), "stop reported, 1 unknown speed");
+  assert.equal(stopAllWords([one(), one({ state: "ready" })], true), "1 not stopped yet");
+  assert.equal(stopAllWords([one(), one({ state: "ready" })], false), "2 vehicles");
+  assert.equal(stopAllWords([one(), one({ at_rest: false, runaway: true })], false), "1 RUNAWAY");
+  assert.equal(stopAllWords([], false), "0 vehicles");
+  assert.equal(pendingStops([one(), one({ state: "ready" }), one({ state: "ready", presence: "gone" })]), 1);
+});

@@ -1,0 +1,115 @@
+//! Clients that restart, faster than any silence limit.
+
+use super::*;
+use crate::endpoint::Outgoing;
+use crate::service::life::Life;
+
+/// The numbers of two starts of a client.
+const OLD: u64 = 7;
+const NEW: u64 = 8;
+
+impl Rig {
+    /// The client tells its incarnation, as it does before it requests control.
+    fn introduce(&mut self, client: JausId, incarnation: u64) -> Vec<Sent> {
+        self.hear(client, &QueryIncarnation { incarnation })
+    }
+
+    /// Lets the time pass; whenever the client is asked for its incarnation, it answers. Returns
+    /// after which time it was asked.
+    fn answer_for(&mut self, time: Duration, client: JausId, incarnation: u64) -> Vec<Duration> {
+        let (start, end) = (self.now, self.now + time);
+        let mut asked = Vec::new();
+        while let Some(wake) = self.stack.poll_timeout().filter(|wake| *wake <= end) {
+            self.now = self.now.max(wake);
+            self.stack.handle_timeout(self.now);
+            let sent: Vec<Outgoing> = std::iter::from_fn(|| self.stack.poll_transmit()).collect();
+            for message in sent.iter().filter(|it| it.destination == client) {
+                if QueryIncarnation::decode(&message.payload).is_ok() {
+                    asked.push(self.now - start);
+                    self.hear(client, &ReportIncarnation { incarnation });
+                }
+            }
+        }
+        self.now = end;
+        asked
+    }
+
+    /// A ready component that the old `FIRST` controls, after some time.
+    fn driven() -> Self {
+        let mut rig = Self::managed();
+        rig.introduce(FIRST, OLD);
+        rig.request(FIRST, 100);
+        rig.hear(FIRST, &Resume);
+        rig.answer_for(Duration::from_millis(900), FIRST, OLD);
+        assert_eq!(rig.state(), State::Ready);
+        rig
+    }
+}
+
+#[test]
+fn a_component_tells_its_own_incarnation_and_always_the_same() {
+    let mut rig = Rig::managed();
+    let report = told(
+        FIRST,
+        &ReportIncarnation {
+            incarnation: rig.stack.incarnation().number(),
+        },
+    );
+    for _ in 0..2 {
+        assert_eq!(rig.introduce(FIRST, 0), [report.clone()]);
+    }
+    assert_ne!(Rig::managed().stack.incarnation(), rig.stack.incarnation());
+}
+
+#[test]
+fn a_client_in_control_that_restarts_is_noticed_within_half_a_second_although_it_was_never_silent()
+{
+    let mut rig = Rig::driven();
+    // The new process answers probes as the old one did.
+    let asked = rig.answer_for(Duration::from_millis(500), FIRST, NEW);
+    assert!(asked[0] <= Life::CHECK, "{asked:?}");
+    assert_eq!((rig.state(), rig.controller()), (State::Standby, None));
+}
+
+#[test]
+fn a_client_that_goes_on_keeps_control_and_is_asked_five_times_a_second() {
+    let mut rig = Rig::driven();
+    let asked = rig.answer_for(Duration::from_secs(2), FIRST, OLD);
+    assert!((9..=11).contains(&asked.len()), "{asked:?}");
+    assert_eq!(rig.controller(), Some((FIRST, 100)));
+}
+
+#[test]
+fn a_new_incarnation_that_requests_control_at_once_begins_in_standby() {
+    let mut rig = Rig::driven();
+    let said = rig.introduce(FIRST, NEW);
+    assert!(said.contains(&rejected(FIRST, Rejection::CONTROL_RELEASED)));
+    assert_eq!(
+        rig.request(FIRST, 50),
+        [confirmed(FIRST, Confirmation::CONTROL_ACCEPTED)]
+    );
+    assert_eq!(rig.state(), State::Standby);
+    assert_eq!(rig.controller(), Some((FIRST, 50)));
+    rig.hear(FIRST, &Resume);
+    assert_eq!(rig.state(), State::Ready, "by its own command");
+    rig.answer_for(Duration::from_secs(1), FIRST, NEW);
+    assert_eq!(rig.state(), State::Ready);
+}
+
+#[test]
+fn a_client_without_the_service_is_never_asked() {
+    let mut rig = Rig::ready();
+    let asked = rig.answer_for(Duration::from_secs(2), FIRST, OLD);
+    assert_eq!((asked.len(), rig.state()), (0, State::Ready));
+}
+
+#[test]
+fn another_component_that_restarts_changes_nothing() {
+    let mut rig = Rig::driven();
+    rig.introduce(SECOND, OLD);
+    rig.introduce(SECOND, NEW);
+    assert_eq!(
+        (rig.state(), rig.controller()),
+        (State::Ready, Some((FIRST, 100)))
+    );
+}
