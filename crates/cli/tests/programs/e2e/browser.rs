@@ -6,7 +6,9 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -17,6 +19,8 @@ static BROWSERS: AtomicU32 = AtomicU32::new(0);
 const LIMIT: Duration = Duration::from_secs(60);
 /// Polling interval of a condition.
 const PERIOD: Duration = Duration::from_millis(50);
+/// Delay of a held key's first repeat, and of each further one.
+const REPEATS: [Duration; 2] = [Duration::from_millis(250), Duration::from_millis(33)];
 
 /// A screen size and colour scheme for the page.
 #[derive(Clone, Copy)]
@@ -69,8 +73,9 @@ pub(crate) fn missing() -> Option<String> {
 /// One browser with one page; killed when dropped.
 pub(crate) struct Browser {
     child: Child,
-    commands: ChildStdin,
+    commands: Arc<Mutex<ChildStdin>>,
     said: Receiver<Value>,
+    held_key: Option<HeldKey>,
     session: Option<String>,
     number: u64,
     profile: PathBuf,
@@ -138,8 +143,9 @@ impl Browser {
         });
         let mut browser = Self {
             child,
-            commands,
+            commands: Arc::new(Mutex::new(commands)),
             said,
+            held_key: None,
             session: None,
             number: 0,
             profile,
@@ -174,9 +180,7 @@ impl Browser {
         if let Some(session) = &self.session {
             command["sessionId"] = json!(session);
         }
-        let mut octets = command.to_string().into_bytes();
-        octets.push(0);
-        self.commands.write_all(&octets).unwrap();
+        write(&self.commands, &command);
         loop {
             let said = self.said.recv_timeout(LIMIT);
             let said = said.unwrap_or_else(|e| panic!("{method}: the browser is silent: {e}"));
@@ -324,6 +328,12 @@ impl Browser {
         )
     }
 
+    /// Sends a command of the DevTools protocol that has no method here.
+    #[track_caller]
+    pub(crate) fn command(&mut self, method: &str, parameters: &Value) -> Value {
+        self.call(method, parameters)
+    }
+
     /// Touches the middle of an element, once it is visible and enabled.
     #[track_caller]
     pub(crate) fn press(&mut self, selector: &str) {
@@ -435,6 +445,38 @@ impl Browser {
         self.key_up("Enter", "Enter");
     }
 
+    /// Presses a key and keeps it down: the page gets its repeats, as from a keyboard.
+    pub(crate) fn hold_key(&mut self, code: &str, key: &str) {
+        self.key_down(code, key);
+        let (stop, stopped) = channel();
+        let (commands, session) = (Arc::clone(&self.commands), self.session.clone());
+        // No call waits for the answers: no call has the number 0.
+        let repeat = json!({ "id": 0, "sessionId": session, "method": "Input.dispatchKeyEvent",
+            "params": { "type": "keyDown", "code": code, "key": key, "autoRepeat": true } });
+        let thread = std::thread::spawn(move || {
+            let [mut delay, next] = REPEATS;
+            while stopped.recv_timeout(delay) == Err(RecvTimeoutError::Timeout) {
+                write(&commands, &repeat);
+                delay = next;
+            }
+        });
+        self.held_key = Some(HeldKey { stop, thread });
+    }
+
+    /// Lets go of the key that is held.
+    pub(crate) fn let_go_of_key(&mut self, code: &str, key: &str) {
+        self.stop_repeats();
+        self.key_up(code, key);
+    }
+
+    /// The key that is held repeats no more, and nobody tells the page that it was let go.
+    pub(crate) fn stop_repeats(&mut self) {
+        if let Some(HeldKey { stop, thread }) = self.held_key.take() {
+            drop(stop);
+            thread.join().unwrap();
+        }
+    }
+
     pub(crate) fn key_down(&mut self, code: &str, key: &str) {
         self.call(
             "Input.dispatchKeyEvent",
@@ -473,6 +515,19 @@ impl Browser {
         let octets = from_base64(shot["data"].as_str().unwrap());
         std::fs::write(directory.join(name).with_extension("png"), octets).unwrap();
     }
+}
+
+/// A key that is held: a thread repeats it.
+struct HeldKey {
+    stop: Sender<()>,
+    thread: JoinHandle<()>,
+}
+
+/// Writes a command to the browser.
+fn write(commands: &Mutex<ChildStdin>, command: &Value) {
+    let mut octets = command.to_string().into_bytes();
+    octets.push(0);
+    commands.lock().unwrap().write_all(&octets).unwrap();
 }
 
 /// A node of the accessibility tree.
@@ -530,6 +585,7 @@ fn text_within(node: &Value, nodes: &[Value]) -> String {
 
 impl Drop for Browser {
     fn drop(&mut self) {
+        self.stop_repeats();
         let _ = self.child.kill();
         let _ = self.child.wait();
         let _ = std::fs::remove_dir_all(&self.profile);

@@ -6,7 +6,8 @@ use std::process::{Child, Command, Stdio};
 
 use super::browser::{Browser, SCREENS};
 use super::steps::{
-    emergency, every_control_has_a_name, is_announced, look_from_all_screens, take_control,
+    emergency, every_control_has_a_name, is_announced, look_from, look_from_all_screens,
+    take_control,
 };
 use super::system::program;
 
@@ -94,10 +95,10 @@ pub(crate) fn run() {
     one_button_leads_from_arrival_to_driving(&mut page);
     every_view_is_accessible(&mut page);
     shows_the_state_in_the_tree(&mut page, "ready");
-    page.key_down("ArrowUp", "ArrowUp");
+    page.hold_key("ArrowUp", "ArrowUp");
     page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
     page.screenshot("by-hand-keys");
-    page.key_up("ArrowUp", "ArrowUp");
+    page.let_go_of_key("ArrowUp", "ArrowUp");
     page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
 
     page.hold("#stick", (0.0, -0.6));
@@ -169,13 +170,21 @@ fn shows_the_state_in_the_tree(page: &mut Browser, state: &str) {
 /// While the vehicle is suspended, all values on the page are stale: the page says so and does not
 /// drive.
 fn refuses_to_drive_without_news(page: &mut Browser, vehicle: &Running) {
-    page.key_down("ArrowUp", "ArrowUp");
+    for screen in SCREENS {
+        // A change of size ends a drive.
+        page.look_on(screen);
+        page.hold_key("ArrowUp", "ArrowUp");
+        page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+        look_from(page, screen, "by-hand-driving");
+        page.let_go_of_key("ArrowUp", "ArrowUp");
+    }
+    page.look_on(SCREENS[0]);
+    page.hold_key("ArrowUp", "ArrowUp");
     page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
-    look_from_all_screens(page, "by-hand-driving");
     vehicle.suspend(true);
     page.wait("document.querySelector('#drive-line').textContent.includes('picture is stale')");
     page.wait("document.querySelector('#drive-source').textContent === 'Idle'");
-    page.key_up("ArrowUp", "ArrowUp");
+    page.let_go_of_key("ArrowUp", "ArrowUp");
     page.key_down("ArrowUp", "ArrowUp");
     page.key_up("ArrowUp", "ArrowUp");
     assert_eq!(page.text("#drive-source"), "Idle");

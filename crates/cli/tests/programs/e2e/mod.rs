@@ -10,6 +10,7 @@ mod browser;
 mod by_hand;
 mod fleet;
 mod handover;
+mod input;
 mod keyboard;
 mod pictures;
 mod steps;
@@ -80,6 +81,11 @@ fn a_mission_through_the_page_survives_the_death_of_every_part() {
 #[test]
 fn a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once() {
     on_a_station(by_hand::run);
+}
+
+#[test]
+fn only_an_input_that_proves_itself_drives_and_each_event_ends_it() {
+    on_a_station(input::run);
 }
 
 #[test]
@@ -208,17 +214,29 @@ fn says_that_the_planner_is_gone(system: &System, page: &mut Browser) {
     comes_alive(page);
 }
 
-/// Holding a key drives the vehicle and ends a mission; releasing the key stops it.
+/// Keys leave a mission alone, in every view. After *Take over* holding a key drives the vehicle, and releasing
+/// it stops it.
 fn take_over_by_keyboard(page: &mut Browser) {
-    page.press("[data-show=drive]");
-    page.key_down("KeyW", "w");
+    for view in ["system", "drive"] {
+        page.press(&format!("[data-show={view}]"));
+        page.hold_key("ArrowDown", "ArrowDown");
+        std::thread::sleep(Duration::from_secs(1));
+        assert_eq!(page.text("#drive-source"), "Idle", "in the view {view}");
+        assert_eq!(page.value("document.body.dataset.mission"), "under-way");
+        page.let_go_of_key("ArrowDown", "ArrowDown");
+    }
+    page.wait("document.querySelector('#drive-line').textContent.includes('Take over')");
+    look_from_all_screens(page, "4-take-over");
+    page.press("#take-over");
+    page.wait("document.body.dataset.mission === 'over'");
+    page.wait("document.querySelector('#drive-line').textContent.startsWith('Ready')");
+    page.hold_key("KeyW", "w");
     page.wait(
         "document.querySelector('#drive-line').textContent.includes('commands are being sent')",
     );
     page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.3");
     page.screenshot("4-keyboard");
-    page.wait("document.body.dataset.mission === 'over'");
-    page.key_up("KeyW", "w");
+    page.let_go_of_key("KeyW", "w");
     page.wait("document.querySelector('#drive-source').textContent === 'Idle'");
     page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::browser::{Accessible, Browser, SCREENS};
+use super::browser::{Accessible, Browser, SCREENS, Screen};
 
 /// Takes control unless it is already held or requested, and makes the vehicle Ready.
 pub(crate) fn take_control(page: &mut Browser) {
@@ -59,24 +59,29 @@ const HIDDEN: &str = "['#estop', '#state-word', '#state-detail', '#speed', '#hea
 pub(crate) fn look_from_all_screens(page: &mut Browser, name: &str) {
     for screen in SCREENS {
         page.look_on(screen);
-        page.wait("document.documentElement.scrollWidth <= innerWidth");
-        page.wait("document.querySelector('#state-word').getClientRects().length");
-        let fits = page.holds_within(Duration::from_secs(5), &format!("{OVERFLOWING} === ''"));
-        assert!(
-            fits,
-            "{name} on {}: {}",
-            screen.name,
-            page.value(OVERFLOWING)
-        );
-        let fits = page.holds_within(Duration::from_secs(5), &format!("{HIDDEN} === ''"));
-        if !fits {
-            page.screenshot(&format!("{name}-{}-hidden", screen.name));
-        }
-        assert!(fits, "{name} on {}: {}", screen.name, page.value(HIDDEN));
-        std::thread::sleep(Duration::from_millis(120));
-        page.screenshot(&format!("{name}-{}", screen.name));
+        look_from(page, screen, name);
     }
     page.look_on(SCREENS[0]);
+}
+
+/// The same on one screen, which the page is shown on.
+pub(crate) fn look_from(page: &mut Browser, screen: Screen, name: &str) {
+    page.wait("document.documentElement.scrollWidth <= innerWidth");
+    page.wait("document.querySelector('#state-word').getClientRects().length");
+    let fits = page.holds_within(Duration::from_secs(5), &format!("{OVERFLOWING} === ''"));
+    assert!(
+        fits,
+        "{name} on {}: {}",
+        screen.name,
+        page.value(OVERFLOWING)
+    );
+    let fits = page.holds_within(Duration::from_secs(5), &format!("{HIDDEN} === ''"));
+    if !fits {
+        page.screenshot(&format!("{name}-{}-hidden", screen.name));
+    }
+    assert!(fits, "{name} on {}: {}", screen.name, page.value(HIDDEN));
+    std::thread::sleep(Duration::from_millis(120));
+    page.screenshot(&format!("{name}-{}", screen.name));
 }
 
 /// A dialog with this name is shown, and everything that can have the focus has a name.
