@@ -76,6 +76,7 @@ fn from(source: JausId, payload: Bytes) -> Received {
         priority: Priority::Standard,
         broadcast: Broadcast::None,
         payload,
+        sequence: None,
         path: None,
     }
 }

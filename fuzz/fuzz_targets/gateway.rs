@@ -84,6 +84,7 @@ impl Story {
                     to,
                     priority: Priority::Standard,
                     broadcast: Broadcast::None,
+                    sequence: None,
                     path: Some(Path {
                         link: LinkId(0),
                         peer: from.into(),

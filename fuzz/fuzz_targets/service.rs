@@ -170,6 +170,7 @@ fn received(source: JausId, payload: bytes::Bytes, to_all: bool) -> Received {
         } else {
             Broadcast::None
         },
+        sequence: None,
         path: Some(Path {
             link: LinkId(0),
             peer: std::net::SocketAddr::from(([10, 0, 0, 2], 3794)).into(),

@@ -9,6 +9,7 @@ use super::Component;
 use super::directories::{Directories, Membership};
 use super::driver::{Driver, Publisher};
 use super::handle::Shared;
+use super::latest::LatestSender;
 use super::watch::Outlet;
 use crate::address::JausId;
 use crate::node::{self, Node, Port};
@@ -201,8 +202,9 @@ impl Builder {
             changes: changes.clone(),
             messages: messages.clone(),
         };
+        let latest = LatestSender::new(port.sender());
         let shared = Shared {
-            sender: port.sender(),
+            sender: latest.clone(),
             commands,
             known: membership.directory(),
             directories,
@@ -211,7 +213,17 @@ impl Builder {
             messages,
             requests: AtomicU8::new(u8::MAX),
         };
-        tokio::spawn(Driver::new(stack, membership, port, inbox, publisher, patience).run());
+        tokio::spawn(
+            Driver::new(
+                stack,
+                membership,
+                (port, latest),
+                inbox,
+                publisher,
+                patience,
+            )
+            .run(),
+        );
         Ok(Component::new(shared))
     }
 

@@ -11,6 +11,7 @@ use tokio::task::JoinSet;
 
 use super::clients::{Clients, Hold, Instruction};
 use super::directories::Membership;
+use super::latest::LatestSender;
 use super::watch::Outlet;
 use crate::address::JausId;
 use crate::codec::Message;
@@ -82,6 +83,7 @@ pub(super) struct Driver {
     membership: Membership,
     port: Port,
     resident: Resident,
+    latest: LatestSender,
     probes: Probes,
     inbox: mpsc::Receiver<Command>,
     publisher: Publisher,
@@ -95,7 +97,7 @@ impl Driver {
     pub(super) fn new(
         stack: Stack,
         membership: Membership,
-        port: Port,
+        (port, latest): (Port, LatestSender),
         inbox: mpsc::Receiver<Command>,
         publisher: Publisher,
         patience: Patience,
@@ -106,6 +108,7 @@ impl Driver {
             membership,
             resident: port.reside(),
             port,
+            latest,
             probes: Probes::default(),
             inbox,
             publisher,
@@ -280,18 +283,20 @@ impl Driver {
         let Self {
             stack,
             port,
+            latest,
             clients,
             patience,
             probes,
             ..
         } = self;
         clients.obey(stack, hold, *patience, |stack| {
-            transmit(stack, port, probes)
+            transmit(stack, (port, latest), probes)
         });
     }
 
     fn transmit(&mut self) -> Result<(), node::SendError> {
-        transmit(&mut self.stack, &self.port, &mut self.probes)
+        let ways = (&self.port, &self.latest);
+        transmit(&mut self.stack, ways, &mut self.probes)
     }
 
     /// Cancels queries whose callers have gone.
@@ -344,7 +349,11 @@ impl Probes {
 }
 
 /// Sends all queued messages; returns the first error.
-fn transmit(stack: &mut Stack, port: &Port, probes: &mut Probes) -> Result<(), node::SendError> {
+fn transmit(
+    stack: &mut Stack,
+    (port, latest): (&Port, &LatestSender),
+    probes: &mut Probes,
+) -> Result<(), node::SendError> {
     let mut result = Ok(());
     while let Some(message) = stack.poll_transmit() {
         // An acknowledged probe is a sign of life.
@@ -353,7 +362,7 @@ fn transmit(stack: &mut Stack, port: &Port, probes: &mut Probes) -> Result<(), n
             .starts_with(&QueryHeartbeatPulse::CODE.to_le_bytes());
         let sent = match message.acknowledge && is_probe {
             true => probes.send(port, message),
-            false => port.send(message).map(drop),
+            false => latest.send(message).map(drop),
         };
         result = result.and(sent);
     }

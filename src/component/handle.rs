@@ -9,6 +9,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use super::clients::{Hold, NotControlled, NotSubscribed};
 use super::driver::{Answer, Ask, Command};
+use super::latest::LatestSender;
 use super::offers::missing_for;
 use super::watch::Outlet;
 use super::{
@@ -19,7 +20,6 @@ use crate::address::JausId;
 use crate::codec::{Message, Query, Report};
 use crate::endpoint::{Outgoing, Received};
 use crate::messages;
-use crate::node;
 use crate::service::{
     Change, Condition, Directory, Kind, LaterAnswer, NodeDirectory, Publication, QueryOptions,
     Service, Standing, Topic, UnsafeService, When, code_of,
@@ -48,7 +48,7 @@ pub struct Component {
 
 #[derive(Debug)]
 pub(super) struct Shared {
-    pub(super) sender: node::Sender,
+    pub(super) sender: LatestSender,
     pub(super) commands: mpsc::Sender<Command>,
     pub(super) known: Arc<NodeDirectory>,
     pub(super) directories: watch::Receiver<()>,
@@ -194,7 +194,13 @@ impl Component {
     }
 
     /// Sends a message, with retransmission, and waits until the receiver acknowledges it. Dropping
-    /// the future cancels the retransmission; the message may still arrive.
+    /// the future cancels the message: it is not sent or retransmitted any more. A copy that is
+    /// already on the way may still arrive.
+    ///
+    /// A setpoint of the standard's mobility and manipulator services is cancelled as well when this
+    /// component sends the same peer a newer one, or a stop (release, standby, reset, shutdown,
+    /// emergency). Setpoints that are repeated anyway need no acknowledgement: [`send`](Self::send)
+    /// them, and `deliver` the stop.
     ///
     /// # Errors
     /// [`DeliverError`] gives the reason why delivery is not confirmed.

@@ -84,6 +84,7 @@ mod feed;
 mod find;
 mod group;
 mod handle;
+mod latest;
 mod list;
 mod offers;
 mod request;

@@ -17,6 +17,8 @@ counters! {
     UnawaitedAcknowledgement = "unexpected acknowledgements",
     Retransmissions = "retransmissions",
     MessagesGivenUp = "messages given up, unacknowledged",
+    /// Messages whose senders no longer waited for the acknowledgement.
+    MessagesCancelled = "messages cancelled, unacknowledged",
     PeersEvicted = "peers evicted, table full",
     /// Octets after the last message of a datagram, left by a peer that does not truncate its
     /// buffer.

@@ -41,6 +41,13 @@ pub(super) enum Novelty {
 }
 
 impl Endpoint {
+    /// Whether a message that requests an acknowledgement was received before: it needs no room.
+    pub(super) fn is_repeat(&self, arrival: Arrival<'_>, seen: Fingerprint) -> bool {
+        let seen = seen.in_round(self.peers.round(arrival.frame));
+        let window = self.duplicate_window(arrival);
+        self.heard.contains(arrival.now, seen, window)
+    }
+
     /// Runs the duplicate check and records the message.
     ///
     /// Peers with the older headers leave the sequence number at 0, so equal messages look alike.

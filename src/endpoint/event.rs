@@ -80,6 +80,9 @@ pub struct Received {
     pub priority: Priority,
     /// The broadcast scope.
     pub broadcast: Broadcast,
+    /// The sequence number that the sender gave it; of a large message, that of its first fragment.
+    /// `None` from a component of this node, whose messages arrive in order.
+    pub sequence: Option<u16>,
     /// The message, beginning with its two code octets.
     pub payload: Bytes,
     /// The path it arrived on; `None` from a component of this node.

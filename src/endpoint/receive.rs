@@ -173,7 +173,10 @@ impl Endpoint {
                 }
                 Acknowledgement::Request => {
                     let may_be_refused = frame.destination.is_unicast() && !is_challenge(frame);
-                    if may_be_refused && !sink.has_room(frame.destination, frame.flags.priority()) {
+                    if may_be_refused
+                        && !sink.has_room(frame.destination, frame.flags.priority())
+                        && !self.is_repeat(arrival, seen)
+                    {
                         return Err(Counter::ReceiverBusy);
                     }
                     self.acknowledge(arrival);
@@ -285,11 +288,12 @@ impl Endpoint {
     ) -> Result<(), Counter> {
         let Arrival { frame, path, .. } = arrival;
         let source = frame.source;
-        let received = |destination, priority, broadcast, payload| Received {
+        let received = |destination, priority, broadcast, sequence, payload| Received {
             source,
             destination,
             priority,
             broadcast,
+            sequence: Some(sequence),
             payload,
             path: Some(path),
             to: destination,
@@ -313,12 +317,14 @@ impl Endpoint {
             } else {
                 broadcast
             };
-            let message = received(whole.destination, whole.priority, scope, whole.payload);
+            let (to, first) = (whole.destination, whole.first.0);
+            let message = received(to, whole.priority, scope, first, whole.payload);
             self.deliver(&message, None, sink);
         }
         if is_single {
             let (destination, priority) = (frame.destination, frame.flags.priority());
-            let message = received(destination, priority, broadcast, frame.payload.clone());
+            let (number, payload) = (frame.sequence, frame.payload.clone());
+            let message = received(destination, priority, broadcast, number, payload);
             self.deliver(&message, None, sink);
         }
         Ok(())

@@ -359,6 +359,7 @@ fn received_locally(message: Outgoing, broadcast: Broadcast) -> Received {
         destination: message.destination,
         priority: message.priority,
         broadcast,
+        sequence: None,
         payload: message.payload,
         path: None,
         to: message.destination,

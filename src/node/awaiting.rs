@@ -17,7 +17,15 @@ pub(super) const MAX_AWAITED: usize = 4096;
 
 /// All waiting senders.
 #[derive(Debug, Default)]
-pub(super) struct Awaiting(HashMap<MessageHandle, (JausId, Waiter)>);
+pub(super) struct Awaiting(HashMap<MessageHandle, Awaited>);
+
+/// A message with its waiting sender.
+#[derive(Debug)]
+struct Awaited {
+    source: JausId,
+    destination: JausId,
+    waiter: Waiter,
+}
 
 /// A waiting sender.
 #[derive(Debug)]
@@ -39,16 +47,17 @@ impl Awaiting {
     pub(super) fn insert(
         &mut self,
         message: MessageHandle,
-        source: JausId,
+        (source, destination): (JausId, JausId),
         waiter: Waiter,
     ) -> bool {
-        if self.0.len() >= MAX_AWAITED {
-            let has_left = |waiter: &Waiter| matches!(waiter, Waiter::Here(it) if it.is_closed());
-            self.0.retain(|_, (_, waiter)| !has_left(waiter));
-        }
         let has_room = self.0.len() < MAX_AWAITED;
         if has_room {
-            self.0.insert(message, (source, waiter));
+            let awaited = Awaited {
+                source,
+                destination,
+                waiter,
+            };
+            self.0.insert(message, awaited);
         }
         has_room
     }
@@ -66,12 +75,29 @@ impl Awaiting {
     }
 
     pub(super) fn remove(&mut self, message: MessageHandle) -> Option<Waiter> {
-        self.0.remove(&message).map(|(_, waiter)| waiter)
+        self.0.remove(&message).map(|it| it.waiter)
+    }
+
+    /// The message, with its destination, that a component process knows by this handle.
+    pub(super) fn of_process(
+        &self,
+        source: JausId,
+        handle: u64,
+    ) -> Option<(MessageHandle, JausId)> {
+        let is_meant = |it: &Awaited| {
+            let known = match it.waiter {
+                Waiter::There { handle, .. } => Some(handle),
+                Waiter::Here(_) => None,
+            };
+            it.source == source && known == Some(handle)
+        };
+        let (message, it) = self.0.iter().find(|(_, it)| is_meant(it))?;
+        Some((*message, it.destination))
     }
 
     /// Drops the waiters of a component that is gone.
     pub(super) fn forget_source(&mut self, source: JausId) {
-        self.0.retain(|_, (of, _)| *of != source);
+        self.0.retain(|_, it| it.source != source);
     }
 
     /// Drops all waiters: no more outcomes will be known.

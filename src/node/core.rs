@@ -215,7 +215,7 @@ impl Core {
         message: Outgoing,
         waiter: Option<Waiter>,
     ) -> Result<MessageHandle, SendError> {
-        let (source, deadline) = (message.source, self.deadline());
+        let (ends, deadline) = ((message.source, message.destination), self.deadline());
         let urgent = message.priority > Priority::Standard;
         let now = now();
         let mut result = self
@@ -228,7 +228,7 @@ impl Core {
         }
         if let (Ok(handle), Some(waiter)) = (&result, waiter) {
             // The endpoint has the same limit.
-            let _ = self.awaiting.insert(*handle, source, waiter);
+            let _ = self.awaiting.insert(*handle, ends, waiter);
         }
         // The first message of a burst leaves at once, and so do urgent ones. The others leave
         // together in the driver's next turn, for which the first one woke it.
@@ -241,6 +241,19 @@ impl Core {
             self.wake_driver();
         }
         Ok(result?)
+    }
+
+    /// Cancels a message whose sender no longer waits for its outcome.
+    pub(super) fn cancel(&mut self, destination: JausId, message: MessageHandle) {
+        self.awaiting.remove(message);
+        self.endpoint.cancel(destination, message);
+    }
+
+    /// The same for a message that a component process knows by this handle of its own.
+    pub(super) fn cancel_of_process(&mut self, source: JausId, handle: u64) {
+        if let Some((message, destination)) = self.awaiting.of_process(source, handle) {
+            self.cancel(destination, message);
+        }
     }
 
     /// Starts to shut down; the driver completes it.

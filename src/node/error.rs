@@ -81,6 +81,10 @@ pub enum Undelivered {
     /// It was sent, but not or not completely acknowledged.
     #[error(transparent)]
     NotAcknowledged(#[from] Shortfall),
+    /// A newer setpoint or a stop for the same component was sent meanwhile. The message may have
+    /// arrived before.
+    #[error("a newer setpoint or a stop has superseded it")]
+    Superseded,
     /// The component or its node ended before the outcome was known. The message may have arrived.
     #[error("the node was lost before it reported the delivery")]
     Lost,

@@ -237,6 +237,7 @@ mod tests {
             priority,
             broadcast: Broadcast::None,
             payload: Bytes::from_static(b"12345678"),
+            sequence: None,
             path: None,
         }
     }

@@ -218,15 +218,25 @@ impl Sender {
     }
 
     /// Sends a message with acknowledgement, and waits for it. Dropping the future cancels the
-    /// wait; the message may still arrive.
+    /// message: it is not sent any more, neither for the first time nor again, and so reaches no
+    /// component that attaches under the destination's id later. Copies that are already on the
+    /// way may still arrive.
     ///
     /// # Errors
     /// [`Undelivered`] tells what was not acknowledged, and why.
     pub async fn deliver(&self, mut message: Outgoing) -> Result<(), Undelivered> {
         message.acknowledge = true;
-        let (sender, outcome) = oneshot::channel();
-        self.transmit(message, Some(Waiter::Here(sender)))?;
-        outcome.await.unwrap_or(Err(Undelivered::Lost))
+        let destination = message.destination;
+        let (waiter, outcome) = oneshot::channel();
+        let message = self.transmit(message, Some(Waiter::Here(waiter)))?;
+        let mut delivery = Delivery {
+            sender: self,
+            destination,
+            message: Some(message),
+        };
+        let outcome = outcome.await;
+        delivery.message = None;
+        outcome.unwrap_or(Err(Undelivered::Lost))
     }
 
     /// Waits until all messages sent so far are written to the connection to the host's node, or it
@@ -267,6 +277,26 @@ impl Sender {
         match &self.way {
             Attachment::Here(shared) => shared.lock().send(message, waiter),
             Attachment::Host(client) => client.send(message, waiter),
+        }
+    }
+}
+
+/// A message whose outcome is awaited. Dropped before the outcome, it is cancelled.
+struct Delivery<'a> {
+    sender: &'a Sender,
+    destination: JausId,
+    /// `None` once the outcome is known.
+    message: Option<MessageHandle>,
+}
+
+impl Drop for Delivery<'_> {
+    fn drop(&mut self) {
+        let Some(message) = self.message else {
+            return;
+        };
+        match &self.sender.way {
+            Attachment::Here(shared) => shared.lock().cancel(self.destination, message),
+            Attachment::Host(client) => client.cancel(message),
         }
     }
 }

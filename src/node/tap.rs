@@ -294,6 +294,7 @@ mod tests {
             priority: Priority::Standard,
             broadcast: crate::wire::Broadcast::None,
             payload: vec![0, 0, number].into(),
+            sequence: None,
             path: None,
         }
     }

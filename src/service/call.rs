@@ -107,7 +107,11 @@ impl<'a> Call<'a> {
         let Some(received) = self.permitted(may, M::NAME) else {
             return Ok(());
         };
-        match step(M::decode(&received.payload)?, self) {
+        let message = M::decode(&received.payload)?;
+        if moves && !self.admits(received) {
+            return Ok(());
+        }
+        match step(message, self) {
             Outcome::Handled => self.accepted |= moves,
             outcome => {
                 let source = received.source;
@@ -129,11 +133,22 @@ impl<'a> Call<'a> {
         let Some(received) = self.permitted(may, name) else {
             return;
         };
+        if validity.is_some() && !self.admits(received) {
+            return;
+        }
         if let Some(validity) = validity {
             self.set_validity(validity);
             self.accepted = true;
         }
         handle(received, &mut self.context);
+    }
+
+    /// Whether a setpoint is in its sender's order.
+    fn admits(&mut self, received: &Received) -> bool {
+        let code = super::code_of(&received.payload).unwrap_or_default();
+        let now = self.now;
+        self.context
+            .admits_setpoint(now, received, Validity::of(code))
     }
 
     /// The message, if its sender may send it.

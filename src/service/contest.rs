@@ -124,6 +124,7 @@ fn request(source: JausId, hex: &str) -> Received {
         priority: Priority::Standard,
         broadcast: Broadcast::Global,
         payload: octets(hex),
+        sequence: None,
         path: None,
     }
 }

@@ -7,7 +7,8 @@ use std::time::{Instant, SystemTime};
 use bytes::Bytes;
 
 use super::life::Life;
-use super::{Controller, Outbox, Publication, Standing, StopCause};
+use super::order::SendOrder;
+use super::{Controller, Outbox, Publication, Standing, StopCause, Validity};
 use crate::address::JausId;
 use crate::codec::{Message, Query, Report};
 use crate::endpoint::Received;
@@ -33,6 +34,7 @@ pub struct Context<'a> {
     out: &'a mut Outbox,
     standing: &'a Standing,
     life: &'a Life,
+    order: &'a mut SendOrder,
     news: &'a mut News,
 }
 
@@ -41,12 +43,14 @@ impl<'a> Context<'a> {
         out: &'a mut Outbox,
         standing: &'a Standing,
         life: &'a Life,
+        order: &'a mut SendOrder,
         news: &'a mut News,
     ) -> Self {
         Self {
             out,
             standing,
             life,
+            order,
             news,
         }
     }
@@ -57,6 +61,7 @@ impl<'a> Context<'a> {
             out: self.out,
             standing: self.standing,
             life: self.life,
+            order: self.order,
             news: self.news,
         }
     }
@@ -78,6 +83,29 @@ impl<'a> Context<'a> {
     #[must_use]
     pub fn last_sign(&self, client: JausId) -> Option<Instant> {
         self.life.last_sign(client)
+    }
+
+    /// Whether a setpoint is newer, by its sender's sequence numbers, than the sender's last one of its
+    /// kind and than its last stop. If so it counts as the newest one from now on. If not
+    /// it must not move anything: it is a late retransmission or was overtaken. Such setpoints are
+    /// counted ([`Stack::refused_setpoints`](super::Stack::refused_setpoints)).
+    ///
+    /// Call this once for each setpoint whose sender may command. [`Handlers`](super::Handlers) do
+    /// it for their commands.
+    pub fn admits_setpoint(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        validity: Validity,
+    ) -> bool {
+        self.order.admits(now, message, validity)
+    }
+
+    /// Notes a message of the service that stops what setpoints have started, such as Stop Mission:
+    /// setpoints that its sender has sent before are no longer
+    /// [admitted](Self::admits_setpoint). The stops of the core services are noted already.
+    pub fn note_stop(&mut self, now: Instant, message: &Received) {
+        self.order.note_stop(now, message);
     }
 
     /// Reports a fault. A component with Management goes to

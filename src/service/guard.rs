@@ -9,7 +9,8 @@
 //! | vector ([`Validity::WhileAlive`]) | its owner has shown no life for 1 s |
 //! | goal ([`Validity::UntilDone`]) | it is reached |
 //!
-//! A setpoint also ends when another one replaces it, and on every [`StopCause`].
+//! A setpoint also ends when another one replaces it, and on every [`StopCause`]. A setpoint that is
+//! older than that, by its sender's order, [is not admitted](super::Context::admits_setpoint).
 //! [`Handlers`](super::Handlers) and the vehicle services of the crate `jaus-vehicle` have a guard
 //! each. The [`Stack`](super::Stack) reports changes of the component's state and control to it.
 

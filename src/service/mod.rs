@@ -41,6 +41,7 @@ mod list;
 mod liveness;
 #[cfg(test)]
 mod machines;
+mod order;
 mod outbox;
 mod publication;
 #[cfg(any(test, feature = "arbitrary"))]
@@ -86,6 +87,8 @@ pub use inquiries::{Inquiry, NoAnswer, Patience, QueryOptions};
 pub use life::{Life, Rank};
 pub use list::{ElementList, Elements, ListManager};
 pub use liveness::Liveness;
+#[cfg(feature = "node")]
+pub(crate) use order::{is_stop, series_of};
 pub use outbox::Outbox;
 pub use publication::{NotPublished, Publication};
 pub use safety::UnsafeService;

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use super::context::News;
 use super::life::{Life, Rank};
+use super::order::SendOrder;
 use super::{Context, Controller, Handled, Outbox, Service, Standing, State, StopCause};
 use crate::address::JausId;
 use crate::codec::Message;
@@ -31,6 +32,7 @@ pub struct Rig {
     /// Whether [`CLIENT`] shows life at each wake-up.
     pub client_lives: bool,
     life: Life,
+    order: SendOrder,
     standing: Standing,
     out: Outbox,
 }
@@ -48,6 +50,7 @@ impl Rig {
             news: News::default(),
             client_lives: true,
             life: Life::default(),
+            order: SendOrder::default(),
             standing: Standing::default(),
             out: Outbox::new(JausId::new(101, 1, 1)),
         };
@@ -68,8 +71,13 @@ impl Rig {
             },
         );
         for service in &mut self.services {
-            let mut context =
-                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
+            let mut context = Context::new(
+                &mut self.out,
+                &self.standing,
+                &self.life,
+                &mut self.order,
+                &mut self.news,
+            );
             if let Some(cause) = StopCause::of(&before, &self.standing) {
                 service.handle_stop(&cause, &mut context);
             }
@@ -79,18 +87,34 @@ impl Rig {
 
     /// Passes a message to the first service that handles it; returns whether one did.
     pub fn send<M: Message>(&mut self, source: JausId, message: &M) -> bool {
+        self.send_as(None, source, message)
+    }
+
+    /// The same with the sender's sequence number.
+    pub fn send_as<M: Message>(
+        &mut self,
+        sequence: Option<u16>,
+        source: JausId,
+        message: &M,
+    ) -> bool {
         let received = Received {
             source,
             destination: self.out.source(),
             priority: Priority::Standard,
             broadcast: Broadcast::None,
             payload: message.encode().unwrap(),
+            sequence,
             path: None,
             to: self.out.source(),
         };
         self.services.iter_mut().any(|service| {
-            let mut context =
-                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
+            let mut context = Context::new(
+                &mut self.out,
+                &self.standing,
+                &self.life,
+                &mut self.order,
+                &mut self.news,
+            );
             service.handle_message(self.now, &received, &mut context) == Handled::Yes
         })
     }
@@ -148,8 +172,13 @@ impl Rig {
             self.life.hear(self.now, CLIENT, &bytes::Bytes::new());
         }
         for service in &mut self.services {
-            let mut context =
-                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
+            let mut context = Context::new(
+                &mut self.out,
+                &self.standing,
+                &self.life,
+                &mut self.order,
+                &mut self.news,
+            );
             service.handle_timeout(self.now, &mut context);
         }
     }

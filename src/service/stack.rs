@@ -15,6 +15,7 @@ use super::control::{AccessControl, Control, Management};
 use super::events::{CommandTrial, EventSettings, Events, Outcome, Refusal};
 use super::inquiries::Inquiries;
 use super::life::{Life, Rank};
+use super::order::{SendOrder, is_stop};
 use super::{
     Change, Context, ControlId, ControlNews, Directory, Discovery, Handled, Incarnation, Inquiry,
     NoAnswer, NotPublished, Outbox, Publication, Service, SessionId, SessionState, Standing,
@@ -38,6 +39,8 @@ pub struct Stack {
     standing: Standing,
     /// Liveness of the clients that matter.
     life: Life,
+    /// The order in which clients have sent setpoints and stops.
+    order: SendOrder,
     /// The client in control whose death would go undetected, once a warning about it was logged.
     mute: Option<JausId>,
     faults: Faults,
@@ -88,6 +91,7 @@ impl Stack {
             control: Control::default(),
             standing: Standing::default(),
             life: Life::new(incarnation),
+            order: SendOrder::default(),
             mute: None,
             faults: Faults::default(),
             called: None,
@@ -173,6 +177,12 @@ impl Stack {
         &self.standing
     }
 
+    /// How many setpoints were refused because their senders had superseded them.
+    #[must_use]
+    pub const fn refused_setpoints(&self) -> u64 {
+        self.order.refused()
+    }
+
     /// Reports, for the application, that the answer to the query with this code has changed.
     pub fn announce(&mut self, now: Instant, query: u16) {
         self.news.changed.insert(query);
@@ -192,10 +202,10 @@ impl Stack {
     }
 
     fn pass_on(&mut self, publication: &Publication) -> Result<(), NotPublished> {
-        let (out, standing, life, news) =
-            (&mut self.out, &self.standing, &self.life, &mut self.news);
+        let (out, standing, life) = (&mut self.out, &self.standing, &self.life);
+        let (order, news) = (&mut self.order, &mut self.news);
         let is_taken = self.services.iter_mut().any(|service| {
-            let mut context = Context::new(out, standing, life, news);
+            let mut context = Context::new(out, standing, life, order, news);
             service.handle_publication(publication, &mut context) == Handled::Yes
         });
         is_taken.then_some(()).ok_or_else(|| publication.refused())
@@ -248,6 +258,9 @@ impl Stack {
     }
 
     fn handle_control(&mut self, now: Instant, message: &Received) -> Handled {
+        if is_stop(&message.payload) && self.control.standing().obeys(message.source) {
+            self.order.note_stop(now, message);
+        }
         let is_alive = |client| self.life.is_alive(now, client);
         let control = &mut self.control;
         let handled = control.handle_message(now, message, is_alive, &mut self.out);
@@ -274,10 +287,10 @@ impl Stack {
     }
 
     fn handle_by_services(&mut self, now: Instant, message: &Received) -> Handled {
-        let (out, standing, life, news) =
-            (&mut self.out, &self.standing, &self.life, &mut self.news);
+        let (out, standing, life) = (&mut self.out, &self.standing, &self.life);
+        let (order, news) = (&mut self.order, &mut self.news);
         let handled = self.services.iter_mut().any(|service| {
-            let mut context = Context::new(out, standing, life, news);
+            let mut context = Context::new(out, standing, life, order, news);
             service.handle_message(now, message, &mut context) == Handled::Yes
         });
         if handled { Handled::Yes } else { Handled::No }
@@ -328,6 +341,7 @@ impl Stack {
             priority: Priority::Standard,
             broadcast: Broadcast::None,
             payload: query.clone(),
+            sequence: None,
             path: None,
         };
         // Messages sent meanwhile are the answer and are not transmitted. A query changes nothing.
@@ -409,8 +423,13 @@ impl Stack {
         let withdrawn: Vec<_> = self.services.extract_if(.., is_meant).collect();
         let is_any = !withdrawn.is_empty();
         for mut service in withdrawn {
-            let mut context =
-                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
+            let mut context = Context::new(
+                &mut self.out,
+                &self.standing,
+                &self.life,
+                &mut self.order,
+                &mut self.news,
+            );
             service.handle_stop(&StopCause::Ended, &mut context);
         }
         self.publish_offers(now);
@@ -471,8 +490,13 @@ impl Stack {
         self.probe(now);
         self.subscribers.expire(now, &mut self.out);
         for service in &mut self.services {
-            let mut context =
-                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
+            let mut context = Context::new(
+                &mut self.out,
+                &self.standing,
+                &self.life,
+                &mut self.order,
+                &mut self.news,
+            );
             service.handle_timeout(now, &mut context);
         }
         self.inquiries.handle_timeout(now, &mut self.out);
@@ -532,8 +556,13 @@ impl Stack {
             self.stop(&cause);
         }
         for service in &mut self.services {
-            let mut context =
-                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
+            let mut context = Context::new(
+                &mut self.out,
+                &self.standing,
+                &self.life,
+                &mut self.order,
+                &mut self.news,
+            );
             service.handle_standing(now, &before, &mut context);
         }
         self.events.push_back(Event::Standing(after));

@@ -63,6 +63,7 @@ impl StackRig {
             priority: Priority::Standard,
             broadcast: Broadcast::None,
             payload: message.encode().unwrap(),
+            sequence: None,
             path,
         };
         self.stack.handle_message(self.now, &received);

@@ -19,4 +19,5 @@ mod requests;
 mod servers;
 #[path = "../support/streams.rs"]
 mod streams;
+mod superseded;
 mod undecoded;

@@ -1,9 +1,11 @@
 //! Whole nodes with real sockets on the loopback interface: unicast, both broadcast scopes,
 //! acknowledgement, components that do not read, and shutdown. Needs no network.
 
+use std::time::Duration;
+
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{Event, Outgoing, Received, Shortfall, Unacknowledged};
+use jaus::endpoint::{Counter, Event, Outgoing, Received, Shortfall, Unacknowledged};
 use jaus::link::Group;
 use jaus::node::{Config, Events, MailboxLimits, Node, Port, StartError};
 use jaus::wire::{Broadcast, Priority};
@@ -360,4 +362,35 @@ async fn a_node_that_cannot_start_says_why() {
 fn a_node_outside_of_a_runtime_says_what_it_needs() {
     let error = Node::start(Config::loopback(101, 1)).unwrap_err();
     assert!(matches!(error, StartError::NoRuntime), "{error}");
+}
+
+/// Sends a message that is not acknowledged, because its receiver has left, and drops the future.
+/// Returns the receiver's successor under its id after the time in which the message would have been
+/// retransmitted.
+async fn give_up_waiting(sender: &Port, node: &Node, receiver: Port) -> Port {
+    let to_receiver = || to(sender, receiver.id(), QUERY_HEARTBEAT);
+    assert_eq!(within_limit(sender.deliver(to_receiver())).await, Ok(()));
+    let id = receiver.id();
+    drop(receiver);
+    let delivery = sender.deliver(to(sender, id, REPORT_HEARTBEAT));
+    tokio::time::timeout(Duration::from_millis(150), delivery)
+        .await
+        .expect_err("nobody acknowledges");
+    let successor = node.attach(id.component()).unwrap();
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    successor
+}
+
+#[tokio::test]
+async fn a_message_whose_sender_no_longer_waits_reaches_no_successor() {
+    let group = own_group();
+    let (a, b) = (start(101, 1, group), start(102, 1, group));
+    let (driver, console) = (a.attach(33).unwrap(), b.attach(1).unwrap());
+    let mut successor = give_up_waiting(&console, &a, driver).await;
+    assert_eq!(successor.try_recv(), None);
+    assert_eq!(b.counters().get(Counter::MessagesCancelled), 1);
+    console
+        .send(to(&console, successor.id(), QUERY_HEARTBEAT))
+        .unwrap();
+    assert_eq!(receive(&mut successor).await.payload, QUERY_HEARTBEAT);
 }

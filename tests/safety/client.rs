@@ -85,6 +85,13 @@ impl Client {
         self.queue.extend(commands::motion(self.driver));
     }
 
+    /// Takes control and makes the vehicle ready.
+    pub(crate) fn make_ready(&mut self, now: Instant) {
+        self.take_control(now);
+        self.queue.push_back(commands::encode(&Resume {}));
+        self.driver = Driver::Waypoint;
+    }
+
     /// Takes control without using it.
     pub(crate) fn take_control(&mut self, now: Instant) {
         self.wants = true;

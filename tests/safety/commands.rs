@@ -68,6 +68,14 @@ pub(crate) fn encode<M: Message>(message: &M) -> Bytes {
     message.encode().expect("small numbers")
 }
 
+/// The effort that stops the vehicle.
+pub(crate) fn stop() -> Bytes {
+    let mut effort = SetWrenchEffort::default();
+    let set = effort.set_propulsive_linear_effort_x_percent(0.0);
+    set.expect("a percentage");
+    encode(&effort)
+}
+
 fn effort() -> SetWrenchEffort {
     let mut effort = SetWrenchEffort::default();
     let set = effort.set_propulsive_linear_effort_x_percent(60.0);

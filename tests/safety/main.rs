@@ -30,6 +30,7 @@ mod cell;
 mod client;
 mod commands;
 mod gateway;
+mod order;
 mod plant;
 mod positioning;
 #[path = "../sim/mod.rs"]

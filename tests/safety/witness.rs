@@ -23,6 +23,8 @@ pub(crate) struct Witness {
     pub(crate) last_message: Option<Instant>,
     /// When the vehicle received its last setpoint.
     pub(crate) last_setpoint: Option<Instant>,
+    /// When the vehicle first received [the effort that stops it](commands::stop).
+    pub(crate) last_stop: Option<Instant>,
     /// When the vehicle received its last Request Control.
     pub(crate) last_request: Option<Instant>,
     /// Whether the controller was in control at the last observation.
@@ -42,6 +44,7 @@ impl Witness {
             counts: true,
             last_message: None,
             last_setpoint: None,
+            last_stop: None,
             last_request: None,
             is_held: false,
             freed: None,
@@ -59,6 +62,10 @@ impl Witness {
             return;
         }
         self.last_message = Some(now);
+        if message.payload == commands::stop() {
+            self.last_stop.get_or_insert(now);
+            return;
+        }
         let code = message.payload.get(..2);
         if code == Some(&self.setpoint) {
             self.last_setpoint = Some(now);

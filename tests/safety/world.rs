@@ -4,7 +4,7 @@
 use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Endpoint, Outgoing};
+use jaus::endpoint::{Config, Endpoint, MessageHandle, Outgoing};
 use jaus::messages::core::{
     QueryHeartbeatPulse, ReportIdentification, report_identification::QueryType,
 };
@@ -55,6 +55,8 @@ pub(crate) struct World {
     pub(crate) crowd: Host,
     crowd_size: usize,
     seed: u64,
+    /// The controller's last message that it has sent by hand, with acknowledgement.
+    pub(crate) last_delivery: Option<MessageHandle>,
 }
 
 impl Vehicle {
@@ -218,6 +220,7 @@ impl World {
             crowd,
             crowd_size: 0,
             seed,
+            last_delivery: None,
         }
     }
 

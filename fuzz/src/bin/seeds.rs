@@ -144,6 +144,7 @@ fn node() -> Vec<u8> {
         flags: Flags::default(),
         source: JausId::new(42, 1, 1),
         destination: id,
+        sequence: 7,
         path: Some(Path { link, peer }),
     };
     let unacknowledged = Outcome::NotAcknowledged(Shortfall {

@@ -63,7 +63,7 @@ impl Component {
 
     /// Sends a message to each member of an audience, with retransmission until it is acknowledged
     /// or times out. Returns the result for each member. Dropping the future cancels the
-    /// retransmission; the message may still arrive.
+    /// messages that are not acknowledged; a copy that is already on the way may still arrive.
     ///
     /// Members that are found meanwhile do not get it.
     pub async fn deliver_all<M: Message>(

@@ -473,8 +473,8 @@ impl Flow {
         self.outcomes.push_back((message, pending, given_up));
     }
 
-    /// Removes a message and its packets in flight.
-    fn remove(&mut self, message: MessageHandle) -> Option<PendingMessage> {
+    /// Removes a message and its packets in flight. What is left of it in the queues is skipped.
+    pub(super) fn remove(&mut self, message: MessageHandle) -> Option<PendingMessage> {
         let pending = self.pending_messages.remove(&message)?;
         if let Some(started) = &pending.started
             && started.missing > 0

@@ -192,6 +192,17 @@ impl Deliveries {
         Some(outcome)
     }
 
+    /// Drops a message whose outcome is open; returns whether there was one.
+    fn cancel(&mut self, destination: JausId, message: MessageHandle) -> bool {
+        let flow = self.flows.get_mut(&destination);
+        let Some(pending) = flow.and_then(|flow| flow.remove(message)) else {
+            return false;
+        };
+        self.settle(pending.whole.payload.len());
+        self.touch(destination);
+        true
+    }
+
     /// Drops the messages of a detached component; returns how many.
     pub(super) fn forget_source(&mut self, source: JausId) -> u64 {
         let before = self.messages;
@@ -213,6 +224,21 @@ impl Endpoint {
     #[must_use]
     pub fn flow(&self, destination: JausId) -> Option<FlowStatus> {
         self.deliveries.flows.get(&destination).map(Flow::status)
+    }
+
+    /// Cancels a message that waits for its acknowledgement: from now on it is neither sent nor
+    /// retransmitted, in whole or in part, and its outcome is not reported. Copies that were sent
+    /// may still arrive. Returns whether it was waiting.
+    ///
+    /// Receivers do not notice the gap in the sequence numbers: AS5669A orders nothing by them.
+    /// Junior, JAUS++ and this endpoint use them to recognise duplicates and to put fragments
+    /// together, and drop the fragments of a message that stays incomplete when they get too old.
+    pub fn cancel(&mut self, destination: JausId, message: MessageHandle) -> bool {
+        let is_cancelled = self.deliveries.cancel(destination, message);
+        if is_cancelled {
+            self.counters.add(Counter::MessagesCancelled);
+        }
+        is_cancelled
     }
 
     /// Queues a message that wants an acknowledgement, or a large one for an unknown address.

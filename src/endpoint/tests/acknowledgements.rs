@@ -85,6 +85,17 @@ fn a_request_to_a_busy_component_is_left_alone_until_it_has_room() {
 }
 
 #[test]
+fn a_repeated_request_is_acknowledged_although_the_mailbox_is_full_by_now() {
+    let mut rig = Rig::new();
+    rig.hear(&request());
+    rig.inbox.full.push(US);
+    rig.pass(Duration::from_millis(105));
+    rig.hear(&request());
+    assert_eq!((rig.sent().len(), rig.received().len()), (2, 1));
+    assert_eq!(rig.count(Counter::ReceiverBusy), 0);
+}
+
+#[test]
 fn a_request_to_many_is_not_acknowledged() {
     let mut rig = Rig::new();
     rig.hear(&Frame {

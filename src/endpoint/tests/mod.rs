@@ -5,6 +5,7 @@ mod acknowledgements;
 mod anything;
 mod bounds;
 mod budget;
+mod cancelling;
 mod delivery;
 mod duplicates;
 mod flood;

@@ -24,6 +24,7 @@ fn a_message_is_delivered_with_all_that_its_header_says() {
             priority: Priority::High,
             broadcast: Broadcast::None,
             payload: Bytes::from_static(QUERY_IDENTIFICATION),
+            sequence: Some(1),
             path: Some(path(PEER_HOST)),
             to: US,
         }]

@@ -183,6 +183,7 @@ mod tests {
             flags: Flags::default(),
             source: JausId::new(1, 1, 1),
             destination: JausId::new(1, 1, 2),
+            sequence: 7,
             path: None,
         };
         let payload = Bytes::from(vec![7; 1 << 20]);

@@ -9,9 +9,10 @@
 //! | 1 | Hello | `JAUS`, version u8, 01h, id u32 | the component's name |
 //! | 2 | Send | flags u8, handle u64, destination u32 | the message |
 //! | 3 | Leave | | |
+//! | 4 | Cancel | handle u64 | |
 //! | 17 | Welcome | id u32, longest message u32 | |
 //! | 18 | Refused | reason u8 | why |
-//! | 19 | Deliver | flags u8, source u32, destination u32, path | the message |
+//! | 19 | Deliver | flags u8, source u32, destination u32, sequence u16, path | the message |
 //! | 20 | Outcome | handle u64, outcome u8; if 1: destination u32, reason u8, acknowledged u32, length u32 | why |
 //! | 21 | Progress | source u32 | |
 //!
@@ -36,7 +37,7 @@ use crate::endpoint::{LinkId, Path, Remote, SessionId, Shortfall};
 use crate::wire::Flags;
 
 /// The version of the format.
-pub const VERSION: u8 = 4;
+pub const VERSION: u8 = 5;
 /// Octets of the length field before each record.
 pub const LENGTH: usize = 4;
 /// The longest message that a record carries, in octets.
@@ -90,6 +91,12 @@ pub enum Head {
     /// The component leaves on purpose.
     #[deku(id = 3)]
     Leave,
+    /// The component no longer waits for the outcome of a message: it must not be sent any more.
+    #[deku(id = 4)]
+    Cancel {
+        /// The component's handle for it.
+        handle: u64,
+    },
     /// The node has attached the component.
     #[deku(id = 17)]
     Welcome {
@@ -111,6 +118,8 @@ pub enum Head {
         source: JausId,
         /// Its destination, as given by the sender.
         destination: JausId,
+        /// The sender's sequence number; 0 from a component of the same node.
+        sequence: u16,
         /// The path on which it arrived; `None` from a component of the same node.
         #[deku(
             reader = "read_path(deku::reader)",

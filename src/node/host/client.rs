@@ -105,8 +105,9 @@ impl Client {
         self.check(&inner, &message)?;
         inner.sent += 1;
         let handle = inner.sent;
+        let ends = (self.id, message.destination);
         if let Some(waiter) = waiter
-            && !inner.awaited.insert(MessageHandle(handle), self.id, waiter)
+            && !inner.awaited.insert(MessageHandle(handle), ends, waiter)
         {
             let limit = MAX_AWAITED;
             return Err(endpoint::SendError::TooManyUnacknowledged { limit }.into());
@@ -126,6 +127,16 @@ impl Client {
             self.emptied.notify_waiters();
         }
         Ok(MessageHandle(handle))
+    }
+
+    /// Cancels a message whose sender no longer waits for its outcome.
+    pub(in super::super) fn cancel(&self, message: MessageHandle) {
+        let mut inner = self.lock();
+        // Without an entry the outcome is known, or the node that had the message is lost.
+        if inner.awaited.remove(message).is_some() {
+            let handle = message.0;
+            inner.writer.send_now(&Head::Cancel { handle }.into());
+        }
     }
 
     /// Checks a message without asking the node.
@@ -307,6 +318,7 @@ impl Client {
                 flags,
                 source,
                 destination,
+                sequence,
                 path,
             } => {
                 self.mailbox.deliver(Received {
@@ -314,6 +326,8 @@ impl Client {
                     destination,
                     priority: flags.priority(),
                     broadcast: flags.broadcast().unwrap_or_default(),
+                    // Components of one node have no numbers, and no path either.
+                    sequence: path.map(|_| sequence),
                     payload: record.payload,
                     path,
                     to: self.id,

@@ -139,9 +139,37 @@ impl Session {
     }
 
     /// Handles the records read so far; returns whether the component leaves.
+    ///
+    /// A message that is cancelled further on is not sent at all: a node that did not run for a
+    /// while must not send late commands that nobody waits for.
     fn handle_records(&self, reader: &mut Reader) -> Result<bool, RecordError> {
+        let mut records = Vec::new();
+        let end = loop {
+            match reader.next_record() {
+                Ok(Some(Record {
+                    head: Head::Cancel { handle },
+                    payload,
+                })) => match records.iter().position(|it| is_sent_as(it, handle)) {
+                    Some(place) => drop(records.remove(place)),
+                    None => records.push(Record {
+                        head: Head::Cancel { handle },
+                        payload,
+                    }),
+                },
+                Ok(Some(record)) => records.push(record),
+                Ok(None) => break Ok(false),
+                Err(error) => break Err(error),
+            }
+        };
+        match self.handle_all(records)? {
+            true => Ok(true),
+            false => end,
+        }
+    }
+
+    fn handle_all(&self, records: Vec<Record>) -> Result<bool, RecordError> {
         let mut core = None;
-        while let Some(Record { head, payload }) = reader.next_record()? {
+        for Record { head, payload } in records {
             match head {
                 Head::Send {
                     flags,
@@ -165,6 +193,10 @@ impl Session {
                         self.answers.send(handle, Err(error.into()));
                     }
                 }
+                Head::Cancel { handle } => {
+                    let core = core.get_or_insert_with(|| self.shared.lock());
+                    core.cancel_of_process(self.id, handle);
+                }
                 Head::Leave => return Ok(true),
                 _ => return Err(RecordError::Unexpected),
             }
@@ -180,12 +212,18 @@ impl Drop for Session {
     }
 }
 
+/// Whether a record is the message that its component knows by this handle.
+fn is_sent_as(record: &Record, wanted: u64) -> bool {
+    matches!(record.head, Head::Send { handle, .. } if handle == wanted)
+}
+
 fn delivery(message: Received) -> Record {
     Record {
         head: Head::Deliver {
             flags: Flags::new(message.priority).with_broadcast(message.broadcast),
             source: message.source,
             destination: message.destination,
+            sequence: message.sequence.unwrap_or_default(),
             path: message.path,
         },
         payload: message.payload,

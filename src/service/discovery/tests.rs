@@ -66,6 +66,7 @@ impl Rig {
             priority: Priority::Standard,
             broadcast: Broadcast::None,
             payload: message.encode().unwrap(),
+            sequence: None,
             path: Some(Path { link, peer }),
         };
         let mut out = Outbox::new(US);
@@ -422,6 +423,7 @@ fn what_one_component_of_a_node_learns_the_others_know_also_when_it_is_gone() {
         priority: Priority::Standard,
         broadcast: Broadcast::None,
         payload: query(2).encode().unwrap(),
+        sequence: None,
         path: None,
     };
     let mut out = Outbox::new(US);

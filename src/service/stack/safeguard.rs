@@ -64,8 +64,13 @@ impl Stack {
     /// Stops everything that the services move.
     pub fn stop(&mut self, cause: &StopCause) {
         for service in &mut self.services {
-            let mut context =
-                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
+            let mut context = Context::new(
+                &mut self.out,
+                &self.standing,
+                &self.life,
+                &mut self.order,
+                &mut self.news,
+            );
             service.handle_stop(cause, &mut context);
         }
     }
@@ -204,8 +209,13 @@ impl Drop for Stack {
     /// However a component ends, including by a panic in one of its functions, its motion stops.
     fn drop(&mut self) {
         for service in &mut self.services {
-            let mut context =
-                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
+            let mut context = Context::new(
+                &mut self.out,
+                &self.standing,
+                &self.life,
+                &mut self.order,
+                &mut self.news,
+            );
             // A panic in one stop action must not skip the next ones, nor may a panic during a
             // panic end the process before the last one.
             let stop = || service.handle_stop(&StopCause::Ended, &mut context);

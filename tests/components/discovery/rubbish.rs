@@ -39,6 +39,7 @@ fn message() -> impl Strategy<Value = Received> {
                     Broadcast::None
                 },
                 payload: Bytes::from(payload),
+                sequence: None,
                 path: None,
                 to: OWN,
             }

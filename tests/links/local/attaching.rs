@@ -1,13 +1,18 @@
 //! A component on the host's node behaves like one in the node's own process.
 
+use std::pin::pin;
 use std::task::{Context, Waker};
+use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::component::{Component, Kind, Level};
-use jaus::endpoint::Outgoing;
-use jaus::node::{ComponentEvent, Departure, HostError, HostEvent, SendError, Undelivered};
+use jaus::endpoint::{Counter, Outgoing};
+use jaus::node::{
+    ComponentEvent, Config, Departure, HostError, HostEvent, Node, SendError, Undelivered,
+};
 use jaus::wire::{Broadcast, Priority};
+use jaus_test_kit::group::own_group;
 use jaus_test_kit::waiting::{until, within_limit};
 
 use crate::local::place::{Place, component_event, message, receive};
@@ -49,7 +54,7 @@ async fn two_component_processes_talk_through_their_node_also_in_large_messages(
     let mut config = place.config();
     config.max_message = 16 << 20;
     config.mailbox.octets = 40 << 20;
-    let _node = jaus::node::Node::start(config).unwrap();
+    let _node = Node::start(config).unwrap();
     let mut one = place.host().attach(1).await.unwrap();
     let mut two = place.host().attach(2).await.unwrap();
     for length in [0, 1, 4000, 8190, 8192, 20_000, 100_000, (16 << 20) - 2] {
@@ -89,11 +94,73 @@ async fn a_sender_learns_whether_its_message_has_arrived() {
 }
 
 #[tokio::test]
+async fn a_message_whose_sender_no_longer_waits_is_not_sent_again() {
+    let place = Place::new();
+    let group = own_group();
+    let node = Node::start(Config::loopback(101, 1).group(group).local(place.address())).unwrap();
+    let other = Node::start(Config::loopback(102, 1).group(group)).unwrap();
+    let there = place.host().attach(33).await.unwrap();
+    let receiver = other.attach(1).unwrap();
+    let id = receiver.id();
+    assert_eq!(
+        within_limit(there.deliver(message(&there, id, b"1"))).await,
+        Ok(())
+    );
+    drop(receiver);
+    let delivery = there.deliver(message(&there, id, b"2"));
+    tokio::time::timeout(Duration::from_millis(150), delivery)
+        .await
+        .expect_err("nobody acknowledges");
+    let mut successor = other.attach(1).unwrap();
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    assert_eq!(successor.try_recv(), None);
+    assert_eq!(node.counters().get(Counter::MessagesCancelled), 1);
+    there.send(message(&there, id, b"3")).unwrap();
+    assert_eq!(receive(&mut successor).await.payload[2..], *b"3");
+}
+
+#[tokio::test]
+async fn what_was_cancelled_while_the_node_did_not_run_is_not_sent_at_all() {
+    let place = Place::new();
+    let node = place.node();
+    let mut receiver = node.attach(1).unwrap();
+    let there = place.host().attach(33).await.unwrap();
+    {
+        // On a runtime of one thread the node runs only when this task waits.
+        let mut delivery = pin!(there.deliver(message(&there, receiver.id(), b"2")));
+        let mut cx = Context::from_waker(Waker::noop());
+        assert!(delivery.as_mut().poll(&mut cx).is_pending());
+    }
+    there.send(message(&there, receiver.id(), b"3")).unwrap();
+    assert_eq!(receive(&mut receiver).await.payload[2..], *b"3");
+}
+
+#[tokio::test]
+async fn a_component_process_gets_the_numbers_of_the_senders_on_other_nodes() {
+    let place = Place::new();
+    let group = own_group();
+    let node = Node::start(Config::loopback(101, 1).group(group).local(place.address())).unwrap();
+    let other = Node::start(Config::loopback(102, 1).group(group)).unwrap();
+    let mut there = place.host().attach(33).await.unwrap();
+    let (away, here) = (other.attach(1).unwrap(), node.attach(1).unwrap());
+    let mut numbers = Vec::new();
+    for _ in 0..2 {
+        let sent = away.deliver(message(&away, there.id(), b"x"));
+        assert_eq!(within_limit(sent).await, Ok(()));
+        numbers.push(receive(&mut there).await.sequence.unwrap());
+    }
+    let step = numbers[1].wrapping_sub(numbers[0]);
+    assert!((1..10).contains(&step), "{numbers:?}");
+    here.send(message(&here, there.id(), b"x")).unwrap();
+    assert_eq!(receive(&mut there).await.sequence, None);
+}
+
+#[tokio::test]
 async fn what_cannot_be_sent_is_told_at_once_or_by_the_node() {
     let place = Place::new();
     let mut config = place.config();
     config.max_message = 500_000;
-    let _node = jaus::node::Node::start(config).unwrap();
+    let _node = Node::start(config).unwrap();
     let port = place.host().attach(33).await.unwrap();
     let mut events = port.host_events();
     let to = JausId::new(101, 1, 1);

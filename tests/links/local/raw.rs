@@ -115,7 +115,7 @@ async fn a_node_of_an_older_release_is_named_as_the_reason() {
         let mut hello = [0; 15];
         stream.read_exact(&mut hello).unwrap();
         // A version 1 node reads up to here, sees another version, and refuses.
-        assert_eq!(hello[4..11], *b"\x01JAUS\x04\x01");
+        assert_eq!(hello[4..11], *b"\x01JAUS\x05\x01");
         assert_eq!(hello[11..], JausId::new(0, 0, 33).to_wire());
         stream.write_all(b"\x05\0\0\0\x12\x01old").unwrap();
     });

@@ -75,9 +75,16 @@ fn head() -> impl Strategy<Value = Head> {
         1 => Just(Head::Leave),
         1 => (id(), any::<u32>()).prop_map(|(id, max_message)| Head::Welcome { id, max_message }),
         1 => Just(Head::Refused(Reason::Taken)),
-        8 => (flags(), id(), id(), path()).prop_map(|(flags, source, destination, path)| {
-            Head::Deliver { flags, source, destination, path }
-        }),
+        1 => any::<u64>().prop_map(|handle| Head::Cancel { handle }),
+        8 => (flags(), id(), id(), any::<u16>(), path()).prop_map(
+            |(flags, source, destination, sequence, path)| Head::Deliver {
+                flags,
+                source,
+                destination,
+                sequence,
+                path,
+            }
+        ),
         1 => id().prop_map(|source| Head::Progress { source }),
         4 => (any::<u64>(), outcome())
             .prop_map(|(handle, outcome)| Head::Outcome { handle, outcome }),

@@ -321,7 +321,8 @@ impl Reader<'_> {
         let may_drive = self.visitor.may(UserRole::Drive);
         // Selecting is looking at another vehicle.
         let needs_less = request.is_stop() || matches!(request, OperatorRequest::Select { .. });
-        if !may_drive && !(needs_less && self.visitor.may(UserRole::Observe)) {
+        let may_ask = may_drive || (needs_less && self.visitor.may(UserRole::Observe));
+        if !may_ask {
             return reply(Err(self.why_not()));
         }
         let access = &self.shared.access;

@@ -239,7 +239,7 @@ impl Vehicle {
             OperatorRequest::Standby => self.set_ready(now, false, client, reply),
             OperatorRequest::TakeOver => self.take_over(client, reply),
             OperatorRequest::Destination { x, y, speed } => {
-                self.go_to((x, y), speed, client, reply)
+                self.go_to((x, y), speed, client, reply);
             }
             OperatorRequest::Approve { mission } => self.approve(now, mission, client, reply),
             OperatorRequest::Continue { mission } => {

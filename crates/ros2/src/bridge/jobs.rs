@@ -29,11 +29,8 @@ pub(super) enum Finished {
         peer: JausId,
         result: Result<Session, SessionError>,
     },
-    /// The driver received a velocity, or did not acknowledge it.
-    Driven {
-        velocity: Velocity,
-        is_acknowledged: bool,
-    },
+    /// The driver received a stop, or did not acknowledge it.
+    Halted { is_acknowledged: bool },
     /// The component that takes goals received an order, or not, for this reason.
     Ordered {
         order: Order,
@@ -64,10 +61,11 @@ pub(super) struct Jobs {
 struct Steering {
     velocity: Velocity,
     sent: Instant,
-    task: AbortHandle,
+    /// The delivery of a stop.
+    stop: Option<AbortHandle>,
 }
 
-/// A velocity without acknowledgement for this time is replaced by a newer one.
+/// A stop without acknowledgement for this time is sent anew.
 const STEERING_PATIENCE: Duration = Duration::from_millis(100);
 /// The same velocity is sent again after this time: at each beat.
 const REPETITION: Duration = Duration::from_millis(40);
@@ -97,7 +95,7 @@ impl Jobs {
                 // The end of a delivery of an earlier request says nothing about the last one.
                 Some(Ok(Finished::Alarmed { request, .. })) if request != self.request => {}
                 Some(Ok(finished)) => return finished,
-                // A velocity or an emergency replaced by a newer one.
+                // A stop or an emergency replaced by a newer one.
                 Some(Err(_)) => {}
                 None => std::future::pending().await,
             }
@@ -116,8 +114,8 @@ impl Jobs {
         });
     }
 
-    /// Sends a velocity to the driver, unless it is too early for it. The newest one counts: an older
-    /// one still on its way is dropped when it is late, and immediately if the vehicle has to stop.
+    /// Sends a velocity to the driver, unless it is too early for it. One that moves is not
+    /// acknowledged, because a retransmission would come after newer ones. A stop is.
     pub(super) fn steer(
         &mut self,
         now: Instant,
@@ -128,28 +126,39 @@ impl Jobs {
     ) {
         if let Some(last) = &self.steering {
             let since = now.saturating_duration_since(last.sent);
-            let is_underway = !last.task.is_finished();
+            let is_underway = last.stop.as_ref().is_some_and(|stop| !stop.is_finished());
             if !may_follow(last.velocity, since, is_underway, velocity) {
                 return;
             }
-            last.task.abort();
+            if let Some(stop) = &last.stop {
+                stop.abort();
+            }
         }
-        let session = Arc::clone(session);
-        let task = self.tasks.spawn(async move {
-            let is_acknowledged = match role {
-                Role::VelocityDriver => deliver(&session, velocity.command()).await,
-                _ => deliver(&session, velocity.effort(limits)).await,
+        let stop = if velocity == Velocity::ZERO {
+            let session = Arc::clone(session);
+            let halt = async move {
+                let is_acknowledged = match role {
+                    Role::VelocityDriver => deliver(&session, velocity.command()).await,
+                    _ => deliver(&session, velocity.effort(limits)).await,
+                }
+                .is_ok();
+                Finished::Halted { is_acknowledged }
+            };
+            Some(self.tasks.spawn(halt))
+        } else {
+            let sent = match role {
+                Role::VelocityDriver => send(session, velocity.command()),
+                _ => send(session, velocity.effort(limits)),
+            };
+            if let Err(error) = sent {
+                tracing::debug!(%error, "velocity not sent");
             }
-            .is_ok();
-            Finished::Driven {
-                velocity,
-                is_acknowledged,
-            }
-        });
+            None
+        };
         self.steering = Some(Steering {
             velocity,
             sent: now,
-            task,
+            stop,
         });
     }
 
@@ -248,6 +257,11 @@ async fn deliver<M: Message>(
     delivered.map_err(|error| error.to_string())
 }
 
+fn send<M: Message>(session: &Session, command: Result<M, OutOfRange>) -> Result<(), String> {
+    let command = command.map_err(|error| error.to_string())?;
+    session.send(&command).map_err(|error| error.to_string())
+}
+
 async fn follow(session: &Session, role: Role, order: Order, speed: f64) -> Result<(), String> {
     match (role, order) {
         (Role::Planner, Order::Go(goal)) => deliver(session, Ok(destination(goal, speed))).await,
@@ -300,9 +314,9 @@ mod tests {
             (at(1.0), ms(40), false, at(1.0), true),
             (at(1.0), ms(9), false, at(1.1), false),
             (at(1.0), ms(10), false, at(1.1), true),
-            (at(1.0), ms(99), true, at(1.1), false),
-            (at(1.0), ms(100), true, at(1.1), true),
-            (at(1.0), ms(0), true, Velocity::ZERO, true),
+            (Velocity::ZERO, ms(99), true, at(1.1), false),
+            (Velocity::ZERO, ms(100), true, at(1.1), true),
+            (at(1.0), ms(0), false, Velocity::ZERO, true),
             (Velocity::ZERO, ms(39), false, Velocity::ZERO, false),
         ] {
             let may = may_follow(last, since, is_underway, next);

@@ -298,11 +298,8 @@ impl Runner {
                 };
                 lease.handle_begun(peer, result);
             }
-            Finished::Driven {
-                velocity,
-                is_acknowledged,
-            } => {
-                if is_acknowledged && velocity == Velocity::ZERO {
+            Finished::Halted { is_acknowledged } => {
+                if is_acknowledged {
                     self.drive.handle_stopped();
                 }
             }

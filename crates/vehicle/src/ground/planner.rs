@@ -17,7 +17,7 @@ use jaus::address::JausId;
 use jaus::codec::{Message, ServiceId, Text};
 use jaus::endpoint::Received;
 use jaus::service::{
-    Context, Handled, Hazards, Service, Standing, State, StopCause, code_of, read,
+    Context, Handled, Hazards, Service, Standing, State, StopCause, Validity, code_of, read,
 };
 
 /// A planner's mission, shared by the service and the executor.
@@ -121,6 +121,11 @@ impl Service for MissionPlanner {
         context: &mut Context<'_>,
     ) -> Handled {
         match code_of(&message.payload) {
+            // In the order in which the client has sent them: a retransmitted destination must not
+            // start a mission that was stopped since.
+            Some(SetDestination::CODE)
+                if context.standing().acts_for(message.source)
+                    && !context.admits_setpoint(now, message, Validity::UntilDone) => {}
             Some(SetDestination::CODE) => self.command(message, context, |command, mission| {
                 let (destination, approved) = wanted(&command);
                 mission.go_to(now, destination, approved);
@@ -140,6 +145,7 @@ impl Service for MissionPlanner {
                 });
             }
             Some(StopMission::CODE) => {
+                context.note_stop(now, message);
                 let reason = format!("{} has stopped the mission", message.source);
                 self.command(message, context, |_: StopMission, mission| {
                     mission.stop(&reason);
@@ -478,6 +484,17 @@ mod tests {
         let report = bench.report();
         assert_eq!(report.stage, report_mission::Stage::STOPPED);
         assert_eq!(report.reason, "42.1.1 has stopped the mission");
+    }
+
+    #[test]
+    fn a_destination_from_before_the_stop_starts_nothing() {
+        let mut bench = Bench::new();
+        let destination = SetDestination::default();
+        bench.rig.send_as(Some(7), CLIENT, &StopMission {});
+        bench.rig.send_as(Some(6), CLIENT, &destination);
+        assert_eq!(bench.report().stage, report_mission::Stage::IDLE);
+        bench.rig.send_as(Some(8), CLIENT, &destination);
+        assert_ne!(bench.report().stage, report_mission::Stage::IDLE);
     }
 
     #[test]

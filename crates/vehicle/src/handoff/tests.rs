@@ -49,6 +49,7 @@ impl Rover {
             priority: Priority::Standard,
             broadcast: Broadcast::None,
             payload: message.encode().unwrap(),
+            sequence: None,
             path: None,
         };
         self.sent.clear();

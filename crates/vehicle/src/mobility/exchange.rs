@@ -7,7 +7,7 @@ use crate::motion::{Goal, Ticket};
 use jaus::address::JausId;
 use jaus::codec::{Message, OutOfRange, Query, Report};
 use jaus::endpoint::Received;
-use jaus::service::{Context, Standing, State, Validity, read};
+use jaus::service::{Context, Standing, State, Validity, code_of, read};
 
 /// A command from the client in control.
 pub(super) struct Command<M> {
@@ -67,15 +67,25 @@ impl Exchange<'_, '_> {
 
     /// Reads a command from the client in control. In standby the command is stored and reported
     /// but never moves the vehicle, not even later. The judges of the public contests check this.
-    pub(super) fn command<M: Message>(&self) -> Option<Command<M>> {
+    pub(super) fn command<M: Message>(&mut self) -> Option<Command<M>> {
         let may = |standing: &Standing, client| match standing.state {
             State::Ready | State::Standby => standing.obeys(client),
             _ => false,
         };
         let message = self.read_if(may)?;
+        if !self.is_in_order() {
+            return None;
+        }
         let is_ready = self.context.standing().acts_for(self.message.source);
         let acts = is_ready && !self.controls.is_in_trouble();
         Some(Command { message, acts })
+    }
+
+    /// Whether the setpoint is newer than its sender's last one and than its last stop.
+    pub(super) fn is_in_order(&mut self) -> bool {
+        let validity = code_of(&self.message.payload).map_or(Validity::Brief, Validity::of);
+        self.context
+            .admits_setpoint(self.now, self.message, validity)
     }
 
     /// Pursues a goal for the sender as long as its command is valid.

@@ -2,7 +2,7 @@
 //! services.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::acceleration_state_sensor::AccelerationStateSensor;
 use super::behaviour::Behaviour;
@@ -116,6 +116,14 @@ impl Vehicle {
     #[must_use]
     pub fn held(&self) -> Option<String> {
         self.lock().held()
+    }
+
+    /// Whether the command in force expires within this time unless it is repeated or its owner shows
+    /// life.
+    #[must_use]
+    pub fn expires_within(&self, now: Instant, time: Duration) -> bool {
+        let end = self.lock().guard.expires_at();
+        end.is_some_and(|end| end.saturating_duration_since(now) < time)
     }
 
     /// The latest pose and velocity.

@@ -144,6 +144,9 @@ impl VelocityStateDriver {
             tracing::debug!(%source, command_type, "unknown kind of velocity command");
             return;
         };
+        if matches!(which, Which::Current) && !exchange.is_in_order() {
+            return;
+        }
         let velocity = wanted(self.velocity(which, exchange.controls));
         let pilot = &mut exchange.controls.pilot;
         let limits = *pilot.limits();

@@ -84,6 +84,7 @@ impl Rover {
             priority: Priority::Standard,
             broadcast: Broadcast::None,
             payload,
+            sequence: None,
             path: None,
         };
         self.stack.handle_message(self.now, &received);

@@ -80,6 +80,7 @@ impl Bench {
             priority: Priority::Standard,
             broadcast: Broadcast::None,
             payload,
+            sequence: None,
             path: None,
             to: CLIENT,
         };

@@ -169,6 +169,7 @@ fn begin(events: &mut Events, rig: &Rig, source: JausId, code: u16, out: &mut Ou
         priority: Priority::Standard,
         broadcast: Broadcast::None,
         payload: Bytes::new(),
+        sequence: None,
         path: None,
     };
     let create = CreateCommandEvent {

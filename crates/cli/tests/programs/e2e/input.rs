@@ -66,8 +66,11 @@ impl Source {
     }
 }
 
+/// An event that ends a drive: its name, and how it happens.
+type Ending = (&'static str, fn(&mut Browser));
+
 /// What ends a drive, apart from letting go.
-const ENDINGS: [(&str, fn(&mut Browser)); 9] = [
+const ENDINGS: [Ending; 9] = [
     ("a menu on the map", |page| {
         let (x, y) = middle(page, "#map");
         for kind in ["mousePressed", "mouseReleased"] {
@@ -141,7 +144,7 @@ pub(crate) fn run() {
         }
         for other in Source::ALL.into_iter().filter(|it| *it != source) {
             ends(page, source, &format!("{other:?}"), |page| {
-                other.take_up(page)
+                other.take_up(page);
             });
             other.let_go(page);
         }

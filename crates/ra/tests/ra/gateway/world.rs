@@ -304,6 +304,7 @@ impl World {
             priority: message.priority,
             broadcast: message.broadcast,
             payload: message.payload.clone(),
+            sequence: None,
             path: None,
         };
         let meant = |id: &JausId| *id != message.source && message.destination.matches(*id);

@@ -1,9 +1,12 @@
 //! The link from one driver to the next: a session, its commands, and standing down.
 //!
-//! Commands are acknowledged one at a time. While one is in flight, later ones wait, and only the
-//! latest is sent. When a sensor fails, or when the next driver restarts, fails or is unreachable, the
-//! driver halts: it drops its command and waits for a new one, also when the fault is gone. When the
-//! next driver was stopped by an emergency or taken over, it stands down in the same way.
+//! Setpoints are sent without acknowledgement: a retransmission would come after newer ones, and
+//! nothing on the wire tells the age of a setpoint. For the same reason none is sent whose command
+//! is about to expire. Stops are delivered: sent until they are acknowledged.
+//!
+//! When a sensor fails, or when the next driver restarts, fails or is unreachable, the driver halts:
+//! it drops its command and waits for a new one, also when the fault is gone. When the next driver
+//! was stopped by an emergency or taken over, it stands down in the same way.
 #![expect(
     clippy::disallowed_methods,
     reason = "gives the driver its clock and timer"
@@ -12,6 +15,7 @@
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
+use tokio::sync::watch;
 use tokio::time::{Interval, MissedTickBehavior, interval, sleep, timeout};
 
 use super::remote_platform::{Order, Plan, RemotePlatform};
@@ -26,7 +30,12 @@ use jaus::codec::Message;
 use jaus::component::{
     Audience, Component, Retake, Session, SessionLoss, SessionSettings, SessionState,
 };
+use jaus::messages::core::QueryStatus;
 use jaus::node::now;
+
+/// The next driver counts the validity of a setpoint from its arrival. So none is sent whose own
+/// command is valid for less than this: a stop is sent instead.
+const LEAST_BUDGET: Duration = Duration::from_millis(200);
 
 /// The command interface of the next driver.
 pub(in crate::parts) trait Language: Send + 'static {
@@ -66,9 +75,11 @@ pub(in crate::parts) struct Next<L> {
 impl<L: Language> Next<L> {
     /// How long control of the next driver is kept while there is nothing to do.
     const LINGER: Duration = Duration::from_millis(500);
-    /// Timeout for the acknowledgement of a command. A later command then replaces it.
+    /// Timeout for the acknowledgement of a stop. A later command then replaces it.
     const PATIENCE: Duration = Duration::from_millis(400);
-    /// Without any acknowledgement for this time, the driver halts.
+    /// Interval of the queries whether the next driver lives.
+    const PULSE: Duration = Duration::from_millis(500);
+    /// Without any answer for this time, the driver halts.
     const SILENCE: Duration = Duration::from_secs(2);
 
     /// Runs until the component has stopped. The owner also notices that by other means.
@@ -174,8 +185,10 @@ impl<L: Language> Next<L> {
         let session = self.component.session(self.providers(), settings).await;
         let session = session.map_err(|_| PartError::NodeStopped)?;
         let component = self.component.clone();
+        let answered = watch::Sender::new(now());
         let end = tokio::select! {
-            end = self.command(&session, ticks, watchman) => end,
+            end = self.command(&session, &answered, ticks, watchman) => end,
+            never = note_answers(&component, &session, &answered, Self::PULSE) => match never {},
             why = stood_down(&component, &session) => Some(why),
         };
         // Limit the wait, in case the next driver is gone.
@@ -191,11 +204,11 @@ impl<L: Language> Next<L> {
     async fn command(
         &mut self,
         session: &Session,
+        answered: &watch::Sender<Instant>,
         ticks: &mut Interval,
         watchman: &mut Watchman,
     ) -> Option<Down> {
         let mut busy = now();
-        let mut acknowledged = busy;
         let mut had_control = false;
         let mut moved_at = None;
         loop {
@@ -212,30 +225,42 @@ impl<L: Language> Next<L> {
             }
             if let SessionState::Ready(peer) = state {
                 had_control = true;
-                let is_silent = start.saturating_duration_since(acknowledged) > Self::SILENCE;
+                let is_silent = start.saturating_duration_since(*answered.borrow()) > Self::SILENCE;
                 if is_silent && plan != Plan::Rest {
-                    let why = format!("{peer} does not acknowledge commands");
+                    let why = format!("{peer} does not answer");
                     return Some(Down::Fault(why));
                 }
                 if let Some(why) = fault_of(start, &plan, &mut moved_at) {
                     return Some(Down::Fault(why));
                 }
-                let command = self.carry_out(start, plan, peer).await;
-                match timeout(Self::PATIENCE, session.deliver(&command)).await {
-                    Ok(Ok(())) => acknowledged = now(),
-                    Ok(Err(error)) => tracing::debug!(%error, "not delivered"),
-                    Err(_) => tracing::debug!(%peer, "not acknowledged in time"),
+                match self.carry_out(start, plan, peer).await {
+                    Some(setpoint) => {
+                        if let Err(error) = session.send(&setpoint) {
+                            tracing::debug!(%error, "not sent");
+                        }
+                    }
+                    None => self.halt(session).await,
                 }
             } else {
-                acknowledged = start;
+                answered.send_replace(start);
                 self.tell_engaging(state).await;
             }
             ticks.tick().await;
         }
     }
 
-    /// Reports what the driver does, and returns the command for it.
-    async fn carry_out(&mut self, now: Instant, plan: Plan, peer: JausId) -> L::Command {
+    /// Delivers a stop.
+    async fn halt(&mut self, session: &Session) {
+        let stop = self.language.halt();
+        match timeout(Self::PATIENCE, session.deliver(&stop)).await {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => tracing::debug!(%error, "not delivered"),
+            Err(_) => tracing::debug!("not acknowledged in time"),
+        }
+    }
+
+    /// Reports what the driver does, and returns the setpoint for it; `None` to stop.
+    async fn carry_out(&mut self, now: Instant, plan: Plan, peer: JausId) -> Option<L::Command> {
         match plan {
             Plan::Go(order, motion) => {
                 self.check_sensors(None).await;
@@ -244,18 +269,19 @@ impl<L: Language> Next<L> {
                     None => (StageState::Active, String::new()),
                 };
                 self.tell(state, Some(peer), why).await;
-                self.language.command(now, order, &motion)
+                let is_valid = !self.vehicle.expires_within(now, LEAST_BUDGET);
+                is_valid.then(|| self.language.command(now, order, &motion))
             }
             Plan::Wait(lack) => {
                 self.check_sensors(Some(&lack.why)).await;
                 self.tell(StageState::Blocked, Some(peer), lack.why).await;
-                self.language.halt()
+                None
             }
             Plan::Rest => {
                 if self.vehicle.has_arrived() {
                     self.tell(StageState::Done, None, String::new()).await;
                 }
-                self.language.halt()
+                None
             }
         }
     }
@@ -390,6 +416,24 @@ fn down_in(state: SessionState, had_control: bool) -> Option<Down> {
         SessionState::Disabled { .. } | SessionState::Lost { .. } | SessionState::Seeking
     );
     (is_lost && had_control).then(|| Down::Fault(state.to_string()))
+}
+
+/// Notes the times at which the next driver answers. Setpoints have no acknowledgements that would
+/// tell, and a node also acknowledges for a component that hangs.
+async fn note_answers(
+    component: &Component,
+    session: &Session,
+    answered: &watch::Sender<Instant>,
+    interval: Duration,
+) -> Infallible {
+    loop {
+        sleep(interval).await;
+        if let SessionState::Ready(peer) = session.state()
+            && component.query(peer, &QueryStatus {}).await.is_ok()
+        {
+            answered.send_replace(now());
+        }
+    }
 }
 
 /// Interval between two queries of the next driver's stage.
