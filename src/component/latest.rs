@@ -73,7 +73,8 @@ impl LatestSender {
         }
         self.lock().retain(|it| {
             let is_superseded = stops || series == Some(it.series);
-            !it.waits.is_closed() && !(is_superseded && message.destination.matches(it.peer))
+            let is_of_peer = message.destination.matches(it.peer);
+            !(it.waits.is_closed() || is_superseded && is_of_peer)
         });
     }
 
