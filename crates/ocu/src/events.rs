@@ -261,12 +261,12 @@ impl EventLog {
         let omitted = std::mem::take(&mut observed.omitted);
         if omitted > 0 {
             let words = format!("{omitted} further events came too fast and are not listed");
-            self.push(now, vehicle, EventKind::Log, Level::Warn, words);
+            self.push(now, vehicle, EventKind::Log, Level::Warn, &words);
         }
-        self.push(now, vehicle, kind, level, text);
+        self.push(now, vehicle, kind, level, &text);
     }
 
-    fn push(&mut self, now: EventTime, vehicle: u16, kind: EventKind, level: Level, text: String) {
+    fn push(&mut self, now: EventTime, vehicle: u16, kind: EventKind, level: Level, text: &str) {
         self.latest += 1;
         self.events.push_back(Entry {
             number: self.latest,

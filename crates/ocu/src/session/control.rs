@@ -111,11 +111,11 @@ impl Session {
         let shown = self.pages.vehicle(page);
         match request {
             OperatorRequest::Emergency { on: false } => {
-                self.note_emergency(now, meant.or(shown), self.user(page), false);
+                self.note_emergency(now, meant.or(shown), &self.user(page), false);
                 return self.clear_emergency(now, meant.or(shown), reply);
             }
             OperatorRequest::EmergencyAll { on: false } => {
-                self.note_emergency_of_all(now, self.user(page), false);
+                self.note_emergency_of_all(now, &self.user(page), false);
                 return self.clear_all_emergencies(now, reply);
             }
             OperatorRequest::Handover {

@@ -24,10 +24,10 @@ impl Session {
             StopTarget::Vehicle(number) => Some(number),
             StopTarget::All => {
                 self.stop_all(now, reply);
-                return self.note_emergency_of_all(now, user, true);
+                return self.note_emergency_of_all(now, &user, true);
             }
         };
-        self.note_emergency(now, number, user, true);
+        self.note_emergency(now, number, &user, true);
         let vehicle = number.and_then(|number| self.fleet.get_mut(number));
         let vehicle = vehicle.filter(|it| it.has_managed());
         match (vehicle, reply) {

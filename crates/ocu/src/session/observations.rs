@@ -31,20 +31,20 @@ impl Session {
         &mut self,
         now: Instant,
         vehicle: Option<u16>,
-        user: Arc<str>,
+        user: &Arc<str>,
         on: bool,
     ) {
         if let Some(vehicle) = vehicle.filter(|number| self.fleet.contains(*number)) {
             let now = event_time(now);
-            self.events.handle_request(now, &[vehicle], &user, on);
+            self.events.handle_request(now, &[vehicle], user, on);
         }
     }
 
     /// Logs a request for the emergency of all vehicles, or for its end.
-    pub(super) fn note_emergency_of_all(&mut self, now: Instant, user: Arc<str>, on: bool) {
+    pub(super) fn note_emergency_of_all(&mut self, now: Instant, user: &Arc<str>, on: bool) {
         let vehicles: Vec<u16> = self.fleet.numbers().collect();
         let now = event_time(now);
-        self.events.handle_request(now, &vehicles, &user, on);
+        self.events.handle_request(now, &vehicles, user, on);
     }
 
     /// The user of a page; empty if the page is gone.
