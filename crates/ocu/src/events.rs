@@ -205,7 +205,7 @@ impl EventLog {
                 };
                 let text = format!("{what} requested by {user}");
                 let level = if on { Level::Bad } else { Level::Warn };
-                self.log(now, vehicle, EventKind::Emergency, level, text);
+                self.log(now, vehicle, EventKind::Emergency, level, &text);
             }
         }
     }
@@ -232,7 +232,7 @@ impl EventLog {
         observed.repeating_events(now.at, &old, &new, &mut found);
         observed.facts = new;
         for (kind, level, text) in found {
-            self.log(now, vehicle, kind, level, text);
+            self.log(now, vehicle, kind, level, &text);
         }
     }
 
@@ -252,7 +252,7 @@ impl EventLog {
         })
     }
 
-    fn log(&mut self, now: EventTime, vehicle: u16, kind: EventKind, level: Level, text: String) {
+    fn log(&mut self, now: EventTime, vehicle: u16, kind: EventKind, level: Level, text: &str) {
         let observed = self.observed(now, vehicle);
         if observed.bucket.take(now.at, Self::RATE).is_err() {
             observed.omitted += 1;
@@ -263,7 +263,7 @@ impl EventLog {
             let words = format!("{omitted} further events came too fast and are not listed");
             self.push(now, vehicle, EventKind::Log, Level::Warn, &words);
         }
-        self.push(now, vehicle, kind, level, &text);
+        self.push(now, vehicle, kind, level, text);
     }
 
     fn push(&mut self, now: EventTime, vehicle: u16, kind: EventKind, level: Level, text: &str) {
