@@ -182,6 +182,11 @@ impl SendOrder {
         }
     }
 
+    /// Forgets the numbers of a client that has restarted: it may count anew.
+    pub(super) fn forget(&mut self, client: JausId) {
+        self.clients.remove(&client);
+    }
+
     /// How many setpoints were refused.
     pub(super) const fn refused(&self) -> u64 {
         self.refused
@@ -361,6 +366,14 @@ mod tests {
             let next = [first, first + 2, first + 3];
             assert_eq!(rig.admitted(next), next[1..]);
         }
+    }
+
+    #[test]
+    fn a_client_that_is_known_to_have_restarted_is_admitted_at_once() {
+        let mut rig = Rig::new();
+        rig.admitted([500]);
+        rig.order.forget(CLIENT);
+        assert_eq!(rig.admitted([1, 2]), [1, 2]);
     }
 
     #[test]

@@ -68,10 +68,11 @@ pub(crate) fn encode<M: Message>(message: &M) -> Bytes {
     message.encode().expect("small numbers")
 }
 
-/// The effort that stops the vehicle.
-pub(crate) fn stop() -> Bytes {
+/// An effort that stops the vehicle, one of several: without propulsion, because no field holds a
+/// percentage of exactly 0.
+pub(crate) fn stop(number: u8) -> Bytes {
     let mut effort = SetWrenchEffort::default();
-    let set = effort.set_propulsive_linear_effort_x_percent(0.0);
+    let set = effort.set_resistive_linear_effort_x_percent(50.0 + f64::from(number));
     set.expect("a percentage");
     encode(&effort)
 }

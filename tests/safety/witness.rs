@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::endpoint::Received;
@@ -23,7 +24,9 @@ pub(crate) struct Witness {
     pub(crate) last_message: Option<Instant>,
     /// When the vehicle received its last setpoint.
     pub(crate) last_setpoint: Option<Instant>,
-    /// When the vehicle first received [the effort that stops it](commands::stop).
+    /// [The effort that stops the vehicle](commands::stop) next.
+    pub(crate) stop: Bytes,
+    /// When the vehicle first received it.
     pub(crate) last_stop: Option<Instant>,
     /// When the vehicle received its last Request Control.
     pub(crate) last_request: Option<Instant>,
@@ -44,6 +47,7 @@ impl Witness {
             counts: true,
             last_message: None,
             last_setpoint: None,
+            stop: commands::stop(0),
             last_stop: None,
             last_request: None,
             is_held: false,
@@ -62,7 +66,7 @@ impl Witness {
             return;
         }
         self.last_message = Some(now);
-        if message.payload == commands::stop() {
+        if message.payload == self.stop {
             self.last_stop.get_or_insert(now);
             return;
         }

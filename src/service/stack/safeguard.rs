@@ -128,6 +128,7 @@ impl Stack {
     /// client.
     pub(super) fn end_control_of_restarted(&mut self, now: Instant) {
         while let Some(client) = self.life.poll_restarted() {
+            self.order.forget(client);
             let is_moving = self
                 .services
                 .iter()
