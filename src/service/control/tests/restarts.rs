@@ -56,7 +56,7 @@ fn a_component_tells_its_own_incarnation_and_always_the_same() {
         },
     );
     for _ in 0..2 {
-        assert_eq!(rig.introduce(FIRST, 0), [report.clone()]);
+        assert_eq!(rig.introduce(FIRST, 0), std::slice::from_ref(&report));
     }
     assert_ne!(Rig::managed().stack.incarnation(), rig.stack.incarnation());
 }
