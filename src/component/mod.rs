@@ -94,7 +94,7 @@ mod undecoded;
 mod watch;
 
 pub use crate::service::{
-    AccessControl, Audience, Call, CannotSubscribe, Change, Condition, ControlLost, ControlRefused,
+    AccessControl, Audience, CLEAR_ALL, Call, CannotSubscribe, Change, Condition, ControlLost, ControlRefused,
     Directory, EventSettings, Handlers, Identification, Kind, LaterAnswer, Level, Liveness, Loss,
     Management, NeedsControl, Offer, Outage, Patience, QueryOptions, Rejection, Retake, Scope,
     Service, SessionLoss, SessionSettings, SessionState, Standing, State, SubscriptionEnd,
