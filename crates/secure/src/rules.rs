@@ -178,9 +178,7 @@ impl Rules {
             Permission::Control { authority } => return self.check_authority(authority),
             Permission::Command => (self.command || self.control.is_some(), Refusal::Command),
             Permission::ClearEmergency => (self.clear_emergency, Refusal::ClearEmergency),
-            Permission::ClearAnyEmergency => {
-                (self.clear_any_emergency, Refusal::ClearAnyEmergency)
-            }
+            Permission::ClearAnyEmergency => (self.clear_any_emergency, Refusal::ClearAnyEmergency),
             Permission::Configure => (self.configure, Refusal::Configure),
         };
         if allowed { Ok(()) } else { Err(refusal) }

@@ -3,8 +3,8 @@
 use super::super::management::MOST_EMERGENCIES;
 use super::*;
 use crate::endpoint::{LinkId, Path, Remote, SessionId as PeerSession};
-use crate::service::control::CLEAR_ALL;
 use crate::service::code_of;
+use crate::service::control::CLEAR_ALL;
 
 const CLEAR_OF_ALL: ClearEmergency = ClearEmergency {
     emergency_code: clear_emergency::EmergencyCode(CLEAR_ALL),
