@@ -249,7 +249,11 @@ impl Reader<'_> {
     /// Handles a token from the page.
     async fn show(&mut self, id: Option<u64>, token: &str) -> Option<Parting> {
         let address = self.visitor.address;
-        let Err(why) = self.shared.admit_later(self.visitor, token, &self.shared.places).await else {
+        let Err(why) = self
+            .shared
+            .admit_later(self.visitor, token, &self.shared.places)
+            .await
+        else {
             self.say(id.map(|id| Answer::Done { id }).as_ref());
             return None;
         };

@@ -118,11 +118,13 @@ fn an_emergency_of_another_client_is_cleared_by_a_key_with_the_right_alone() {
         let command = ["control", "115.1.7", action, "--id", id, "--timeout", "2s"];
         as_operator(host, &address, &command)
     };
+    // A running node applies a change within two seconds.
+    let applied = || std::thread::sleep(std::time::Duration::from_secs(3));
+    applied();
     let allow = |name: &str, rules: &[&str]| {
         let allowed = at_vehicle.keys(&[&["allow", name], rules].concat());
         assert_eq!(allowed.status, 0, "{allowed:?}");
-        // A running node applies it within two seconds.
-        std::thread::sleep(std::time::Duration::from_secs(3));
+        applied();
     };
     let stopped = control(&viewer, "61.1.1", "emergency");
     assert_eq!(stopped.status, 0, "{stopped:?}");
