@@ -246,13 +246,13 @@ impl Part for OpenStation {
                 let is_secure = station.tls.is_some();
                 let file =
                     |folder: PathBuf| folder.join(format!("page-{}.devices", address.port()));
-                Gate::Users(UserGate::new(
+                Gate::Users(Box::new(UserGate::new(
                     users,
                     Devices::load(station.state.map(file)),
                     address.port(),
                     is_secure,
                     trail.clone(),
-                ))
+                )))
             }
             (None, Some(token)) => Gate::Token {
                 token,

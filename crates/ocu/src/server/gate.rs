@@ -25,7 +25,7 @@ pub(crate) enum Gate {
     /// Driving requires the token, and looking and stopping too if `to_read` is set.
     Token { token: Token, to_read: bool },
     /// Everything requires a login.
-    Users(UserGate),
+    Users(Box<UserGate>),
 }
 
 impl Gate {
@@ -46,7 +46,7 @@ impl Gate {
         !matches!(self, Self::Token { to_read: true, .. })
     }
 
-    pub(super) const fn users(&self) -> Option<&UserGate> {
+    pub(super) fn users(&self) -> Option<&UserGate> {
         match self {
             Self::Users(gate) => Some(gate),
             _ => None,
